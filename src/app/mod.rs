@@ -1,0 +1,1 @@
+//! The jobs: replay and check, their clock, files and progress.

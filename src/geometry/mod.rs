@@ -1,0 +1,11 @@
+//! Shapes, poses and cameras as plain values: no GPU, file, clock or OpenCV type on this floor.
+//!
+//! The spaces, all in metres and radians:
+//! *world* right-handed, z up, origin at the first board's centre on the table, x right and y up as printed;
+//! *marker* and *board* the same axes at their own centre; *object* as its OBJ file says;
+//! *camera* x right, y down, z forward (OpenCV). A pixel's integer coordinate is its centre.
+//! `a_from_b` maps b to a.
+
+pub mod camera;
+pub mod mesh;
+pub mod pose;

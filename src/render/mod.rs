@@ -1,0 +1,1 @@
+//! Draws a frame: the GPU side of the pipeline.

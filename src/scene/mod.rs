@@ -1,0 +1,138 @@
+//! A scene: what is tracked, what is real, what is virtual, what lights them; one TOML file, parsed into types that cannot be wrong.
+
+use std::path::PathBuf;
+
+use glam::{DAffine3, DVec2, DVec3};
+
+use crate::geometry::mesh::Mesh;
+use crate::light::{Light, Material};
+
+#[derive(Debug, Clone)]
+pub struct Scene {
+    pub camera: CameraSettings,
+    pub tracking: TrackingSettings,
+    /// Boards first, then lone markers; the first is the world.
+    pub anchors: Vec<Anchor>,
+    pub phantoms: Vec<Object>,
+    pub virtuals: Vec<Object>,
+    pub lights: Vec<Light>,
+    /// Radiance of the constant surrounding light, linear RGB.
+    pub ambient_radiance: DVec3,
+    pub shadows: ShadowSettings,
+}
+
+#[derive(Debug, Clone)]
+pub struct CameraSettings {
+    /// As the file says, a path made absolute against the scene file's folder.
+    pub source: String,
+    /// `None`: what the recording itself carries.
+    pub calibration: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DetectorKind {
+    AprilTag,
+    Aruco,
+}
+
+/// Where the corners of OpenCV's detector are refined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ArucoRefinement {
+    None,
+    Subpixel,
+    Contour,
+    AprilTag,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrackingSettings {
+    pub detector: DetectorKind,
+    /// libapriltag: factor by which the picture is shrunk for the search; 1 is full resolution.
+    pub decimation: f64,
+    /// libapriltag: standard deviation of the blur before the search, pixels.
+    pub blur_px: f64,
+    /// libapriltag: snap edges to strong gradients at full resolution.
+    pub refine_edges: bool,
+    /// OpenCV's ArUco: corner refinement.
+    pub aruco_refinement: ArucoRefinement,
+    /// Bits that may be corrected in a marker's code.
+    pub corrected_bits: u32,
+    /// libapriltag: detections with a smaller decision margin are dropped.
+    pub min_margin: f64,
+    pub threads: u32,
+}
+
+impl Default for TrackingSettings {
+    fn default() -> Self {
+        Self {
+            detector: DetectorKind::AprilTag,
+            decimation: 2.0,
+            blur_px: 0.0,
+            refine_edges: true,
+            aruco_refinement: ArucoRefinement::AprilTag,
+            corrected_bits: 1,
+            min_margin: 20.0,
+            threads: 1,
+        }
+    }
+}
+
+/// A family (AprilTag) or dictionary (ArUco) of square markers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Family {
+    Tag16h5,
+    Tag25h9,
+    Tag36h10,
+    Tag36h11,
+    /// OpenCV's `DICT_NxN_M`: N cells a side, M markers (50, 100, 250 or 1000).
+    Aruco { cells: u8, count: u16 },
+    ArucoOriginal,
+}
+
+/// A marker in its anchor's frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Marker {
+    pub family: Family,
+    pub id: u32,
+    /// Side of the black square, metres.
+    pub size_m: f64,
+    pub center_m: DVec2,
+    /// Counter-clockwise turn in the board's plane, radians.
+    pub rotation_rad: f64,
+}
+
+/// A board of markers or a lone marker, with its own frame (x right, y up as printed, z towards the viewer).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Anchor {
+    pub name: String,
+    pub markers: Vec<Marker>,
+}
+
+/// A phantom or a virtual thing.
+#[derive(Debug, Clone)]
+pub struct Object {
+    pub name: String,
+    pub mesh: Mesh,
+    /// As many as `mesh.triangle_materials` names; never empty.
+    pub materials: Vec<Material>,
+    /// Index into [`Scene::anchors`].
+    pub anchor: usize,
+    /// Placement with rotation and scale; its determinant is never 0.
+    pub anchor_from_object: DAffine3,
+    /// Whether it takes light away from others.
+    pub casts: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Technique {
+    Auto,
+    Volumes,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShadowSettings {
+    pub technique: Technique,
+    /// Samples per pixel: 1 or 4.
+    pub samples: u32,
+}
+
