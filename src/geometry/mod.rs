@@ -9,3 +9,4 @@
 pub mod camera;
 pub mod mesh;
 pub mod pose;
+pub mod shadow_volume;
