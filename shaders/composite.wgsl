@@ -49,7 +49,7 @@ fn change(pixel: vec2i) -> Change {
         let without = textureLoad(before, pixel, sample);
         // The same lights were added in the same order, so an equal sum means that nothing is hidden. A surface
         // that no light reaches has nothing to lose.
-        let hidden = without.rgb > with_virtual.rgb && vec3(without.a > 0.5);
+        let hidden = (without.rgb > with_virtual.rgb) & vec3<bool>(without.a > 0.5);
         gain += select(vec3f(1.0), with_virtual.rgb / max(without.rgb, vec3f(1e-6)), hidden);
         touched = touched || any(hidden);
     }

@@ -7,7 +7,7 @@ use glam::{DAffine3, DVec2, DVec3};
 use crate::geometry::mesh::Mesh;
 use crate::light::{Light, Material};
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Scene {
     pub camera: CameraSettings,
     pub tracking: TrackingSettings,
@@ -21,7 +21,7 @@ pub struct Scene {
     pub shadows: ShadowSettings,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct CameraSettings {
     /// As the file says, a path made absolute against the scene file's folder.
     pub source: String,
@@ -136,3 +136,9 @@ pub struct ShadowSettings {
     pub samples: u32,
 }
 
+
+impl Default for ShadowSettings {
+    fn default() -> Self {
+        Self { technique: Technique::Auto, samples: 4 }
+    }
+}
