@@ -234,6 +234,18 @@ impl Renderer {
         self.gpu.queue.submit([encoder.finish()]);
     }
 
+    /// Waits until the picture is drawn, so that drawing and reading back can be timed apart.
+    ///
+    /// # Errors
+    /// The device failed since it was opened.
+    pub fn wait(&self) -> Result<(), RenderError> {
+        self.gpu
+            .device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map_err(|error| RenderError::Failed(error.to_string()))?;
+        self.gpu.check()
+    }
+
     /// Waits for the drawn picture: sRGB-encoded RGBA, rows from the top.
     ///
     /// # Errors
