@@ -8,4 +8,5 @@
 
 pub mod camera;
 pub mod mesh;
+pub mod normals;
 pub mod pose;
