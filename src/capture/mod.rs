@@ -1,6 +1,24 @@
 //! Frames from sessions, videos and folders of images, and the calibration of the camera that took them.
 //! OpenCV's types stay inside.
 
+pub mod calibration;
+mod error;
+mod images;
+mod pixels;
+mod times;
+mod video;
+
+use std::path::{Path, PathBuf};
+
+use crate::geometry::camera::Intrinsics;
+
+pub use calibration::{CalibrationError, check_frame_size, load_calibration, load_calibration_for};
+pub use error::{CaptureError, Notice};
+
+use images::ImageFrames;
+use times::FrameTimes;
+use video::VideoFrames;
+
 /// A picture with its place in the recording; the pixels are as the camera gave them (distorted, sRGB).
 #[derive(Debug, Clone)]
 pub struct Frame {
@@ -8,7 +26,183 @@ pub struct Frame {
     pub index: u32,
     /// Time since the recording's start, seconds.
     pub time_secs: f64,
+    /// Width and height in pixels.
     pub size_px: [u32; 2],
     /// 8-bit RGBA, rows from the top, alpha 255.
     pub rgba: Vec<u8>,
 }
+
+/// A recording that hands out its frames in order: a session folder, a video file or a folder of images.
+///
+/// Frames that cannot be decoded are left out and told of in [`FrameSource::notices`]; all others come, each with
+/// the index that it has in the recording.
+pub struct FrameSource {
+    path: PathBuf,
+    pictures: Pictures,
+    times: FrameTimes,
+    calibration: Option<Intrinsics>,
+    notices: Vec<Notice>,
+    good_frames: u32,
+}
+
+enum Pictures {
+    Video(VideoFrames),
+    Images(ImageFrames),
+}
+
+/// What a session folder calls its calibration, the preferred one first.
+const CALIBRATION_NAMES: [&str; 5] = ["camera.toml", "camera.json", "camera.yaml", "camera.yml", "session.json"];
+const TIMES_NAME: &str = "times.csv";
+const VIDEO_EXTENSIONS: [&str; 8] = ["mp4", "mkv", "avi", "mov", "webm", "m4v", "mpg", "ts"];
+
+impl FrameSource {
+    /// Opens a session folder (`video.*` with `camera.toml`, perhaps `times.csv`), a video file or a folder of images.
+    pub fn open(source: &str) -> Result<Self, CaptureError> {
+        if source.starts_with("webcam") || source.contains("://") {
+            return Err(CaptureError::Live { source_name: source.to_owned() });
+        }
+        let path = Path::new(source);
+        let io_error = |error| CaptureError::Io { path: path.to_owned(), error };
+        let metadata = std::fs::metadata(path).map_err(|error| match error.kind() {
+            std::io::ErrorKind::NotFound => CaptureError::Missing { path: path.to_owned() },
+            _ => io_error(error),
+        })?;
+        if metadata.is_dir() {
+            let files = files_of(path).map_err(io_error)?;
+            Self::open_folder(path, files)
+        } else if images::is_image(path) {
+            let images = ImageFrames::open(path, vec![path.to_owned()])?;
+            Ok(Self::new(path, Pictures::Images(images), FrameTimes::default(), None))
+        } else {
+            let video = VideoFrames::open(path)?;
+            Ok(Self::new(path, Pictures::Video(video), FrameTimes::default(), None))
+        }
+    }
+
+    fn open_folder(folder: &Path, files: Vec<PathBuf>) -> Result<Self, CaptureError> {
+        let named = |name: &str| files.iter().find(|file| file.file_name().is_some_and(|found| found == name));
+        let videos: Vec<&PathBuf> = files.iter().filter(|file| is_session_video(file)).collect();
+        let pictures = match videos.as_slice() {
+            [] => Pictures::Images(ImageFrames::open(
+                folder,
+                files.iter().filter(|file| images::is_image(file)).cloned().collect(),
+            )?),
+            [video] => Pictures::Video(VideoFrames::open(video)?),
+            [first, second, ..] => {
+                return Err(CaptureError::SeveralVideos {
+                    path: folder.to_owned(),
+                    first: first.to_path_buf(),
+                    second: second.to_path_buf(),
+                });
+            }
+        };
+        let times = named(TIMES_NAME).map(|file| FrameTimes::load(file)).transpose()?.unwrap_or_default();
+        let size_px = pictures.size_px();
+        let calibration = CALIBRATION_NAMES
+            .iter()
+            .find_map(|name| named(name))
+            .map(|file| calibration::load_calibration_or_fill(file, size_px))
+            .transpose()?;
+        Ok(Self::new(folder, pictures, times, calibration))
+    }
+
+    fn new(path: &Path, pictures: Pictures, times: FrameTimes, calibration: Option<Intrinsics>) -> Self {
+        Self { path: path.to_owned(), pictures, times, calibration, notices: Vec::new(), good_frames: 0 }
+    }
+
+    /// Where the recording lies.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The calibration that the session carries. Whether its size is that of the frames, [`check_frame_size`] tells.
+    pub fn calibration(&self) -> Option<Intrinsics> {
+        self.calibration
+    }
+
+    /// How many frames the recording says it has; a broken one may give fewer.
+    pub fn frame_count(&self) -> Option<u32> {
+        match &self.pictures {
+            Pictures::Video(video) => video.announced_frames(),
+            Pictures::Images(images) => Some(images.frame_count()),
+        }
+    }
+
+    /// Frames per second.
+    pub fn fps(&self) -> f64 {
+        let nominal = match &self.pictures {
+            Pictures::Video(video) => video.fps(),
+            Pictures::Images(_) => images::ASSUMED_FPS,
+        };
+        self.times.fps().unwrap_or(nominal)
+    }
+
+    /// Width and height of every frame, pixels.
+    pub fn size_px(&self) -> [u32; 2] {
+        self.pictures.size_px()
+    }
+
+    /// The next good frame; `None` at the end.
+    pub fn next_frame(&mut self) -> Result<Option<Frame>, CaptureError> {
+        let picture = match &mut self.pictures {
+            Pictures::Video(video) => video.next_picture(&mut self.notices)?,
+            Pictures::Images(images) => images.next_picture(&mut self.notices)?,
+        };
+        let Some((index, rgba)) = picture else { return Ok(None) };
+        self.good_frames += 1;
+        let nominal_secs = f64::from(index) / self.nominal_fps();
+        let time_secs = self.times.time_secs(index).unwrap_or(nominal_secs);
+        Ok(Some(Frame { index, time_secs, size_px: self.size_px(), rgba }))
+    }
+
+    /// What went wrong so far without ending the recording; whole once [`FrameSource::next_frame`] gave `None`.
+    pub fn notices(&self) -> &[Notice] {
+        &self.notices
+    }
+
+    /// Frames handed out so far.
+    pub fn good_frames(&self) -> u32 {
+        self.good_frames
+    }
+
+    fn nominal_fps(&self) -> f64 {
+        match &self.pictures {
+            Pictures::Video(video) => video.fps(),
+            Pictures::Images(_) => images::ASSUMED_FPS,
+        }
+    }
+}
+
+impl Pictures {
+    fn size_px(&self) -> [u32; 2] {
+        match self {
+            Self::Video(video) => video.size_px(),
+            Self::Images(images) => images.size_px(),
+        }
+    }
+}
+
+fn files_of(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path.is_file() {
+            files.push(path);
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+fn is_session_video(file: &Path) -> bool {
+    file.file_stem().is_some_and(|stem| stem == "video") && has_extension(file, &VIDEO_EXTENSIONS)
+}
+
+fn has_extension(file: &Path, extensions: &[&str]) -> bool {
+    file.extension()
+        .and_then(|extension| extension.to_str())
+        .is_some_and(|extension| extensions.iter().any(|known| known.eq_ignore_ascii_case(extension)))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,163 @@
+//! What can go wrong with a recording: errors end it, notices do not.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use super::calibration::CalibrationError;
+
+/// Why a recording cannot be opened or read on.
+#[derive(Debug, thiserror::Error)]
+pub enum CaptureError {
+    /// The scene names a camera or a stream.
+    #[error(
+        "{source_name}: live sources (webcams, streams) come with `gnomon live`, which this version does not have; \
+         name a session folder, a video file or a folder of images"
+    )]
+    Live {
+        /// As the scene says.
+        source_name: String,
+    },
+    /// There is nothing at this path.
+    #[error("{}: no such file or folder", path.display())]
+    Missing {
+        /// What was looked for.
+        path: PathBuf,
+    },
+    /// The system refuses to read it.
+    #[error("{}: {error}", path.display())]
+    Io {
+        /// What was to be read.
+        path: PathBuf,
+        /// What the system says.
+        error: std::io::Error,
+    },
+    /// A folder without a video and without pictures.
+    #[error("{}: the folder holds neither a video (video.mp4, .mkv, .avi, …) nor pictures (.png, .jpg, …)", path.display())]
+    NoPictures {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A session folder in which more than one file could be the recording.
+    #[error("{}: both {} and {} could be the session's video; leave one", path.display(), first.display(), second.display())]
+    SeveralVideos {
+        /// The folder.
+        path: PathBuf,
+        /// One candidate.
+        first: PathBuf,
+        /// Another candidate.
+        second: PathBuf,
+    },
+    /// OpenCV does not know the file as a video.
+    #[error(
+        "{}: cannot be opened as a video; it is of an unknown format, or it was cut off before its index was written \
+         (ffmpeg -i FILE says more)",
+        path.display()
+    )]
+    NotAVideo {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Not one frame could be decoded.
+    #[error("{}: not one frame can be decoded", path.display())]
+    NoGoodFrame {
+        /// The recording.
+        path: PathBuf,
+    },
+    /// OpenCV failed where it has no reason to.
+    #[error("{}: frame {frame}: {message}", path.display())]
+    OpenCv {
+        /// The recording or the picture.
+        path: PathBuf,
+        /// Index of the frame.
+        frame: u32,
+        /// What OpenCV says.
+        message: String,
+    },
+    /// `times.csv` cannot be used.
+    #[error("{}:{line}: {message}", path.display())]
+    Times {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// What is wrong there.
+        message: String,
+    },
+    /// The session's calibration cannot be used.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
+}
+
+/// What went wrong without ending the recording.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Notice {
+    /// Frames that cannot be decoded, or are missing, with others after them.
+    Broken {
+        /// The video, or the picture.
+        path: PathBuf,
+        /// Index of the first such frame.
+        first: u32,
+        /// How many there are.
+        count: u32,
+        /// Good frames that came before.
+        good_before: u32,
+    },
+    /// A picture of another size than the first one's.
+    OtherSize {
+        /// The video, or the picture.
+        path: PathBuf,
+        /// Index of the frame.
+        frame: u32,
+        /// Its width and height.
+        size_px: [u32; 2],
+        /// Width and height of the first frame.
+        expected_px: [u32; 2],
+    },
+    /// A video that gives fewer frames than its header says.
+    EndedEarly {
+        /// The video.
+        path: PathBuf,
+        /// Good frames in it.
+        good: u32,
+        /// Index at which nothing more could be read.
+        ended_at: u32,
+        /// How many frames the header says.
+        announced: u32,
+    },
+}
+
+impl Notice {
+    /// How many frames this cost.
+    pub fn lost_frames(&self) -> u32 {
+        match self {
+            Self::Broken { count, .. } => *count,
+            Self::OtherSize { .. } => 1,
+            Self::EndedEarly { ended_at, announced, .. } => announced.saturating_sub(*ended_at),
+        }
+    }
+}
+
+impl fmt::Display for Notice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Broken { path, first, count, good_before } => {
+                let name = path.display();
+                match count {
+                    1 => write!(f, "{name}: frame {first} is broken or missing")?,
+                    _ => write!(f, "{name}: frames {first} to {} are broken or missing", first + count - 1)?,
+                }
+                write!(f, "; {good_before} good frames before, reading goes on")
+            }
+            Self::OtherSize { path, frame, size_px: [width, height], expected_px: [first_width, first_height] } => write!(
+                f,
+                "{}: frame {frame} is {width} x {height}, the first one was {first_width} x {first_height}; left out",
+                path.display()
+            ),
+            Self::EndedEarly { path, good, ended_at, announced } => write!(
+                f,
+                "{}: ends early, at frame {ended_at} of {announced}; {good} frames were good",
+                path.display()
+            ),
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! `times.csv` of a session: when each frame was taken.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::error::CaptureError;
+
+const HEADER: &str = "frame,time_s";
+
+/// Times by frame; empty where the recording says nothing.
+#[derive(Debug, Default)]
+pub(super) struct FrameTimes {
+    secs_by_frame: BTreeMap<u32, f64>,
+}
+
+impl FrameTimes {
+    pub(super) fn load(path: &Path) -> Result<Self, CaptureError> {
+        let text = std::fs::read_to_string(path).map_err(|error| CaptureError::Io { path: path.to_owned(), error })?;
+        Self::parse(&text).map_err(|(line, message)| CaptureError::Times { path: path.to_owned(), line, message })
+    }
+
+    fn parse(text: &str) -> Result<Self, (usize, String)> {
+        let mut lines = text.lines().enumerate().map(|(number, line)| (number + 1, line.trim()));
+        match lines.next() {
+            Some((_, HEADER)) => {}
+            _ => return Err((1, format!("the first line must be '{HEADER}'"))),
+        }
+        let mut secs_by_frame = BTreeMap::new();
+        let mut last: Option<(u32, f64)> = None;
+        for (number, line) in lines.filter(|(_, line)| !line.is_empty()) {
+            let (frame, secs) = parse_row(line)
+                .ok_or_else(|| (number, format!("'{line}' is not a frame's index and its time in seconds")))?;
+            // A filter divides by the time that passed: it has to pass.
+            if last.is_some_and(|(last_frame, last_secs)| frame <= last_frame || secs <= last_secs) {
+                return Err((number, "frames and times must both increase".to_owned()));
+            }
+            last = Some((frame, secs));
+            secs_by_frame.insert(frame, secs);
+        }
+        Ok(Self { secs_by_frame })
+    }
+
+    pub(super) fn time_secs(&self, frame: u32) -> Option<f64> {
+        self.secs_by_frame.get(&frame).copied()
+    }
+
+    /// The mean rate; `None` with less than two times.
+    pub(super) fn fps(&self) -> Option<f64> {
+        let (first_frame, first_secs) = self.secs_by_frame.first_key_value()?;
+        let (last_frame, last_secs) = self.secs_by_frame.last_key_value()?;
+        (last_frame > first_frame).then(|| f64::from(last_frame - first_frame) / (last_secs - first_secs))
+    }
+}
+
+fn parse_row(line: &str) -> Option<(u32, f64)> {
+    let (frame, secs) = line.split_once(',')?;
+    let secs: f64 = secs.trim().parse().ok()?;
+    secs.is_finite().then_some((frame.trim().parse().ok()?, secs))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_read() {
+        let times = FrameTimes::parse("frame,time_s\n0,0.0\n1,0.04\n\n3, 0.12\r\n").unwrap();
+        assert_eq!(times.time_secs(3), Some(0.12));
+        assert_eq!(times.time_secs(2), None);
+        assert!((times.fps().unwrap() - 25.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn bad_times_name_their_line() {
+        for (text, line) in [
+            ("", 1),
+            ("time,frame\n", 1),
+            ("frame,time_s\n0,0\n1,soon\n", 3),
+            ("frame,time_s\n0,0\n1,NaN\n", 3),
+            ("frame,time_s\n0,1\n1,1\n", 3),
+            ("frame,time_s\n1,0\n0,1\n", 3),
+        ] {
+            assert_eq!(FrameTimes::parse(text).unwrap_err().0, line, "{text:?}");
+        }
+    }
+}
