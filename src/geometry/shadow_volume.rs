@@ -83,13 +83,13 @@ impl Caster {
         let closed = !edges.is_empty()
             && edge_starts.windows(2).all(|range| {
                 let around = &edge_triangles[range[0] as usize..range[1] as usize];
-                matches!(around, [(_, first), (_, second)] if first != second)
+                around.iter().filter(|(_, forward)| *forward).count() * 2 == around.len()
             });
         Self { positions, triangles, planes, edges, edge_starts, edge_triangles, closed }
     }
 
-    /// Whether each edge is met by two triangles that run along it in opposite ways, so that the mesh encloses a
-    /// space and the triangles facing the light are enough.
+    /// Whether each edge is run along as often one way as the other, so that a ray that enters the mesh leaves it
+    /// again and the triangles facing the light are enough.
     pub fn is_closed(&self) -> bool {
         self.closed
     }

@@ -138,3 +138,38 @@ pub(super) fn uniform_entry(binding: u32, dynamic: bool) -> wgpu::BindGroupLayou
         count: None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::mem::offset_of;
+
+    /// Members of a WGSL struct as (name, offset), and the struct's size.
+    fn wgsl_struct(source: &str, name: &str) -> (Vec<(String, u32)>, u32) {
+        let module = naga::front::wgsl::parse_str(source).expect("WGSL");
+        let found = module.types.iter().find(|(_, kind)| kind.name.as_deref() == Some(name));
+        let Some((_, naga::Type { inner: naga::TypeInner::Struct { members, span }, .. })) = found else {
+            panic!("no struct {name}");
+        };
+        let named = |member: &naga::StructMember| (member.name.clone().expect("a name"), member.offset);
+        (members.iter().map(named).collect(), *span)
+    }
+
+    macro_rules! assert_twins {
+        ($source:expr, $twin:ty, $($member:ident),+) => {
+            let ours = vec![$((stringify!($member).to_owned(), offset_of!($twin, $member) as u32)),+];
+            let (theirs, size) = wgsl_struct($source, stringify!($twin));
+            assert_eq!((ours, size_of::<$twin>() as u32), (theirs, size), stringify!($twin));
+        };
+    }
+
+    #[test]
+    fn every_uniform_has_the_layout_of_its_wgsl_twin() {
+        let common = include_str!("../../shaders/common.wgsl");
+        assert_twins!(common, View, clip_from_anchor, camera_from_anchor);
+        assert_twins!(common, LightSource, place_in_camera, power);
+        assert_twins!(common, Surroundings, ambient_radiance);
+        let composite = include_str!("../../shaders/composite.wgsl");
+        assert_twins!(composite, Lens, focal_px, center_px, distortion, k3, distorts, size_px);
+    }
+}

@@ -21,3 +21,10 @@ pub struct AnchorPose {
     /// Root mean square distance of the corners from where the pose puts them, pixels; 0 when lost.
     pub reprojection_px: f64,
 }
+
+impl AnchorPose {
+    /// An anchor that was not found.
+    pub fn lost() -> Self {
+        Self { status: Status::Lost, markers: 0, camera_from_anchor: None, reprojection_px: 0.0 }
+    }
+}

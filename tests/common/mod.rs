@@ -8,7 +8,7 @@ use std::sync::{Arc, OnceLock};
 
 use glam::{DAffine3, DMat3, DMat4, DVec2, DVec3, Vec3};
 use gnomon::geometry::camera::Intrinsics;
-use gnomon::geometry::mesh::Mesh;
+use gnomon::geometry::mesh::{Mesh, MeshReport};
 use gnomon::light::{Light, Material};
 use gnomon::render::Gpu;
 use gnomon::scene::{Anchor, Object, Scene, ShadowSettings, Technique};
@@ -60,6 +60,7 @@ pub fn object(name: &str, mesh: Mesh, albedo: DVec3, world_from_object: DAffine3
     Object {
         name: name.to_owned(),
         mesh,
+        mesh_report: MeshReport::default(),
         materials: vec![Material { albedo, roughness: None }],
         anchor: 0,
         anchor_from_object: world_from_object,
