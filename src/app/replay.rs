@@ -18,12 +18,13 @@ use crate::tracking::{AnchorPose, Tracker};
 
 use super::layer_files::{Layer, write_layers};
 use super::output::FrameSink;
+use super::picture_files::write_text;
 use super::poses_file::{GivenPoses, PosesText};
 use super::progress::Progress;
 use super::contact_sheet::ContactSheet;
 use super::stats::{StageLog, Stats, peak_memory_mib};
 use super::stopwatch::Stopwatch;
-use super::whole_file;
+use super::video_writer::Codec;
 
 /// Frames that may wait between two stages: enough to even out their times, few enough to stay small.
 const QUEUE: usize = 3;
@@ -78,7 +79,7 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
     let source = FrameSource::open(&scene.camera.source)?;
     let intrinsics = calibration(&scene, &source)?;
     if let (Some(out), false) = (&request.out, request.layers.is_empty())
-        && FrameSink::is_video(out)
+        && Codec::of_path(out).is_some()
     {
         bail!("--layers writes PNGs beside the pictures: give --out a folder, not {}", out.display());
     }
@@ -115,13 +116,13 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
         Err(error) => (Vec::new(), Some(error)),
     };
     if let Some(path) = &request.poses {
-        whole_file::write(path, run.poses.as_str().as_bytes())?;
+        write_text(path, run.poses.as_str())?;
     }
     let dropped = notices.iter().map(crate::capture::Notice::lost_frames).sum();
     if let Some(path) = &request.stats {
         let stats = run.stats(size_px, dropped, adapter, watch.elapsed_ms() * 1e-3);
         let text = serde_json::to_string_pretty(&stats)?;
-        whole_file::write(path, format!("{text}\n").as_bytes())?;
+        write_text(path, &format!("{text}\n"))?;
     }
     if let Some(failure) = failure {
         return Err(failure);
@@ -190,8 +191,7 @@ struct DrawnFrame {
 struct Drawing {
     gpu: Arc<Gpu>,
     renderer: Renderer,
-    sink: Option<FrameSink>,
-    sheet: Option<ContactSheet>,
+    files: Files,
 }
 
 impl Drawing {
@@ -209,12 +209,8 @@ impl Drawing {
             .as_ref()
             .map(|out| FrameSink::create(out, source.size_px(), source.fps()))
             .transpose()?;
-        let count = match &request.frames {
-            Some(frames) => Some(frames.len() as u32),
-            None => source.frame_count(),
-        };
-        let sheet = request.sheet.as_ref().map(|_| ContactSheet::new(source.size_px(), count));
-        Ok(Self { gpu, renderer, sink, sheet })
+        let sheet = request.sheet.as_ref().map(|_| ContactSheet::new(4, 3));
+        Ok(Self { gpu, renderer, files: Files { sink, sheet, size_px: source.size_px() } })
     }
 }
 
@@ -253,7 +249,7 @@ impl Run<'_> {
                 scope.spawn(move || capture_stage(source, &to_tracker, last, stop));
             let tracking = scope.spawn(move || track_stage(poser, &from_camera, &to_renderer));
             let (mut renderer, files) = match drawing {
-                Some(drawing) => (Some(drawing.renderer), Some((drawing.sink, drawing.sheet))),
+                Some(drawing) => (Some(drawing.renderer), Some(drawing.files)),
                 None => (None, None),
             };
             let request = self.request;
@@ -443,7 +439,14 @@ fn track_stage(
     Ok(())
 }
 
-type Files = (Option<FrameSink>, Option<ContactSheet>);
+/// The files that pictures go to.
+struct Files {
+    sink: Option<FrameSink>,
+    sheet: Option<ContactSheet>,
+    size_px: [u32; 2],
+}
+
+/// For each stage what each frame took.
 type StageSamples = Vec<(&'static str, Vec<f64>)>;
 
 /// Writes pictures and layers as they come, and finishes the files; gives what each stage took per frame.
@@ -452,23 +455,23 @@ fn write_stage(
     files: Option<Files>,
     from_renderer: &Receiver<DrawnFrame>,
 ) -> Result<StageSamples> {
-    let Some((mut sink, mut sheet)) = files else { return Ok(Vec::new()) };
+    let Some(Files { mut sink, mut sheet, size_px }) = files else { return Ok(Vec::new()) };
     let mut encode_ms = Vec::new();
     let folder = request.out.as_deref().unwrap_or(Path::new("."));
     for DrawnFrame { index, rgba, layers } in from_renderer {
         let (written, ms) = Stopwatch::time(|| -> Result<()> {
             if let Some(sink) = &mut sink {
-                sink.write(index, &rgba)?;
+                sink.push(index, size_px, &rgba)?;
             }
             if let Some(layers) = &layers {
-                write_layers(folder, index, layers, &request.layers)?;
+                write_layers(folder, index, size_px, layers, &request.layers)?;
             }
             Ok(())
         });
         written?;
         encode_ms.push(ms);
         if let Some(sheet) = &mut sheet {
-            sheet.add(&rgba);
+            sheet.push(size_px, &rgba);
         }
     }
     if let Some(sink) = sink {

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec2;
 use opencv::core::{
-    FileNode, FileNodeTraitConst, FileStorage, FileStorageTraitConst, FileStorage_MEMORY, FileStorage_READ,
+    FileNode, FileNodeTraitConst, FileStorage, FileStorage_MEMORY, FileStorage_READ,
+    FileStorageTraitConst,
 };
 use serde_json::{Map, Value};
 
@@ -66,13 +67,21 @@ pub enum CalibrationError {
 /// Reads a calibration that says its own picture size.
 pub fn load_calibration(path: &Path) -> Result<Intrinsics, CalibrationError> {
     let calibration = read(path)?;
-    let size_px = calibration.size_px.ok_or_else(|| CalibrationError::NoSize { path: path.to_owned() })?;
+    let size_px = calibration
+        .size_px
+        .ok_or_else(|| CalibrationError::NoSize {
+            path: path.to_owned(),
+        })?;
     calibration.into_intrinsics(path, size_px)
 }
 
 /// Reads a calibration for frames of a known size: one that says no size is taken to hold for them, one that says
 /// another is refused. `frames_of` names the recording in the message.
-pub fn load_calibration_for(path: &Path, frame_px: [u32; 2], frames_of: &str) -> Result<Intrinsics, CalibrationError> {
+pub fn load_calibration_for(
+    path: &Path,
+    frame_px: [u32; 2],
+    frames_of: &str,
+) -> Result<Intrinsics, CalibrationError> {
     let intrinsics = load_calibration_or_fill(path, frame_px)?;
     check_frame_size(&intrinsics, frame_px, frames_of)?;
     Ok(intrinsics)
@@ -95,7 +104,10 @@ pub fn check_frame_size(
 }
 
 /// As [`load_calibration`], with a size for files that say none.
-pub(super) fn load_calibration_or_fill(path: &Path, default_px: [u32; 2]) -> Result<Intrinsics, CalibrationError> {
+pub(super) fn load_calibration_or_fill(
+    path: &Path,
+    default_px: [u32; 2],
+) -> Result<Intrinsics, CalibrationError> {
     let calibration = read(path)?;
     let size_px = calibration.size_px.unwrap_or(default_px);
     calibration.into_intrinsics(path, size_px)
@@ -110,18 +122,40 @@ struct Calibration {
 }
 
 impl Calibration {
-    fn into_intrinsics(self, path: &Path, size_px: [u32; 2]) -> Result<Intrinsics, CalibrationError> {
-        let refuse = |message: String| Err(CalibrationError::Value { path: path.to_owned(), message });
-        let Self { focal_px, center_px, distortion, .. } = self;
+    fn into_intrinsics(
+        self,
+        path: &Path,
+        size_px: [u32; 2],
+    ) -> Result<Intrinsics, CalibrationError> {
+        let refuse = |message: String| {
+            Err(CalibrationError::Value {
+                path: path.to_owned(),
+                message,
+            })
+        };
+        let Self {
+            focal_px,
+            center_px,
+            distortion,
+            ..
+        } = self;
         let mut numbers = focal_px.iter().chain(&center_px).chain(&distortion);
         if !numbers.all(|number| number.is_finite()) {
-            return refuse("focal lengths, centre and distortion must be finite numbers".to_owned());
+            return refuse(
+                "focal lengths, centre and distortion must be finite numbers".to_owned(),
+            );
         }
         if size_px.contains(&0) || size_px.iter().any(|&side| side > 32768) {
-            return refuse(format!("the picture size {} x {} must be from 1 to 32768", size_px[0], size_px[1]));
+            return refuse(format!(
+                "the picture size {} x {} must be from 1 to 32768",
+                size_px[0], size_px[1]
+            ));
         }
         if focal_px.iter().any(|&focal| focal <= 0.0) {
-            return refuse(format!("the focal lengths {} and {} must be greater than 0", focal_px[0], focal_px[1]));
+            return refuse(format!(
+                "the focal lengths {} and {} must be greater than 0",
+                focal_px[0], focal_px[1]
+            ));
         }
         // A cropped picture may have its centre outside, but not far.
         for (center, side) in center_px.iter().zip(size_px.map(f64::from)) {
@@ -142,8 +176,15 @@ impl Calibration {
 }
 
 fn read(path: &Path) -> Result<Calibration, CalibrationError> {
-    let text = std::fs::read_to_string(path).map_err(|error| CalibrationError::Io { path: path.to_owned(), error })?;
-    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let text = std::fs::read_to_string(path).map_err(|error| CalibrationError::Io {
+        path: path.to_owned(),
+        error,
+    })?;
+    let extension = path
+        .extension()
+        .and_then(|extension| extension.to_str())
+        .unwrap_or_default()
+        .to_ascii_lowercase();
     let tree = match extension.as_str() {
         "toml" => toml::from_str(&text).map_err(|error| error.to_string()),
         "json" => serde_json::from_str(&text).map_err(|error| error.to_string()),
@@ -151,9 +192,14 @@ fn read(path: &Path) -> Result<Calibration, CalibrationError> {
         "xml" => tree_of_file_storage(&text),
         _ => Err("a calibration is a .toml, .json, .yaml, .yml or .xml file".to_owned()),
     };
-    let tree: Map<String, Value> =
-        tree.map_err(|message| CalibrationError::Syntax { path: path.to_owned(), message })?;
-    calibration_of_tree(&tree).map_err(|message| CalibrationError::Value { path: path.to_owned(), message })
+    let tree: Map<String, Value> = tree.map_err(|message| CalibrationError::Syntax {
+        path: path.to_owned(),
+        message,
+    })?;
+    calibration_of_tree(&tree).map_err(|message| CalibrationError::Value {
+        path: path.to_owned(),
+        message,
+    })
 }
 
 /// OpenCV insists on a first line that plain YAML (ROS) does not have.
@@ -166,8 +212,14 @@ fn as_opencv_yaml(text: &str) -> String {
 }
 
 const OWN_KEYS: [&str; 4] = ["size_px", "focal_px", "center_px", "distortion"];
-const MATRIX_KEYS: [&str; 6] =
-    ["camera_matrix", "Camera_Matrix", "cameraMatrix", "camera_Matrix", "intrinsic_matrix", "K"];
+const MATRIX_KEYS: [&str; 6] = [
+    "camera_matrix",
+    "Camera_Matrix",
+    "cameraMatrix",
+    "camera_Matrix",
+    "intrinsic_matrix",
+    "K",
+];
 const DISTORTION_KEYS: [&str; 7] = [
     "distortion_coefficients",
     "Distortion_Coefficients",
@@ -194,25 +246,35 @@ fn calibration_of_tree(tree: &Map<String, Value>) -> Result<Calibration, String>
 /// `size_px = [640, 480]`, `focal_px`, `center_px`, `distortion = [k1, k2, p1, p2, k3]`.
 fn calibration_of_own(tree: &Map<String, Value>) -> Result<Calibration, String> {
     if let Some(unknown) = tree.keys().find(|key| !OWN_KEYS.contains(&key.as_str())) {
-        return Err(format!("unknown key '{unknown}'; a calibration has {}", OWN_KEYS.join(", ")));
+        return Err(format!(
+            "unknown key '{unknown}'; a calibration has {}",
+            OWN_KEYS.join(", ")
+        ));
     }
     let pair = |key| {
-        let value = tree.get(key).ok_or_else(|| format!("{key} = [x, y] is missing"))?;
-        numbers::<2>(value).ok_or_else(|| format!("{key} must be two numbers"))
+        let value = tree
+            .get(key)
+            .ok_or_else(|| format!("{key} = [x, y] is missing"))?;
+        numbers::<2>(value).ok_or_else(|| format!("{key} must be two finite numbers"))
     };
     Ok(Calibration {
         size_px: tree.get("size_px").map(size).transpose()?,
         focal_px: pair("focal_px")?,
         center_px: pair("center_px")?,
-        distortion: tree.get("distortion").map_or(Ok([0.0; 5]), five_coefficients)?,
+        distortion: tree
+            .get("distortion")
+            .map_or(Ok([0.0; 5]), five_coefficients)?,
     })
 }
 
 /// `{size, K: {fx, fy, cx, cy}, dist}`.
 fn calibration_of_session(camera: &Map<String, Value>) -> Result<Calibration, String> {
     let entry = |key| {
-        let value = camera.get("K").and_then(|matrix| matrix.get(key)).and_then(Value::as_f64);
-        value.ok_or_else(|| format!("camera.K.{key} must be a number"))
+        let value = camera
+            .get("K")
+            .and_then(|matrix| matrix.get(key))
+            .and_then(Value::as_f64);
+        value.ok_or_else(|| format!("camera.K.{key} must be a finite number"))
     };
     Ok(Calibration {
         size_px: camera.get("size").map(size).transpose()?,
@@ -227,16 +289,23 @@ fn calibration_of_opencv(tree: &Map<String, Value>) -> Result<Calibration, Strin
     if let Some(model) = find(tree, &MODEL_KEYS).and_then(|(_, model)| model.as_str())
         && !matches!(model, "" | "plumb_bob")
     {
-        return Err(format!("the distortion model '{model}' is not supported; plumb_bob (five coefficients) is"));
+        return Err(format!(
+            "the distortion model '{model}' is not supported; plumb_bob (five coefficients) is"
+        ));
     }
     let (key, matrix) = find(tree, &MATRIX_KEYS).ok_or("the camera matrix is missing")?;
-    let [fx, skew, cx, _, fy, cy, _, _, one] =
-        numbers::<9>(data_of(matrix)).ok_or_else(|| format!("{key} must be a matrix of 3 x 3 numbers"))?;
+    let [fx, skew, cx, _, fy, cy, _, _, one] = numbers::<9>(data_of(matrix))
+        .ok_or_else(|| format!("{key} must be a matrix of 3 x 3 finite numbers"))?;
     if skew != 0.0 || one != 1.0 {
         return Err(format!("{key} must be [fx 0 cx; 0 fy cy; 0 0 1]"));
     }
-    let side = |keys: &[&'static str]| find(tree, keys).map(|(key, value)| side_px(value).ok_or_else(|| bad_side(key)));
-    let size_px = match (side(&WIDTH_KEYS).transpose()?, side(&HEIGHT_KEYS).transpose()?) {
+    let side = |keys: &[&'static str]| {
+        find(tree, keys).map(|(key, value)| side_px(value).ok_or_else(|| bad_side(key)))
+    };
+    let size_px = match (
+        side(&WIDTH_KEYS).transpose()?,
+        side(&HEIGHT_KEYS).transpose()?,
+    ) {
         (Some(width), Some(height)) => Some([width, height]),
         _ => None,
     };
@@ -249,8 +318,12 @@ fn calibration_of_opencv(tree: &Map<String, Value>) -> Result<Calibration, Strin
     })
 }
 
-fn find<'a>(tree: &'a Map<String, Value>, keys: &[&'static str]) -> Option<(&'static str, &'a Value)> {
-    keys.iter().find_map(|key| tree.get(*key).map(|value| (*key, value)))
+fn find<'a>(
+    tree: &'a Map<String, Value>,
+    keys: &[&'static str],
+) -> Option<(&'static str, &'a Value)> {
+    keys.iter()
+        .find_map(|key| tree.get(*key).map(|value| (*key, value)))
 }
 
 /// A matrix is written as `{rows, cols, data}`, or as its numbers alone.
@@ -282,7 +355,11 @@ fn flat_numbers(value: &Value) -> Option<Vec<f64>> {
     let mut found = Vec::new();
     for entry in value.as_array()? {
         match entry {
-            Value::Array(row) => found.extend(row.iter().map(Value::as_f64).collect::<Option<Vec<f64>>>()?),
+            Value::Array(row) => found.extend(
+                row.iter()
+                    .map(Value::as_f64)
+                    .collect::<Option<Vec<f64>>>()?,
+            ),
             number => found.push(number.as_f64()?),
         }
     }
@@ -291,8 +368,13 @@ fn flat_numbers(value: &Value) -> Option<Vec<f64>> {
 
 /// Missing coefficients are 0; the terms past k3 (rational, thin prism, tilted) belong to lenses that are not modelled.
 fn five_coefficients(value: &Value) -> Result<[f64; 5], String> {
-    let given = flat_numbers(value).ok_or("the distortion must be a list of numbers k1, k2, p1, p2, k3")?;
-    if let Some(extra) = given.iter().skip(5).find(|coefficient| **coefficient != 0.0) {
+    let given = flat_numbers(value)
+        .ok_or("the distortion must be a list of finite numbers k1, k2, p1, p2, k3")?;
+    if let Some(extra) = given
+        .iter()
+        .skip(5)
+        .find(|coefficient| **coefficient != 0.0)
+    {
         return Err(format!(
             "the distortion has {} coefficients, {extra} among those after the fifth; only k1, k2, p1, p2, k3 are \
              supported: calibrate without the rational, thin prism or tilted model",
@@ -310,10 +392,20 @@ fn five_coefficients(value: &Value) -> Result<[f64; 5], String> {
 fn tree_of_file_storage(text: &str) -> Result<Map<String, Value>, String> {
     let storage = FileStorage::new(text, FileStorage_READ | FileStorage_MEMORY, "")
         .map_err(|error| format!("OpenCV cannot read it: {}", error.message.trim()))?;
-    let keys = [&MATRIX_KEYS[..], &DISTORTION_KEYS, &WIDTH_KEYS, &HEIGHT_KEYS, &MODEL_KEYS, &OWN_KEYS].concat();
+    let keys = [
+        &MATRIX_KEYS[..],
+        &DISTORTION_KEYS,
+        &WIDTH_KEYS,
+        &HEIGHT_KEYS,
+        &MODEL_KEYS,
+        &OWN_KEYS,
+    ]
+    .concat();
     let mut tree = Map::new();
     for key in keys {
-        let value = storage.get_node(key).and_then(|node| value_of_node(&node, 3));
+        let value = storage
+            .get_node(key)
+            .and_then(|node| value_of_node(&node, 3));
         match value.map_err(|error| format!("{key}: {}", error.message.trim()))? {
             Value::Null => {}
             value => _ = tree.insert(key.to_owned(), value),
@@ -332,10 +424,15 @@ fn value_of_node(node: &FileNode, depth: u32) -> opencv::Result<Value> {
     if node.is_seq()? && depth > 0 {
         // OpenCV walks to an entry from the start; no calibration has more than a few dozen.
         let length = node.size()?.min(64) as i32;
-        return (0..length).map(|index| value_of_node(&node.at(index)?, depth - 1)).collect();
+        return (0..length)
+            .map(|index| value_of_node(&node.at(index)?, depth - 1))
+            .collect();
     }
     if node.is_map()? && depth > 0 {
-        return Ok(Value::from(Map::from_iter([("data".to_owned(), value_of_node(&node.get_node("data")?, depth - 1)?)])));
+        return Ok(Value::from(Map::from_iter([(
+            "data".to_owned(),
+            value_of_node(&node.get_node("data")?, depth - 1)?,
+        )])));
     }
     Ok(Value::Null)
 }
@@ -344,8 +441,7 @@ fn value_of_node(node: &FileNode, depth: u32) -> opencv::Result<Value> {
 mod tests {
     use super::*;
 
-    const OWN: &str =
-        "size_px = [640, 480]\nfocal_px = [615, 613.0]\ncenter_px = [321.4, 238.2]\ndistortion = [0.08, -0.19, 0.0008, -0.0005, 0.05]\n";
+    const OWN: &str = "size_px = [640, 480]\nfocal_px = [615, 613.0]\ncenter_px = [321.4, 238.2]\ndistortion = [0.08, -0.19, 0.0008, -0.0005, 0.05]\n";
 
     fn load(name: &str, text: &str) -> Result<Intrinsics, CalibrationError> {
         let folder = tempfile::tempdir().unwrap();
@@ -408,9 +504,14 @@ mod tests {
     #[test]
     fn missing_coefficients_are_zero_and_further_ones_refused() {
         let four = OWN.replace(", 0.05]", "]");
-        assert_eq!(load("a.toml", &four).unwrap().distortion, [0.08, -0.19, 0.0008, -0.0005, 0.0]);
+        assert_eq!(
+            load("a.toml", &four).unwrap().distortion,
+            [0.08, -0.19, 0.0008, -0.0005, 0.0]
+        );
         let eight = OWN.replace("0.05]", "0.05, 0, 0.3, 0]");
-        assert!(message("a.toml", &eight).contains("8 coefficients, 0.3 among those after the fifth"));
+        assert!(
+            message("a.toml", &eight).contains("8 coefficients, 0.3 among those after the fifth")
+        );
     }
 
     #[test]
@@ -423,15 +524,65 @@ mod tests {
             ("321.4", "3214", "far from"),
             ("640", "0", "whole numbers"),
             ("640", "640.5", "whole numbers"),
-            ("[615, 613.0]", "[615]", "focal_px must be two numbers"),
+            (
+                "[615, 613.0]",
+                "[615]",
+                "focal_px must be two finite numbers",
+            ),
             ("focal_px", "focal", "unknown key 'focal'"),
-            ("focal_px = [615, 613.0]\n", "", "focal_px = [x, y] is missing"),
-            ("size_px = [640, 480]\n", "", "does not say for which picture size"),
+            (
+                "focal_px = [615, 613.0]\n",
+                "",
+                "focal_px = [x, y] is missing",
+            ),
+            (
+                "size_px = [640, 480]\n",
+                "",
+                "does not say for which picture size",
+            ),
             ("center_px = [", "center_px = ", "line 3"),
         ] {
             let text = message("a.toml", &OWN.replace(from, to));
-            assert!(text.contains(expected) && text.contains("a.toml"), "{from} → {to}: {text}");
+            assert!(
+                text.contains(expected) && text.contains("a.toml"),
+                "{from} → {to}: {text}"
+            );
         }
+    }
+
+    /// Photographs' calibrations from OpenCV's tutorials, where this machine has them.
+    #[test]
+    fn opencvs_tutorial_calibrations_are_read() {
+        let mut above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
+        let Some(folder) = above.find_map(|folder| {
+            folder
+                .join("shared/real/opencv_tutorial")
+                .canonicalize()
+                .ok()
+        }) else {
+            return;
+        };
+        let (charuco, params) = (
+            folder.join("tutorial_camera_charuco.yml"),
+            folder.join("tutorial_camera_params.yml"),
+        );
+        let found = load_calibration(&charuco).unwrap();
+        assert_eq!(found.size_px, [640, 480]);
+        assert_eq!(
+            (found.focal_px.x, found.distortion[4]),
+            (4.5251072219637672e+02, 2.9542589406810080e+00)
+        );
+        assert!(matches!(
+            load_calibration(&params),
+            Err(CalibrationError::NoSize { .. })
+        ));
+        assert_eq!(
+            load_calibration_for(&params, [640, 480], "it")
+                .unwrap()
+                .center_px
+                .y,
+            260.908
+        );
     }
 
     #[test]
@@ -449,10 +600,25 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("camera.toml");
         std::fs::write(&path, OWN).unwrap();
-        assert_eq!(load_calibration_for(&path, [640, 480], "lamp").unwrap(), lamp());
-        let text = load_calibration_for(&path, [1280, 720], "lamp").unwrap_err().to_string();
-        assert!(text.starts_with("lamp has frames of 1280 x 720 pixels, but its calibration is for 640 x 480"), "{text}");
+        assert_eq!(
+            load_calibration_for(&path, [640, 480], "lamp").unwrap(),
+            lamp()
+        );
+        let text = load_calibration_for(&path, [1280, 720], "lamp")
+            .unwrap_err()
+            .to_string();
+        assert!(
+            text.starts_with(
+                "lamp has frames of 1280 x 720 pixels, but its calibration is for 640 x 480"
+            ),
+            "{text}"
+        );
         std::fs::write(&path, OWN.replace("size_px = [640, 480]\n", "")).unwrap();
-        assert_eq!(load_calibration_for(&path, [1280, 720], "lamp").unwrap().size_px, [1280, 720]);
+        assert_eq!(
+            load_calibration_for(&path, [1280, 720], "lamp")
+                .unwrap()
+                .size_px,
+            [1280, 720]
+        );
     }
 }

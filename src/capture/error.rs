@@ -132,7 +132,11 @@ impl Notice {
         match self {
             Self::Broken { count, .. } => *count,
             Self::OtherSize { .. } => 1,
-            Self::EndedEarly { ended_at, announced, .. } => announced.saturating_sub(*ended_at),
+            Self::EndedEarly {
+                ended_at,
+                announced,
+                ..
+            } => announced.saturating_sub(*ended_at),
         }
     }
 }
@@ -140,20 +144,39 @@ impl Notice {
 impl fmt::Display for Notice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Broken { path, first, count, good_before } => {
+            Self::Broken {
+                path,
+                first,
+                count,
+                good_before,
+            } => {
                 let name = path.display();
                 match count {
                     1 => write!(f, "{name}: frame {first} is broken or missing")?,
-                    _ => write!(f, "{name}: frames {first} to {} are broken or missing", first + count - 1)?,
+                    _ => write!(
+                        f,
+                        "{name}: frames {first} to {} are broken or missing",
+                        first + count - 1
+                    )?,
                 }
                 write!(f, "; {good_before} good frames before, reading goes on")
             }
-            Self::OtherSize { path, frame, size_px: [width, height], expected_px: [first_width, first_height] } => write!(
+            Self::OtherSize {
+                path,
+                frame,
+                size_px: [width, height],
+                expected_px: [first_width, first_height],
+            } => write!(
                 f,
                 "{}: frame {frame} is {width} x {height}, the first one was {first_width} x {first_height}; left out",
                 path.display()
             ),
-            Self::EndedEarly { path, good, ended_at, announced } => write!(
+            Self::EndedEarly {
+                path,
+                good,
+                ended_at,
+                announced,
+            } => write!(
                 f,
                 "{}: ends early, at frame {ended_at} of {announced}; {good} frames were good",
                 path.display()

@@ -12,7 +12,9 @@ use super::pixels;
 /// Images carry no time of their own.
 pub(super) const ASSUMED_FPS: f64 = 30.0;
 
-const EXTENSIONS: [&str; 9] = ["png", "jpg", "jpeg", "bmp", "tif", "tiff", "webp", "ppm", "pgm"];
+const EXTENSIONS: [&str; 9] = [
+    "png", "jpg", "jpeg", "bmp", "tif", "tiff", "webp", "ppm", "pgm",
+];
 
 pub(super) fn is_image(file: &Path) -> bool {
     super::has_extension(file, &EXTENSIONS)
@@ -29,14 +31,23 @@ impl ImageFrames {
     /// `folder` names the recording in errors.
     pub(super) fn open(folder: &Path, mut paths: Vec<PathBuf>) -> Result<Self, CaptureError> {
         if paths.is_empty() {
-            return Err(CaptureError::NoPictures { path: folder.to_owned() });
+            return Err(CaptureError::NoPictures {
+                path: folder.to_owned(),
+            });
         }
         paths.sort_by(|a, b| natural_order(&name_of(a), &name_of(b)));
         let size_px = paths
             .iter()
             .find_map(|path| read(path).map(|picture| pixels::size_of(&picture)))
-            .ok_or_else(|| CaptureError::NoGoodFrame { path: folder.to_owned() })?;
-        Ok(Self { paths, next_index: 0, good_frames: 0, size_px })
+            .ok_or_else(|| CaptureError::NoGoodFrame {
+                path: folder.to_owned(),
+            })?;
+        Ok(Self {
+            paths,
+            next_index: 0,
+            good_frames: 0,
+            size_px,
+        })
     }
 
     pub(super) fn frame_count(&self) -> u32 {
@@ -47,7 +58,10 @@ impl ImageFrames {
         self.size_px
     }
 
-    pub(super) fn next_picture(&mut self, notices: &mut Vec<Notice>) -> Result<Option<(u32, Vec<u8>)>, CaptureError> {
+    pub(super) fn next_picture(
+        &mut self,
+        notices: &mut Vec<Notice>,
+    ) -> Result<Option<(u32, Vec<u8>)>, CaptureError> {
         while let Some(path) = self.paths.get(self.next_index as usize) {
             let index = self.next_index;
             self.next_index += 1;
@@ -58,19 +72,22 @@ impl ImageFrames {
                     count: 1,
                     good_before: self.good_frames,
                 }),
-                Some(picture) if pixels::size_of(&picture) != self.size_px => notices.push(Notice::OtherSize {
-                    path: path.clone(),
-                    frame: index,
-                    size_px: pixels::size_of(&picture),
-                    expected_px: self.size_px,
-                }),
-                Some(picture) => {
-                    self.good_frames += 1;
-                    let rgba = pixels::rgba_from_bgr(&picture).map_err(|error| CaptureError::OpenCv {
+                Some(picture) if pixels::size_of(&picture) != self.size_px => {
+                    notices.push(Notice::OtherSize {
                         path: path.clone(),
                         frame: index,
-                        message: error.message,
-                    })?;
+                        size_px: pixels::size_of(&picture),
+                        expected_px: self.size_px,
+                    })
+                }
+                Some(picture) => {
+                    self.good_frames += 1;
+                    let rgba =
+                        pixels::rgba_from_bgr(&picture).map_err(|error| CaptureError::OpenCv {
+                            path: path.clone(),
+                            frame: index,
+                            message: error.message,
+                        })?;
                     return Ok(Some((index, rgba)));
                 }
             }
@@ -81,11 +98,15 @@ impl ImageFrames {
 
 /// `None` where OpenCV cannot decode the file; it has no better word for it.
 fn read(path: &Path) -> Option<Mat> {
-    imgcodecs::imread(path, imgcodecs::IMREAD_COLOR).ok().filter(|picture| !picture.empty())
+    imgcodecs::imread(path, imgcodecs::IMREAD_COLOR)
+        .ok()
+        .filter(|picture| !picture.empty())
 }
 
 fn name_of(path: &Path) -> String {
-    path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+    path.file_name()
+        .map(|name| name.to_string_lossy().into_owned())
+        .unwrap_or_default()
 }
 
 /// Orders names as people do: runs of digits by their value, so that `img_9` comes before `img_10`.
@@ -93,10 +114,14 @@ fn natural_order(a: &str, b: &str) -> Ordering {
     let (mut rest_a, mut rest_b) = (a, b);
     while !rest_a.is_empty() && !rest_b.is_empty() {
         let (run_a, run_b) = (take_run(&mut rest_a), take_run(&mut rest_b));
-        let both_digits = run_a.starts_with(|c: char| c.is_ascii_digit()) && run_b.starts_with(|c: char| c.is_ascii_digit());
+        let both_digits = run_a.starts_with(|c: char| c.is_ascii_digit())
+            && run_b.starts_with(|c: char| c.is_ascii_digit());
         let order = if both_digits {
             let (value_a, value_b) = (run_a.trim_start_matches('0'), run_b.trim_start_matches('0'));
-            value_a.len().cmp(&value_b.len()).then_with(|| value_a.cmp(value_b))
+            value_a
+                .len()
+                .cmp(&value_b.len())
+                .then_with(|| value_a.cmp(value_b))
         } else {
             run_a.cmp(run_b)
         };
@@ -110,7 +135,9 @@ fn natural_order(a: &str, b: &str) -> Ordering {
 /// Splits the leading run of digits, or of anything else, off.
 fn take_run<'a>(rest: &mut &'a str) -> &'a str {
     let digits = rest.starts_with(|c: char| c.is_ascii_digit());
-    let end = rest.find(|c: char| c.is_ascii_digit() != digits).unwrap_or(rest.len());
+    let end = rest
+        .find(|c: char| c.is_ascii_digit() != digits)
+        .unwrap_or(rest.len());
     let (run, tail) = rest.split_at(end);
     *rest = tail;
     run
@@ -122,8 +149,27 @@ mod tests {
 
     #[test]
     fn names_sort_as_people_count() {
-        let mut names = ["img_10.png", "img_9.png", "img_009.png", "a2b10.png", "a2b9.png", "img_.png", "10.png", "9.png"];
+        let mut names = [
+            "img_10.png",
+            "img_9.png",
+            "img_009.png",
+            "a2b10.png",
+            "a2b9.png",
+            "10.png",
+            "9.png",
+        ];
         names.sort_by(|a, b| natural_order(a, b));
-        assert_eq!(names, ["9.png", "10.png", "a2b9.png", "a2b10.png", "img_.png", "img_009.png", "img_9.png", "img_10.png"]);
+        assert_eq!(
+            names,
+            [
+                "9.png",
+                "10.png",
+                "a2b9.png",
+                "a2b10.png",
+                "img_009.png",
+                "img_9.png",
+                "img_10.png"
+            ]
+        );
     }
 }

@@ -51,7 +51,13 @@ enum Pictures {
 }
 
 /// What a session folder calls its calibration, the preferred one first.
-const CALIBRATION_NAMES: [&str; 5] = ["camera.toml", "camera.json", "camera.yaml", "camera.yml", "session.json"];
+const CALIBRATION_NAMES: [&str; 5] = [
+    "camera.toml",
+    "camera.json",
+    "camera.yaml",
+    "camera.yml",
+    "session.json",
+];
 const TIMES_NAME: &str = "times.csv";
 const VIDEO_EXTENSIONS: [&str; 8] = ["mp4", "mkv", "avi", "mov", "webm", "m4v", "mpg", "ts"];
 
@@ -59,12 +65,19 @@ impl FrameSource {
     /// Opens a session folder (`video.*` with `camera.toml`, perhaps `times.csv`), a video file or a folder of images.
     pub fn open(source: &str) -> Result<Self, CaptureError> {
         if source.starts_with("webcam") || source.contains("://") {
-            return Err(CaptureError::Live { source_name: source.to_owned() });
+            return Err(CaptureError::Live {
+                source_name: source.to_owned(),
+            });
         }
         let path = Path::new(source);
-        let io_error = |error| CaptureError::Io { path: path.to_owned(), error };
+        let io_error = |error| CaptureError::Io {
+            path: path.to_owned(),
+            error,
+        };
         let metadata = std::fs::metadata(path).map_err(|error| match error.kind() {
-            std::io::ErrorKind::NotFound => CaptureError::Missing { path: path.to_owned() },
+            std::io::ErrorKind::NotFound => CaptureError::Missing {
+                path: path.to_owned(),
+            },
             _ => io_error(error),
         })?;
         if metadata.is_dir() {
@@ -72,20 +85,38 @@ impl FrameSource {
             Self::open_folder(path, files)
         } else if images::is_image(path) {
             let images = ImageFrames::open(path, vec![path.to_owned()])?;
-            Ok(Self::new(path, Pictures::Images(images), FrameTimes::default(), None))
+            Ok(Self::new(
+                path,
+                Pictures::Images(images),
+                FrameTimes::default(),
+                None,
+            ))
         } else {
             let video = VideoFrames::open(path)?;
-            Ok(Self::new(path, Pictures::Video(video), FrameTimes::default(), None))
+            Ok(Self::new(
+                path,
+                Pictures::Video(video),
+                FrameTimes::default(),
+                None,
+            ))
         }
     }
 
     fn open_folder(folder: &Path, files: Vec<PathBuf>) -> Result<Self, CaptureError> {
-        let named = |name: &str| files.iter().find(|file| file.file_name().is_some_and(|found| found == name));
+        let named = |name: &str| {
+            files
+                .iter()
+                .find(|file| file.file_name().is_some_and(|found| found == name))
+        };
         let videos: Vec<&PathBuf> = files.iter().filter(|file| is_session_video(file)).collect();
         let pictures = match videos.as_slice() {
             [] => Pictures::Images(ImageFrames::open(
                 folder,
-                files.iter().filter(|file| images::is_image(file)).cloned().collect(),
+                files
+                    .iter()
+                    .filter(|file| images::is_image(file))
+                    .cloned()
+                    .collect(),
             )?),
             [video] => Pictures::Video(VideoFrames::open(video)?),
             [first, second, ..] => {
@@ -96,7 +127,10 @@ impl FrameSource {
                 });
             }
         };
-        let times = named(TIMES_NAME).map(|file| FrameTimes::load(file)).transpose()?.unwrap_or_default();
+        let times = named(TIMES_NAME)
+            .map(|file| FrameTimes::load(file))
+            .transpose()?
+            .unwrap_or_default();
         let size_px = pictures.size_px();
         let calibration = CALIBRATION_NAMES
             .iter()
@@ -106,8 +140,20 @@ impl FrameSource {
         Ok(Self::new(folder, pictures, times, calibration))
     }
 
-    fn new(path: &Path, pictures: Pictures, times: FrameTimes, calibration: Option<Intrinsics>) -> Self {
-        Self { path: path.to_owned(), pictures, times, calibration, notices: Vec::new(), good_frames: 0 }
+    fn new(
+        path: &Path,
+        pictures: Pictures,
+        times: FrameTimes,
+        calibration: Option<Intrinsics>,
+    ) -> Self {
+        Self {
+            path: path.to_owned(),
+            pictures,
+            times,
+            calibration,
+            notices: Vec::new(),
+            good_frames: 0,
+        }
     }
 
     /// Where the recording lies.
@@ -148,11 +194,18 @@ impl FrameSource {
             Pictures::Video(video) => video.next_picture(&mut self.notices)?,
             Pictures::Images(images) => images.next_picture(&mut self.notices)?,
         };
-        let Some((index, rgba)) = picture else { return Ok(None) };
+        let Some((index, rgba)) = picture else {
+            return Ok(None);
+        };
         self.good_frames += 1;
         let nominal_secs = f64::from(index) / self.nominal_fps();
         let time_secs = self.times.time_secs(index).unwrap_or(nominal_secs);
-        Ok(Some(Frame { index, time_secs, size_px: self.size_px(), rgba }))
+        Ok(Some(Frame {
+            index,
+            time_secs,
+            size_px: self.size_px(),
+            rgba,
+        }))
     }
 
     /// What went wrong so far without ending the recording; whole once [`FrameSource::next_frame`] gave `None`.
@@ -201,7 +254,11 @@ fn is_session_video(file: &Path) -> bool {
 fn has_extension(file: &Path, extensions: &[&str]) -> bool {
     file.extension()
         .and_then(|extension| extension.to_str())
-        .is_some_and(|extension| extensions.iter().any(|known| known.eq_ignore_ascii_case(extension)))
+        .is_some_and(|extension| {
+            extensions
+                .iter()
+                .any(|known| known.eq_ignore_ascii_case(extension))
+        })
 }
 
 #[cfg(test)]

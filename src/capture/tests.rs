@@ -10,8 +10,29 @@ use super::*;
 fn make_video(path: &Path, frames: u32, size: &str) {
     let source = format!("testsrc2=size={size}:rate=30");
     let status = Command::new("ffmpeg")
-        .args(["-v", "error", "-y", "-f", "lavfi", "-i", &source, "-frames:v", &frames.to_string()])
-        .args(["-c:v", "libx264", "-preset", "ultrafast", "-g", "1", "-pix_fmt", "yuv420p", "-movflags", "+faststart"])
+        .args([
+            "-v",
+            "error",
+            "-y",
+            "-f",
+            "lavfi",
+            "-i",
+            &source,
+            "-frames:v",
+            &frames.to_string(),
+        ])
+        .args([
+            "-c:v",
+            "libx264",
+            "-preset",
+            "ultrafast",
+            "-g",
+            "1",
+            "-pix_fmt",
+            "yuv420p",
+            "-movflags",
+            "+faststart",
+        ])
         .arg(path)
         .status()
         .unwrap();
@@ -21,7 +42,9 @@ fn make_video(path: &Path, frames: u32, size: &str) {
 fn make_images(folder: &Path, count: u32) {
     for index in 0..count {
         let picture = image::RgbImage::from_pixel(32, 24, image::Rgb([index as u8, 100, 200]));
-        picture.save(folder.join(format!("shot_{index}.png"))).unwrap();
+        picture
+            .save(folder.join(format!("shot_{index}.png")))
+            .unwrap();
     }
 }
 
@@ -32,15 +55,26 @@ fn open(path: &Path) -> Result<FrameSource, CaptureError> {
 fn indices(source: &mut FrameSource) -> Vec<u32> {
     let mut found = Vec::new();
     while let Some(frame) = source.next_frame().unwrap() {
-        assert_eq!(frame.rgba.len(), (frame.size_px[0] * frame.size_px[1] * 4) as usize);
+        assert_eq!(
+            frame.rgba.len(),
+            (frame.size_px[0] * frame.size_px[1] * 4) as usize
+        );
         found.push(frame.index);
     }
-    assert!(source.next_frame().unwrap().is_none(), "the end stays the end");
+    assert!(
+        source.next_frame().unwrap().is_none(),
+        "the end stays the end"
+    );
     found
 }
 
 fn said(source: &FrameSource) -> String {
-    source.notices().iter().map(Notice::to_string).collect::<Vec<_>>().join("\n")
+    source
+        .notices()
+        .iter()
+        .map(Notice::to_string)
+        .collect::<Vec<_>>()
+        .join("\n")
 }
 
 #[test]
@@ -49,13 +83,23 @@ fn a_whole_video_gives_all_its_frames() {
     let path = folder.path().join("a.mp4");
     make_video(&path, 20, "64x48");
     let mut source = open(&path).unwrap();
-    assert_eq!((source.frame_count(), source.fps(), source.size_px()), (Some(20), 30.0, [64, 48]));
+    assert_eq!(
+        (source.frame_count(), source.fps(), source.size_px()),
+        (Some(20), 30.0, [64, 48])
+    );
     assert!(source.calibration().is_none());
     let first = source.next_frame().unwrap().unwrap();
     let second = source.next_frame().unwrap().unwrap();
     assert_eq!((first.index, second.index), (0, 1));
     assert!((second.time_secs - 1.0 / 30.0).abs() < 1e-12);
-    assert!(first.rgba.iter().skip(3).step_by(4).all(|&alpha| alpha == 255));
+    assert!(
+        first
+            .rgba
+            .iter()
+            .skip(3)
+            .step_by(4)
+            .all(|&alpha| alpha == 255)
+    );
     assert_ne!(first.rgba, second.rgba);
     assert_eq!(indices(&mut source), (2..20).collect::<Vec<_>>());
     assert_eq!(source.notices(), []);
@@ -66,7 +110,16 @@ fn reordered_frames_keep_their_indices() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mp4");
     let status = Command::new("ffmpeg")
-        .args(["-v", "error", "-f", "lavfi", "-i", "testsrc2=size=64x48:rate=25", "-frames:v", "20"])
+        .args([
+            "-v",
+            "error",
+            "-f",
+            "lavfi",
+            "-i",
+            "testsrc2=size=64x48:rate=25",
+            "-frames:v",
+            "20",
+        ])
         .args(["-c:v", "libx264", "-bf", "3"])
         .arg(&path)
         .status()
@@ -89,7 +142,10 @@ fn a_video_cut_off_gives_what_is_there() {
     assert!((10..30).contains(&found.len()), "{found:?}");
     assert_eq!(found, (0..found.len() as u32).collect::<Vec<_>>());
     let text = said(&source);
-    assert!(text.contains("cut.mp4: ends early, at frame") && text.contains("of 40"), "{text}");
+    assert!(
+        text.contains("cut.mp4: ends early, at frame") && text.contains("of 40"),
+        "{text}"
+    );
     assert_eq!(source.notices()[0].lost_frames(), 40 - found.len() as u32);
 }
 
@@ -101,7 +157,10 @@ fn a_video_cut_off_before_its_index_says_so() {
     let bytes = fs::read(&path).unwrap();
     fs::write(&path, &bytes[..200]).unwrap();
     let text = open(&path).err().unwrap().to_string();
-    assert!(text.contains("cut.mp4: cannot be opened as a video"), "{text}");
+    assert!(
+        text.contains("cut.mp4: cannot be opened as a video"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -119,9 +178,16 @@ fn a_video_broken_in_the_middle_goes_on_after_it() {
     let found = indices(&mut source);
     let text = said(&source);
     assert!((30..40).contains(&found.len()), "{found:?} {text}");
-    assert_eq!((found[0], found[found.len() - 1]), (0, 39), "{found:?} {text}");
+    assert_eq!(
+        (found[0], found[found.len() - 1]),
+        (0, 39),
+        "{found:?} {text}"
+    );
     assert!(found.windows(2).all(|pair| pair[0] < pair[1]), "{found:?}");
-    assert!(text.contains("broken.mp4: frames") && text.contains("are broken or missing"), "{text}");
+    assert!(
+        text.contains("broken.mp4: frames") && text.contains("are broken or missing"),
+        "{text}"
+    );
     let lost: u32 = source.notices().iter().map(Notice::lost_frames).sum();
     assert_eq!(lost + source.good_frames(), 40);
 }
@@ -132,7 +198,11 @@ fn a_session_brings_its_calibration_and_times() {
     make_video(&folder.path().join("video.mp4"), 3, "64x48");
     let calibration = "size_px = [64, 48]\nfocal_px = [60, 60]\ncenter_px = [31.5, 23.5]\n";
     fs::write(folder.path().join("camera.toml"), calibration).unwrap();
-    fs::write(folder.path().join("times.csv"), "frame,time_s\n0,0\n1,0.05\n2,0.09\n").unwrap();
+    fs::write(
+        folder.path().join("times.csv"),
+        "frame,time_s\n0,0\n1,0.05\n2,0.09\n",
+    )
+    .unwrap();
     let mut source = open(folder.path()).unwrap();
     assert_eq!(source.calibration().unwrap().focal_px.x, 60.0);
     assert!(check_frame_size(&source.calibration().unwrap(), source.size_px(), "it").is_ok());
@@ -142,11 +212,22 @@ fn a_session_brings_its_calibration_and_times() {
     let other = calibration.replace("64, 48", "640, 480");
     fs::write(folder.path().join("camera.toml"), other).unwrap();
     let source = open(folder.path()).unwrap();
-    let text = check_frame_size(&source.calibration().unwrap(), source.size_px(), "it").unwrap_err().to_string();
-    assert!(text.contains("64 x 48") && text.contains("640 x 480"), "{text}");
+    let text = check_frame_size(&source.calibration().unwrap(), source.size_px(), "it")
+        .unwrap_err()
+        .to_string();
+    assert!(
+        text.contains("64 x 48") && text.contains("640 x 480"),
+        "{text}"
+    );
 
     fs::write(folder.path().join("times.csv"), "frame,time_s\n0,x\n").unwrap();
-    assert!(open(folder.path()).err().unwrap().to_string().contains("times.csv:2:"));
+    assert!(
+        open(folder.path())
+            .err()
+            .unwrap()
+            .to_string()
+            .contains("times.csv:2:")
+    );
 }
 
 #[test]
@@ -155,10 +236,16 @@ fn images_come_in_the_order_of_their_numbers() {
     make_images(folder.path(), 12);
     fs::write(folder.path().join("notes.txt"), "not a picture").unwrap();
     let mut source = open(folder.path()).unwrap();
-    assert_eq!((source.frame_count(), source.fps(), source.size_px()), (Some(12), 30.0, [32, 24]));
+    assert_eq!(
+        (source.frame_count(), source.fps(), source.size_px()),
+        (Some(12), 30.0, [32, 24])
+    );
     for index in 0..12 {
         let frame = source.next_frame().unwrap().unwrap();
-        assert_eq!((frame.index, &frame.rgba[..4]), (index, &[index as u8, 100, 200, 255][..]));
+        assert_eq!(
+            (frame.index, &frame.rgba[..4]),
+            (index, &[index as u8, 100, 200, 255][..])
+        );
     }
     assert!(source.next_frame().unwrap().is_none());
 }
@@ -168,12 +255,17 @@ fn a_broken_image_and_one_of_another_size_are_left_out() {
     let folder = tempfile::tempdir().unwrap();
     make_images(folder.path(), 6);
     fs::write(folder.path().join("shot_2.png"), "no picture").unwrap();
-    image::RgbImage::new(33, 24).save(folder.path().join("shot_4.png")).unwrap();
+    image::RgbImage::new(33, 24)
+        .save(folder.path().join("shot_4.png"))
+        .unwrap();
     let mut source = open(folder.path()).unwrap();
     assert_eq!(indices(&mut source), [0, 1, 3, 5]);
     let text = said(&source);
     assert!(text.contains("shot_2.png: frame 2 is broken"), "{text}");
-    assert!(text.contains("shot_4.png: frame 4 is 33 x 24, the first one was 32 x 24"), "{text}");
+    assert!(
+        text.contains("shot_4.png: frame 4 is 33 x 24, the first one was 32 x 24"),
+        "{text}"
+    );
 }
 
 #[test]

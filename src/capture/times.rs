@@ -15,12 +15,22 @@ pub(super) struct FrameTimes {
 
 impl FrameTimes {
     pub(super) fn load(path: &Path) -> Result<Self, CaptureError> {
-        let text = std::fs::read_to_string(path).map_err(|error| CaptureError::Io { path: path.to_owned(), error })?;
-        Self::parse(&text).map_err(|(line, message)| CaptureError::Times { path: path.to_owned(), line, message })
+        let text = std::fs::read_to_string(path).map_err(|error| CaptureError::Io {
+            path: path.to_owned(),
+            error,
+        })?;
+        Self::parse(&text).map_err(|(line, message)| CaptureError::Times {
+            path: path.to_owned(),
+            line,
+            message,
+        })
     }
 
     fn parse(text: &str) -> Result<Self, (usize, String)> {
-        let mut lines = text.lines().enumerate().map(|(number, line)| (number + 1, line.trim()));
+        let mut lines = text
+            .lines()
+            .enumerate()
+            .map(|(number, line)| (number + 1, line.trim()));
         match lines.next() {
             Some((_, HEADER)) => {}
             _ => return Err((1, format!("the first line must be '{HEADER}'"))),
@@ -28,10 +38,15 @@ impl FrameTimes {
         let mut secs_by_frame = BTreeMap::new();
         let mut last: Option<(u32, f64)> = None;
         for (number, line) in lines.filter(|(_, line)| !line.is_empty()) {
-            let (frame, secs) = parse_row(line)
-                .ok_or_else(|| (number, format!("'{line}' is not a frame's index and its time in seconds")))?;
+            let (frame, secs) = parse_row(line).ok_or_else(|| {
+                (
+                    number,
+                    format!("'{line}' is not a frame's index and its time in seconds"),
+                )
+            })?;
             // A filter divides by the time that passed: it has to pass.
-            if last.is_some_and(|(last_frame, last_secs)| frame <= last_frame || secs <= last_secs) {
+            if last.is_some_and(|(last_frame, last_secs)| frame <= last_frame || secs <= last_secs)
+            {
                 return Err((number, "frames and times must both increase".to_owned()));
             }
             last = Some((frame, secs));
@@ -48,14 +63,16 @@ impl FrameTimes {
     pub(super) fn fps(&self) -> Option<f64> {
         let (first_frame, first_secs) = self.secs_by_frame.first_key_value()?;
         let (last_frame, last_secs) = self.secs_by_frame.last_key_value()?;
-        (last_frame > first_frame).then(|| f64::from(last_frame - first_frame) / (last_secs - first_secs))
+        (last_frame > first_frame)
+            .then(|| f64::from(last_frame - first_frame) / (last_secs - first_secs))
     }
 }
 
 fn parse_row(line: &str) -> Option<(u32, f64)> {
     let (frame, secs) = line.split_once(',')?;
     let secs: f64 = secs.trim().parse().ok()?;
-    secs.is_finite().then_some((frame.trim().parse().ok()?, secs))
+    secs.is_finite()
+        .then_some((frame.trim().parse().ok()?, secs))
 }
 
 #[cfg(test)]
