@@ -49,6 +49,7 @@ impl Family {
             .map(|(_, family)| *family)
     }
 
+    /// The name that [`Family::from_name`] takes.
     pub fn name(self) -> &'static str {
         NAMED
             .iter()
