@@ -52,11 +52,17 @@ impl Mesh {
     ///
     /// # Panics
     /// If a triangle names a vertex that `raw_positions` does not have.
-    pub fn weld(raw_positions: &[Vec3], raw: &[RawTriangle], crease_rad: f64) -> (Self, MeshReport) {
+    pub fn weld(
+        raw_positions: &[Vec3],
+        raw: &[RawTriangle],
+        crease_rad: f64,
+    ) -> (Self, MeshReport) {
         let mut welded = Welder::new(raw_positions.len());
         let mut corners: Vec<([u32; 3], &RawTriangle)> = Vec::with_capacity(raw.len());
         for triangle in raw {
-            let indices = triangle.vertices.map(|vertex| welded.index(raw_positions, vertex));
+            let indices = triangle
+                .vertices
+                .map(|vertex| welded.index(raw_positions, vertex));
             corners.push((indices, triangle));
         }
         let merged_vertices = welded.used - welded.positions.len();
@@ -65,8 +71,12 @@ impl Mesh {
         corners.retain(|([a, b, c], _)| a != b && b != c && c != a);
         let with_needles = open_edge_count(corners.iter().map(|(indices, _)| *indices));
         let has_area = |indices: &[u32; 3]| face_normal(&positions, *indices) != DVec3::ZERO;
-        let without_needles =
-            open_edge_count(corners.iter().map(|(indices, _)| *indices).filter(|indices| has_area(indices)));
+        let without_needles = open_edge_count(
+            corners
+                .iter()
+                .map(|(indices, _)| *indices)
+                .filter(|indices| has_area(indices)),
+        );
         if without_needles <= with_needles {
             corners.retain(|(indices, _)| has_area(indices));
         }
@@ -78,7 +88,8 @@ impl Mesh {
             .zip(made)
             .map(|((_, raw), made)| {
                 std::array::from_fn(|corner| {
-                    let given = raw.normals[corner].map(|normal| normal.as_dvec3().normalize_or_zero());
+                    let given =
+                        raw.normals[corner].map(|normal| normal.as_dvec3().normalize_or_zero());
                     match given {
                         Some(normal) if normal != DVec3::ZERO => normal.as_vec3(),
                         _ => made[corner],
@@ -88,10 +99,24 @@ impl Mesh {
             .collect();
         let triangle_materials = corners.iter().map(|(_, raw)| raw.material).collect();
         let dropped_triangles = raw.len() - triangles.len();
-        let mesh = Self { positions, triangles, corner_normals, triangle_materials }.without_unused_positions();
+        let mesh = Self {
+            positions,
+            triangles,
+            corner_normals,
+            triangle_materials,
+        }
+        .without_unused_positions();
         let open_edges = mesh.open_edge_count();
         let closed = open_edges == 0 && !mesh.triangles.is_empty();
-        (mesh, MeshReport { merged_vertices, dropped_triangles, open_edges, closed })
+        (
+            mesh,
+            MeshReport {
+                merged_vertices,
+                dropped_triangles,
+                open_edges,
+                closed,
+            },
+        )
     }
 
     /// Edges that are not passed as often one way as the other; 0 for a mesh that bounds a volume.
@@ -116,8 +141,12 @@ impl Mesh {
 
     /// The mesh with the winding of each triangle turned round; the corners keep their normals.
     pub fn with_winding_reversed(mut self) -> Self {
-        self.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
-        self.corner_normals.iter_mut().for_each(|normals| normals.swap(1, 2));
+        self.triangles
+            .iter_mut()
+            .for_each(|corners| corners.swap(1, 2));
+        self.corner_normals
+            .iter_mut()
+            .for_each(|normals| normals.swap(1, 2));
         self
     }
 
@@ -147,7 +176,12 @@ struct Welder {
 
 impl Welder {
     fn new(raw_count: usize) -> Self {
-        Self { positions: Vec::new(), index_at: HashMap::new(), index_of_raw: vec![None; raw_count], used: 0 }
+        Self {
+            positions: Vec::new(),
+            index_at: HashMap::new(),
+            index_of_raw: vec![None; raw_count],
+            used: 0,
+        }
     }
 
     fn index(&mut self, raw_positions: &[Vec3], raw: u32) -> u32 {
@@ -158,7 +192,10 @@ impl Welder {
         // Adding 0 makes 0 of -0, which is the same place.
         let position = raw_positions[raw as usize] + Vec3::ZERO;
         let next = self.positions.len() as u32;
-        let index = *self.index_at.entry(position.to_array().map(f32::to_bits)).or_insert(next);
+        let index = *self
+            .index_at
+            .entry(position.to_array().map(f32::to_bits))
+            .or_insert(next);
         if index == next {
             self.positions.push(position);
         }
@@ -172,7 +209,8 @@ fn open_edge_count(triangles: impl Iterator<Item = [u32; 3]>) -> usize {
     let mut balance: HashMap<(u32, u32), i64> = HashMap::new();
     for [a, b, c] in triangles {
         for (from, to) in [(a, b), (b, c), (c, a)] {
-            *balance.entry((from.min(to), from.max(to))).or_default() += if from < to { 1 } else { -1 };
+            *balance.entry((from.min(to), from.max(to))).or_default() +=
+                if from < to { 1 } else { -1 };
         }
     }
     balance.values().filter(|&&passes| passes != 0).count()
@@ -183,15 +221,28 @@ mod tests {
     use super::*;
 
     fn raw(vertices: [u32; 3]) -> RawTriangle {
-        RawTriangle { vertices, normals: [None; 3], material: 0 }
+        RawTriangle {
+            vertices,
+            normals: [None; 3],
+            material: 0,
+        }
     }
 
     /// A tetrahedron whose triangles share no vertex.
     fn loose_tetrahedron() -> (Vec<Vec3>, Vec<RawTriangle>) {
         let corners = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
         let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
-        let positions = faces.iter().flatten().map(|&corner| corners[corner as usize]).collect();
-        (positions, (0..4).map(|face| raw([3 * face, 3 * face + 1, 3 * face + 2])).collect())
+        let positions = faces
+            .iter()
+            .flatten()
+            .map(|&corner| corners[corner as usize])
+            .collect();
+        (
+            positions,
+            (0..4)
+                .map(|face| raw([3 * face, 3 * face + 1, 3 * face + 2]))
+                .collect(),
+        )
     }
 
     #[test]
@@ -199,7 +250,15 @@ mod tests {
         let (mut positions, triangles) = loose_tetrahedron();
         positions[0] = Vec3::new(-0.0, 0.0, -0.0);
         let (mesh, report) = Mesh::weld(&positions, &triangles, 0.0);
-        assert_eq!(report, MeshReport { merged_vertices: 8, dropped_triangles: 0, open_edges: 0, closed: true });
+        assert_eq!(
+            report,
+            MeshReport {
+                merged_vertices: 8,
+                dropped_triangles: 0,
+                open_edges: 0,
+                closed: true
+            }
+        );
         assert_eq!(mesh.positions.len(), 4);
         assert!(mesh.closed_and_consistent());
         assert!((mesh.signed_volume_m3() - 1.0 / 6.0).abs() < 1e-12);
@@ -213,7 +272,14 @@ mod tests {
         let (positions, mut triangles) = loose_tetrahedron();
         triangles[3].vertices.swap(0, 1);
         let (mesh, report) = Mesh::weld(&positions, &triangles, 0.0);
-        assert_eq!((report.open_edges, report.closed, mesh.closed_and_consistent()), (3, false, false));
+        assert_eq!(
+            (
+                report.open_edges,
+                report.closed,
+                mesh.closed_and_consistent()
+            ),
+            (3, false, false)
+        );
         triangles.pop();
         assert_eq!(Mesh::weld(&positions, &triangles, 0.0).1.open_edges, 3);
         assert!(!Mesh::default().closed_and_consistent());
@@ -224,7 +290,14 @@ mod tests {
         let (mut positions, mut triangles) = loose_tetrahedron();
         triangles.push(raw([0, 0, 1]));
         let (mesh, report) = Mesh::weld(&positions, &triangles, 0.0);
-        assert_eq!((mesh.triangles.len(), report.dropped_triangles, report.closed), (4, 1, true));
+        assert_eq!(
+            (
+                mesh.triangles.len(),
+                report.dropped_triangles,
+                report.closed
+            ),
+            (4, 1, true)
+        );
 
         // The edge from (1,0,0) to (0,1,0) of the last face gets a vertex in its middle, and a needle fills the gap.
         positions.push(Vec3::new(0.5, 0.5, 0.0));
@@ -235,12 +308,26 @@ mod tests {
         triangles[4].vertices = [12, y, z];
         triangles.push(raw([x, y, 12]));
         let (mesh, report) = Mesh::weld(&positions, &triangles, 0.0);
-        assert_eq!((mesh.triangles.len(), report.dropped_triangles, report.closed), (6, 0, true));
+        assert_eq!(
+            (
+                mesh.triangles.len(),
+                report.dropped_triangles,
+                report.closed
+            ),
+            (6, 0, true)
+        );
 
         // By itself it joins nothing.
         let line = [Vec3::ZERO, Vec3::X, Vec3::X * 2.0];
         let (mesh, report) = Mesh::weld(&line, &[raw([0, 1, 2])], 0.0);
-        assert_eq!((mesh.positions.len(), mesh.triangles.len(), report.dropped_triangles), (0, 0, 1));
+        assert_eq!(
+            (
+                mesh.positions.len(),
+                mesh.triangles.len(),
+                report.dropped_triangles
+            ),
+            (0, 0, 1)
+        );
         assert!(!report.closed);
     }
 
@@ -248,8 +335,15 @@ mod tests {
     fn given_normals_are_made_unit_and_zero_ones_are_replaced() {
         let positions = [Vec3::ZERO, Vec3::X, Vec3::Y];
         let normals = [Some(Vec3::new(0.0, 3.0, 4.0)), Some(Vec3::ZERO), None];
-        let triangle = RawTriangle { vertices: [0, 1, 2], normals, material: 0 };
+        let triangle = RawTriangle {
+            vertices: [0, 1, 2],
+            normals,
+            material: 0,
+        };
         let (mesh, _) = Mesh::weld(&positions, &[triangle], 0.0);
-        assert_eq!(mesh.corner_normals[0], [Vec3::new(0.0, 0.6, 0.8), Vec3::Z, Vec3::Z]);
+        assert_eq!(
+            mesh.corner_normals[0],
+            [Vec3::new(0.0, 0.6, 0.8), Vec3::Z, Vec3::Z]
+        );
     }
 }

@@ -12,18 +12,29 @@ pub fn face_normal(positions: &[Vec3], [a, b, c]: [u32; 3]) -> DVec3 {
     let [a, b, c] = [a, b, c].map(|index| positions[index as usize].as_dvec3());
     let (ab, ac, bc) = (b - a, c - a, c - b);
     let cross = ab.cross(ac);
-    let longest_squared = ab.length_squared().max(ac.length_squared()).max(bc.length_squared());
-    if cross.length() <= NEEDLE * longest_squared { DVec3::ZERO } else { cross.normalize_or_zero() }
+    let longest_squared = ab
+        .length_squared()
+        .max(ac.length_squared())
+        .max(bc.length_squared());
+    if cross.length() <= NEEDLE * longest_squared {
+        DVec3::ZERO
+    } else {
+        cross.normalize_or_zero()
+    }
 }
 
 /// A unit normal for each corner: the mean over the faces around its vertex whose normals lie within `crease_rad` of
 /// its own face's, weighted by their angles there (Thürmer & Wüthrich 1998). 0 gives the face's own normal.
 pub fn made_normals(positions: &[Vec3], triangles: &[[u32; 3]], crease_rad: f64) -> Vec<[Vec3; 3]> {
-    let faces: Vec<DVec3> = triangles.iter().map(|&corners| face_normal(positions, corners)).collect();
+    let faces: Vec<DVec3> = triangles
+        .iter()
+        .map(|&corners| face_normal(positions, corners))
+        .collect();
     let mut weighted_at: Vec<Vec<(DVec3, f64)>> = vec![Vec::new(); positions.len()];
     for (&corners, &normal) in triangles.iter().zip(&faces) {
         for corner in 0..3 {
-            weighted_at[corners[corner] as usize].push((normal, corner_angle_rad(positions, corners, corner)));
+            weighted_at[corners[corner] as usize]
+                .push((normal, corner_angle_rad(positions, corners, corner)));
         }
     }
     let least_cosine = crease_rad.cos() - CREASE_SLACK;
@@ -47,7 +58,11 @@ pub fn made_normals(positions: &[Vec3], triangles: &[[u32; 3]], crease_rad: f64)
                     _ if crease_rad == 0.0 => own,
                     _ => mean(&|normal| normal.dot(own) >= least_cosine),
                 };
-                [made, own, DVec3::Z].into_iter().find(|normal| *normal != DVec3::ZERO).unwrap_or(DVec3::Z).as_vec3()
+                [made, own, DVec3::Z]
+                    .into_iter()
+                    .find(|normal| *normal != DVec3::ZERO)
+                    .unwrap_or(DVec3::Z)
+                    .as_vec3()
             })
         })
         .collect()
@@ -56,7 +71,10 @@ pub fn made_normals(positions: &[Vec3], triangles: &[[u32; 3]], crease_rad: f64)
 fn corner_angle_rad(positions: &[Vec3], corners: [u32; 3], corner: usize) -> f64 {
     let at = |offset: usize| positions[corners[(corner + offset) % 3] as usize].as_dvec3();
     let (towards_next, towards_last) = (at(1) - at(0), at(2) - at(0));
-    towards_next.cross(towards_last).length().atan2(towards_next.dot(towards_last))
+    towards_next
+        .cross(towards_last)
+        .length()
+        .atan2(towards_next.dot(towards_last))
 }
 
 #[cfg(test)]
@@ -66,10 +84,27 @@ mod tests {
     /// A cube of side 2 about the origin.
     fn cube() -> (Vec<Vec3>, Vec<[u32; 3]>) {
         let positions = (0..8)
-            .map(|bits| Vec3::from_array(std::array::from_fn(|axis| if bits >> axis & 1 == 1 { 1.0 } else { -1.0 })))
+            .map(|bits| {
+                Vec3::from_array(std::array::from_fn(|axis| {
+                    if bits >> axis & 1 == 1 { 1.0 } else { -1.0 }
+                }))
+            })
             .collect();
-        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        (positions, quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
+        let quads = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        (
+            positions,
+            quads
+                .iter()
+                .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+                .collect(),
+        )
     }
 
     #[test]
@@ -79,7 +114,10 @@ mod tests {
             let normals = made_normals(&positions, &triangles, crease_deg.to_radians());
             for (corners, normals) in triangles.iter().zip(normals) {
                 let flat = face_normal(&positions, *corners).as_vec3();
-                assert!(normals.iter().all(|normal| (normal - flat).length() < 1e-6), "{crease_deg}");
+                assert!(
+                    normals.iter().all(|normal| (normal - flat).length() < 1e-6),
+                    "{crease_deg}"
+                );
             }
         }
     }
@@ -103,7 +141,11 @@ mod tests {
             let polar = std::f32::consts::PI * ring as f32 / rings as f32;
             positions.extend((0..sectors).map(|sector| {
                 let azimuth = std::f32::consts::TAU * sector as f32 / sectors as f32;
-                Vec3::new(polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin(), polar.cos())
+                Vec3::new(
+                    polar.sin() * azimuth.cos(),
+                    polar.sin() * azimuth.sin(),
+                    polar.cos(),
+                )
             }));
         }
         positions.push(-Vec3::Z);
@@ -113,18 +155,31 @@ mod tests {
             _ => 1 + (ring - 1) * sectors + sector % sectors,
         };
         let mut triangles = Vec::new();
-        for (ring, sector) in (0..rings).flat_map(|ring| (0..sectors).map(move |sector| (ring, sector))) {
+        for (ring, sector) in
+            (0..rings).flat_map(|ring| (0..sectors).map(move |sector| (ring, sector)))
+        {
             if ring + 1 < rings {
-                triangles.push([at(ring, sector), at(ring + 1, sector), at(ring + 1, sector + 1)]);
+                triangles.push([
+                    at(ring, sector),
+                    at(ring + 1, sector),
+                    at(ring + 1, sector + 1),
+                ]);
             }
             if ring > 0 {
-                triangles.push([at(ring, sector), at(ring + 1, sector + 1), at(ring, sector + 1)]);
+                triangles.push([
+                    at(ring, sector),
+                    at(ring + 1, sector + 1),
+                    at(ring, sector + 1),
+                ]);
             }
         }
         let normals = made_normals(&positions, &triangles, 30.0_f64.to_radians());
         for (corners, normals) in triangles.iter().zip(normals) {
             for (&corner, normal) in corners.iter().zip(normals) {
-                assert!(normal.angle_between(positions[corner as usize]) < 0.01, "{normal}");
+                assert!(
+                    normal.angle_between(positions[corner as usize]) < 0.01,
+                    "{normal}"
+                );
             }
         }
     }

@@ -16,7 +16,11 @@ pub const ANGLE: Numbers = Numbers::between(-1e6, 1e6, "degrees");
 
 /// The anchors, boards first.
 pub fn anchors(root: &Table, detector: DetectorKind) -> Result<Vec<Anchor>, SceneError> {
-    let mut reader = AnchorReader { detector, name_lines: HashMap::new(), owners: HashMap::new() };
+    let mut reader = AnchorReader {
+        detector,
+        name_lines: HashMap::new(),
+        owners: HashMap::new(),
+    };
     let mut anchors = Vec::new();
     for board in root.tables("board", &["name", "family", "markers"])? {
         anchors.push(reader.board(&board)?);
@@ -66,7 +70,16 @@ impl AnchorReader {
         let family = self.family(marker)?;
         let id = self.id(marker, family, &name)?;
         let size_m = size(marker)?;
-        Ok(Anchor { name, markers: vec![Marker { family, id, size_m, center_m: DVec2::ZERO, rotation_rad: 0.0 }] })
+        Ok(Anchor {
+            name,
+            markers: vec![Marker {
+                family,
+                id,
+                size_m,
+                center_m: DVec2::ZERO,
+                rotation_rad: 0.0,
+            }],
+        })
     }
 
     fn name(&mut self, table: &Table) -> Result<String, SceneError> {
@@ -74,13 +87,21 @@ impl AnchorReader {
     }
 
     fn family(&self, table: &Table) -> Result<Family, SceneError> {
-        let Some(value) = table.optional("family") else { return Ok(Family::Tag36h11) };
+        let Some(value) = table.optional("family") else {
+            return Ok(Family::Tag36h11);
+        };
         let written = value.text()?;
-        let family = Family::from_name(written)
-            .ok_or_else(|| value.error(format!("unknown family{}", suggestion(written, &Family::all_names()))))?;
+        let family = Family::from_name(written).ok_or_else(|| {
+            value.error(format!(
+                "unknown family{}",
+                suggestion(written, &Family::all_names())
+            ))
+        })?;
         let aruco = matches!(family, Family::Aruco { .. } | Family::ArucoOriginal);
         if aruco && self.detector == DetectorKind::AprilTag {
-            return Err(value.error("libapriltag does not know this family; set tracking.detector = \"aruco\" for it"));
+            return Err(value.error(
+                "libapriltag does not know this family; set tracking.detector = \"aruco\" for it",
+            ));
         }
         Ok(family)
     }
@@ -103,15 +124,25 @@ impl AnchorReader {
 }
 
 /// A name that no other of its kind has.
-pub fn unique_name(table: &Table, lines: &mut HashMap<String, usize>) -> Result<String, SceneError> {
+pub fn unique_name(
+    table: &Table,
+    lines: &mut HashMap<String, usize>,
+) -> Result<String, SceneError> {
     let value: Value = table.required("name", "a name in quotes is expected")?;
     let name = value.name()?;
     match lines.insert(name.clone(), value.line()) {
-        Some(line) => Err(value.error(format!("the name is taken on line {line}; allowed: each name once"))),
+        Some(line) => Err(value.error(format!(
+            "the name is taken on line {line}; allowed: each name once"
+        ))),
         None => Ok(name),
     }
 }
 
 fn size(table: &Table) -> Result<f64, SceneError> {
-    table.required("size_m", "the side of the black square in metres is expected")?.number(&SIZE)
+    table
+        .required(
+            "size_m",
+            "the side of the black square in metres is expected",
+        )?
+        .number(&SIZE)
 }

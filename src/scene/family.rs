@@ -10,7 +10,10 @@ pub enum Family {
     Tag36h10,
     Tag36h11,
     /// OpenCV's `DICT_NxN_M`: N cells a side, M markers (50, 100, 250 or 1000).
-    Aruco { cells: u8, count: u16 },
+    Aruco {
+        cells: u8,
+        count: u16,
+    },
     ArucoOriginal,
 }
 
@@ -22,20 +25,36 @@ static NAMED: LazyLock<Vec<(String, Family)>> = LazyLock::new(|| {
         ("tag36h11", Family::Tag36h11),
     ];
     let aruco = (4..=7_u8).flat_map(|cells| {
-        [50, 100, 250, 1000].map(|count| (format!("DICT_{cells}X{cells}_{count}"), Family::Aruco { cells, count }))
+        [50, 100, 250, 1000].map(|count| {
+            (
+                format!("DICT_{cells}X{cells}_{count}"),
+                Family::Aruco { cells, count },
+            )
+        })
     });
     let original = ("DICT_ARUCO_ORIGINAL".to_owned(), Family::ArucoOriginal);
-    tags.map(|(name, family)| (name.to_owned(), family)).into_iter().chain(aruco).chain([original]).collect()
+    tags.map(|(name, family)| (name.to_owned(), family))
+        .into_iter()
+        .chain(aruco)
+        .chain([original])
+        .collect()
 });
 
 impl Family {
     /// The family of this name; AprilTag's names are its library's, ArUco's are OpenCV's.
     pub fn from_name(name: &str) -> Option<Self> {
-        NAMED.iter().find(|(known, _)| known == name).map(|(_, family)| *family)
+        NAMED
+            .iter()
+            .find(|(known, _)| known == name)
+            .map(|(_, family)| *family)
     }
 
+    /// The name that [`Family::from_name`] takes.
     pub fn name(self) -> &'static str {
-        NAMED.iter().find(|(_, known)| *known == self).map_or("unknown", |(name, _)| name)
+        NAMED
+            .iter()
+            .find(|(_, known)| *known == self)
+            .map_or("unknown", |(name, _)| name)
     }
 
     /// All names, AprilTag's first.
@@ -67,6 +86,9 @@ mod tests {
             assert_eq!(Family::from_name(name).map(Family::name), Some(name));
         }
         assert_eq!(Family::from_name("tag36h12"), None);
-        assert_eq!(Family::from_name("DICT_5X5_250").map(Family::id_count), Some(250));
+        assert_eq!(
+            Family::from_name("DICT_5X5_250").map(Family::id_count),
+            Some(250)
+        );
     }
 }

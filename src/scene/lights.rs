@@ -19,9 +19,14 @@ enum Kind {
 }
 
 pub fn lights(root: &Table) -> Result<Vec<Light>, SceneError> {
-    let tables = root.tables("light", &["kind", "position_m", "intensity", "direction", "irradiance"])?;
+    let tables = root.tables(
+        "light",
+        &["kind", "position_m", "intensity", "direction", "irradiance"],
+    )?;
     if let Some(extra) = tables.get(MOST_LIGHTS) {
-        return Err(extra.error(format!("light: too many; allowed: up to {MOST_LIGHTS} lights")));
+        return Err(extra.error(format!(
+            "light: too many; allowed: up to {MOST_LIGHTS} lights"
+        )));
     }
     tables.iter().map(light).collect()
 }
@@ -33,7 +38,10 @@ fn light(table: &Table) -> Result<Light, SceneError> {
         Kind::Point => {
             table.allow(&["kind", "position_m", "intensity"])?;
             let position = table.required("position_m", "three numbers in metres are expected")?;
-            let intensity = table.required("intensity", "a number or three (W/sr, linear RGB) are expected")?;
+            let intensity = table.required(
+                "intensity",
+                "a number or three (W/sr, linear RGB) are expected",
+            )?;
             Ok(Light::Point {
                 position_m: DVec3::from_array(position.numbers(&POSITION)?),
                 intensity: intensity.splat_or_vector(&POWER)?,
@@ -43,20 +51,31 @@ fn light(table: &Table) -> Result<Light, SceneError> {
             table.allow(&["kind", "direction", "irradiance"])?;
             let what = "three numbers are expected: the way that the light travels";
             let direction = table.required("direction", what)?;
-            let written = DVec3::from_array(direction.numbers(&Numbers::between(f64::MIN, f64::MAX, ""))?);
+            let written =
+                DVec3::from_array(direction.numbers(&Numbers::between(f64::MIN, f64::MAX, ""))?);
             // Scaled first, so that neither tiny nor huge numbers vanish in the squares.
             let unit = (written / written.abs().max_element()).normalize_or_zero();
             if unit == DVec3::ZERO {
                 return Err(direction.error("no direction; allowed: any length but zero"));
             }
-            let irradiance = table.required("irradiance", "a number or three (W/m², linear RGB) are expected")?;
-            Ok(Light::Directional { direction: unit, irradiance: irradiance.splat_or_vector(&POWER)? })
+            let irradiance = table.required(
+                "irradiance",
+                "a number or three (W/m², linear RGB) are expected",
+            )?;
+            Ok(Light::Directional {
+                direction: unit,
+                irradiance: irradiance.splat_or_vector(&POWER)?,
+            })
         }
     }
 }
 
 /// The radiance of the constant surrounding light; none where the scene has no `[ambient]`.
 pub fn ambient_radiance(root: &Table) -> Result<DVec3, SceneError> {
-    let Some(ambient) = root.table("ambient", &["radiance"])? else { return Ok(DVec3::ZERO) };
-    ambient.optional("radiance").map_or(Ok(DVec3::ZERO), |value| value.splat_or_vector(&POWER))
+    let Some(ambient) = root.table("ambient", &["radiance"])? else {
+        return Ok(DVec3::ZERO);
+    };
+    ambient
+        .optional("radiance")
+        .map_or(Ok(DVec3::ZERO), |value| value.splat_or_vector(&POWER))
 }

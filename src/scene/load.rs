@@ -9,21 +9,29 @@ use super::reader::{Document, Table};
 use super::{Scene, anchors, lights, objects, settings};
 
 /// What may stand at the outermost level; `probe` is known and refused with its reason.
-const TABLES: [&str; 11] =
-    ["camera", "tracking", "board", "marker", "phantom", "virtual", "light", "ambient", "table", "shadows", "probe"];
+const TABLES: [&str; 11] = [
+    "camera", "tracking", "board", "marker", "phantom", "virtual", "light", "ambient", "table",
+    "shadows", "probe",
+];
 
 impl Scene {
     /// Reads a scene file and the meshes that it names. Relative paths in it start at its own folder, or else at that
     /// one's parent.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
-        let bytes = std::fs::read(path)
-            .map_err(|error| SceneError::of_file(path, format!("the scene cannot be read: {error}")))?;
+        let bytes = std::fs::read(path).map_err(|error| {
+            SceneError::of_file(path, format!("the scene cannot be read: {error}"))
+        })?;
         let text = match String::from_utf8(bytes) {
             Ok(text) => text,
             Err(error) => {
                 let valid = error.utf8_error().valid_up_to();
                 let text = String::from_utf8_lossy(error.as_bytes());
-                return Err(SceneError::at(path, &text, valid..valid + 1, "not UTF-8 text, which TOML has to be"));
+                return Err(SceneError::at(
+                    path,
+                    &text,
+                    valid..valid + 1,
+                    "not UTF-8 text, which TOML has to be",
+                ));
             }
         };
         Self::parse(path, &text)
@@ -44,6 +52,15 @@ impl Scene {
         let lights = lights::lights(&root)?;
         let ambient_radiance = lights::ambient_radiance(&root)?;
         let (phantoms, virtuals) = objects::objects(&root, &anchors)?;
-        Ok(Self { camera, tracking, anchors, phantoms, virtuals, lights, ambient_radiance, shadows })
+        Ok(Self {
+            camera,
+            tracking,
+            anchors,
+            phantoms,
+            virtuals,
+            lights,
+            ambient_radiance,
+            shadows,
+        })
     }
 }

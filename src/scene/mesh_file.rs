@@ -37,7 +37,8 @@ const LEAST_ROUGHNESS: f64 = 0.01;
 /// Reads the mesh that a scene's value names.
 pub fn load(value: &Value, normals: Normals) -> Result<LoadedMesh, SceneError> {
     let path = value.existing_path()?;
-    let bytes = std::fs::read(&path).map_err(|error| value.error(format!("the mesh cannot be read: {error}")))?;
+    let bytes = std::fs::read(&path)
+        .map_err(|error| value.error(format!("the mesh cannot be read: {error}")))?;
     // Only names and comments may be in another encoding, and nothing depends on them.
     read(&path, &String::from_utf8_lossy(&bytes), normals).map_err(|mut error| {
         error.message += &format!(" (a mesh of {})", value.location());
@@ -48,17 +49,28 @@ pub fn load(value: &Value, normals: Normals) -> Result<LoadedMesh, SceneError> {
 fn read(path: &Path, text: &str, normals: Normals) -> Result<LoadedMesh, SceneError> {
     let misread = |ScanError { span, message }| SceneError::at(path, text, span, message);
     if text.trim().is_empty() {
-        return Err(SceneError::of_file(path, "the file is empty; an OBJ mesh is expected"));
+        return Err(SceneError::of_file(
+            path,
+            "the file is empty; an OBJ mesh is expected",
+        ));
     }
     let scanned = scan_obj(text).map_err(misread)?;
     if scanned.corner_has_normal.is_empty() {
-        return Err(SceneError::of_file(path, "no faces; an OBJ mesh with f records is expected"));
+        return Err(SceneError::of_file(
+            path,
+            "no faces; an OBJ mesh with f records is expected",
+        ));
     }
     let (models, mtl_materials) = read_with_tobj(path, &scanned)?;
 
     let mut builder = Builder::default();
     for model in &models {
-        builder.add(&model.mesh, &scanned.corner_has_normal, &mtl_materials, normals);
+        builder.add(
+            &model.mesh,
+            &scanned.corner_has_normal,
+            &mtl_materials,
+            normals,
+        );
     }
     let crease_rad = match normals {
         Normals::Flat => 0.0,
@@ -66,14 +78,28 @@ fn read(path: &Path, text: &str, normals: Normals) -> Result<LoadedMesh, SceneEr
     };
     let (mesh, report) = Mesh::weld(&builder.positions, &builder.triangles, crease_rad);
     if mesh.triangles.is_empty() {
-        return Err(SceneError::of_file(path, "no triangle has an area; an OBJ mesh is expected"));
+        return Err(SceneError::of_file(
+            path,
+            "no triangle has an area; an OBJ mesh is expected",
+        ));
     }
-    Ok(LoadedMesh { mesh, report, materials: builder.materials })
+    Ok(LoadedMesh {
+        mesh,
+        report,
+        materials: builder.materials,
+    })
 }
 
-fn read_with_tobj(path: &Path, scanned: &ScannedObj) -> Result<(Vec<tobj::Model>, Vec<tobj::Material>), SceneError> {
-    let options =
-        tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
+fn read_with_tobj(
+    path: &Path,
+    scanned: &ScannedObj,
+) -> Result<(Vec<tobj::Model>, Vec<tobj::Material>), SceneError> {
+    let options = tobj::LoadOptions {
+        triangulate: true,
+        ignore_points: true,
+        ignore_lines: true,
+        ..Default::default()
+    };
     let mtl_error = RefCell::new(None);
     let load_mtl = |name: &Path| {
         let mtl_path = path.parent().unwrap_or(Path::new("")).join(name);
@@ -89,8 +115,10 @@ fn read_with_tobj(path: &Path, scanned: &ScannedObj) -> Result<(Vec<tobj::Model>
     if let Some(error) = mtl_error.into_inner() {
         return Err(error);
     }
-    let (models, materials) = loaded.map_err(|error| SceneError::of_file(path, format!("not a mesh: {error}")))?;
-    let materials = materials.map_err(|error| SceneError::of_file(path, format!("a material file of it: {error}")))?;
+    let (models, materials) =
+        loaded.map_err(|error| SceneError::of_file(path, format!("not a mesh: {error}")))?;
+    let materials = materials
+        .map_err(|error| SceneError::of_file(path, format!("a material file of it: {error}")))?;
     Ok((models, materials))
 }
 
@@ -99,7 +127,12 @@ fn checked_mtl(path: &PathBuf) -> Result<String, SceneError> {
     let bytes = match std::fs::read(path) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(String::new()),
-        Err(error) => return Err(SceneError::of_file(path, format!("the material file cannot be read: {error}"))),
+        Err(error) => {
+            return Err(SceneError::of_file(
+                path,
+                format!("the material file cannot be read: {error}"),
+            ));
+        }
     };
     let text = String::from_utf8_lossy(&bytes).into_owned();
     match scan_mtl(&text) {
@@ -131,15 +164,21 @@ impl Builder {
         }
         let material = self.material(mesh.material_id, mtl_materials);
         let first = self.positions.len() as u32;
-        self.positions.extend(mesh.positions.chunks_exact(3).map(Vec3::from_slice));
+        self.positions
+            .extend(mesh.positions.chunks_exact(3).map(Vec3::from_slice));
         for (number, corners) in mesh.indices.chunks_exact(3).enumerate() {
-            let has_normal = corner_has_normal.get(self.triangles.len()).copied().unwrap_or_default();
+            let has_normal = corner_has_normal
+                .get(self.triangles.len())
+                .copied()
+                .unwrap_or_default();
             let given = |corner: usize| {
                 if normals == Normals::Flat || !has_normal[corner] {
                     return None;
                 }
                 let index = *mesh.normal_indices.get(3 * number + corner)? as usize;
-                mesh.normals.get(3 * index..3 * index + 3).map(Vec3::from_slice)
+                mesh.normals
+                    .get(3 * index..3 * index + 3)
+                    .map(Vec3::from_slice)
             };
             self.triangles.push(RawTriangle {
                 vertices: [corners[0], corners[1], corners[2]].map(|corner| first + corner),
@@ -153,7 +192,8 @@ impl Builder {
         let known = self.material_ids.iter().position(|known| *known == id);
         let index = known.unwrap_or_else(|| {
             self.material_ids.push(id);
-            self.materials.push(material(id.and_then(|id| mtl_materials.get(id))));
+            self.materials
+                .push(material(id.and_then(|id| mtl_materials.get(id))));
             self.materials.len() - 1
         });
         index as u32
@@ -163,11 +203,21 @@ impl Builder {
 /// The material that an MTL file describes. Its gloss comes from `Pr` (squared, as is usual) or else from `Ns`, unless
 /// `Ks` is black: roughness² = 2 / (Ns + 2), which gives Blinn's lobe and GGX's the same width.
 fn material(mtl: Option<&tobj::Material>) -> Material {
-    let albedo = mtl.and_then(|mtl| mtl.diffuse).map(|kd| DVec3::from_array(kd.map(f64::from)));
+    let albedo = mtl
+        .and_then(|mtl| mtl.diffuse)
+        .map(|kd| DVec3::from_array(kd.map(f64::from)));
     let roughness = mtl.and_then(|mtl| {
-        let pr = mtl.unknown_param.get("Pr").and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
-        let shiny = mtl.specular.is_none_or(|ks| ks.iter().any(|&channel| channel > 0.0));
-        let ns = mtl.shininess.filter(|_| shiny).map(|ns| (2.0 / (f64::from(ns) + 2.0)).sqrt());
+        let pr = mtl
+            .unknown_param
+            .get("Pr")
+            .and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
+        let shiny = mtl
+            .specular
+            .is_none_or(|ks| ks.iter().any(|&channel| channel > 0.0));
+        let ns = mtl
+            .shininess
+            .filter(|_| shiny)
+            .map(|ns| (2.0 / (f64::from(ns) + 2.0)).sqrt());
         pr.map(|pr| pr * pr).or(ns)
     });
     Material {
@@ -183,16 +233,28 @@ mod tests {
     const SMOOTH: Normals = Normals::GivenOrMade { crease_rad: 0.5 };
 
     fn failure(text: &str) -> String {
-        read(Path::new("bad.obj"), text, SMOOTH).unwrap_err().to_string()
+        read(Path::new("bad.obj"), text, SMOOTH)
+            .unwrap_err()
+            .to_string()
     }
 
     #[test]
     fn normals_come_from_the_file_where_it_has_them() {
-        let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvn 0 3 4\nvn 0 0 0\nf 1//1 2//2 3\nf 2 4 3//-2\n";
+        let text =
+            "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvn 0 3 4\nvn 0 0 0\nf 1//1 2//2 3\nf 2 4 3//-2\n";
         let loaded = read(Path::new("a.obj"), text, SMOOTH).unwrap();
         let given = Vec3::new(0.0, 0.6, 0.8);
-        assert_eq!(loaded.mesh.corner_normals, [[given, Vec3::Z, Vec3::Z], [Vec3::Z, Vec3::Z, given]]);
-        assert_eq!(loaded.materials, [Material { albedo: DVec3::splat(0.5), roughness: None }]);
+        assert_eq!(
+            loaded.mesh.corner_normals,
+            [[given, Vec3::Z, Vec3::Z], [Vec3::Z, Vec3::Z, given]]
+        );
+        assert_eq!(
+            loaded.materials,
+            [Material {
+                albedo: DVec3::splat(0.5),
+                roughness: None
+            }]
+        );
         let flat = read(Path::new("a.obj"), text, Normals::Flat).unwrap();
         assert_eq!(flat.mesh.corner_normals, [[Vec3::Z; 3]; 2]);
     }
@@ -200,14 +262,29 @@ mod tests {
     #[test]
     fn groups_and_loose_quads_weld_into_a_closed_box() {
         let mut text = String::new();
-        for [a, b, c, d] in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]] {
+        for [a, b, c, d] in [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ] {
             for corner in [a, b, c, d] {
                 text += &format!("v {} {} {}\n", corner & 1, corner >> 1 & 1, corner >> 2);
             }
             text += "g side\nf -4 -3 -2 -1\n";
         }
         let loaded = read(Path::new("box.obj"), &text, SMOOTH).unwrap();
-        assert_eq!(loaded.report, MeshReport { merged_vertices: 16, dropped_triangles: 0, open_edges: 0, closed: true });
+        assert_eq!(
+            loaded.report,
+            MeshReport {
+                merged_vertices: 16,
+                dropped_triangles: 0,
+                open_edges: 0,
+                closed: true
+            }
+        );
         assert!((loaded.mesh.signed_volume_m3() - 1.0).abs() < 1e-12);
     }
 
@@ -216,7 +293,10 @@ mod tests {
         assert!(failure(" \n").contains("bad.obj: the file is empty"));
         assert!(failure("v 0 0 0\n").contains("bad.obj: no faces"));
         assert!(failure("v 0 0 0\nf 1 1 1\n").contains("no triangle has an area"));
-        assert!(failure("v 0 0 0\nv 1 0 0\nv 0 NaN 0\nf 1 2 3\n").starts_with("bad.obj:3:5: v: NaN is not a finite number"));
+        assert!(
+            failure("v 0 0 0\nv 1 0 0\nv 0 NaN 0\nf 1 2 3\n")
+                .starts_with("bad.obj:3:5: v: NaN is not a finite number")
+        );
     }
 
     #[test]
@@ -225,18 +305,38 @@ mod tests {
         let path = folder.path().join("a.obj");
         let mtl = folder.path().join("a.mtl");
         let text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl matt\nf 1 2 3\nusemtl shiny\nf 1 3 2\nusemtl none\nf 1 2 3\n";
-        let plain = Material { albedo: DVec3::splat(0.5), roughness: None };
-        assert_eq!(read(&path, text, SMOOTH).unwrap().materials, [plain], "a missing file is no mistake");
+        let plain = Material {
+            albedo: DVec3::splat(0.5),
+            roughness: None,
+        };
+        assert_eq!(
+            read(&path, text, SMOOTH).unwrap().materials,
+            [plain],
+            "a missing file is no mistake"
+        );
 
-        std::fs::write(&mtl, "newmtl matt\nKd .25 .5 1\nKs 0 0 0\nNs 96\nnewmtl shiny\nKs 1 1 1\nNs 98\n").unwrap();
+        std::fs::write(
+            &mtl,
+            "newmtl matt\nKd .25 .5 1\nKs 0 0 0\nNs 96\nnewmtl shiny\nKs 1 1 1\nNs 98\n",
+        )
+        .unwrap();
         let loaded = read(&path, text, SMOOTH).unwrap();
         assert_eq!(loaded.mesh.triangle_materials, [0, 1, 2]);
-        assert_eq!(loaded.materials[0], Material { albedo: DVec3::new(0.25, 0.5, 1.0), roughness: None });
+        assert_eq!(
+            loaded.materials[0],
+            Material {
+                albedo: DVec3::new(0.25, 0.5, 1.0),
+                roughness: None
+            }
+        );
         assert!((loaded.materials[1].roughness.unwrap() - 0.02_f64.sqrt()).abs() < 1e-6);
         assert_eq!(loaded.materials[2], plain);
 
         std::fs::write(&mtl, "newmtl matt\nKd .25 .5\n").unwrap();
         let message = read(&path, text, SMOOTH).unwrap_err().to_string();
-        assert!(message.contains("a.mtl:2:1: Kd: 2 numbers; 3 are expected"), "{message}");
+        assert!(
+            message.contains("a.mtl:2:1: Kd: 2 numbers; 3 are expected"),
+            "{message}"
+        );
     }
 }

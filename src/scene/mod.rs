@@ -154,7 +154,11 @@ pub struct ShadowSettings {
 
 impl Default for ShadowSettings {
     fn default() -> Self {
-        Self { technique: Technique::Auto, samples: 4, frame_budget_ms: None }
+        Self {
+            technique: Technique::Auto,
+            samples: 4,
+            frame_budget_ms: None,
+        }
     }
 }
 

@@ -48,49 +48,82 @@ impl<'a> Table<'a> {
         allowed: &[&str],
     ) -> Result<Self, SceneError> {
         // A key that is missing in the whole file has its place at the file's start.
-        let table = Self { document, name: String::new(), span: 0..0, keys: root.get_ref() };
+        let table = Self {
+            document,
+            name: String::new(),
+            span: 0..0,
+            keys: root.get_ref(),
+        };
         table.allow(allowed)?;
         Ok(table)
     }
 
     /// Refuses keys other than these.
     pub fn allow(&self, allowed: &[&str]) -> Result<(), SceneError> {
-        let unknown = self.keys.keys().find(|key| !allowed.contains(&key.get_ref().as_ref()));
+        let unknown = self
+            .keys
+            .keys()
+            .find(|key| !allowed.contains(&key.get_ref().as_ref()));
         let Some(key) = unknown else { return Ok(()) };
         let name = self.name_of(key.get_ref());
-        Err(self.document.error(key.span(), format!("{name}: unknown key{}", suggestion(key.get_ref(), allowed))))
+        Err(self.document.error(
+            key.span(),
+            format!("{name}: unknown key{}", suggestion(key.get_ref(), allowed)),
+        ))
     }
 
     pub fn optional(&self, key: &str) -> Option<Value<'a>> {
         let value = self.keys.get(key)?;
-        Some(Value { document: self.document, name: self.name_of(key), value })
+        Some(Value {
+            document: self.document,
+            name: self.name_of(key),
+            value,
+        })
     }
 
     /// A key that must be there; `what` it is follows "missing".
     pub fn required(&self, key: &str, what: &str) -> Result<Value<'a>, SceneError> {
-        self.optional(key).ok_or_else(|| self.error(format!("{}: missing; {what}", self.name_of(key))))
+        self.optional(key)
+            .ok_or_else(|| self.error(format!("{}: missing; {what}", self.name_of(key))))
     }
 
     /// A table of its own, with these keys.
     pub fn table(&self, key: &str, allowed: &[&str]) -> Result<Option<Table<'a>>, SceneError> {
-        self.optional(key).map(|value| value.table(allowed)).transpose()
+        self.optional(key)
+            .map(|value| value.table(allowed))
+            .transpose()
     }
 
     /// The tables of `[[key]]`, with these keys; none where it is missing.
     pub fn tables(&self, key: &str, allowed: &[&str]) -> Result<Vec<Table<'a>>, SceneError> {
-        let Some(value) = self.optional(key) else { return Ok(Vec::new()) };
+        let Some(value) = self.optional(key) else {
+            return Ok(Vec::new());
+        };
         if value.value.get_ref().is_table() {
-            return Err(value.error_without_value(format!("may occur more than once: write [[{key}]]")));
+            return Err(
+                value.error_without_value(format!("may occur more than once: write [[{key}]]"))
+            );
         }
-        value.array("tables")?.iter().map(|entry| entry.table(allowed)).collect()
+        value
+            .array("tables")?
+            .iter()
+            .map(|entry| entry.table(allowed))
+            .collect()
     }
 
     pub fn number_or(&self, key: &str, default: f64, allowed: &Numbers) -> Result<f64, SceneError> {
-        self.optional(key).map_or(Ok(default), |value| value.number(allowed))
+        self.optional(key)
+            .map_or(Ok(default), |value| value.number(allowed))
     }
 
-    pub fn integer_or(&self, key: &str, default: u32, allowed: RangeInclusive<u32>) -> Result<u32, SceneError> {
-        self.optional(key).map_or(Ok(default), |value| value.integer(allowed))
+    pub fn integer_or(
+        &self,
+        key: &str,
+        default: u32,
+        allowed: RangeInclusive<u32>,
+    ) -> Result<u32, SceneError> {
+        self.optional(key)
+            .map_or(Ok(default), |value| value.integer(allowed))
     }
 
     pub fn flag_or(&self, key: &str, default: bool) -> Result<bool, SceneError> {
@@ -98,8 +131,15 @@ impl<'a> Table<'a> {
     }
 
     /// Three numbers.
-    pub fn vector_or(&self, key: &str, default: DVec3, allowed: &Numbers) -> Result<DVec3, SceneError> {
-        self.optional(key).map_or(Ok(default), |value| value.numbers(allowed).map(DVec3::from_array))
+    pub fn vector_or(
+        &self,
+        key: &str,
+        default: DVec3,
+        allowed: &Numbers,
+    ) -> Result<DVec3, SceneError> {
+        self.optional(key).map_or(Ok(default), |value| {
+            value.numbers(allowed).map(DVec3::from_array)
+        })
     }
 
     /// A mistake of the table as a whole, at its head.
@@ -126,21 +166,38 @@ pub struct Numbers {
 
 impl Numbers {
     pub const fn between(least: f64, most: f64, unit: &'static str) -> Self {
-        Self { least, most, above: false, unit }
+        Self {
+            least,
+            most,
+            above: false,
+            unit,
+        }
     }
 
     pub const fn above(least: f64, most: f64, unit: &'static str) -> Self {
-        Self { least, most, above: true, unit }
+        Self {
+            least,
+            most,
+            above: true,
+            unit,
+        }
     }
 
     fn has(&self, number: f64) -> bool {
-        number <= self.most && if self.above { number > self.least } else { number >= self.least }
+        number <= self.most
+            && if self.above {
+                number > self.least
+            } else {
+                number >= self.least
+            }
     }
 }
 
 impl Display for Numbers {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { least, most, unit, .. } = self;
+        let Self {
+            least, most, unit, ..
+        } = self;
         let space = if unit.is_empty() { "" } else { " " };
         match (self.above, most.is_finite()) {
             (true, true) => write!(f, "above {least}, up to {most}{space}{unit}"),
@@ -154,49 +211,87 @@ impl Display for Numbers {
 impl<'a> Value<'a> {
     /// `name = value: message`, at the value.
     pub fn error(&self, message: impl Display) -> SceneError {
-        let written = self.document.text.get(self.value.span()).unwrap_or_default();
+        let written = self
+            .document
+            .text
+            .get(self.value.span())
+            .unwrap_or_default();
         let mut shown: String = written.chars().take(60).collect();
         if shown.len() < written.len() {
             shown.push('…');
         }
-        self.document.error(self.value.span(), format!("{} = {shown}: {message}", self.name))
+        self.document.error(
+            self.value.span(),
+            format!("{} = {shown}: {message}", self.name),
+        )
     }
 
     /// `name: message`, at the value.
     pub fn error_without_value(&self, message: impl Display) -> SceneError {
-        self.document.error(self.value.span(), format!("{}: {message}", self.name))
+        self.document
+            .error(self.value.span(), format!("{}: {message}", self.name))
     }
 
     /// `file:line:column`.
     pub fn location(&self) -> String {
         let place = Place::of_span(self.document.text, self.value.span());
-        format!("{}:{}:{}", self.document.path.display(), place.line, place.column)
+        format!(
+            "{}:{}:{}",
+            self.document.path.display(),
+            place.line,
+            place.column
+        )
     }
 
     /// The line that the value begins on, from 1.
     pub fn line(&self) -> usize {
-        self.document.text.get(..self.value.span().start).unwrap_or_default().matches('\n').count() + 1
+        self.document
+            .text
+            .get(..self.value.span().start)
+            .unwrap_or_default()
+            .matches('\n')
+            .count()
+            + 1
     }
 
     pub fn table(&self, allowed: &[&str]) -> Result<Table<'a>, SceneError> {
-        let keys = self.value.get_ref().as_table().ok_or_else(|| self.wrong_type("a table"))?;
-        let table = Table { document: self.document, name: self.name.clone(), span: self.value.span(), keys };
+        let keys = self
+            .value
+            .get_ref()
+            .as_table()
+            .ok_or_else(|| self.wrong_type("a table"))?;
+        let table = Table {
+            document: self.document,
+            name: self.name.clone(),
+            span: self.value.span(),
+            keys,
+        };
         table.allow(allowed)?;
         Ok(table)
     }
 
     /// The entries of an array of `what`.
     pub fn array(&self, what: &str) -> Result<Vec<Value<'a>>, SceneError> {
-        let entries =
-            self.value.get_ref().as_array().ok_or_else(|| self.wrong_type(&format!("an array of {what}")))?;
+        let entries = self
+            .value
+            .get_ref()
+            .as_array()
+            .ok_or_else(|| self.wrong_type(&format!("an array of {what}")))?;
         Ok(entries
             .iter()
-            .map(|value| Value { document: self.document, name: self.name.clone(), value })
+            .map(|value| Value {
+                document: self.document,
+                name: self.name.clone(),
+                value,
+            })
             .collect())
     }
 
     pub fn text(&self) -> Result<&'a str, SceneError> {
-        self.value.get_ref().as_str().ok_or_else(|| self.wrong_type("a text in quotes"))
+        self.value
+            .get_ref()
+            .as_str()
+            .ok_or_else(|| self.wrong_type("a text in quotes"))
     }
 
     /// A name: a text that can stand in a message and in a column of a CSV file.
@@ -211,23 +306,36 @@ impl<'a> Value<'a> {
     }
 
     pub fn flag(&self) -> Result<bool, SceneError> {
-        self.value.get_ref().as_bool().ok_or_else(|| self.wrong_type("true or false"))
+        self.value
+            .get_ref()
+            .as_bool()
+            .ok_or_else(|| self.wrong_type("true or false"))
     }
 
     pub fn integer(&self, allowed: RangeInclusive<u32>) -> Result<u32, SceneError> {
-        let integer = self.value.get_ref().as_integer().ok_or_else(|| self.wrong_type("a whole number"))?;
+        let integer = self
+            .value
+            .get_ref()
+            .as_integer()
+            .ok_or_else(|| self.wrong_type("a whole number"))?;
         // Too large for the type is out of the range as well.
         let parsed = u32::from_str_radix(integer.as_str(), integer.radix()).ok();
-        parsed.filter(|number| allowed.contains(number)).ok_or_else(|| {
-            self.error(format!("out of range; allowed: {} to {}", allowed.start(), allowed.end()))
-        })
+        parsed
+            .filter(|number| allowed.contains(number))
+            .ok_or_else(|| {
+                self.error(format!(
+                    "out of range; allowed: {} to {}",
+                    allowed.start(),
+                    allowed.end()
+                ))
+            })
     }
 
     pub fn number(&self, allowed: &Numbers) -> Result<f64, SceneError> {
         let parsed = match self.value.get_ref() {
-            DeValue::Integer(integer) => {
-                i64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|number| number as f64)
-            }
+            DeValue::Integer(integer) => i64::from_str_radix(integer.as_str(), integer.radix())
+                .ok()
+                .map(|number| number as f64),
             DeValue::Float(float) => float.as_str().parse().ok(),
             _ => return Err(self.wrong_type("a number")),
         };
@@ -243,7 +351,11 @@ impl<'a> Value<'a> {
     /// Just `N` numbers in brackets.
     pub fn numbers<const N: usize>(&self, allowed: &Numbers) -> Result<[f64; N], SceneError> {
         let what = format!("{N} numbers in brackets");
-        let entries = self.value.get_ref().as_array().ok_or_else(|| self.wrong_type(&what))?;
+        let entries = self
+            .value
+            .get_ref()
+            .as_array()
+            .ok_or_else(|| self.wrong_type(&what))?;
         if entries.len() != N {
             return Err(self.error(format!("{} entries; {what} are expected", entries.len())));
         }
@@ -277,19 +389,31 @@ impl<'a> Value<'a> {
     /// root where scenes lie in `config/`).
     pub fn existing_path(&self) -> Result<PathBuf, SceneError> {
         let written = self.text()?;
-        let scene_file = std::path::absolute(self.document.path).unwrap_or_else(|_| self.document.path.to_owned());
+        let scene_file = std::path::absolute(self.document.path)
+            .unwrap_or_else(|_| self.document.path.to_owned());
         let folders = scene_file.ancestors().skip(1).take(2);
         let tried: Vec<PathBuf> = folders.map(|folder| folder.join(written)).collect();
-        let found = tried.iter().find(|path| !written.is_empty() && path.exists());
+        let found = tried
+            .iter()
+            .find(|path| !written.is_empty() && path.exists());
         found.cloned().ok_or_else(|| {
-            let mut tried: Vec<String> = tried.iter().map(|path| path.display().to_string()).collect();
+            let mut tried: Vec<String> = tried
+                .iter()
+                .map(|path| path.display().to_string())
+                .collect();
             tried.dedup();
-            self.error(format!("no such file or folder; looked for {}", tried.join(" and ")))
+            self.error(format!(
+                "no such file or folder; looked for {}",
+                tried.join(" and ")
+            ))
         })
     }
 
     fn wrong_type(&self, expected: &str) -> SceneError {
-        self.error(format!("{expected} is expected, this is {}", article(self.value.get_ref().type_str())))
+        self.error(format!(
+            "{expected} is expected, this is {}",
+            article(self.value.get_ref().type_str())
+        ))
     }
 }
 
