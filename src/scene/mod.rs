@@ -1,11 +1,15 @@
 //! A scene: what is tracked, what is real, what is virtual, what lights them; one TOML file, parsed into types that cannot be wrong.
 
+mod family;
+
 use std::path::PathBuf;
 
 use glam::{DAffine3, DVec2, DVec3};
 
 use crate::geometry::mesh::Mesh;
 use crate::light::{Light, Material};
+
+pub use family::Family;
 
 #[derive(Debug, Clone)]
 pub struct Scene {
@@ -77,18 +81,6 @@ impl Default for TrackingSettings {
     }
 }
 
-/// A family (AprilTag) or dictionary (ArUco) of square markers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Family {
-    Tag16h5,
-    Tag25h9,
-    Tag36h10,
-    Tag36h11,
-    /// OpenCV's `DICT_NxN_M`: N cells a side, M markers (50, 100, 250 or 1000).
-    Aruco { cells: u8, count: u16 },
-    ArucoOriginal,
-}
-
 /// A marker in its anchor's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Marker {
@@ -135,4 +127,3 @@ pub struct ShadowSettings {
     /// Samples per pixel: 1 or 4.
     pub samples: u32,
 }
-
