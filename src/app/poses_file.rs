@@ -171,7 +171,7 @@ impl GivenPoses {
 }
 
 fn lost() -> AnchorPose {
-    AnchorPose::lost()
+    AnchorPose::LOST
 }
 
 #[cfg(test)]
