@@ -4,7 +4,7 @@ use std::path::Path;
 
 use image::RgbaImage;
 
-use super::output::OutputError;
+use super::output_error::OutputError;
 use super::picture_files;
 
 const SHEET_WIDTH_PX: u32 = 1600;

@@ -4,6 +4,8 @@ pub mod check;
 pub mod contact_sheet;
 pub mod layer_files;
 pub mod output;
+mod output_error;
+mod partial_files;
 pub mod picture_files;
 pub mod poses_file;
 mod progress;

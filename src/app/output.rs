@@ -2,57 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+pub use super::output_error::OutputError;
 use super::picture_files;
 use super::video_writer::VideoWriter;
-
-/// Why results cannot be written.
-#[derive(Debug, thiserror::Error)]
-pub enum OutputError {
-    /// The encoder is not installed.
-    #[error(
-        "{}: writing a video needs ffmpeg, which cannot be started ({error}); install it (apt-get install ffmpeg), \
-         or name a folder to get PNGs",
-        path.display()
-    )]
-    FfmpegMissing {
-        /// What was to be written.
-        path: PathBuf,
-        /// What the system says.
-        error: std::io::Error,
-    },
-    /// The encoder gave up.
-    #[error("{}: ffmpeg failed after {frames} frames: {message}", path.display())]
-    Encoder {
-        /// What was to be written.
-        path: PathBuf,
-        /// Frames it had been given.
-        frames: u32,
-        /// The end of what ffmpeg said.
-        message: String,
-    },
-    /// The system refuses to write.
-    #[error("{}: {error}", path.display())]
-    Io {
-        /// What was to be written.
-        path: PathBuf,
-        /// What the system says.
-        error: std::io::Error,
-    },
-    /// A picture that its format cannot hold.
-    #[error("{}: {message}", path.display())]
-    Picture {
-        /// What was to be written.
-        path: PathBuf,
-        /// What is wrong with it.
-        message: String,
-    },
-    /// A name that looks like a video, of a kind that is not written.
-    #[error("{}: videos are written as .mp4 or .mov (H.264), .mkv or .avi (FFV1, lossless); any other name is a folder of PNGs", path.display())]
-    UnknownFormat {
-        /// The name.
-        path: PathBuf,
-    },
-}
 
 /// Takes frames one by one.
 pub enum FrameSink {
@@ -109,27 +61,6 @@ impl FrameSink {
 /// The name of a frame's picture: its index in the recording, six digits.
 pub fn frame_name(index: u32) -> String {
     format!("{index:06}.png")
-}
-
-/// The name under which a file is written before it is whole: `lamp.mp4` as `lamp.partial.mp4`.
-pub(super) fn partial_path(path: &Path) -> PathBuf {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let extension = path.extension().unwrap_or_default().to_string_lossy();
-    path.with_file_name(format!("{stem}.partial.{extension}"))
-}
-
-/// Makes the folder that `path` is to lie in.
-pub(super) fn make_parent(path: &Path) -> Result<(), OutputError> {
-    let Some(parent) = path
-        .parent()
-        .filter(|parent| !parent.as_os_str().is_empty())
-    else {
-        return Ok(());
-    };
-    std::fs::create_dir_all(parent).map_err(|error| OutputError::Io {
-        path: parent.to_owned(),
-        error,
-    })
 }
 
 #[cfg(test)]

@@ -8,7 +8,8 @@ use exr::prelude::WritableImage;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
-use super::output::{OutputError, make_parent, partial_path};
+use super::output_error::OutputError;
+use super::partial_files::{make_parent, partial_path};
 
 /// Writes 8-bit RGBA as an 8-bit RGB PNG; alpha is dropped.
 pub fn write_rgb_png(path: &Path, size_px: [u32; 2], rgba: &[u8]) -> Result<(), OutputError> {

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::thread::JoinHandle;
 
-use super::output::{OutputError, make_parent, partial_path};
+use super::output_error::OutputError;
+use super::partial_files::{make_parent, partial_path};
 
 /// How a video is encoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,0 +1,21 @@
+# Both targets set up what they need first (scripts/setup) and use the release profile, so dependencies compile once.
+.PHONY: demo test setup
+
+demo: setup
+	cargo build --release
+	target/release/gnomon replay config/lamp.toml --out out/lamp.mp4 --sheet out/lamp.png --poses out/lamp_poses.csv --stats out/lamp_stats.json
+	@echo
+	@echo "A virtual torus on a real table:"
+	@echo "  out/lamp.mp4         the video"
+	@echo "  out/lamp.png         some of its frames on one sheet"
+	@echo "  out/lamp_poses.csv   where the camera was"
+	@echo "  out/lamp_stats.json  how long each stage took"
+
+test: setup
+	cargo fmt --check
+	cargo clippy --release --all-targets -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps
+	cargo test --release
+
+setup:
+	@scripts/setup
