@@ -12,11 +12,6 @@ struct LightSource {
     power: vec4f,
 }
 
-struct Surroundings {
-    // Radiance that arrives from everywhere alike.
-    ambient_radiance: vec4f,
-}
-
 const PI: f32 = 3.14159265358979;
 
 // The one place where positions become clip coordinates: surfaces and shadow volumes must land on the same depths,

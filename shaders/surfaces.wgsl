@@ -2,14 +2,14 @@
 //!include "common.wgsl"
 
 @group(0) @binding(0) var<uniform> view: View;
-@group(1) @binding(0) var<uniform> surroundings: Surroundings;
-@group(1) @binding(1) var<uniform> light: LightSource;
+@group(1) @binding(0) var<uniform> light: LightSource;
 
 struct Corner {
     @location(0) position: vec3f,
     @location(1) normal: vec3f,
     @location(2) albedo: vec3f,
     @location(3) roughness: f32,
+    @location(4) indirect: vec3f,
 }
 
 struct Surface {
@@ -19,6 +19,8 @@ struct Surface {
     @location(1) @interpolate(perspective, centroid) normal_in_camera: vec3f,
     @location(2) @interpolate(flat) albedo: vec3f,
     @location(3) @interpolate(flat) roughness: f32,
+    // Irradiance from the surroundings, lights aside (light::bounce).
+    @location(4) @interpolate(perspective, centroid) indirect: vec3f,
 }
 
 struct Light {
@@ -37,18 +39,18 @@ fn place(corner: Corner) -> Surface {
         (view.camera_from_anchor * vec4f(corner.normal, 0.0)).xyz,
         corner.albedo,
         corner.roughness,
+        corner.indirect,
     );
 }
 
 @fragment
 fn ambient_on_real(surface: Surface) -> Light {
-    let irradiance = PI * surroundings.ambient_radiance.rgb;
-    return Light(vec4f(irradiance, 1.0), vec4f(irradiance, 0.0));
+    return Light(vec4f(surface.indirect, 1.0), vec4f(surface.indirect, 0.0));
 }
 
 @fragment
 fn ambient_on_virtual(surface: Surface) -> Light {
-    return Light(vec4f(0.0), vec4f(surface.albedo * surroundings.ambient_radiance.rgb, 1.0));
+    return Light(vec4f(0.0), vec4f(surface.albedo / PI * surface.indirect, 1.0));
 }
 
 @fragment
@@ -80,14 +82,24 @@ fn reflectance(albedo: vec3f, roughness: f32, normal: vec3f, to_light: vec3f, to
     let cos_camera = max(dot(normal, to_camera), 1e-3);
     let halfway = normalize(to_light + to_camera);
     let cos_half = clamp(dot(normal, halfway), 0.0, 1.0);
-    let alpha_squared = roughness * roughness * roughness * roughness;
+    let alpha_squared = roughness * roughness;
     let spread = cos_half * cos_half * (alpha_squared - 1.0) + 1.0;
     let distribution = alpha_squared / (PI * spread * spread);
     let visibility = 0.5
         / (cos_light * sqrt(cos_camera * cos_camera * (1.0 - alpha_squared) + alpha_squared)
             + cos_camera * sqrt(cos_light * cos_light * (1.0 - alpha_squared) + alpha_squared));
-    let grazing = 1.0 - clamp(dot(to_light, halfway), 0.0, 1.0);
+    let specular = distribution * visibility * fresnel(dot(to_light, halfway));
+    // What the layer lets in and out again; the mean keeps a white material white.
+    let let_through = (1.0 - fresnel(cos_light)) * (1.0 - fresnel(cos_camera)) / (1.0 - MEAN_FRESNEL);
+    return diffuse * let_through + specular;
+}
+
+// Cosine-weighted mean of `fresnel` over the hemisphere.
+const MEAN_FRESNEL: f32 = 0.04 + 0.96 / 21.0;
+
+// Schlick's approximation for a dielectric of index 1.5.
+fn fresnel(cosine: f32) -> f32 {
+    let grazing = 1.0 - clamp(cosine, 0.0, 1.0);
     let grazing_squared = grazing * grazing;
-    let fresnel = 0.04 + 0.96 * grazing_squared * grazing_squared * grazing;
-    return diffuse * (1.0 - fresnel) + distribution * visibility * fresnel;
+    return 0.04 + 0.96 * grazing_squared * grazing_squared * grazing;
 }

@@ -10,4 +10,5 @@ pub mod camera;
 pub mod mesh;
 pub mod normals;
 pub mod pose;
+pub mod ray_caster;
 pub mod shadow_volume;

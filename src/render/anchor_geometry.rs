@@ -1,11 +1,14 @@
 //! The scene's meshes on the GPU. Objects stand still on their anchor, so their vertices are kept in the anchor's
 //! space: one matrix per anchor draws all that it carries.
 
+use std::f64::consts::PI;
+
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use wgpu::util::DeviceExt as _;
 
 use crate::geometry::shadow_volume::Caster;
+use crate::light::bounce::Reflector;
 use crate::scene::{Object, Scene};
 
 /// What kind of thing a surface belongs to.
@@ -33,11 +36,20 @@ pub(super) const CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::Vertex
     attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x3, 3 => Float32],
 };
 
+/// Vertex layout of [`SurfaceBatch::indirect`].
+pub(super) const INDIRECT_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
+    array_stride: size_of::<Vec3>() as u64,
+    step_mode: wgpu::VertexStepMode::Vertex,
+    attributes: &wgpu::vertex_attr_array![4 => Float32x3],
+};
+
 /// All surfaces of one role on one anchor.
 pub(super) struct SurfaceBatch {
     pub role: Role,
     pub anchor: usize,
     pub corners: wgpu::Buffer,
+    /// For each corner the irradiance that no light gives it.
+    pub indirect: wgpu::Buffer,
     pub corner_count: u32,
 }
 
@@ -51,6 +63,7 @@ pub(super) struct AnchoredCaster {
 /// Surfaces, the real ones first.
 pub(super) fn surface_batches(device: &wgpu::Device, scene: &Scene) -> Vec<SurfaceBatch> {
     let roles = [(Role::Real, &scene.phantoms), (Role::Virtual, &scene.virtuals)];
+    let ambient = (PI * scene.ambient_radiance).as_vec3();
     let mut batches = Vec::new();
     for (role, objects) in roles {
         for anchor in 0..scene.anchors.len() {
@@ -67,6 +80,11 @@ pub(super) fn surface_batches(device: &wgpu::Device, scene: &Scene) -> Vec<Surfa
                     label: Some("surface corners"),
                     contents: bytemuck::cast_slice(&corners),
                     usage: wgpu::BufferUsages::VERTEX,
+                }),
+                indirect: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                    label: Some("indirect light"),
+                    contents: bytemuck::cast_slice(&vec![ambient; corners.len()]),
+                    usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
                 }),
             });
         }
@@ -113,4 +131,19 @@ fn corners(object: &Object) -> Vec<Corner> {
             })
         })
         .collect()
+}
+
+/// The triangles of an object as what light meets there, in its anchor's space.
+pub(super) fn reflectors(object: &Object) -> impl Iterator<Item = Reflector> {
+    let positions = positions_in_anchor(object);
+    let mesh = &object.mesh;
+    mesh.triangles.iter().zip(&mesh.triangle_materials).map(move |(triangle, &material)| Reflector {
+        corners: triangle.map(|index| positions[index as usize]),
+        albedo: object.materials[material as usize].albedo,
+    })
+}
+
+/// Place and normal of each corner of an object's triangles, in its anchor's space; the same order as in a batch.
+pub(super) fn corner_places(object: &Object) -> impl Iterator<Item = (Vec3, Vec3)> {
+    corners(object).into_iter().map(|corner| (corner.position, corner.normal))
 }

@@ -6,6 +6,7 @@
 mod anchor_geometry;
 mod composite;
 mod gpu;
+mod indirect;
 mod layers;
 mod readback;
 mod renderer;

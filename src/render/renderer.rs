@@ -13,10 +13,11 @@ use crate::scene::Scene;
 use super::anchor_geometry::{self, AnchoredCaster, Role, SurfaceBatch};
 use super::composite::{Composite, GAIN_FORMAT, PICTURE_FORMAT};
 use super::gpu::{Gpu, RenderError};
+use super::indirect::Indirect;
 use super::layers::{LayerPasses, Layers};
 use super::readback::{self, Readback};
 use super::surfaces::{LIGHT_FORMAT, Surfaces};
-use super::uniforms::{Lens, LightSource, Surroundings, UniformRow, View, uniform_entry};
+use super::uniforms::{Lens, LightSource, UniformRow, View, uniform_entry};
 use super::volumes::{self, VolumeBuffers};
 
 /// What a frame shows.
@@ -42,6 +43,7 @@ pub struct Renderer {
     lights: Vec<Light>,
     surfaces: Vec<SurfaceBatch>,
     casters: Vec<AnchoredCaster>,
+    indirect: Option<Indirect>,
     /// For each light those of each caster.
     volumes: Vec<Vec<VolumeBuffers>>,
     views: UniformRow,
@@ -108,8 +110,6 @@ impl Renderer {
 
         let views = UniformRow::new::<View>(device, "views", scene.anchors.len());
         let light_sources = UniformRow::new::<LightSource>(device, "lights", scene.lights.len());
-        let surroundings = UniformRow::new::<Surroundings>(device, "surroundings", 1);
-        surroundings.write(&gpu.queue, 0, &Surroundings::new(scene.ambient_radiance));
         let lens = UniformRow::new::<Lens>(device, "lens", 1);
         lens.write(&gpu.queue, 0, &Lens::new(&intrinsics));
 
@@ -132,7 +132,7 @@ impl Renderer {
             })
         };
         let view_layout = layout("view", &[uniform_entry(0, true)]);
-        let light_layout = layout("light", &[uniform_entry(0, false), uniform_entry(1, true)]);
+        let light_layout = layout("light", &[uniform_entry(0, true)]);
         let geometry_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("geometry"),
             bind_group_layouts: &[Some(&view_layout), Some(&light_layout)],
@@ -142,10 +142,7 @@ impl Renderer {
         let casters = anchor_geometry::casters(scene);
         Ok(Self {
             view_group: group(&view_layout, vec![views.binding()]),
-            light_group: group(
-                &light_layout,
-                vec![surroundings.binding(), light_sources.binding()],
-            ),
+            light_group: group(&light_layout, vec![light_sources.binding()]),
             composite_group: group(
                 &composite_pass.layout,
                 vec![
@@ -164,6 +161,7 @@ impl Renderer {
                 &[LIGHT_FORMAT, LIGHT_FORMAT],
             ),
             surfaces: anchor_geometry::surface_batches(device, scene),
+            indirect: Indirect::new(scene),
             volumes: scene
                 .lights
                 .iter()
@@ -318,6 +316,11 @@ impl Renderer {
             }
         }
         let Some(camera_from_world) = camera_from_world else { return };
+        let world_virtuals =
+            self.surfaces.iter().find(|batch| batch.role == Role::Virtual && batch.anchor == 0);
+        if let (Some(indirect), Some(batch)) = (&mut self.indirect, world_virtuals) {
+            indirect.update(queue, &batch.indirect, camera_from_anchor, &camera_from_world);
+        }
         for (index, (light, volumes)) in self.lights.iter().zip(&mut self.volumes).enumerate() {
             self.light_sources.write(queue, index, &LightSource::new(light, &camera_from_world));
             for (volume, caster) in volumes.iter_mut().zip(&self.casters) {
@@ -408,6 +411,7 @@ impl Renderer {
             if batch.role == role && self.placed[batch.anchor] {
                 pass.set_bind_group(0, &self.view_group, &[self.views.offset(batch.anchor)]);
                 pass.set_vertex_buffer(0, batch.corners.slice(..));
+                pass.set_vertex_buffer(1, batch.indirect.slice(..));
                 pass.draw(0..batch.corner_count, 0..1);
             }
         }

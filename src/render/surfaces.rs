@@ -1,7 +1,7 @@
 //! Draws real and virtual surfaces: depth and ambient light first, then each light where the stencil is 0.
 //! Reads the stencil. Writes depth, `before` and `after` (see surfaces.wgsl).
 
-use super::anchor_geometry::{CORNER_LAYOUT, Role};
+use super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT, Role};
 use super::shader;
 
 /// Format of `before` and `after`.
@@ -64,7 +64,7 @@ impl Surfaces {
                     module: &module,
                     entry_point: Some("place"),
                     compilation_options: Default::default(),
-                    buffers: &[Some(CORNER_LAYOUT)],
+                    buffers: &[Some(CORNER_LAYOUT), Some(INDIRECT_LAYOUT)],
                 },
                 primitive: wgpu::PrimitiveState::default(),
                 depth_stencil: Some(wgpu::DepthStencilState {

@@ -1,7 +1,7 @@
 //! Uniform structs, each the twin of a WGSL struct; a test holds them against it offset by offset.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DAffine3, DVec3, Mat4, Vec4};
+use glam::{DAffine3, Mat4, Vec4};
 
 use crate::geometry::camera::Intrinsics;
 use crate::light::Light;
@@ -44,19 +44,6 @@ impl LightSource {
             }
         };
         Self { place_in_camera: place.as_vec3().extend(weight), power: power.as_vec3().extend(0.0) }
-    }
-}
-
-/// Twin of `Surroundings` in common.wgsl.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(super) struct Surroundings {
-    pub ambient_radiance: Vec4,
-}
-
-impl Surroundings {
-    pub fn new(ambient_radiance: DVec3) -> Self {
-        Self { ambient_radiance: ambient_radiance.as_vec3().extend(0.0) }
     }
 }
 
@@ -168,7 +155,6 @@ mod tests {
         let common = include_str!("../../shaders/common.wgsl");
         assert_twins!(common, View, clip_from_anchor, camera_from_anchor);
         assert_twins!(common, LightSource, place_in_camera, power);
-        assert_twins!(common, Surroundings, ambient_radiance);
         let composite = include_str!("../../shaders/composite.wgsl");
         assert_twins!(composite, Lens, focal_px, center_px, distortion, k3, distorts, size_px);
     }

@@ -1,0 +1,88 @@
+//! Rays against triangles, by a bounding-volume hierarchy (obvhs).
+
+use std::time::Duration;
+
+use glam::{Vec3, Vec3A};
+use obvhs::BvhBuildParams;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2_from_tris;
+use obvhs::ray::{Ray, RayHit};
+use obvhs::triangle::Triangle;
+
+/// Triangles ready to be hit.
+pub struct RayCaster {
+    triangles: Vec<Triangle>,
+    /// `None` without triangles.
+    hierarchy: Option<Bvh2>,
+}
+
+/// Where a ray first meets a triangle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hit {
+    /// Index of the triangle.
+    pub triangle: usize,
+    /// In units of the ray's direction.
+    pub distance: f32,
+}
+
+impl RayCaster {
+    /// Prepares triangles, three corners each.
+    pub fn new(corners: &[[Vec3; 3]]) -> Self {
+        let triangles: Vec<Triangle> = corners
+            .iter()
+            .map(|&[v0, v1, v2]| Triangle { v0: v0.into(), v1: v1.into(), v2: v2.into() })
+            .collect();
+        let hierarchy = (!triangles.is_empty()).then(|| {
+            let params = BvhBuildParams::medium_build();
+            build_bvh2_from_tris(&triangles, params, &mut Duration::default())
+        });
+        Self { triangles, hierarchy }
+    }
+
+    /// The first triangle within `reach` along a ray, if any; both sides of a triangle are hit.
+    pub fn first_hit(&self, origin: Vec3, direction: Vec3, reach: f32) -> Option<Hit> {
+        let hierarchy = self.hierarchy.as_ref()?;
+        let ray = Ray::new(Vec3A::from(origin), Vec3A::from(direction), 0.0, reach);
+        let mut hit = RayHit::none();
+        let found = hierarchy.ray_traverse(ray, &mut hit, |ray, id| {
+            self.triangles[hierarchy.primitive_indices[id] as usize].intersect(ray)
+        });
+        found.then(|| Hit {
+            triangle: hierarchy.primitive_indices[hit.primitive_id as usize] as usize,
+            distance: hit.t,
+        })
+    }
+
+    /// Whether anything lies within `reach` along a ray.
+    pub fn is_hidden(&self, origin: Vec3, direction: Vec3, reach: f32) -> bool {
+        let Some(hierarchy) = &self.hierarchy else { return false };
+        let ray = Ray::new(Vec3A::from(origin), Vec3A::from(direction), 0.0, reach);
+        !hierarchy.ray_traverse_miss(ray, |ray, id| {
+            self.triangles[hierarchy.primitive_indices[id] as usize].intersect(ray)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ray_hits_the_nearer_of_two_squares_and_no_farther_than_it_reaches() {
+        let square = |z: f32| {
+            let corner = |x: f32, y: f32| Vec3::new(x, y, z);
+            [
+                [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0)],
+                [corner(-1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
+            ]
+        };
+        let caster = RayCaster::new(&[square(-3.0), square(-1.0)].concat());
+        let (origin, down) = (Vec3::new(0.25, 0.5, 1.0), Vec3::NEG_Z);
+        let hit = caster.first_hit(origin, down, f32::INFINITY).expect("a hit");
+        assert!(hit.triangle == 3 && (hit.distance - 2.0).abs() < 1e-6, "{hit:?}");
+        assert_eq!(caster.first_hit(origin, down, 1.9), None);
+        assert!(caster.is_hidden(origin, down, 2.1) && !caster.is_hidden(origin, down, 1.9));
+        assert_eq!(caster.first_hit(origin, Vec3::Z, f32::INFINITY), None);
+        assert!(!RayCaster::new(&[]).is_hidden(origin, down, 9.0));
+    }
+}

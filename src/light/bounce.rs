@@ -1,0 +1,356 @@
+//! The light that reaches a virtual surface from its surroundings: the ambient light where nothing hides it, and what
+//! the things around throw back of the lights (one bounce). A white sheet under a lamp lights what stands on it more
+//! than the room does.
+//!
+//! What stands still is gathered once ([`Surroundings::gather`]): the rays of each point with what they met. What moves
+//! then only takes from those rays what it hides ([`Gathering::irradiances`]), frame by frame.
+
+use std::f64::consts::{PI, TAU};
+use std::panic::resume_unwind;
+
+use glam::{DAffine3, DVec3, Vec3};
+
+use crate::geometry::ray_caster::RayCaster;
+
+use super::{Light, irradiance};
+
+/// Rays per point where there are few points; more change no diffuse thing by a level of the display.
+const MOST_RAYS: usize = 256;
+/// Rays per point of a mesh of any size.
+const LEAST_RAYS: usize = 32;
+/// Rays start this part of the surroundings' size off the surface, past its own rounding.
+const START_OFFSET: f64 = 1e-5;
+
+/// A diffuse triangle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reflector {
+    /// Counter-clockwise seen from outside, metres.
+    pub corners: [Vec3; 3],
+    /// Diffuse reflectance, linear RGB.
+    pub albedo: DVec3,
+}
+
+/// Everything that stands still around a virtual thing, itself included, in world space.
+pub struct Surroundings {
+    reflectors: Vec<Reflector>,
+    caster: RayCaster,
+    lights: Vec<Light>,
+    ambient_radiance: DVec3,
+    start_offset_m: f64,
+}
+
+/// Things that move together.
+pub struct Mover {
+    /// Their triangles, in a space of their own.
+    caster: RayCaster,
+    center: DVec3,
+    albedo: DVec3,
+}
+
+impl Mover {
+    /// Prepares what may hide or throw back light; `None` without triangles.
+    pub fn new(reflectors: &[Reflector]) -> Option<Self> {
+        let corners: Vec<_> = reflectors.iter().map(|reflector| reflector.corners).collect();
+        let share = 1.0 / reflectors.len().max(1) as f64;
+        let points = corners.iter().flatten().map(|corner| corner.as_dvec3());
+        (!corners.is_empty()).then(|| Self {
+            center: points.sum::<DVec3>() * (share / 3.0),
+            albedo: reflectors.iter().map(|reflector| reflector.albedo).sum::<DVec3>() * share,
+            caster: RayCaster::new(&corners),
+        })
+    }
+}
+
+/// The rays of many points, with what they met that stands still.
+pub struct Gathering {
+    starts: Vec<Vec3>,
+    rays_per_point: usize,
+    /// `rays_per_point` for each point.
+    rays: Vec<GatheredRay>,
+    /// For each ray and light the radiance that the light has its end throw back; zero where hidden.
+    lit: Vec<Vec3>,
+    lights: Vec<Light>,
+    ambient_radiance: DVec3,
+}
+
+#[derive(Clone, Copy)]
+struct GatheredRay {
+    direction: Vec3,
+    /// Metres; infinite where it meets nothing.
+    distance_m: f32,
+    /// Radiance along it that no light gives: the ambient light, or what its end throws back of it.
+    unlit: Vec3,
+}
+
+impl Surroundings {
+    /// Prepares what may hide or throw back light.
+    pub fn new(reflectors: Vec<Reflector>, lights: Vec<Light>, ambient_radiance: DVec3) -> Self {
+        let corners: Vec<_> = reflectors.iter().map(|reflector| reflector.corners).collect();
+        let points = || corners.iter().flatten();
+        let size = points().copied().fold(Vec3::MIN, Vec3::max)
+            - points().copied().fold(Vec3::MAX, Vec3::min);
+        Self {
+            caster: RayCaster::new(&corners),
+            start_offset_m: f64::from(size.max_element().max(1e-3)) * START_OFFSET,
+            reflectors,
+            lights,
+            ambient_radiance,
+        }
+    }
+
+    /// Sends rays from points with unit normals, some `budget` in all.
+    pub fn gather(&self, places: &[(DVec3, DVec3)], budget: usize) -> Gathering {
+        let rays_per_point = (budget / places.len().max(1)).clamp(LEAST_RAYS, MOST_RAYS);
+        let shares = on_all_cores(places.len(), |range| {
+            let mut gathered = (Vec::new(), Vec::new());
+            for &place in &places[range] {
+                self.gather_point(place, rays_per_point, &mut gathered);
+            }
+            gathered
+        });
+        let (mut rays, mut lit) = (Vec::new(), Vec::new());
+        for (share_rays, share_lit) in shares {
+            rays.extend(share_rays);
+            lit.extend(share_lit);
+        }
+        Gathering {
+            starts: places.iter().map(|&place| self.start(place).as_vec3()).collect(),
+            rays_per_point,
+            rays,
+            lit,
+            lights: self.lights.clone(),
+            ambient_radiance: self.ambient_radiance,
+        }
+    }
+
+    fn start(&self, (point, normal): (DVec3, DVec3)) -> DVec3 {
+        point + normal * self.start_offset_m
+    }
+
+    fn gather_point(
+        &self,
+        place: (DVec3, DVec3),
+        count: usize,
+        (rays, lit): &mut (Vec<GatheredRay>, Vec<Vec3>),
+    ) {
+        let (start, normal) = (self.start(place), place.1);
+        let (tangent, bitangent) = normal.any_orthonormal_pair();
+        for index in 0..count {
+            // A golden-angle spiral over the disc, lifted on to the hemisphere (Malley): the same rays each time.
+            let radius = ((index as f64 + 0.5) / count as f64).sqrt();
+            let angle = TAU * 0.618_033_988_749_895 * index as f64;
+            let (sine, cosine) = angle.sin_cos();
+            let direction = tangent * (radius * cosine)
+                + bitangent * (radius * sine)
+                + normal * (1.0 - radius * radius).max(0.0).sqrt();
+            rays.push(self.follow(start, direction, lit));
+        }
+    }
+
+    fn follow(&self, start: DVec3, direction: DVec3, lit: &mut Vec<Vec3>) -> GatheredRay {
+        let single = direction.as_vec3();
+        let Some(hit) = self.caster.first_hit(start.as_vec3(), single, f32::INFINITY) else {
+            lit.extend(self.lights.iter().map(|_| Vec3::ZERO));
+            let unlit = self.ambient_radiance.as_vec3();
+            return GatheredRay { direction: single, distance_m: f32::INFINITY, unlit };
+        };
+        let Reflector { corners: [a, b, c], albedo } = self.reflectors[hit.triangle];
+        let outward = (b - a).cross(c - a).as_dvec3().normalize_or_zero();
+        let normal = if outward.dot(direction) > 0.0 { -outward } else { outward };
+        let place =
+            start + direction * f64::from(hit.distance) + normal * self.start_offset_m;
+        lit.extend(self.lights.iter().map(|light| {
+            let (to_light, reach) = way_to(light, place);
+            let hidden = self.caster.is_hidden(place.as_vec3(), to_light.as_vec3(), reach);
+            let arriving = if hidden { DVec3::ZERO } else { irradiance(light, place, normal) };
+            (albedo / PI * arriving).as_vec3()
+        }));
+        let unlit = (albedo * self.ambient_radiance).as_vec3();
+        GatheredRay { direction: single, distance_m: hit.distance, unlit }
+    }
+}
+
+impl Gathering {
+    /// Irradiance of each point, but for what the lights themselves give it: the cosine-weighted mean of the radiance
+    /// that arrives, times π. `movers` come with where they are.
+    pub fn irradiances(&self, movers: &[(&Mover, DAffine3)]) -> Vec<Vec3> {
+        let placed: Vec<PlacedMover> =
+            movers.iter().map(|&(mover, place)| self.place(mover, place)).collect();
+        let shares = on_all_cores(self.starts.len(), |range| {
+            range.map(|point| self.irradiance(point, &placed)).collect::<Vec<_>>()
+        });
+        shares.into_iter().flatten().collect()
+    }
+
+    fn place<'a>(&self, mover: &'a Mover, world_from_mover: DAffine3) -> PlacedMover<'a> {
+        let center = world_from_mover.transform_point3(mover.center);
+        // Seen from all sides alike, a lit thing shows a quarter of its lit face.
+        let lit: DVec3 = self
+            .lights
+            .iter()
+            .map(|light| irradiance(light, center, way_to(light, center).0.normalize_or_zero()))
+            .sum();
+        PlacedMover {
+            caster: &mover.caster,
+            mover_from_world: world_from_mover.inverse().as_affine3(),
+            radiance: (mover.albedo * (self.ambient_radiance + lit / (4.0 * PI))).as_vec3(),
+        }
+    }
+
+    fn irradiance(&self, point: usize, movers: &[PlacedMover<'_>]) -> Vec3 {
+        let start = self.starts[point];
+        let rays = point * self.rays_per_point..(point + 1) * self.rays_per_point;
+        let mut sum = Vec3::ZERO;
+        for index in rays {
+            let ray = self.rays[index];
+            let blocker = movers.iter().find(|m| m.hides(start, ray.direction, ray.distance_m));
+            if let Some(blocker) = blocker {
+                sum += blocker.radiance;
+                continue;
+            }
+            sum += ray.unlit;
+            let count = self.lights.len();
+            let lit = &self.lit[index * count..(index + 1) * count];
+            for (light, &radiance) in self.lights.iter().zip(lit) {
+                if radiance == Vec3::ZERO {
+                    continue;
+                }
+                let end = start + ray.direction * ray.distance_m;
+                let (to_light, reach) = way_to(light, end.as_dvec3());
+                if !movers.iter().any(|m| m.hides(end, to_light.as_vec3(), reach)) {
+                    sum += radiance;
+                }
+            }
+        }
+        sum * (std::f32::consts::PI / self.rays_per_point as f32)
+    }
+}
+
+struct PlacedMover<'a> {
+    caster: &'a RayCaster,
+    mover_from_world: glam::Affine3,
+    /// What it throws back, about.
+    radiance: Vec3,
+}
+
+impl PlacedMover<'_> {
+    fn hides(&self, origin: Vec3, direction: Vec3, reach: f32) -> bool {
+        let origin = self.mover_from_world.transform_point3(origin);
+        let direction = self.mover_from_world.transform_vector3(direction);
+        self.caster.is_hidden(origin, direction, reach)
+    }
+}
+
+/// Vector to a light, and how far along it the light is.
+fn way_to(light: &Light, point: DVec3) -> (DVec3, f32) {
+    match *light {
+        Light::Point { position_m, .. } => (position_m - point, 1.0),
+        Light::Directional { direction, .. } => (-direction, f32::INFINITY),
+    }
+}
+
+/// Splits `0..count` among the cores; the results come in order.
+fn on_all_cores<T: Send>(
+    count: usize,
+    work: impl Fn(std::ops::Range<usize>) -> T + Sync,
+) -> Vec<T> {
+    let threads = std::thread::available_parallelism().map_or(1, |threads| threads.get());
+    let share = count.div_ceil(threads).max(1);
+    std::thread::scope(|scope| {
+        let ranges = (0..count).step_by(share).map(|first| first..count.min(first + share));
+        let work = &work;
+        let workers: Vec<_> = ranges.map(|range| scope.spawn(move || work(range))).collect();
+        let join = |worker: std::thread::ScopedJoinHandle<'_, T>| {
+            worker.join().unwrap_or_else(|panic| resume_unwind(panic))
+        };
+        workers.into_iter().map(join).collect()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// At one point, by the most rays that are sent.
+    fn irradiance_at(around: &Surroundings, point: DVec3, normal: DVec3) -> DVec3 {
+        let places = vec![(point, normal); 16];
+        let all = around.gather(&places, 16 * MOST_RAYS).irradiances(&[]);
+        assert!(all.iter().all(|one| *one == all[0]));
+        all[0].as_dvec3()
+    }
+
+    fn square(half_m: f32, z: f32, albedo: f64) -> [Reflector; 2] {
+        let corner = |x: f32, y: f32| Vec3::new(x * half_m, y * half_m, z);
+        [
+            [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0)],
+            [corner(-1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
+        ]
+        .map(|corners| Reflector { corners, albedo: DVec3::splat(albedo) })
+    }
+
+    #[test]
+    fn an_empty_furnace_gives_pi_times_its_radiance() {
+        let empty = Surroundings::new(Vec::new(), Vec::new(), DVec3::new(1.0, 2.0, 3.0));
+        let irradiance = irradiance_at(&empty, DVec3::ZERO, DVec3::new(0.6, 0.0, 0.8));
+        assert!((irradiance - PI * DVec3::new(1.0, 2.0, 3.0)).length() < 1e-5);
+    }
+
+    #[test]
+    fn a_white_table_keeps_the_furnace_white() {
+        let table = Surroundings::new(square(50.0, 0.0, 1.0).to_vec(), Vec::new(), DVec3::ONE);
+        for normal in [DVec3::X, DVec3::Z, DVec3::NEG_Z] {
+            let irradiance = irradiance_at(&table, DVec3::new(0.0, 0.0, 0.1), normal);
+            assert!((irradiance - PI).abs().max_element() < 1e-5, "{normal} {irradiance}");
+        }
+    }
+
+    #[test]
+    fn a_lit_table_lights_what_faces_it_by_its_form_factor() {
+        // Distant light of irradiance E straight down on a wide table of albedo a: a surface facing down gets a E, one
+        // that stands upright half of it.
+        let light = Light::Directional { direction: DVec3::NEG_Z, irradiance: DVec3::splat(2.0) };
+        let table = Surroundings::new(square(500.0, 0.0, 0.5).to_vec(), vec![light], DVec3::ZERO);
+        let above = DVec3::new(0.3, 0.2, 0.5);
+        let down = irradiance_at(&table, above, DVec3::NEG_Z).x;
+        let aside = irradiance_at(&table, above, DVec3::X).x;
+        assert!((down - 1.0).abs() < 0.01 && (aside - 0.5).abs() < 0.01, "{down} {aside}");
+        assert_eq!(irradiance_at(&table, above, DVec3::Z), DVec3::ZERO);
+    }
+
+    #[test]
+    fn a_square_facing_its_parallel_twin_gets_the_closed_forms_share() {
+        // Form factor from a point to a coaxial parallel square of side 2a at distance h (Howell's catalogue B-4, four
+        // quarters): F = 4 / π · A/√(1+A²) · atan(A/√(1+A²)) with A = a/h.
+        let (half_m, height) = (0.5, 0.4);
+        let walls = Surroundings::new(square(half_m as f32, height as f32, 0.0).to_vec(), Vec::new(), DVec3::ONE);
+        let ratio: f64 = half_m / height;
+        let slant = ratio / (1.0 + ratio * ratio).sqrt();
+        let hidden = 4.0 / PI * slant * slant.atan();
+        // Walls without albedo throw nothing back of the ambient light: what they hide is missing.
+        let found = irradiance_at(&walls, DVec3::ZERO, DVec3::Z).x / PI;
+        assert!((found - (1.0 - hidden)).abs() < 0.01, "{found} {}", 1.0 - hidden);
+    }
+
+    #[test]
+    fn what_moves_takes_what_it_hides() {
+        // The same plate, once as part of the standing surroundings and once as a mover, black both times.
+        let light = Light::Point { position_m: DVec3::new(0.2, 0.1, 2.0), intensity: DVec3::splat(3.0) };
+        let floor = square(2.0, 0.0, 0.8).to_vec();
+        let plate = square(0.3, 0.0, 0.0);
+        let lift = DAffine3::from_translation(DVec3::new(0.1, 0.0, 0.5));
+        let lifted = plate.map(|reflector| Reflector {
+            corners: reflector.corners.map(|c| lift.transform_point3(c.as_dvec3()).as_vec3()),
+            ..reflector
+        });
+        let places = [(DVec3::new(-0.4, 0.1, 0.2), DVec3::X), (DVec3::new(0.5, 0.0, 0.3), DVec3::Z)];
+        let lights = vec![light];
+        let standing = Surroundings::new([floor.clone(), lifted.to_vec()].concat(), lights.clone(), DVec3::ONE);
+        let expected = standing.gather(&places, 1 << 20).irradiances(&[]);
+        let floor_alone = Surroundings::new(floor, lights, DVec3::ONE).gather(&places, 1 << 20);
+        let mover = Mover::new(&plate).expect("triangles");
+        for (expected, found) in expected.iter().zip(floor_alone.irradiances(&[(&mover, lift)])) {
+            assert!((*expected - found).length() < 1e-3, "{expected} {found}");
+        }
+        assert!((expected[0] - floor_alone.irradiances(&[])[0]).length() > 0.05);
+    }
+}

@@ -1,0 +1,102 @@
+//! Light that virtual things in the world get from their surroundings (light::bounce), corner by corner.
+//! Reads the poses of what moves. Writes the `indirect` vertices of the world's virtual batch.
+//!
+//! Virtual things on moving anchors keep the plain ambient light: their surroundings change in every frame.
+
+use std::collections::HashMap;
+
+use glam::{DAffine3, DVec3, Vec3};
+
+use crate::light::bounce::{Gathering, Mover, Surroundings};
+use crate::scene::Scene;
+
+use super::anchor_geometry::{corner_places, reflectors};
+
+/// Rays for a scene in which nothing moves: gathered once, in a second or so.
+const STANDING_BUDGET: usize = 1_000_000;
+/// Rays where things move: held against them in every frame, in some milliseconds.
+const MOVING_BUDGET: usize = 75_000;
+/// Part of the way to its triangle's middle at which a corner's surroundings are gathered: a corner that stands on the
+/// table would see into it.
+const CORNER_INSET: f64 = 0.05;
+
+/// The gathered light of the world's virtual things.
+pub(super) struct Indirect {
+    gathering: Gathering,
+    /// What stands on each moving anchor.
+    movers: Vec<(usize, Mover)>,
+    /// For each corner of the batch its point of the gathering.
+    point_of_corner: Vec<usize>,
+    /// Whether the batch has light that fits; without movers once is enough.
+    settled: bool,
+}
+
+impl Indirect {
+    /// Sends the rays; `None` where nothing virtual stands in the world.
+    pub fn new(scene: &Scene) -> Option<Self> {
+        let corners: Vec<(Vec3, Vec3)> =
+            scene.virtuals.iter().filter(|object| object.anchor == 0).flat_map(corner_places).collect();
+        if corners.is_empty() {
+            return None;
+        }
+        let on_anchor = |anchor: usize| {
+            let all = scene.phantoms.iter().chain(&scene.virtuals);
+            all.filter(move |object| object.anchor == anchor).flat_map(reflectors).collect::<Vec<_>>()
+        };
+        let movers: Vec<(usize, Mover)> = (1..scene.anchors.len())
+            .filter_map(|anchor| Some((anchor, Mover::new(&on_anchor(anchor))?)))
+            .collect();
+        let surroundings =
+            Surroundings::new(on_anchor(0), scene.lights.clone(), scene.ambient_radiance);
+        let (points, point_of_corner) = points(&corners);
+        let budget = if movers.is_empty() { STANDING_BUDGET } else { MOVING_BUDGET };
+        let gathering = surroundings.gather(&points, budget);
+        Some(Self { gathering, movers, point_of_corner, settled: false })
+    }
+
+    /// Brings the batch's light up to what moves in this frame.
+    pub fn update(
+        &mut self,
+        queue: &wgpu::Queue,
+        batch: &wgpu::Buffer,
+        camera_from_anchor: &[Option<DAffine3>],
+        camera_from_world: &DAffine3,
+    ) {
+        if self.settled {
+            return;
+        }
+        let world_from_camera = camera_from_world.inverse();
+        let placed: Vec<(&Mover, DAffine3)> = self
+            .movers
+            .iter()
+            .filter_map(|(anchor, mover)| {
+                Some((mover, world_from_camera * camera_from_anchor[*anchor]?))
+            })
+            .collect();
+        let irradiances = self.gathering.irradiances(&placed);
+        let corners: Vec<Vec3> =
+            self.point_of_corner.iter().map(|&point| irradiances[point]).collect();
+        queue.write_buffer(batch, 0, bytemuck::cast_slice(&corners));
+        self.settled = self.movers.is_empty();
+    }
+}
+
+/// One point for all corners that share place and normal, and for each corner its point.
+fn points(corners: &[(Vec3, Vec3)]) -> (Vec<(DVec3, DVec3)>, Vec<usize>) {
+    let mut point_at: HashMap<[u32; 6], usize> = HashMap::new();
+    let mut points = Vec::new();
+    let mut point_of_corner = Vec::with_capacity(corners.len());
+    for triangle in corners.chunks(3) {
+        let middle = triangle.iter().map(|(place, _)| place.as_dvec3()).sum::<DVec3>() / 3.0;
+        for &(place, normal) in triangle {
+            let [x, y, z] = place.to_array().map(f32::to_bits);
+            let [nx, ny, nz] = normal.to_array().map(f32::to_bits);
+            let point = *point_at.entry([x, y, z, nx, ny, nz]).or_insert_with(|| {
+                points.push((place.as_dvec3().lerp(middle, CORNER_INSET), normal.as_dvec3()));
+                points.len() - 1
+            });
+            point_of_corner.push(point);
+        }
+    }
+    (points, point_of_corner)
+}
