@@ -71,6 +71,15 @@ pub fn write_float_exr(path: &Path, size_px: [u32; 2], values: &[f32]) -> Result
     })
 }
 
+/// Writes text (poses, statistics).
+pub fn write_text(path: &Path, text: &str) -> Result<(), OutputError> {
+    write_whole(path, |writer| {
+        writer
+            .write_all(text.as_bytes())
+            .map_err(|error| io_error(path, error))
+    })
+}
+
 fn write_png(
     path: &Path,
     size_px: [u32; 2],

@@ -8,4 +8,6 @@
 
 pub mod camera;
 pub mod mesh;
+pub mod normals;
 pub mod pose;
+pub mod shadow_volume;

@@ -1,1 +1,19 @@
-//! Draws a frame: the GPU side of the pipeline.
+//! Draws a frame: the GPU side of the pipeline, and the only home of wgpu.
+//!
+//! Each pass is one file here and one WGSL file of the same name under `shaders/`; [`Renderer::draw`] tells the frame
+//! from top to bottom.
+
+mod anchor_geometry;
+mod composite;
+mod gpu;
+mod layers;
+mod readback;
+mod renderer;
+mod shader;
+mod surfaces;
+mod uniforms;
+mod volumes;
+
+pub use gpu::{Gpu, RenderError};
+pub use layers::Layers;
+pub use renderer::{GpuTimes, Renderer, Shown};

@@ -4,10 +4,25 @@ use std::path::PathBuf;
 
 use glam::{DAffine3, DVec2, DVec3};
 
-use crate::geometry::mesh::Mesh;
+use crate::geometry::mesh::{Mesh, MeshReport};
 use crate::light::{Light, Material};
 
-#[derive(Debug, Clone)]
+mod anchors;
+mod error;
+mod family;
+mod lights;
+mod load;
+mod mesh_file;
+mod obj_scan;
+mod objects;
+mod reader;
+mod settings;
+
+pub use error::{Place, SceneError};
+pub use family::Family;
+
+/// What one scene file says, checked.
+#[derive(Debug, Clone, Default)]
 pub struct Scene {
     pub camera: CameraSettings,
     pub tracking: TrackingSettings,
@@ -21,7 +36,8 @@ pub struct Scene {
     pub shadows: ShadowSettings,
 }
 
-#[derive(Debug, Clone)]
+/// Where the pictures come from.
+#[derive(Debug, Clone, Default)]
 pub struct CameraSettings {
     /// As the file says, a path made absolute against the scene file's folder.
     pub source: String,
@@ -29,9 +45,12 @@ pub struct CameraSettings {
     pub calibration: Option<PathBuf>,
 }
 
+/// Which library finds the markers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DetectorKind {
+    /// libapriltag: AprilTag's families alone.
     AprilTag,
+    /// OpenCV's ArUco: every family.
     Aruco,
 }
 
@@ -44,6 +63,7 @@ pub enum ArucoRefinement {
     AprilTag,
 }
 
+/// How markers are found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackingSettings {
     pub detector: DetectorKind,
@@ -77,18 +97,6 @@ impl Default for TrackingSettings {
     }
 }
 
-/// A family (AprilTag) or dictionary (ArUco) of square markers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Family {
-    Tag16h5,
-    Tag25h9,
-    Tag36h10,
-    Tag36h11,
-    /// OpenCV's `DICT_NxN_M`: N cells a side, M markers (50, 100, 250 or 1000).
-    Aruco { cells: u8, count: u16 },
-    ArucoOriginal,
-}
-
 /// A marker in its anchor's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Marker {
@@ -112,7 +120,10 @@ pub struct Anchor {
 #[derive(Debug, Clone)]
 pub struct Object {
     pub name: String,
+    /// Its triangles are counter-clockwise seen from outside *in the anchor's frame*: where `anchor_from_object` mirrors,
+    /// they are turned round against the file's.
     pub mesh: Mesh,
+    pub mesh_report: MeshReport,
     /// As many as `mesh.triangle_materials` names; never empty.
     pub materials: Vec<Material>,
     /// Index into [`Scene::anchors`].
@@ -123,16 +134,40 @@ pub struct Object {
     pub casts: bool,
 }
 
+/// How shadows are made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Technique {
+    /// What the scene's lights call for.
     Auto,
     Volumes,
 }
 
+/// How shadows are made and how finely.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShadowSettings {
     pub technique: Technique,
     /// Samples per pixel: 1 or 4.
     pub samples: u32,
+    /// What a frame may take, milliseconds; `None`: no limit is asked for.
+    pub frame_budget_ms: Option<f64>,
 }
 
+impl Default for ShadowSettings {
+    fn default() -> Self {
+        Self {
+            technique: Technique::Auto,
+            samples: 4,
+            frame_budget_ms: None,
+        }
+    }
+}
+
+impl Scene {
+    /// The technique that makes this scene's shadows (never [`Technique::Auto`]), and why.
+    pub fn chosen_technique(&self) -> (Technique, &'static str) {
+        match self.shadows.technique {
+            Technique::Auto => (Technique::Volumes, "the scene has no probe"),
+            Technique::Volumes => (Technique::Volumes, "the scene asks for it"),
+        }
+    }
+}

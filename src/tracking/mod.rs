@@ -1,23 +1,117 @@
 //! Where the anchors are: markers detected, poses solved.
+//!
+//! [`Tracker`] goes from a frame to a pose per anchor; [`Detector`] is its first half, markers alone. What the two
+//! libraries behind it call a corner is told apart in `conventions.rs` and nowhere else; no type of theirs leaves.
+
+mod apriltag;
+mod aruco;
+mod conventions;
+mod detector;
+mod pose;
+mod tracker;
+mod undistort;
 
 use glam::DAffine3;
 
+pub use detector::{Detection, Detector};
+pub use tracker::Tracker;
+
+/// How far a pose can be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
+    /// One pose explains the picture.
     Tracked,
     /// A lone marker whose two poses explain the picture about equally well.
     Ambiguous,
+    /// No marker of the anchor was seen, or none that can be trusted.
     Lost,
 }
 
 /// What is known of one anchor in one frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AnchorPose {
+    /// How far the pose can be trusted.
     pub status: Status,
     /// Markers that the pose rests on.
     pub markers: u32,
     /// `None` when lost.
     pub camera_from_anchor: Option<DAffine3>,
-    /// Root mean square distance of the corners from where the pose puts them, pixels; 0 when lost.
+    /// Root mean square distance of the corners from where the pose puts them, pixels; 0 when lost. Above a pixel the
+    /// calibration or the markers' sizes are wrong.
     pub reprojection_px: f64,
+    /// The other of the two poses that a plane has, where it differs.
+    pub alternative: Option<Alternative>,
+}
+
+impl AnchorPose {
+    /// An anchor that was not found.
+    pub const LOST: Self = Self {
+        status: Status::Lost,
+        markers: 0,
+        camera_from_anchor: None,
+        reprojection_px: 0.0,
+        alternative: None,
+    };
+}
+
+/// The pose of a plane that was not chosen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alternative {
+    /// The pose.
+    pub camera_from_anchor: DAffine3,
+    /// Root mean square distance of the corners from where it puts them, pixels.
+    pub reprojection_px: f64,
+}
+
+/// What stops tracking; a marker that is not seen does not.
+#[derive(Debug, thiserror::Error)]
+pub enum TrackingError {
+    /// The detector does not know the family.
+    #[error("{detector} does not know the family {family}; it knows {allowed}")]
+    FamilyNotAvailable {
+        /// Name of the family.
+        family: &'static str,
+        /// Name of the detector.
+        detector: &'static str,
+        /// Names of the families that it knows.
+        allowed: String,
+    },
+    /// A setting is out of its range.
+    #[error("{name} = {value} is out of range; allowed: {allowed}")]
+    Setting {
+        /// Name of the setting, as in the scene file.
+        name: &'static str,
+        /// What it was.
+        value: String,
+        /// What it may be.
+        allowed: &'static str,
+    },
+    /// The frame is not of the size that the camera was calibrated for.
+    #[error(
+        "a frame of {} x {} pixels does not fit a calibration for {} x {}",
+        frame_px[0], frame_px[1], calibration_px[0], calibration_px[1]
+    )]
+    FrameSize {
+        /// Width and height of the frame.
+        frame_px: [u32; 2],
+        /// Width and height that the calibration is for.
+        calibration_px: [u32; 2],
+    },
+    /// A picture's bytes do not make up its size.
+    #[error("{bytes} bytes are no picture of {} x {} pixels", size_px[0], size_px[1])]
+    PictureSize {
+        /// Number of bytes.
+        bytes: usize,
+        /// Width and height that they should make up.
+        size_px: [u32; 2],
+    },
+    /// libapriltag or OpenCV failed.
+    #[error("{0}")]
+    Library(String),
+}
+
+impl From<opencv::Error> for TrackingError {
+    fn from(error: opencv::Error) -> Self {
+        Self::Library(format!("OpenCV: {}", error.message))
+    }
 }

@@ -1,0 +1,95 @@
+//! What a replay cost, as `--stats` writes it.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+/// Times of one stage over all frames, milliseconds.
+#[derive(Debug, Clone, Copy, Serialize, PartialEq)]
+pub struct StageTimes {
+    pub median_ms: f64,
+    pub p95_ms: f64,
+    pub max_ms: f64,
+    /// Frames that the stage worked on.
+    pub frames: usize,
+}
+
+/// Gathers times by stage.
+#[derive(Debug, Default)]
+pub struct StageLog {
+    samples_ms: BTreeMap<&'static str, Vec<f64>>,
+}
+
+impl StageLog {
+    /// Notes what a stage took for one frame.
+    pub fn add(&mut self, stage: &'static str, ms: f64) {
+        self.samples_ms.entry(stage).or_default().push(ms);
+    }
+
+    /// The summary of each stage that worked.
+    pub fn summary(&self) -> BTreeMap<&'static str, StageTimes> {
+        self.samples_ms.iter().map(|(&stage, samples)| (stage, summarise(samples))).collect()
+    }
+}
+
+fn summarise(samples_ms: &[f64]) -> StageTimes {
+    let mut sorted = samples_ms.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    // The sample that at least this part of all does not exceed.
+    let quantile = |part: f64| {
+        let rank = (part * sorted.len() as f64).ceil() as usize;
+        sorted.get(rank.saturating_sub(1)).copied().unwrap_or(0.0)
+    };
+    StageTimes {
+        median_ms: quantile(0.5),
+        p95_ms: quantile(0.95),
+        max_ms: quantile(1.0),
+        frames: sorted.len(),
+    }
+}
+
+/// The whole of `--stats`.
+#[derive(Debug, Serialize)]
+pub struct Stats {
+    pub source: String,
+    pub size_px: [u32; 2],
+    /// Frames that were read.
+    pub frames: u32,
+    /// Frames that were drawn and written.
+    pub drawn: u32,
+    /// Frames that were dropped: none in a replay, but for those the recording has lost.
+    pub drops: u32,
+    /// For each anchor the frames without a pose.
+    pub lost: BTreeMap<String, u32>,
+    pub detector: String,
+    pub technique: String,
+    /// `None` where nothing was drawn.
+    pub adapter: Option<String>,
+    pub stages: BTreeMap<&'static str, StageTimes>,
+    /// From the first frame to the last file, seconds.
+    pub total_secs: f64,
+    /// `None` where the system does not tell.
+    pub peak_memory_mib: Option<f64>,
+}
+
+/// The largest resident memory of this process so far, MiB (Linux).
+pub fn peak_memory_mib() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kib / 1024.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_samples() {
+        let mut log = StageLog::default();
+        (1..=100).rev().for_each(|ms| log.add("track", f64::from(ms)));
+        let times = log.summary()["track"];
+        assert_eq!((times.median_ms, times.p95_ms, times.max_ms), (50.0, 95.0, 100.0));
+        assert_eq!(summarise(&[3.0]).p95_ms, 3.0);
+    }
+}

@@ -1,0 +1,194 @@
+//! Normals made where a mesh has none.
+
+use glam::{DVec3, Vec3};
+
+/// Cosine's slack, so that faces at just the crease angle count as within it whatever the rounding.
+const CREASE_SLACK: f64 = 1e-6;
+/// A triangle whose height is below this part of its longest side has no area that single precision can tell.
+const NEEDLE: f64 = 1e-7;
+
+/// A triangle's unit normal, outward by its winding; zero if it has no area.
+pub fn face_normal(positions: &[Vec3], [a, b, c]: [u32; 3]) -> DVec3 {
+    let [a, b, c] = [a, b, c].map(|index| positions[index as usize].as_dvec3());
+    let (ab, ac, bc) = (b - a, c - a, c - b);
+    let cross = ab.cross(ac);
+    let longest_squared = ab
+        .length_squared()
+        .max(ac.length_squared())
+        .max(bc.length_squared());
+    if cross.length() <= NEEDLE * longest_squared {
+        DVec3::ZERO
+    } else {
+        cross.normalize_or_zero()
+    }
+}
+
+/// A unit normal for each corner: the mean over the faces around its vertex whose normals lie within `crease_rad` of
+/// its own face's, weighted by their angles there (Thürmer & Wüthrich 1998). 0 gives the face's own normal.
+pub fn made_normals(positions: &[Vec3], triangles: &[[u32; 3]], crease_rad: f64) -> Vec<[Vec3; 3]> {
+    let faces: Vec<DVec3> = triangles
+        .iter()
+        .map(|&corners| face_normal(positions, corners))
+        .collect();
+    let mut weighted_at: Vec<Vec<(DVec3, f64)>> = vec![Vec::new(); positions.len()];
+    for (&corners, &normal) in triangles.iter().zip(&faces) {
+        for corner in 0..3 {
+            weighted_at[corners[corner] as usize]
+                .push((normal, corner_angle_rad(positions, corners, corner)));
+        }
+    }
+    let least_cosine = crease_rad.cos() - CREASE_SLACK;
+    triangles
+        .iter()
+        .zip(&faces)
+        .map(|(corners, &own)| {
+            corners.map(|vertex| {
+                let around = &weighted_at[vertex as usize];
+                let mean = |within: &dyn Fn(DVec3) -> bool| {
+                    around
+                        .iter()
+                        .filter(|(normal, _)| within(*normal))
+                        .map(|(normal, angle_rad)| normal * angle_rad)
+                        .sum::<DVec3>()
+                        .normalize_or_zero()
+                };
+                let made = match own {
+                    // A needle has no side of its own and takes its surroundings'.
+                    DVec3::ZERO => mean(&|_| true),
+                    _ if crease_rad == 0.0 => own,
+                    _ => mean(&|normal| normal.dot(own) >= least_cosine),
+                };
+                [made, own, DVec3::Z]
+                    .into_iter()
+                    .find(|normal| *normal != DVec3::ZERO)
+                    .unwrap_or(DVec3::Z)
+                    .as_vec3()
+            })
+        })
+        .collect()
+}
+
+fn corner_angle_rad(positions: &[Vec3], corners: [u32; 3], corner: usize) -> f64 {
+    let at = |offset: usize| positions[corners[(corner + offset) % 3] as usize].as_dvec3();
+    let (towards_next, towards_last) = (at(1) - at(0), at(2) - at(0));
+    towards_next
+        .cross(towards_last)
+        .length()
+        .atan2(towards_next.dot(towards_last))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cube of side 2 about the origin.
+    fn cube() -> (Vec<Vec3>, Vec<[u32; 3]>) {
+        let positions = (0..8)
+            .map(|bits| {
+                Vec3::from_array(std::array::from_fn(|axis| {
+                    if bits >> axis & 1 == 1 { 1.0 } else { -1.0 }
+                }))
+            })
+            .collect();
+        let quads = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        (
+            positions,
+            quads
+                .iter()
+                .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+                .collect(),
+        )
+    }
+
+    #[test]
+    fn a_cube_stays_flat_below_its_crease_angle() {
+        let (positions, triangles) = cube();
+        for crease_deg in [0.0_f64, 30.0, 89.0] {
+            let normals = made_normals(&positions, &triangles, crease_deg.to_radians());
+            for (corners, normals) in triangles.iter().zip(normals) {
+                let flat = face_normal(&positions, *corners).as_vec3();
+                assert!(
+                    normals.iter().all(|normal| (normal - flat).length() < 1e-6),
+                    "{crease_deg}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_cube_within_its_crease_angle_has_its_diagonals_whatever_way_its_squares_are_cut() {
+        let (positions, triangles) = cube();
+        let normals = made_normals(&positions, &triangles, 90.0_f64.to_radians());
+        for (corners, normals) in triangles.iter().zip(normals) {
+            for (&corner, normal) in corners.iter().zip(normals) {
+                assert!((normal - positions[corner as usize].normalize()).length() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn a_sphere_has_nearly_its_radii() {
+        let (rings, sectors) = (24_u32, 48_u32);
+        let mut positions = vec![Vec3::Z];
+        for ring in 1..rings {
+            let polar = std::f32::consts::PI * ring as f32 / rings as f32;
+            positions.extend((0..sectors).map(|sector| {
+                let azimuth = std::f32::consts::TAU * sector as f32 / sectors as f32;
+                Vec3::new(
+                    polar.sin() * azimuth.cos(),
+                    polar.sin() * azimuth.sin(),
+                    polar.cos(),
+                )
+            }));
+        }
+        positions.push(-Vec3::Z);
+        let at = |ring: u32, sector: u32| match ring {
+            0 => 0,
+            _ if ring == rings => (rings - 1) * sectors + 1,
+            _ => 1 + (ring - 1) * sectors + sector % sectors,
+        };
+        let mut triangles = Vec::new();
+        for (ring, sector) in
+            (0..rings).flat_map(|ring| (0..sectors).map(move |sector| (ring, sector)))
+        {
+            if ring + 1 < rings {
+                triangles.push([
+                    at(ring, sector),
+                    at(ring + 1, sector),
+                    at(ring + 1, sector + 1),
+                ]);
+            }
+            if ring > 0 {
+                triangles.push([
+                    at(ring, sector),
+                    at(ring + 1, sector + 1),
+                    at(ring, sector + 1),
+                ]);
+            }
+        }
+        let normals = made_normals(&positions, &triangles, 30.0_f64.to_radians());
+        for (corners, normals) in triangles.iter().zip(normals) {
+            for (&corner, normal) in corners.iter().zip(normals) {
+                assert!(
+                    normal.angle_between(positions[corner as usize]) < 0.01,
+                    "{normal}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_needle_takes_the_normal_around_it() {
+        let positions = [Vec3::ZERO, Vec3::X, Vec3::X * 0.5, Vec3::Y];
+        let normals = made_normals(&positions, &[[0, 1, 2], [0, 1, 3]], 0.0);
+        assert_eq!(normals[0], [Vec3::Z; 3]);
+        assert_eq!(made_normals(&positions, &[[0, 1, 2]], 0.5)[0], [Vec3::Z; 3]);
+    }
+}

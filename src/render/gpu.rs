@@ -1,0 +1,126 @@
+//! The device that draws: chosen by name, else the best there is.
+
+use std::sync::{Arc, Mutex};
+
+/// What can go wrong on the way to a drawn frame.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    #[error("no graphics adapter found; install a Vulkan driver (Debian: mesa-vulkan-drivers)")]
+    NoAdapter,
+    #[error("no adapter is called \"{wanted}\"; there are: {found}")]
+    UnknownAdapter { wanted: String, found: String },
+    #[error("the adapter \"{adapter}\" cannot be used: {reason}")]
+    Unusable { adapter: String, reason: String },
+    #[error("the picture of {width}x{height} is larger than the adapter's limit of {limit}")]
+    TooLarge { width: u32, height: u32, limit: u32 },
+    #[error("the frame is {found:?} pixels, the camera's calibration {expected:?}")]
+    FrameSize { found: [u32; 2], expected: [u32; 2] },
+    #[error("the GPU failed: {0}")]
+    Failed(String),
+}
+
+/// An opened adapter.
+pub struct Gpu {
+    pub(super) device: wgpu::Device,
+    pub(super) queue: wgpu::Queue,
+    pub(super) depth_format: wgpu::TextureFormat,
+    /// Nanoseconds per tick of a timestamp; `None` where the adapter has no timestamps.
+    pub(super) timestamp_period_ns: Option<f32>,
+    description: String,
+    failure: Arc<Mutex<Option<String>>>,
+}
+
+impl Gpu {
+    /// Opens the adapter whose name contains `wanted` (any case), else the fastest kind there is: discrete,
+    /// integrated, virtual, then software.
+    ///
+    /// # Errors
+    /// No adapter, none of that name, or one that lacks what the passes need.
+    pub fn open(wanted: Option<&str>) -> Result<Self, RenderError> {
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+        descriptor.backends = wgpu::Backends::PRIMARY;
+        let instance = wgpu::Instance::new(descriptor);
+        let mut adapters =
+            pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
+        adapters.sort_by_key(|adapter| match adapter.get_info().device_type {
+            wgpu::DeviceType::DiscreteGpu => 0,
+            wgpu::DeviceType::IntegratedGpu => 1,
+            wgpu::DeviceType::VirtualGpu => 2,
+            wgpu::DeviceType::Other => 3,
+            wgpu::DeviceType::Cpu => 4,
+        });
+        let name = |adapter: &wgpu::Adapter| adapter.get_info().name;
+        let adapter = match wanted {
+            None => adapters.first().ok_or(RenderError::NoAdapter)?,
+            Some(wanted) => adapters
+                .iter()
+                .find(|adapter| name(adapter).to_lowercase().contains(&wanted.to_lowercase()))
+                .ok_or_else(|| RenderError::UnknownAdapter {
+                    wanted: wanted.to_owned(),
+                    found: adapters.iter().map(name).collect::<Vec<_>>().join(", "),
+                })?,
+        };
+        Self::from_adapter(adapter)
+    }
+
+    fn from_adapter(adapter: &wgpu::Adapter) -> Result<Self, RenderError> {
+        let info = adapter.get_info();
+        let offered = adapter.features();
+        let wished = wgpu::Features::DEPTH32FLOAT_STENCIL8 | wgpu::Features::TIMESTAMP_QUERY;
+        let features = offered & wished;
+        let unusable = |reason: String| RenderError::Unusable { adapter: info.name.clone(), reason };
+        let (device, queue) =
+            pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+                label: Some("gnomon"),
+                required_features: features,
+                required_limits: adapter.limits(),
+                ..Default::default()
+            }))
+            .map_err(|error| unusable(error.to_string()))?;
+
+        // wgpu's own answer to an uncaught error is a panic; ours is a message when the frame is read.
+        let failure = Arc::new(Mutex::new(None));
+        let note = |failure: &Arc<Mutex<Option<String>>>, message: String| {
+            if let Ok(mut first) = failure.lock() {
+                first.get_or_insert(message);
+            }
+        };
+        let uncaptured = Arc::clone(&failure);
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            note(&uncaptured, error.to_string());
+        }));
+        let lost = Arc::clone(&failure);
+        device.set_device_lost_callback(move |reason, message| {
+            if reason != wgpu::DeviceLostReason::Destroyed {
+                note(&lost, format!("device lost: {message}"));
+            }
+        });
+
+        Ok(Self {
+            // Floating depth spends its precision evenly over reversed depth; 24 bits are the fallback.
+            depth_format: if features.contains(wgpu::Features::DEPTH32FLOAT_STENCIL8) {
+                wgpu::TextureFormat::Depth32FloatStencil8
+            } else {
+                wgpu::TextureFormat::Depth24PlusStencil8
+            },
+            timestamp_period_ns: features
+                .contains(wgpu::Features::TIMESTAMP_QUERY)
+                .then(|| queue.get_timestamp_period()),
+            description: format!("{} ({:?}, {})", info.name, info.backend, info.driver_info),
+            device,
+            queue,
+            failure,
+        })
+    }
+
+    /// The adapter's name, its interface and its driver.
+    pub fn description(&self) -> &str {
+        &self.description
+    }
+
+    /// The first failure that the device reported, if any.
+    pub(super) fn check(&self) -> Result<(), RenderError> {
+        let failure = self.failure.lock().map(|first| first.clone()).unwrap_or_default();
+        failure.map_or(Ok(()), |message| Err(RenderError::Failed(message)))
+    }
+}

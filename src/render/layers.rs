@@ -1,0 +1,246 @@
+//! Layers for tests and tools, one sample at each pixel's centre: role, depth and shadow bits of the visible surface.
+//! Same vertices, same volumes and same counting as the picture. Reads nothing. Writes textures of its own.
+
+use super::anchor_geometry::{CORNER_LAYOUT, Role};
+use super::gpu::{Gpu, RenderError};
+use super::readback::Readback;
+use super::{shader, volumes};
+
+const ROLE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
+const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
+const BITS_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
+
+/// What is seen at each pixel's centre, rows from the top.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Layers {
+    /// 0 none, 100 real, 200 virtual.
+    pub role: Vec<u8>,
+    /// Distance along the camera's axis, metres; 0 where there is nothing.
+    pub depth_m: Vec<f32>,
+    /// For each light: bit 0 in a real thing's shadow, bit 1 in a virtual thing's.
+    pub shadow: Vec<Vec<u8>>,
+    /// Factor on the real part of the pixel's light, linear RGB.
+    pub gain: Vec<[f32; 3]>,
+}
+
+/// Pipelines and textures of the layers.
+pub(super) struct LayerPasses {
+    real: wgpu::RenderPipeline,
+    seeming: wgpu::RenderPipeline,
+    volumes: wgpu::RenderPipeline,
+    mark_real: wgpu::RenderPipeline,
+    mark_virtual: wgpu::RenderPipeline,
+    role: wgpu::Texture,
+    depth_m: wgpu::Texture,
+    bits: wgpu::Texture,
+    depth_stencil: wgpu::TextureView,
+    role_readback: Readback,
+    depth_readback: Readback,
+    bits_readback: Readback,
+}
+
+/// Draws all surfaces of a role, or all volumes of a role's casters for one light, into the pass.
+pub(super) type DrawRole<'a> = &'a dyn Fn(&mut wgpu::RenderPass<'_>, Role);
+
+impl LayerPasses {
+    pub fn new(gpu: &Gpu, layout: &wgpu::PipelineLayout, size_px: [u32; 2]) -> Self {
+        let device = &gpu.device;
+        let module = shader::module(device, "layers", include_str!("../../shaders/layers.wgsl"));
+        let texture = |label, format, usage| {
+            device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d {
+                    width: size_px[0],
+                    height: size_px[1],
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
+                view_formats: &[],
+            })
+        };
+        let copied = wgpu::TextureUsages::COPY_SRC;
+        let surface = |entry_point: &str| {
+            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(entry_point),
+                layout: Some(layout),
+                vertex: wgpu::VertexState {
+                    module: &module,
+                    entry_point: Some("place"),
+                    compilation_options: Default::default(),
+                    buffers: &[Some(CORNER_LAYOUT)],
+                },
+                primitive: wgpu::PrimitiveState::default(),
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: gpu.depth_format,
+                    depth_write_enabled: Some(true),
+                    depth_compare: Some(wgpu::CompareFunction::Greater),
+                    stencil: wgpu::StencilState::default(),
+                    bias: wgpu::DepthBiasState::default(),
+                }),
+                multisample: wgpu::MultisampleState::default(),
+                fragment: Some(wgpu::FragmentState {
+                    module: &module,
+                    entry_point: Some(entry_point),
+                    compilation_options: Default::default(),
+                    targets: &[Some(ROLE_FORMAT.into()), Some(DEPTH_FORMAT.into())],
+                }),
+                multiview_mask: None,
+                cache: None,
+            })
+        };
+        let mark = |entry_point: &str| {
+            let shadowed = wgpu::StencilFaceState {
+                compare: wgpu::CompareFunction::NotEqual,
+                ..Default::default()
+            };
+            let add = wgpu::BlendComponent {
+                src_factor: wgpu::BlendFactor::One,
+                dst_factor: wgpu::BlendFactor::One,
+                operation: wgpu::BlendOperation::Add,
+            };
+            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(entry_point),
+                layout: Some(layout),
+                vertex: wgpu::VertexState {
+                    module: &module,
+                    entry_point: Some("whole_picture"),
+                    compilation_options: Default::default(),
+                    buffers: &[],
+                },
+                primitive: wgpu::PrimitiveState::default(),
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: gpu.depth_format,
+                    depth_write_enabled: Some(false),
+                    depth_compare: Some(wgpu::CompareFunction::Always),
+                    stencil: wgpu::StencilState {
+                        front: shadowed,
+                        back: shadowed,
+                        read_mask: 0xff,
+                        write_mask: 0,
+                    },
+                    bias: wgpu::DepthBiasState::default(),
+                }),
+                multisample: wgpu::MultisampleState::default(),
+                fragment: Some(wgpu::FragmentState {
+                    module: &module,
+                    entry_point: Some(entry_point),
+                    compilation_options: Default::default(),
+                    targets: &[Some(wgpu::ColorTargetState {
+                        format: BITS_FORMAT,
+                        blend: Some(wgpu::BlendState { color: add, alpha: add }),
+                        write_mask: wgpu::ColorWrites::ALL,
+                    })],
+                }),
+                multiview_mask: None,
+                cache: None,
+            })
+        };
+        Self {
+            real: surface("real"),
+            seeming: surface("virtual_thing"),
+            volumes: volumes::pipeline(device, layout, gpu.depth_format, 1, &[BITS_FORMAT]),
+            mark_real: mark("in_real_shadow"),
+            mark_virtual: mark("in_virtual_shadow"),
+            depth_stencil: texture(
+                "layer depth and stencil",
+                gpu.depth_format,
+                wgpu::TextureUsages::empty(),
+            )
+            .create_view(&Default::default()),
+            role: texture("role layer", ROLE_FORMAT, copied),
+            depth_m: texture("depth layer", DEPTH_FORMAT, copied),
+            bits: texture("shadow layer", BITS_FORMAT, copied),
+            role_readback: Readback::new(device, size_px, 1),
+            depth_readback: Readback::new(device, size_px, 4),
+            bits_readback: Readback::new(device, size_px, 1),
+        }
+    }
+
+    /// Role and depth of the visible surfaces; the depth buffer stays for [`LayerPasses::shadow`].
+    pub fn role_and_depth(
+        &self,
+        gpu: &Gpu,
+        draw_surfaces: DrawRole<'_>,
+    ) -> Result<(Vec<u8>, Vec<f32>), RenderError> {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let (role, depth_m) = (
+            self.role.create_view(&Default::default()),
+            self.depth_m.create_view(&Default::default()),
+        );
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("role and depth layers"),
+            color_attachments: &[Some(cleared(&role)), Some(cleared(&depth_m))],
+            depth_stencil_attachment: Some(self.depth_stencil(wgpu::LoadOp::Clear(0.0))),
+            ..Default::default()
+        });
+        for (role, pipeline) in [(Role::Real, &self.real), (Role::Virtual, &self.seeming)] {
+            pass.set_pipeline(pipeline);
+            draw_surfaces(&mut pass, role);
+        }
+        drop(pass);
+        self.role_readback.copy_from(&mut encoder, &self.role);
+        self.depth_readback.copy_from(&mut encoder, &self.depth_m);
+        gpu.queue.submit([encoder.finish()]);
+        let depth_m = self.depth_readback.read(gpu)?;
+        Ok((self.role_readback.read(gpu)?, bytemuck::pod_collect_to_vec(&depth_m)))
+    }
+
+    /// The shadow bits of the light whose volumes `draw_volumes` draws.
+    pub fn shadow(&self, gpu: &Gpu, draw_volumes: DrawRole<'_>) -> Result<Vec<u8>, RenderError> {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let bits = self.bits.create_view(&Default::default());
+        for (role, mark) in
+            [(Role::Real, &self.mark_real), (Role::Virtual, &self.mark_virtual)]
+        {
+            let mut color = cleared(&bits);
+            if role == Role::Virtual {
+                color.ops.load = wgpu::LoadOp::Load;
+            }
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("shadow layer"),
+                color_attachments: &[Some(color)],
+                depth_stencil_attachment: Some(self.depth_stencil(wgpu::LoadOp::Load)),
+                ..Default::default()
+            });
+            pass.set_pipeline(&self.volumes);
+            draw_volumes(&mut pass, role);
+            pass.set_pipeline(mark);
+            pass.set_stencil_reference(0);
+            pass.draw(0..3, 0..1);
+        }
+        self.bits_readback.copy_from(&mut encoder, &self.bits);
+        gpu.queue.submit([encoder.finish()]);
+        self.bits_readback.read(gpu)
+    }
+
+    /// The stencil starts at 0 in each pass.
+    fn depth_stencil(
+        &self,
+        depth: wgpu::LoadOp<f32>,
+    ) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+        wgpu::RenderPassDepthStencilAttachment {
+            view: &self.depth_stencil,
+            depth_ops: Some(wgpu::Operations { load: depth, store: wgpu::StoreOp::Store }),
+            stencil_ops: Some(wgpu::Operations {
+                load: wgpu::LoadOp::Clear(0),
+                store: wgpu::StoreOp::Discard,
+            }),
+        }
+    }
+}
+
+fn cleared(view: &wgpu::TextureView) -> wgpu::RenderPassColorAttachment<'_> {
+    wgpu::RenderPassColorAttachment {
+        view,
+        depth_slice: None,
+        resolve_target: None,
+        ops: wgpu::Operations {
+            load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+            store: wgpu::StoreOp::Store,
+        },
+    }
+}

@@ -1,0 +1,579 @@
+//! The frame from top to bottom: recorded picture, surfaces, shadow volumes light by light, composite.
+
+use std::sync::Arc;
+
+use glam::DAffine3;
+
+use crate::capture::Frame;
+use crate::geometry::camera::Intrinsics;
+use crate::geometry::shadow_volume::LightPlace;
+use crate::light::Light;
+use crate::scene::Scene;
+
+use super::anchor_geometry::{self, AnchoredCaster, Role, SurfaceBatch};
+use super::composite::{Composite, GAIN_FORMAT, PICTURE_FORMAT};
+use super::gpu::{Gpu, RenderError};
+use super::layers::{LayerPasses, Layers};
+use super::readback::{self, Readback};
+use super::surfaces::{LIGHT_FORMAT, Surfaces};
+use super::uniforms::{Lens, LightSource, Surroundings, UniformRow, View, uniform_entry};
+use super::volumes::{self, VolumeBuffers};
+
+/// What a frame shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shown {
+    /// The video with the virtual things.
+    Composite,
+    /// The undistorted video alone.
+    Bare,
+}
+
+/// What the last frame cost on the GPU, milliseconds; `None` where the adapter has no timestamps.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct GpuTimes {
+    pub shadows_ms: Option<f64>,
+    pub composite_ms: Option<f64>,
+}
+
+/// Draws the frames of one scene through one camera.
+pub struct Renderer {
+    gpu: Arc<Gpu>,
+    intrinsics: Intrinsics,
+    lights: Vec<Light>,
+    surfaces: Vec<SurfaceBatch>,
+    casters: Vec<AnchoredCaster>,
+    /// For each light those of each caster.
+    volumes: Vec<Vec<VolumeBuffers>>,
+    views: UniformRow,
+    light_sources: UniformRow,
+    view_group: wgpu::BindGroup,
+    light_group: wgpu::BindGroup,
+    geometry_layout: wgpu::PipelineLayout,
+    surface_pass: Surfaces,
+    volume_pipeline: wgpu::RenderPipeline,
+    composite_pass: Composite,
+    composite_group: wgpu::BindGroup,
+    recorded: wgpu::Texture,
+    picture: wgpu::Texture,
+    before: wgpu::TextureView,
+    after: wgpu::TextureView,
+    depth_stencil: wgpu::TextureView,
+    picture_readback: Readback,
+    clock: Option<GpuClock>,
+    layer_passes: Option<LayerPasses>,
+    /// Whether each anchor has a pose in the frame that was drawn last, and so whether it is drawn.
+    placed: Vec<bool>,
+}
+
+impl Renderer {
+    /// Prepares all that does not change from frame to frame.
+    ///
+    /// # Errors
+    /// A picture larger than the adapter can hold, or a device that failed.
+    pub fn new(gpu: Arc<Gpu>, scene: &Scene, intrinsics: Intrinsics) -> Result<Self, RenderError> {
+        let device = &gpu.device;
+        let [width, height] = intrinsics.size_px;
+        let limit = device.limits().max_texture_dimension_2d;
+        if width.max(height) > limit {
+            return Err(RenderError::TooLarge { width, height, limit });
+        }
+        let samples = scene.shadows.samples;
+        let texture = |label, format, sample_count, usage| {
+            device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage,
+                view_formats: &[],
+            })
+        };
+        let target = wgpu::TextureUsages::RENDER_ATTACHMENT;
+        let read = wgpu::TextureUsages::TEXTURE_BINDING;
+        let recorded = texture(
+            "recorded picture",
+            PICTURE_FORMAT,
+            1,
+            read | wgpu::TextureUsages::COPY_DST,
+        );
+        let picture =
+            texture("composite", PICTURE_FORMAT, 1, target | wgpu::TextureUsages::COPY_SRC);
+        let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
+        let before = view(&texture("before", LIGHT_FORMAT, samples, target | read));
+        let after = view(&texture("after", LIGHT_FORMAT, samples, target | read));
+        let depth_stencil =
+            view(&texture("depth and stencil", gpu.depth_format, samples, target));
+
+        let views = UniformRow::new::<View>(device, "views", scene.anchors.len());
+        let light_sources = UniformRow::new::<LightSource>(device, "lights", scene.lights.len());
+        let surroundings = UniformRow::new::<Surroundings>(device, "surroundings", 1);
+        surroundings.write(&gpu.queue, 0, &Surroundings::new(scene.ambient_radiance));
+        let lens = UniformRow::new::<Lens>(device, "lens", 1);
+        lens.write(&gpu.queue, 0, &Lens::new(&intrinsics));
+
+        let layout = |label, entries: &[wgpu::BindGroupLayoutEntry]| {
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some(label),
+                entries,
+            })
+        };
+        let group = |layout: &wgpu::BindGroupLayout, resources: Vec<wgpu::BindingResource<'_>>| {
+            let entries: Vec<_> = resources
+                .into_iter()
+                .zip(0..)
+                .map(|(resource, binding)| wgpu::BindGroupEntry { binding, resource })
+                .collect();
+            device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout,
+                entries: &entries,
+            })
+        };
+        let view_layout = layout("view", &[uniform_entry(0, true)]);
+        let light_layout = layout("light", &[uniform_entry(0, false), uniform_entry(1, true)]);
+        let geometry_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("geometry"),
+            bind_group_layouts: &[Some(&view_layout), Some(&light_layout)],
+            immediate_size: 0,
+        });
+        let composite_pass = Composite::new(device, samples);
+        let casters = anchor_geometry::casters(scene);
+        Ok(Self {
+            view_group: group(&view_layout, vec![views.binding()]),
+            light_group: group(
+                &light_layout,
+                vec![surroundings.binding(), light_sources.binding()],
+            ),
+            composite_group: group(
+                &composite_pass.layout,
+                vec![
+                    lens.binding(),
+                    wgpu::BindingResource::TextureView(&view(&recorded)),
+                    wgpu::BindingResource::TextureView(&before),
+                    wgpu::BindingResource::TextureView(&after),
+                ],
+            ),
+            surface_pass: Surfaces::new(device, &geometry_layout, gpu.depth_format, samples),
+            volume_pipeline: volumes::pipeline(
+                device,
+                &geometry_layout,
+                gpu.depth_format,
+                samples,
+                &[LIGHT_FORMAT, LIGHT_FORMAT],
+            ),
+            surfaces: anchor_geometry::surface_batches(device, scene),
+            volumes: scene
+                .lights
+                .iter()
+                .map(|_| casters.iter().map(|_| VolumeBuffers::default()).collect())
+                .collect(),
+            picture_readback: Readback::new(device, intrinsics.size_px, 4),
+            clock: gpu.timestamp_period_ns.map(|period_ns| GpuClock::new(device, period_ns)),
+            layer_passes: None,
+            placed: vec![false; scene.anchors.len()],
+            lights: scene.lights.clone(),
+            intrinsics,
+            casters,
+            views,
+            light_sources,
+            geometry_layout,
+            composite_pass,
+            recorded,
+            picture,
+            before,
+            after,
+            depth_stencil,
+            gpu,
+        })
+    }
+
+    /// Takes the recorded picture to the GPU.
+    ///
+    /// # Errors
+    /// A frame of another size than the camera's calibration.
+    pub fn upload(&mut self, frame: &Frame) -> Result<(), RenderError> {
+        if frame.size_px != self.intrinsics.size_px {
+            return Err(RenderError::FrameSize {
+                found: frame.size_px,
+                expected: self.intrinsics.size_px,
+            });
+        }
+        self.gpu.queue.write_texture(
+            self.recorded.as_image_copy(),
+            &frame.rgba,
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(4 * frame.size_px[0]),
+                rows_per_image: None,
+            },
+            self.recorded.size(),
+        );
+        self.gpu.check()
+    }
+
+    /// Draws the uploaded picture with what stands on the anchors, whose poses come in the scene's order. Without
+    /// the world's pose nobody knows where the light comes from, and the video is shown alone.
+    pub fn draw(&mut self, camera_from_anchor: &[Option<DAffine3>], shown: Shown) {
+        self.place(camera_from_anchor);
+        let with_virtual = shown == Shown::Composite
+            && self.surfaces.iter().any(|batch| {
+                batch.role == Role::Virtual && self.placed[batch.anchor]
+            });
+
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        if with_virtual {
+            self.draw_light(&mut encoder);
+        }
+        self.draw_picture(&mut encoder, with_virtual);
+        self.picture_readback.copy_from(&mut encoder, &self.picture);
+        if let Some(clock) = &mut self.clock {
+            clock.resolve(&mut encoder, with_virtual);
+        }
+        self.gpu.queue.submit([encoder.finish()]);
+    }
+
+    /// Waits until the picture is drawn, so that drawing and reading back can be timed apart.
+    ///
+    /// # Errors
+    /// The device failed since it was opened.
+    pub fn wait(&self) -> Result<(), RenderError> {
+        self.gpu
+            .device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map_err(|error| RenderError::Failed(error.to_string()))?;
+        self.gpu.check()
+    }
+
+    /// Waits for the drawn picture: sRGB-encoded RGBA, rows from the top.
+    ///
+    /// # Errors
+    /// The device failed since it was opened.
+    pub fn read_picture(&self) -> Result<Vec<u8>, RenderError> {
+        self.picture_readback.read(&self.gpu)
+    }
+
+    /// What the last picture cost; to be asked after it was read.
+    ///
+    /// # Errors
+    /// The device failed since it was opened.
+    pub fn gpu_times(&self) -> Result<GpuTimes, RenderError> {
+        self.clock.as_ref().map_or(Ok(GpuTimes::default()), |clock| clock.read(&self.gpu))
+    }
+
+    /// Role, depth, shadow bits and gain of the frame that was drawn last.
+    ///
+    /// # Errors
+    /// The device failed since it was opened.
+    pub fn layers(&mut self) -> Result<Layers, RenderError> {
+        let passes = self.layer_passes.get_or_insert_with(|| {
+            LayerPasses::new(&self.gpu, &self.geometry_layout, self.intrinsics.size_px)
+        });
+        let gpu = &self.gpu;
+        let (views, view_group, placed) = (&self.views, &self.view_group, &self.placed);
+        let set_view = |pass: &mut wgpu::RenderPass<'_>, anchor: usize| {
+            pass.set_bind_group(0, view_group, &[views.offset(anchor)]);
+            pass.set_bind_group(1, &self.light_group, &[0]);
+        };
+        let (role, depth_m) = passes.role_and_depth(gpu, &|pass, role| {
+            for batch in self.surfaces.iter().filter(|b| b.role == role && placed[b.anchor]) {
+                set_view(pass, batch.anchor);
+                pass.set_vertex_buffer(0, batch.corners.slice(..));
+                pass.draw(0..batch.corner_count, 0..1);
+            }
+        })?;
+        let mut shadow = Vec::new();
+        for volumes in &self.volumes {
+            let mut bits = passes.shadow(gpu, &|pass, role| {
+                set_view(pass, 0);
+                for (volume, caster) in volumes.iter().zip(&self.casters) {
+                    if caster.role == role && placed[caster.anchor] {
+                        set_view(pass, caster.anchor);
+                        volume.draw(pass);
+                    }
+                }
+            })?;
+            // Where nothing is modelled nothing can be shadowed.
+            for (bits, &role) in bits.iter_mut().zip(&role) {
+                *bits = if role == 0 { 0 } else { *bits };
+            }
+            shadow.push(bits);
+        }
+        let virtual_placed =
+            self.surfaces.iter().any(|batch| batch.role == Role::Virtual && placed[batch.anchor]);
+        let gain = if virtual_placed { self.read_gain()? } else { vec![[1.0; 3]; role.len()] };
+        Ok(Layers { role, depth_m, shadow, gain })
+    }
+
+    /// Writes the frame's uniforms and makes the shadow volumes whose light has moved.
+    fn place(&mut self, camera_from_anchor: &[Option<DAffine3>]) {
+        let queue = &self.gpu.queue;
+        let camera_from_world = camera_from_anchor.first().copied().flatten();
+        for (anchor, placed) in self.placed.iter_mut().enumerate() {
+            let pose = camera_from_anchor.get(anchor).copied().flatten();
+            *placed = pose.is_some() && camera_from_world.is_some();
+            if let Some(camera_from_anchor) = pose {
+                self.views.write(queue, anchor, &View::new(&self.intrinsics, &camera_from_anchor));
+            }
+        }
+        let Some(camera_from_world) = camera_from_world else { return };
+        for (index, (light, volumes)) in self.lights.iter().zip(&mut self.volumes).enumerate() {
+            self.light_sources.write(queue, index, &LightSource::new(light, &camera_from_world));
+            for (volume, caster) in volumes.iter_mut().zip(&self.casters) {
+                let Some(camera_from_anchor) = camera_from_anchor[caster.anchor] else { continue };
+                // The world stands still to its lights: no camera may come between, or rounding would move them.
+                let anchor_from_world = if caster.anchor == 0 {
+                    DAffine3::IDENTITY
+                } else {
+                    camera_from_anchor.inverse() * camera_from_world
+                };
+                let light = light_place(light, &anchor_from_world);
+                volume.update(&self.gpu.device, queue, &caster.caster, light);
+            }
+        }
+    }
+
+    /// Haller et al. 2003, section 3.2, light by light: phantoms and virtual things into depth; *real onto real* is
+    /// counted; what is lit then is lit in the video; *virtual onto real* is counted on top; what is lit then, real
+    /// or virtual, is lit past all casters.
+    fn draw_light(&self, encoder: &mut wgpu::CommandEncoder) {
+        let passes = self.lights.len().max(1);
+        for index in 0..passes {
+            let first = index == 0;
+            let color = |view| {
+                Some(wgpu::RenderPassColorAttachment {
+                    view,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: if first {
+                            wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT)
+                        } else {
+                            wgpu::LoadOp::Load
+                        },
+                        store: wgpu::StoreOp::Store,
+                    },
+                })
+            };
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("light"),
+                color_attachments: &[color(&self.before), color(&self.after)],
+                depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                    view: &self.depth_stencil,
+                    depth_ops: Some(wgpu::Operations {
+                        load: if first { wgpu::LoadOp::Clear(0.0) } else { wgpu::LoadOp::Load },
+                        store: wgpu::StoreOp::Store,
+                    }),
+                    stencil_ops: Some(wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(0),
+                        store: wgpu::StoreOp::Discard,
+                    }),
+                }),
+                timestamp_writes: self.clock.as_ref().map(|c| c.light(first, index + 1 == passes)),
+                ..Default::default()
+            });
+            if first {
+                for role in [Role::Real, Role::Virtual] {
+                    self.draw_surfaces(&mut pass, self.surface_pass.ambient(role), role, 0);
+                }
+            }
+            if index < self.lights.len() {
+                self.draw_volumes(&mut pass, Role::Real, index);
+                self.draw_surfaces(
+                    &mut pass,
+                    self.surface_pass.light_before(),
+                    Role::Real,
+                    index,
+                );
+                self.draw_volumes(&mut pass, Role::Virtual, index);
+                for role in [Role::Real, Role::Virtual] {
+                    self.draw_surfaces(&mut pass, self.surface_pass.light_after(role), role, index);
+                }
+            }
+        }
+    }
+
+    fn draw_surfaces(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        pipeline: &wgpu::RenderPipeline,
+        role: Role,
+        light: usize,
+    ) {
+        pass.set_pipeline(pipeline);
+        pass.set_stencil_reference(0);
+        pass.set_bind_group(1, &self.light_group, &[self.light_sources.offset(light)]);
+        for batch in &self.surfaces {
+            if batch.role == role && self.placed[batch.anchor] {
+                pass.set_bind_group(0, &self.view_group, &[self.views.offset(batch.anchor)]);
+                pass.set_vertex_buffer(0, batch.corners.slice(..));
+                pass.draw(0..batch.corner_count, 0..1);
+            }
+        }
+    }
+
+    fn draw_volumes(&self, pass: &mut wgpu::RenderPass<'_>, role: Role, light: usize) {
+        pass.set_pipeline(&self.volume_pipeline);
+        pass.set_bind_group(1, &self.light_group, &[self.light_sources.offset(light)]);
+        for (volume, caster) in self.volumes[light].iter().zip(&self.casters) {
+            if caster.role == role && self.placed[caster.anchor] {
+                pass.set_bind_group(0, &self.view_group, &[self.views.offset(caster.anchor)]);
+                volume.draw(pass);
+            }
+        }
+    }
+
+    fn draw_picture(&self, encoder: &mut wgpu::CommandEncoder, with_virtual: bool) {
+        let pipeline = if with_virtual {
+            &self.composite_pass.composite
+        } else {
+            &self.composite_pass.bare
+        };
+        self.draw_whole(
+            encoder,
+            pipeline,
+            &self.picture.create_view(&Default::default()),
+            self.clock.as_ref().map(GpuClock::composite),
+        );
+    }
+
+    fn draw_whole(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        pipeline: &wgpu::RenderPipeline,
+        target: &wgpu::TextureView,
+        timestamp_writes: Option<wgpu::RenderPassTimestampWrites<'_>>,
+    ) {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("composite"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: target,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            timestamp_writes,
+            ..Default::default()
+        });
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &self.composite_group, &[]);
+        pass.draw(0..3, 0..1);
+    }
+
+    /// The factor that the picture's own samples put on the video.
+    fn read_gain(&self) -> Result<Vec<[f32; 3]>, RenderError> {
+        let device = &self.gpu.device;
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("gain layer"),
+            size: self.picture.size(),
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: GAIN_FORMAT,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        let readback = Readback::new(device, self.intrinsics.size_px, 16);
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let view = texture.create_view(&Default::default());
+        self.draw_whole(&mut encoder, &self.composite_pass.gain, &view, None);
+        readback.copy_from(&mut encoder, &texture);
+        self.gpu.queue.submit([encoder.finish()]);
+        let texels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&readback.read(&self.gpu)?);
+        Ok(texels.into_iter().map(|[r, g, b, _]| [r, g, b]).collect())
+    }
+}
+
+fn light_place(light: &Light, anchor_from_world: &DAffine3) -> LightPlace {
+    match *light {
+        Light::Point { position_m, .. } => {
+            LightPlace::Point(anchor_from_world.transform_point3(position_m))
+        }
+        Light::Directional { direction, .. } => {
+            LightPlace::Along(anchor_from_world.transform_vector3(direction))
+        }
+    }
+}
+
+/// Timestamps at the ends of the frame's two stretches: light (0, 1) and composite (2, 3).
+struct GpuClock {
+    queries: wgpu::QuerySet,
+    resolved: wgpu::Buffer,
+    readable: wgpu::Buffer,
+    period_ns: f32,
+    light_drawn: bool,
+}
+
+impl GpuClock {
+    const BYTES: u64 = 4 * 8;
+
+    fn new(device: &wgpu::Device, period_ns: f32) -> Self {
+        let buffer = |usage| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("timestamps"),
+                size: Self::BYTES,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        Self {
+            queries: device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("timestamps"),
+                ty: wgpu::QueryType::Timestamp,
+                count: 4,
+            }),
+            resolved: buffer(wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC),
+            readable: buffer(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
+            period_ns,
+            light_drawn: false,
+        }
+    }
+
+    fn light(&self, first: bool, last: bool) -> wgpu::RenderPassTimestampWrites<'_> {
+        wgpu::RenderPassTimestampWrites {
+            query_set: &self.queries,
+            beginning_of_pass_write_index: first.then_some(0),
+            end_of_pass_write_index: last.then_some(1),
+        }
+    }
+
+    fn composite(&self) -> wgpu::RenderPassTimestampWrites<'_> {
+        wgpu::RenderPassTimestampWrites {
+            query_set: &self.queries,
+            beginning_of_pass_write_index: Some(2),
+            end_of_pass_write_index: Some(3),
+        }
+    }
+
+    fn resolve(&mut self, encoder: &mut wgpu::CommandEncoder, light_drawn: bool) {
+        self.light_drawn = light_drawn;
+        let first = if light_drawn { 0 } else { 2 };
+        encoder.resolve_query_set(&self.queries, first..4, &self.resolved, 0);
+        encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.readable, 0, Self::BYTES);
+    }
+
+    fn read(&self, gpu: &Gpu) -> Result<GpuTimes, RenderError> {
+        readback::map_for_reading(gpu, &self.readable)?;
+        let mapped = self
+            .readable
+            .slice(..)
+            .get_mapped_range()
+            .map_err(|error| RenderError::Failed(error.to_string()))?;
+        let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&mapped);
+        drop(mapped);
+        self.readable.unmap();
+        let stretch_ms = |begin: usize| {
+            let ticks = ticks[begin + 1].saturating_sub(ticks[begin]);
+            Some(ticks as f64 * f64::from(self.period_ns) * 1e-6)
+        };
+        Ok(if self.light_drawn {
+            GpuTimes { shadows_ms: stretch_ms(0), composite_ms: stretch_ms(2) }
+        } else {
+            GpuTimes { shadows_ms: None, composite_ms: stretch_ms(0) }
+        })
+    }
+}

@@ -1,0 +1,175 @@
+//! Uniform structs, each the twin of a WGSL struct; a test holds them against it offset by offset.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DAffine3, DVec3, Mat4, Vec4};
+
+use crate::geometry::camera::Intrinsics;
+use crate::light::Light;
+
+/// Nearest depth that is drawn, metres. Reversed floating depth keeps its precision however near this is.
+pub(super) const NEAR_M: f32 = 1e-3;
+
+/// Twin of `View` in common.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(super) struct View {
+    pub clip_from_anchor: Mat4,
+    pub camera_from_anchor: Mat4,
+}
+
+impl View {
+    pub fn new(intrinsics: &Intrinsics, camera_from_anchor: &DAffine3) -> Self {
+        let camera_from_anchor = glam::DMat4::from(*camera_from_anchor).as_mat4();
+        let clip_from_camera = intrinsics.clip_from_camera(NEAR_M);
+        Self { clip_from_anchor: clip_from_camera * camera_from_anchor, camera_from_anchor }
+    }
+}
+
+/// Twin of `LightSource` in common.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(super) struct LightSource {
+    pub place_in_camera: Vec4,
+    pub power: Vec4,
+}
+
+impl LightSource {
+    pub fn new(light: &Light, camera_from_world: &DAffine3) -> Self {
+        let (place, weight, power) = match *light {
+            Light::Point { position_m, intensity } => {
+                (camera_from_world.transform_point3(position_m), 1.0, intensity)
+            }
+            Light::Directional { direction, irradiance } => {
+                (-camera_from_world.transform_vector3(direction), 0.0, irradiance)
+            }
+        };
+        Self { place_in_camera: place.as_vec3().extend(weight), power: power.as_vec3().extend(0.0) }
+    }
+}
+
+/// Twin of `Surroundings` in common.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(super) struct Surroundings {
+    pub ambient_radiance: Vec4,
+}
+
+impl Surroundings {
+    pub fn new(ambient_radiance: DVec3) -> Self {
+        Self { ambient_radiance: ambient_radiance.as_vec3().extend(0.0) }
+    }
+}
+
+/// Twin of `Lens` in composite.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(super) struct Lens {
+    pub focal_px: [f32; 2],
+    pub center_px: [f32; 2],
+    pub distortion: [f32; 4],
+    pub k3: f32,
+    pub distorts: u32,
+    pub size_px: [u32; 2],
+}
+
+impl Lens {
+    pub fn new(intrinsics: &Intrinsics) -> Self {
+        let [k1, k2, p1, p2, k3] = intrinsics.distortion.map(|coefficient| coefficient as f32);
+        Self {
+            focal_px: intrinsics.focal_px.as_vec2().to_array(),
+            center_px: intrinsics.center_px.as_vec2().to_array(),
+            distortion: [k1, k2, p1, p2],
+            k3,
+            distorts: u32::from(intrinsics.distortion != [0.0; 5]),
+            size_px: intrinsics.size_px,
+        }
+    }
+}
+
+/// Several uniforms of one kind in one buffer, picked by a dynamic offset.
+pub(super) struct UniformRow {
+    pub buffer: wgpu::Buffer,
+    stride: u64,
+    size: u64,
+}
+
+impl UniformRow {
+    pub fn new<T: Pod>(device: &wgpu::Device, label: &str, count: usize) -> Self {
+        let size = size_of::<T>() as u64;
+        let stride =
+            size.next_multiple_of(u64::from(device.limits().min_uniform_buffer_offset_alignment));
+        let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size: stride * count.max(1) as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        Self { buffer, stride, size }
+    }
+
+    pub fn write<T: Pod>(&self, queue: &wgpu::Queue, index: usize, value: &T) {
+        queue.write_buffer(&self.buffer, self.stride * index as u64, bytemuck::bytes_of(value));
+    }
+
+    pub fn offset(&self, index: usize) -> u32 {
+        (self.stride * index as u64) as u32
+    }
+
+    /// One element, to be moved about by the dynamic offset.
+    pub fn binding(&self) -> wgpu::BindingResource<'_> {
+        wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+            buffer: &self.buffer,
+            offset: 0,
+            size: wgpu::BufferSize::new(self.size),
+        })
+    }
+}
+
+/// A uniform's entry in a bind group layout.
+pub(super) fn uniform_entry(binding: u32, dynamic: bool) -> wgpu::BindGroupLayoutEntry {
+    wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
+        ty: wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Uniform,
+            has_dynamic_offset: dynamic,
+            min_binding_size: None,
+        },
+        count: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::mem::offset_of;
+
+    /// Members of a WGSL struct as (name, offset), and the struct's size.
+    fn wgsl_struct(source: &str, name: &str) -> (Vec<(String, u32)>, u32) {
+        let module = naga::front::wgsl::parse_str(source).expect("WGSL");
+        let found = module.types.iter().find(|(_, kind)| kind.name.as_deref() == Some(name));
+        let Some((_, naga::Type { inner: naga::TypeInner::Struct { members, span }, .. })) = found else {
+            panic!("no struct {name}");
+        };
+        let named = |member: &naga::StructMember| (member.name.clone().expect("a name"), member.offset);
+        (members.iter().map(named).collect(), *span)
+    }
+
+    macro_rules! assert_twins {
+        ($source:expr, $twin:ty, $($member:ident),+) => {
+            let ours = vec![$((stringify!($member).to_owned(), offset_of!($twin, $member) as u32)),+];
+            let (theirs, size) = wgsl_struct($source, stringify!($twin));
+            assert_eq!((ours, size_of::<$twin>() as u32), (theirs, size), stringify!($twin));
+        };
+    }
+
+    #[test]
+    fn every_uniform_has_the_layout_of_its_wgsl_twin() {
+        let common = include_str!("../../shaders/common.wgsl");
+        assert_twins!(common, View, clip_from_anchor, camera_from_anchor);
+        assert_twins!(common, LightSource, place_in_camera, power);
+        assert_twins!(common, Surroundings, ambient_radiance);
+        let composite = include_str!("../../shaders/composite.wgsl");
+        assert_twins!(composite, Lens, focal_px, center_px, distortion, k3, distorts, size_px);
+    }
+}

@@ -1,0 +1,423 @@
+//! Reads values from a TOML file's spanned tree; each mistake knows its place and what is allowed there.
+
+use std::fmt::Display;
+use std::ops::{Range, RangeInclusive};
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::error::{Place, SceneError, suggestion};
+
+/// A TOML file's text and where it came from.
+pub struct Document<'a> {
+    pub path: &'a Path,
+    pub text: &'a str,
+}
+
+impl Document<'_> {
+    /// A mistake at a span of the text.
+    pub fn error(&self, span: Range<usize>, message: impl Into<String>) -> SceneError {
+        SceneError::at(self.path, self.text, span, message)
+    }
+}
+
+/// A table with the name that messages give it, all of whose keys are known.
+#[derive(Clone)]
+pub struct Table<'a> {
+    document: &'a Document<'a>,
+    name: String,
+    span: Range<usize>,
+    keys: &'a DeTable<'a>,
+}
+
+/// A value with the name that messages give it.
+#[derive(Clone)]
+pub struct Value<'a> {
+    document: &'a Document<'a>,
+    name: String,
+    value: &'a Spanned<DeValue<'a>>,
+}
+
+impl<'a> Table<'a> {
+    /// The file's outermost table.
+    pub fn root(
+        document: &'a Document<'a>,
+        root: &'a Spanned<DeTable<'a>>,
+        allowed: &[&str],
+    ) -> Result<Self, SceneError> {
+        // A key that is missing in the whole file has its place at the file's start.
+        let table = Self {
+            document,
+            name: String::new(),
+            span: 0..0,
+            keys: root.get_ref(),
+        };
+        table.allow(allowed)?;
+        Ok(table)
+    }
+
+    /// Refuses keys other than these.
+    pub fn allow(&self, allowed: &[&str]) -> Result<(), SceneError> {
+        let unknown = self
+            .keys
+            .keys()
+            .find(|key| !allowed.contains(&key.get_ref().as_ref()));
+        let Some(key) = unknown else { return Ok(()) };
+        let name = self.name_of(key.get_ref());
+        Err(self.document.error(
+            key.span(),
+            format!("{name}: unknown key{}", suggestion(key.get_ref(), allowed)),
+        ))
+    }
+
+    pub fn optional(&self, key: &str) -> Option<Value<'a>> {
+        let value = self.keys.get(key)?;
+        Some(Value {
+            document: self.document,
+            name: self.name_of(key),
+            value,
+        })
+    }
+
+    /// A key that must be there; `what` it is follows "missing".
+    pub fn required(&self, key: &str, what: &str) -> Result<Value<'a>, SceneError> {
+        self.optional(key)
+            .ok_or_else(|| self.error(format!("{}: missing; {what}", self.name_of(key))))
+    }
+
+    /// A table of its own, with these keys.
+    pub fn table(&self, key: &str, allowed: &[&str]) -> Result<Option<Table<'a>>, SceneError> {
+        self.optional(key)
+            .map(|value| value.table(allowed))
+            .transpose()
+    }
+
+    /// The tables of `[[key]]`, with these keys; none where it is missing.
+    pub fn tables(&self, key: &str, allowed: &[&str]) -> Result<Vec<Table<'a>>, SceneError> {
+        let Some(value) = self.optional(key) else {
+            return Ok(Vec::new());
+        };
+        if value.value.get_ref().is_table() {
+            return Err(
+                value.error_without_value(format!("may occur more than once: write [[{key}]]"))
+            );
+        }
+        value
+            .array("tables")?
+            .iter()
+            .map(|entry| entry.table(allowed))
+            .collect()
+    }
+
+    pub fn number_or(&self, key: &str, default: f64, allowed: &Numbers) -> Result<f64, SceneError> {
+        self.optional(key)
+            .map_or(Ok(default), |value| value.number(allowed))
+    }
+
+    pub fn integer_or(
+        &self,
+        key: &str,
+        default: u32,
+        allowed: RangeInclusive<u32>,
+    ) -> Result<u32, SceneError> {
+        self.optional(key)
+            .map_or(Ok(default), |value| value.integer(allowed))
+    }
+
+    pub fn flag_or(&self, key: &str, default: bool) -> Result<bool, SceneError> {
+        self.optional(key).map_or(Ok(default), |value| value.flag())
+    }
+
+    /// Three numbers.
+    pub fn vector_or(
+        &self,
+        key: &str,
+        default: DVec3,
+        allowed: &Numbers,
+    ) -> Result<DVec3, SceneError> {
+        self.optional(key).map_or(Ok(default), |value| {
+            value.numbers(allowed).map(DVec3::from_array)
+        })
+    }
+
+    /// A mistake of the table as a whole, at its head.
+    pub fn error(&self, message: impl Into<String>) -> SceneError {
+        self.document.error(self.span.clone(), message)
+    }
+
+    fn name_of(&self, key: &str) -> String {
+        match self.name.as_str() {
+            "" => key.to_owned(),
+            name => format!("{name}.{key}"),
+        }
+    }
+}
+
+/// Which numbers a key takes.
+pub struct Numbers {
+    pub least: f64,
+    pub most: f64,
+    /// Whether `least` itself is refused.
+    pub above: bool,
+    pub unit: &'static str,
+}
+
+impl Numbers {
+    pub const fn between(least: f64, most: f64, unit: &'static str) -> Self {
+        Self {
+            least,
+            most,
+            above: false,
+            unit,
+        }
+    }
+
+    pub const fn above(least: f64, most: f64, unit: &'static str) -> Self {
+        Self {
+            least,
+            most,
+            above: true,
+            unit,
+        }
+    }
+
+    fn has(&self, number: f64) -> bool {
+        number <= self.most
+            && if self.above {
+                number > self.least
+            } else {
+                number >= self.least
+            }
+    }
+}
+
+impl Display for Numbers {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self {
+            least, most, unit, ..
+        } = self;
+        let space = if unit.is_empty() { "" } else { " " };
+        match (self.above, most.is_finite()) {
+            (true, true) => write!(f, "above {least}, up to {most}{space}{unit}"),
+            (true, false) => write!(f, "above {least}{space}{unit}"),
+            (false, true) => write!(f, "{least} to {most}{space}{unit}"),
+            (false, false) => write!(f, "{least} or more{space}{unit}"),
+        }
+    }
+}
+
+impl<'a> Value<'a> {
+    /// `name = value: message`, at the value.
+    pub fn error(&self, message: impl Display) -> SceneError {
+        let written = self
+            .document
+            .text
+            .get(self.value.span())
+            .unwrap_or_default();
+        let mut shown: String = written.chars().take(60).collect();
+        if shown.len() < written.len() {
+            shown.push('…');
+        }
+        self.document.error(
+            self.value.span(),
+            format!("{} = {shown}: {message}", self.name),
+        )
+    }
+
+    /// `name: message`, at the value.
+    pub fn error_without_value(&self, message: impl Display) -> SceneError {
+        self.document
+            .error(self.value.span(), format!("{}: {message}", self.name))
+    }
+
+    /// `file:line:column`.
+    pub fn location(&self) -> String {
+        let place = Place::of_span(self.document.text, self.value.span());
+        format!(
+            "{}:{}:{}",
+            self.document.path.display(),
+            place.line,
+            place.column
+        )
+    }
+
+    /// The line that the value begins on, from 1.
+    pub fn line(&self) -> usize {
+        self.document
+            .text
+            .get(..self.value.span().start)
+            .unwrap_or_default()
+            .matches('\n')
+            .count()
+            + 1
+    }
+
+    pub fn table(&self, allowed: &[&str]) -> Result<Table<'a>, SceneError> {
+        let keys = self
+            .value
+            .get_ref()
+            .as_table()
+            .ok_or_else(|| self.wrong_type("a table"))?;
+        let table = Table {
+            document: self.document,
+            name: self.name.clone(),
+            span: self.value.span(),
+            keys,
+        };
+        table.allow(allowed)?;
+        Ok(table)
+    }
+
+    /// The entries of an array of `what`.
+    pub fn array(&self, what: &str) -> Result<Vec<Value<'a>>, SceneError> {
+        let entries = self
+            .value
+            .get_ref()
+            .as_array()
+            .ok_or_else(|| self.wrong_type(&format!("an array of {what}")))?;
+        Ok(entries
+            .iter()
+            .map(|value| Value {
+                document: self.document,
+                name: self.name.clone(),
+                value,
+            })
+            .collect())
+    }
+
+    pub fn text(&self) -> Result<&'a str, SceneError> {
+        self.value
+            .get_ref()
+            .as_str()
+            .ok_or_else(|| self.wrong_type("a text in quotes"))
+    }
+
+    /// A name: a text that can stand in a message and in a column of a CSV file.
+    pub fn name(&self) -> Result<String, SceneError> {
+        let name = self.text()?;
+        let unfit = |c: char| c.is_control() || matches!(c, ',' | ';' | '"');
+        if name.trim().is_empty() || name.trim() != name || name.contains(unfit) {
+            let allowed = "a text without commas, semicolons, quotes and line breaks, and without spaces at its ends";
+            return Err(self.error(format!("not a name; allowed: {allowed}")));
+        }
+        Ok(name.to_owned())
+    }
+
+    pub fn flag(&self) -> Result<bool, SceneError> {
+        self.value
+            .get_ref()
+            .as_bool()
+            .ok_or_else(|| self.wrong_type("true or false"))
+    }
+
+    pub fn integer(&self, allowed: RangeInclusive<u32>) -> Result<u32, SceneError> {
+        let integer = self
+            .value
+            .get_ref()
+            .as_integer()
+            .ok_or_else(|| self.wrong_type("a whole number"))?;
+        // Too large for the type is out of the range as well.
+        let parsed = u32::from_str_radix(integer.as_str(), integer.radix()).ok();
+        parsed
+            .filter(|number| allowed.contains(number))
+            .ok_or_else(|| {
+                self.error(format!(
+                    "out of range; allowed: {} to {}",
+                    allowed.start(),
+                    allowed.end()
+                ))
+            })
+    }
+
+    pub fn number(&self, allowed: &Numbers) -> Result<f64, SceneError> {
+        let parsed = match self.value.get_ref() {
+            DeValue::Integer(integer) => i64::from_str_radix(integer.as_str(), integer.radix())
+                .ok()
+                .map(|number| number as f64),
+            DeValue::Float(float) => float.as_str().parse().ok(),
+            _ => return Err(self.wrong_type("a number")),
+        };
+        let Some(number) = parsed.filter(|number: &f64| number.is_finite()) else {
+            return Err(self.error(format!("not a finite number; allowed: {allowed}")));
+        };
+        if !allowed.has(number) {
+            return Err(self.error(format!("out of range; allowed: {allowed}")));
+        }
+        Ok(number)
+    }
+
+    /// Just `N` numbers in brackets.
+    pub fn numbers<const N: usize>(&self, allowed: &Numbers) -> Result<[f64; N], SceneError> {
+        let what = format!("{N} numbers in brackets");
+        let entries = self
+            .value
+            .get_ref()
+            .as_array()
+            .ok_or_else(|| self.wrong_type(&what))?;
+        if entries.len() != N {
+            return Err(self.error(format!("{} entries; {what} are expected", entries.len())));
+        }
+        let mut numbers = [0.0; N];
+        for (number, entry) in numbers.iter_mut().zip(self.array("numbers")?) {
+            *number = entry.number(allowed)?;
+        }
+        Ok(numbers)
+    }
+
+    /// Three numbers, or one that stands for three equal ones.
+    pub fn splat_or_vector(&self, allowed: &Numbers) -> Result<DVec3, SceneError> {
+        match self.value.get_ref() {
+            DeValue::Array(_) => self.numbers(allowed).map(DVec3::from_array),
+            DeValue::Integer(_) | DeValue::Float(_) => self.number(allowed).map(DVec3::splat),
+            _ => Err(self.wrong_type("a number or 3 numbers in brackets")),
+        }
+    }
+
+    /// One of a few words, `what` it is called in a message.
+    pub fn one_of<T: Copy>(&self, what: &str, words: &[(&str, T)]) -> Result<T, SceneError> {
+        let written = self.text()?;
+        let found = words.iter().find(|(word, _)| *word == written);
+        found.map(|(_, meaning)| *meaning).ok_or_else(|| {
+            let allowed: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
+            self.error(format!("unknown {what}{}", suggestion(written, &allowed)))
+        })
+    }
+
+    /// A file or folder that exists: relative to the scene file's folder, or else to that one's parent (the project's
+    /// root where scenes lie in `config/`).
+    pub fn existing_path(&self) -> Result<PathBuf, SceneError> {
+        let written = self.text()?;
+        let scene_file = std::path::absolute(self.document.path)
+            .unwrap_or_else(|_| self.document.path.to_owned());
+        let folders = scene_file.ancestors().skip(1).take(2);
+        let tried: Vec<PathBuf> = folders.map(|folder| folder.join(written)).collect();
+        let found = tried
+            .iter()
+            .find(|path| !written.is_empty() && path.exists());
+        found.cloned().ok_or_else(|| {
+            let mut tried: Vec<String> = tried
+                .iter()
+                .map(|path| path.display().to_string())
+                .collect();
+            tried.dedup();
+            self.error(format!(
+                "no such file or folder; looked for {}",
+                tried.join(" and ")
+            ))
+        })
+    }
+
+    fn wrong_type(&self, expected: &str) -> SceneError {
+        self.error(format!(
+            "{expected} is expected, this is {}",
+            article(self.value.get_ref().type_str())
+        ))
+    }
+}
+
+fn article(noun: &str) -> String {
+    let vowel = noun.starts_with(['a', 'e', 'i', 'o', 'u']);
+    format!("{} {noun}", if vowel { "an" } else { "a" })
+}

@@ -1,0 +1,138 @@
+//! Reads `[camera]`, `[tracking]` and `[shadows]`.
+
+use super::error::SceneError;
+use super::reader::{Numbers, Table, Value};
+use super::{
+    ArucoRefinement, CameraSettings, DetectorKind, ShadowSettings, Technique, TrackingSettings,
+};
+
+pub fn camera(root: &Table) -> Result<CameraSettings, SceneError> {
+    let what = "a scene needs [camera] with a source";
+    let camera = root
+        .required("camera", what)?
+        .table(&["source", "calibration"])?;
+    let what = "a session, a video, a folder of images, \"webcam:0\" or an address is expected";
+    Ok(CameraSettings {
+        source: source(&camera.required("source", what)?)?,
+        calibration: camera
+            .optional("calibration")
+            .map(|path| path.existing_path())
+            .transpose()?,
+    })
+}
+
+fn source(value: &Value) -> Result<String, SceneError> {
+    let written = value.text()?;
+    if let Some(number) = written.strip_prefix("webcam:") {
+        number
+            .parse::<u16>()
+            .map_err(|_| value.error("no such webcam; allowed: webcam:0, webcam:1, …"))?;
+        return Ok(written.to_owned());
+    }
+    if ["http://", "https://", "rtsp://"]
+        .iter()
+        .any(|scheme| written.starts_with(scheme))
+    {
+        return Ok(written.to_owned());
+    }
+    let path = value.existing_path()?;
+    path.into_os_string()
+        .into_string()
+        .map_err(|_| value.error("the path to it is not UTF-8 text"))
+}
+
+pub fn tracking(root: &Table) -> Result<TrackingSettings, SceneError> {
+    const KEYS: [&str; 8] = [
+        "detector",
+        "decimation",
+        "blur_px",
+        "refine_edges",
+        "aruco_refinement",
+        "corrected_bits",
+        "min_margin",
+        "threads",
+    ];
+    const DETECTORS: [(&str, DetectorKind); 2] = [
+        ("apriltag", DetectorKind::AprilTag),
+        ("aruco", DetectorKind::Aruco),
+    ];
+    const REFINEMENTS: [(&str, ArucoRefinement); 4] = [
+        ("none", ArucoRefinement::None),
+        ("subpixel", ArucoRefinement::Subpixel),
+        ("contour", ArucoRefinement::Contour),
+        ("apriltag", ArucoRefinement::AprilTag),
+    ];
+    let default = TrackingSettings::default();
+    let Some(tracking) = root.table("tracking", &KEYS)? else {
+        return Ok(default);
+    };
+    let detector = tracking
+        .optional("detector")
+        .map(|value| value.one_of("detector", &DETECTORS));
+    let refinement = tracking
+        .optional("aruco_refinement")
+        .map(|value| value.one_of("refinement", &REFINEMENTS));
+    Ok(TrackingSettings {
+        detector: detector.transpose()?.unwrap_or(default.detector),
+        decimation: tracking.number_or(
+            "decimation",
+            default.decimation,
+            &Numbers::between(1.0, 8.0, ""),
+        )?,
+        blur_px: tracking.number_or(
+            "blur_px",
+            default.blur_px,
+            &Numbers::between(0.0, 10.0, "px"),
+        )?,
+        refine_edges: tracking.flag_or("refine_edges", default.refine_edges)?,
+        aruco_refinement: refinement.transpose()?.unwrap_or(default.aruco_refinement),
+        corrected_bits: tracking.integer_or("corrected_bits", default.corrected_bits, 0..=3)?,
+        min_margin: tracking.number_or(
+            "min_margin",
+            default.min_margin,
+            &Numbers::between(0.0, 255.0, ""),
+        )?,
+        threads: tracking.integer_or("threads", default.threads, 1..=64)?,
+    })
+}
+
+pub fn shadows(root: &Table) -> Result<ShadowSettings, SceneError> {
+    const TECHNIQUES: [(&str, Technique); 2] =
+        [("auto", Technique::Auto), ("volumes", Technique::Volumes)];
+    if let Some(probe) = root.optional("probe") {
+        return Err(probe.error_without_value(
+            "this version renders `volumes`, which takes [[light]] and [ambient] and no probe; allowed: no [probe]",
+        ));
+    }
+    let default = ShadowSettings::default();
+    let Some(shadows) = root.table("shadows", &["technique", "samples", "frame_budget_ms"])? else {
+        return Ok(default);
+    };
+    let technique = |value: Value| match value.text()? {
+        "shafts" | "environment" => {
+            Err(value.error("this version renders `volumes`; allowed: auto, volumes"))
+        }
+        _ => value.one_of("technique", &TECHNIQUES),
+    };
+    let samples = |value: Value| match value.integer(1..=4)? {
+        samples @ (1 | 4) => Ok(samples),
+        _ => Err(value.error("not a number of samples; allowed: 1, 4")),
+    };
+    let budget = |value: Value| value.number(&Numbers::above(0.0, 1e6, "ms"));
+    Ok(ShadowSettings {
+        technique: shadows
+            .optional("technique")
+            .map(technique)
+            .transpose()?
+            .unwrap_or(default.technique),
+        samples: shadows
+            .optional("samples")
+            .map(samples)
+            .transpose()?
+            .unwrap_or(default.samples),
+        frame_budget_ms: shadows
+            .optional("frame_budget_ms")
+            .map(budget)
+            .transpose()?,
+    })
+}

@@ -1,0 +1,171 @@
+//! Debian's libapriltag, through the shim `apriltag_shim.c`.
+
+use std::ffi::{CStr, c_char};
+use std::ptr::{self, NonNull};
+
+use glam::DVec2;
+
+use super::conventions::corners_from_apriltag;
+use super::{Detection, TrackingError};
+use crate::scene::{Family, TrackingSettings};
+
+/// More corrected bits cost libapriltag gigabytes of tables.
+const MAX_CORRECTED_BITS: u32 = 3;
+
+/// Below this libapriltag's tiles of thresholds have no room.
+const MIN_SIDE_PX: u32 = 16;
+
+/// A detector with its families; built once, used by one thread at a time.
+pub(super) struct AprilTagDetector {
+    raw: NonNull<RawDetector>,
+    families: Vec<Family>,
+    min_margin: f64,
+}
+
+// SAFETY: the shim keeps no thread-local or shared state; `&mut self` on every use keeps it to one thread at a time.
+unsafe impl Send for AprilTagDetector {}
+
+impl AprilTagDetector {
+    pub(super) fn new(settings: &TrackingSettings, families: &[Family]) -> Result<Self, TrackingError> {
+        let names = families
+            .iter()
+            .map(|&family| {
+                c_name(family).ok_or_else(|| TrackingError::FamilyNotAvailable {
+                    family: family.name(),
+                    detector: "libapriltag",
+                    allowed: Family::all_names()
+                        .filter(|name| Family::from_name(name).is_some_and(Family::is_april_tag))
+                        .collect::<Vec<_>>()
+                        .join(", "),
+                })
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        if settings.corrected_bits > MAX_CORRECTED_BITS {
+            return Err(TrackingError::Setting {
+                name: "corrected_bits",
+                value: settings.corrected_bits.to_string(),
+                allowed: "0 to 3 with libapriltag",
+            });
+        }
+        // SAFETY: no argument is a pointer; the settings were checked by `Detector::new`.
+        let raw = unsafe {
+            gnomon_apriltag_create(
+                settings.decimation as f32,
+                settings.blur_px as f32,
+                settings.refine_edges,
+                settings.threads as i32,
+            )
+        };
+        let raw = NonNull::new(raw).ok_or_else(|| TrackingError::Library("libapriltag gave no detector".into()))?;
+        let detector = Self {
+            raw,
+            families: families.to_vec(),
+            min_margin: settings.min_margin,
+        };
+        for (&family, name) in families.iter().zip(names) {
+            let bits = settings.corrected_bits.min(family.correctable_bits()) as i32;
+            // SAFETY: `raw` lives, `name` ends in 0.
+            if !unsafe { gnomon_apriltag_add_family(detector.raw.as_ptr(), name.as_ptr(), bits) } {
+                return Err(TrackingError::Library(format!("libapriltag did not take {}", family.name())));
+            }
+        }
+        Ok(detector)
+    }
+
+    pub(super) fn detect(&mut self, grey: &[u8], size_px: [u32; 2]) -> Result<Vec<Detection>, TrackingError> {
+        let [width, height] = size_px;
+        if width < MIN_SIDE_PX || height < MIN_SIDE_PX {
+            return Ok(Vec::new());
+        }
+        let mut found: *const RawDetection = ptr::null();
+        // SAFETY: `Detector::detect` made sure that `grey` has width × height bytes and that both fit an i32; the shim
+        // does not write to them.
+        let count = unsafe {
+            gnomon_apriltag_detect(self.raw.as_ptr(), grey.as_ptr(), width as i32, height as i32, &mut found)
+        };
+        let count =
+            usize::try_from(count).map_err(|_| TrackingError::Library("libapriltag ran out of memory".into()))?;
+        let found = if count == 0 {
+            &[]
+        } else {
+            // SAFETY: the shim keeps `count` detections there until its next call, which needs `&mut self`.
+            unsafe { std::slice::from_raw_parts(found, count) }
+        };
+        Ok(found
+            .iter()
+            .filter(|raw| f64::from(raw.margin) >= self.min_margin)
+            .filter_map(|raw| {
+                let family = *self.families.get(usize::try_from(raw.family).ok()?)?;
+                let [x0, y0, x1, y1, x2, y2, x3, y3] = raw.corners;
+                let corners = [(x0, y0), (x1, y1), (x2, y2), (x3, y3)].map(DVec2::from);
+                Some(Detection {
+                    family,
+                    id: u32::try_from(raw.id).ok()?,
+                    corners_px: corners_from_apriltag(corners),
+                    margin: f64::from(raw.margin),
+                    corrected_bits: u32::try_from(raw.hamming).ok()?,
+                })
+            })
+            .collect())
+    }
+}
+
+impl Drop for AprilTagDetector {
+    fn drop(&mut self) {
+        // SAFETY: `raw` came from `gnomon_apriltag_create` and is freed once; the shim frees the detector first, then
+        // its families.
+        unsafe { gnomon_apriltag_destroy(self.raw.as_ptr()) };
+    }
+}
+
+/// The cells of an AprilTag as printed, rows from the top, true for white; black border included, white rim not.
+pub(super) fn printed_cells(family: Family, id: u32) -> Option<Vec<bool>> {
+    let mut picture = [0_u8; 256];
+    // SAFETY: the name ends in 0 and the capacity is the picture's.
+    let side = unsafe { gnomon_apriltag_picture(c_name(family)?.as_ptr(), id, picture.as_mut_ptr(), picture.len()) };
+    let side = usize::try_from(side).ok()?;
+    let inner = side.checked_sub(2)?;
+    Some(
+        (0..inner * inner)
+            .map(|k| picture[(k / inner + 1) * side + k % inner + 1] != 0)
+            .collect(),
+    )
+}
+
+fn c_name(family: Family) -> Option<&'static CStr> {
+    match family {
+        Family::Tag16h5 => Some(c"tag16h5"),
+        Family::Tag25h9 => Some(c"tag25h9"),
+        Family::Tag36h10 => Some(c"tag36h10"),
+        Family::Tag36h11 => Some(c"tag36h11"),
+        Family::Aruco { .. } | Family::ArucoOriginal => None,
+    }
+}
+
+#[repr(C)]
+struct RawDetector {
+    _opaque: [u8; 0],
+}
+
+#[repr(C)]
+struct RawDetection {
+    family: i32,
+    id: i32,
+    hamming: i32,
+    margin: f32,
+    corners: [f64; 8],
+}
+
+unsafe extern "C" {
+    fn gnomon_apriltag_create(decimation: f32, blur_px: f32, refine_edges: bool, threads: i32) -> *mut RawDetector;
+    fn gnomon_apriltag_add_family(detector: *mut RawDetector, name: *const c_char, corrected_bits: i32) -> bool;
+    fn gnomon_apriltag_detect(
+        detector: *mut RawDetector,
+        grey: *const u8,
+        width: i32,
+        height: i32,
+        found: *mut *const RawDetection,
+    ) -> i32;
+    fn gnomon_apriltag_destroy(detector: *mut RawDetector);
+    fn gnomon_apriltag_picture(name: *const c_char, id: u32, cells: *mut u8, capacity: usize) -> i32;
+}

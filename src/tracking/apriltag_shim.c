@@ -1,0 +1,158 @@
+// The little of libapriltag that gnomon needs, behind functions whose layout no release changes.
+// One detector belongs to one thread; its families are freed after it.
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <apriltag/apriltag.h>
+#include <apriltag/tag16h5.h>
+#include <apriltag/tag25h9.h>
+#include <apriltag/tag36h10.h>
+#include <apriltag/tag36h11.h>
+
+#define FAMILIES 4
+
+static const struct {
+    const char *name;
+    apriltag_family_t *(*create)(void);
+    void (*destroy)(apriltag_family_t *);
+} KNOWN[FAMILIES] = {
+    {"tag16h5", tag16h5_create, tag16h5_destroy},
+    {"tag25h9", tag25h9_create, tag25h9_destroy},
+    {"tag36h10", tag36h10_create, tag36h10_destroy},
+    {"tag36h11", tag36h11_create, tag36h11_destroy},
+};
+
+struct gnomon_detection {
+    int32_t family; // in the order in which the families were added
+    int32_t id;
+    int32_t hamming;
+    float margin;
+    double corners[8]; // x, y of each corner, as libapriltag gives them
+};
+
+struct gnomon_apriltag {
+    apriltag_detector_t *detector;
+    apriltag_family_t *families[FAMILIES];
+    int known[FAMILIES]; // index into KNOWN
+    int family_count;
+    struct gnomon_detection *found;
+    size_t found_capacity;
+    uint8_t *copy;
+    size_t copy_capacity;
+};
+
+static int known_index(const char *name) {
+    for (int k = 0; k < FAMILIES; k++)
+        if (strcmp(KNOWN[k].name, name) == 0) return k;
+    return -1;
+}
+
+void gnomon_apriltag_destroy(struct gnomon_apriltag *self) {
+    if (!self) return;
+    if (self->detector) apriltag_detector_destroy(self->detector);
+    for (int k = 0; k < self->family_count; k++) KNOWN[self->known[k]].destroy(self->families[k]);
+    free(self->found);
+    free(self->copy);
+    free(self);
+}
+
+struct gnomon_apriltag *gnomon_apriltag_create(float decimation, float blur_px, bool refine_edges, int32_t threads) {
+    struct gnomon_apriltag *self = calloc(1, sizeof *self);
+    if (!self) return NULL;
+    self->detector = apriltag_detector_create();
+    if (!self->detector) {
+        gnomon_apriltag_destroy(self);
+        return NULL;
+    }
+    self->detector->quad_decimate = decimation;
+    self->detector->quad_sigma = blur_px;
+    self->detector->refine_edges = refine_edges;
+    self->detector->nthreads = threads;
+    return self;
+}
+
+bool gnomon_apriltag_add_family(struct gnomon_apriltag *self, const char *name, int32_t corrected_bits) {
+    int k = known_index(name);
+    if (k < 0 || self->family_count == FAMILIES) return false;
+    apriltag_family_t *family = KNOWN[k].create();
+    if (!family) return false;
+    self->families[self->family_count] = family;
+    self->known[self->family_count] = k;
+    self->family_count++;
+    apriltag_detector_add_family_bits(self->detector, family, corrected_bits);
+    return true;
+}
+
+// Returns the number of markers, -1 when memory ran out; `found` stays valid until the next call.
+int32_t gnomon_apriltag_detect(struct gnomon_apriltag *self, const uint8_t *grey, int32_t width, int32_t height,
+                               const struct gnomon_detection **found) {
+    // Without decimation libapriltag blurs the picture that it was given.
+    uint8_t *pixels = (uint8_t *)grey;
+    if (self->detector->quad_decimate <= 1 && self->detector->quad_sigma != 0) {
+        size_t size = (size_t)width * (size_t)height;
+        if (size > self->copy_capacity) {
+            uint8_t *grown = realloc(self->copy, size);
+            if (!grown) return -1;
+            self->copy = grown;
+            self->copy_capacity = size;
+        }
+        memcpy(self->copy, grey, size);
+        pixels = self->copy;
+    }
+    image_u8_t image = {.width = width, .height = height, .stride = width, .buf = pixels};
+    zarray_t *detections = apriltag_detector_detect(self->detector, &image);
+    if (!detections) return -1;
+
+    size_t count = (size_t)zarray_size(detections);
+    if (count > self->found_capacity) {
+        struct gnomon_detection *grown = realloc(self->found, count * sizeof *grown);
+        if (!grown) {
+            apriltag_detections_destroy(detections);
+            return -1;
+        }
+        self->found = grown;
+        self->found_capacity = count;
+    }
+    for (size_t k = 0; k < count; k++) {
+        apriltag_detection_t *detection;
+        zarray_get(detections, (int)k, &detection);
+        struct gnomon_detection *out = &self->found[k];
+        out->family = -1;
+        for (int f = 0; f < self->family_count; f++)
+            if (self->families[f] == detection->family) out->family = f;
+        out->id = detection->id;
+        out->hamming = detection->hamming;
+        out->margin = detection->decision_margin;
+        for (int c = 0; c < 4; c++) {
+            out->corners[2 * c] = detection->p[c][0];
+            out->corners[2 * c + 1] = detection->p[c][1];
+        }
+    }
+    apriltag_detections_destroy(detections);
+    *found = self->found;
+    return (int32_t)count;
+}
+
+// Writes the picture of a marker as printed, one byte a cell (0 black, else white), its white rim included.
+// Returns the cells a side, or -1.
+int32_t gnomon_apriltag_picture(const char *name, uint32_t id, uint8_t *cells, size_t capacity) {
+    int k = known_index(name);
+    if (k < 0) return -1;
+    apriltag_family_t *family = KNOWN[k].create();
+    if (!family) return -1;
+    int32_t side = -1;
+    image_u8_t *image = id < family->ncodes ? apriltag_to_image(family, (int)id) : NULL;
+    if (image && image->width == image->height && (size_t)image->width * (size_t)image->height <= capacity) {
+        side = image->width;
+        for (int32_t y = 0; y < side; y++) memcpy(cells + y * side, image->buf + y * image->stride, (size_t)side);
+    }
+    if (image) { // What image_u8_destroy does; Debian's library does not export it.
+        free(image->buf);
+        free(image);
+    }
+    KNOWN[k].destroy(family);
+    return side;
+}

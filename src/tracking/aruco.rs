@@ -1,0 +1,228 @@
+//! OpenCV's ArUco, in the contrib module `aruco` before OpenCV 4.7 and in `objdetect` since (`build.rs` tells which).
+
+use glam::DVec2;
+use opencv::core::{Mat, Point2f, Vector};
+use opencv::prelude::*;
+
+use super::apriltag::printed_cells;
+use super::conventions::{corners_from_aruco, quarter_turns_between};
+use super::{Detection, TrackingError};
+use crate::scene::{ArucoRefinement, Family, TrackingSettings};
+
+/// OpenCV's detector for some dictionaries, each with the turn of its pictures against the prints.
+pub(super) struct ArucoDetector {
+    dictionaries: Vec<(Family, usize, installed::Dictionary)>,
+    refinement: ArucoRefinement,
+}
+
+impl ArucoDetector {
+    pub(super) fn new(settings: &TrackingSettings, families: &[Family]) -> Result<Self, TrackingError> {
+        // OpenCV has one pool of threads for the whole process.
+        opencv::core::set_num_threads(settings.threads as i32)?;
+        let dictionaries = families
+            .iter()
+            .map(|&family| {
+                let number = dictionary_number(family).ok_or_else(|| TrackingError::FamilyNotAvailable {
+                    family: family.name(),
+                    detector: "OpenCV's ArUco",
+                    allowed: Family::all_names().collect::<Vec<_>>().join(", "),
+                })?;
+                let bits = settings.corrected_bits.min(family.correctable_bits()) as i32;
+                let dictionary = installed::Dictionary::new(number, bits, settings.aruco_refinement)?;
+                Ok((family, quarter_turns(family, &dictionary)?, dictionary))
+            })
+            .collect::<Result<Vec<_>, TrackingError>>()?;
+        Ok(Self {
+            dictionaries,
+            refinement: settings.aruco_refinement,
+        })
+    }
+
+    pub(super) fn detect(&mut self, grey: &[u8], size_px: [u32; 2]) -> Result<Vec<Detection>, TrackingError> {
+        let [width, height] = size_px;
+        let image = Mat::new_rows_cols_with_data(height as i32, width as i32, grey)?;
+        let mut detections = Vec::new();
+        for (family, quarter_turns, dictionary) in &self.dictionaries {
+            let mut ids = Vector::<i32>::new();
+            let mut corners = Vector::<Vector<Point2f>>::new();
+            dictionary.detect(&image, &mut corners, &mut ids)?;
+            for (id, corners) in ids.iter().zip(corners.iter()) {
+                let corners = corners
+                    .iter()
+                    .map(|corner| DVec2::new(f64::from(corner.x), f64::from(corner.y)))
+                    .collect::<Vec<_>>();
+                let (Ok(id), Ok(corners)) = (u32::try_from(id), <[DVec2; 4]>::try_from(corners)) else {
+                    continue;
+                };
+                detections.push(Detection {
+                    family: *family,
+                    id,
+                    corners_px: corners_from_aruco(corners, *quarter_turns, self.refinement),
+                    margin: 0.0,
+                    corrected_bits: 0,
+                });
+            }
+        }
+        Ok(detections)
+    }
+}
+
+/// The turn of the installed dictionary against the prints; its own pictures are the prints of OpenCV's families.
+fn quarter_turns(family: Family, dictionary: &installed::Dictionary) -> Result<usize, TrackingError> {
+    if !family.is_april_tag() {
+        return Ok(0);
+    }
+    let side = family.cells() as usize + 2;
+    let opencv = dictionary.cells(0, side)?;
+    printed_cells(family, 0)
+        .and_then(|print| quarter_turns_between(&print, &opencv, side))
+        .ok_or_else(|| TrackingError::Library(format!("OpenCV's {} is not AprilTag's", family.name())))
+}
+
+/// The number of OpenCV's predefined dictionary, the same in all its releases.
+fn dictionary_number(family: Family) -> Option<i32> {
+    Some(match family {
+        Family::Tag16h5 => 17,
+        Family::Tag25h9 => 18,
+        Family::Tag36h10 => 19,
+        Family::Tag36h11 => 20,
+        Family::ArucoOriginal => 16,
+        Family::Aruco { cells, count } => {
+            let of_size = [50, 100, 250, 1000].iter().position(|&known| known == count)?;
+            i32::from(cells.checked_sub(4).filter(|&size| size < 4)?) * 4 + of_size as i32
+        }
+    })
+}
+
+/// `cv::aruco::CornerRefineMethod`, the same numbers in all releases.
+fn refinement_number(refinement: ArucoRefinement) -> i32 {
+    match refinement {
+        ArucoRefinement::None => 0,
+        ArucoRefinement::Subpixel => 1,
+        ArucoRefinement::Contour => 2,
+        ArucoRefinement::AprilTag => 3,
+    }
+}
+
+/// White cells of a marker's picture of one pixel a cell.
+fn white_cells(picture: &Mat) -> opencv::Result<Vec<bool>> {
+    Ok(picture.data_typed::<u8>()?.iter().map(|&cell| cell != 0).collect())
+}
+
+/// The contrib module `aruco`, OpenCV before 4.7.
+#[cfg(aruco_in_contrib)]
+mod installed {
+    use opencv::aruco;
+    use opencv::core::{Mat, Point2f, Ptr, ToInputArray, Vector, no_array};
+    use opencv::prelude::*;
+
+    use super::{refinement_number, white_cells};
+    use crate::scene::ArucoRefinement;
+
+    pub(super) struct Dictionary {
+        dictionary: Ptr<aruco::Dictionary>,
+        parameters: Ptr<aruco::DetectorParameters>,
+    }
+
+    impl Dictionary {
+        pub(super) fn new(number: i32, corrected_bits: i32, refinement: ArucoRefinement) -> opencv::Result<Self> {
+            let mut dictionary = aruco::get_predefined_dictionary_i32(number)?;
+            dictionary.set_max_correction_bits(corrected_bits);
+            let mut parameters = aruco::DetectorParameters::create()?;
+            parameters.set_error_correction_rate(1.0);
+            parameters.set_corner_refinement_method(refinement_number(refinement));
+            Ok(Self { dictionary, parameters })
+        }
+
+        pub(super) fn detect(
+            &self,
+            image: &impl ToInputArray,
+            corners: &mut Vector<Vector<Point2f>>,
+            ids: &mut Vector<i32>,
+        ) -> opencv::Result<()> {
+            aruco::detect_markers(image, &self.dictionary, corners, ids, &self.parameters, &mut no_array())
+        }
+
+        pub(super) fn cells(&self, id: i32, side: usize) -> opencv::Result<Vec<bool>> {
+            let mut picture = Mat::default();
+            aruco::draw_marker_def(&self.dictionary, id, side as i32, &mut picture)?;
+            white_cells(&picture)
+        }
+    }
+}
+
+/// The module `objdetect`, OpenCV from 4.7 on.
+#[cfg(not(aruco_in_contrib))]
+mod installed {
+    use opencv::core::{Mat, Point2f, ToInputArray, Vector};
+    use opencv::objdetect;
+    use opencv::prelude::*;
+
+    use super::{refinement_number, white_cells};
+    use crate::scene::ArucoRefinement;
+
+    pub(super) struct Dictionary {
+        dictionary: objdetect::Dictionary,
+        detector: objdetect::ArucoDetector,
+    }
+
+    impl Dictionary {
+        pub(super) fn new(number: i32, corrected_bits: i32, refinement: ArucoRefinement) -> opencv::Result<Self> {
+            let mut dictionary = objdetect::get_predefined_dictionary_i32(number)?;
+            dictionary.set_max_correction_bits(corrected_bits);
+            let mut parameters = objdetect::DetectorParameters::default()?;
+            parameters.set_error_correction_rate(1.0);
+            parameters.set_corner_refinement_method(refinement_number(refinement));
+            let refine = objdetect::RefineParameters::new_def()?;
+            let detector = objdetect::ArucoDetector::new(&dictionary, &parameters, refine)?;
+            Ok(Self { dictionary, detector })
+        }
+
+        pub(super) fn detect(
+            &self,
+            image: &impl ToInputArray,
+            corners: &mut Vector<Vector<Point2f>>,
+            ids: &mut Vector<i32>,
+        ) -> opencv::Result<()> {
+            self.detector.detect_markers_def(image, corners, ids)
+        }
+
+        pub(super) fn cells(&self, id: i32, side: usize) -> opencv::Result<Vec<bool>> {
+            let mut picture = Mat::default();
+            objdetect::generate_image_marker_def(&self.dictionary, id, side as i32, &mut picture)?;
+            white_cells(&picture)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_april_tag_of_opencv_is_april_tags_own_up_to_one_turn() {
+        for family in [Family::Tag16h5, Family::Tag25h9, Family::Tag36h10, Family::Tag36h11] {
+            let number = dictionary_number(family).unwrap();
+            let dictionary = installed::Dictionary::new(number, 0, ArucoRefinement::None).unwrap();
+            let side = family.cells() as usize + 2;
+            let turn = quarter_turns(family, &dictionary).unwrap();
+            for id in 0..family.id_count() {
+                let print = printed_cells(family, id).unwrap();
+                let opencv = dictionary.cells(id as i32, side).unwrap();
+                assert_eq!(quarter_turns_between(&print, &opencv, side), Some(turn), "{} {id}", family.name());
+            }
+            assert!(printed_cells(family, family.id_count()).is_none());
+        }
+    }
+
+    #[test]
+    fn the_dictionaries_have_the_ids_that_they_claim() {
+        for family in Family::all_names().filter_map(Family::from_name) {
+            let number = dictionary_number(family).unwrap();
+            let dictionary = installed::Dictionary::new(number, 0, ArucoRefinement::None).unwrap();
+            let side = family.cells() as usize + 2;
+            assert!(dictionary.cells(family.id_count() as i32 - 1, side).is_ok(), "{}", family.name());
+            assert!(dictionary.cells(family.id_count() as i32, side).is_err(), "{}", family.name());
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! Where the two detectors differ on what a corner is, and how gnomon says it.
+//!
+//! gnomon: corners as printed, from the top left clockwise (as the viewer of the print sees them); a pixel's integer
+//! coordinate is its centre. libapriltag: counter-clockwise from the bottom left, a pixel's centre is at .5. OpenCV:
+//! clockwise from the corner that is the top left of *its* picture; the integer is the centre, but corners refined by
+//! its copy of AprilTag's code keep that code's half pixel.
+
+use glam::DVec2;
+
+use crate::scene::ArucoRefinement;
+
+/// Corners as printed from those of libapriltag.
+pub(super) fn corners_from_apriltag(corners: [DVec2; 4]) -> [DVec2; 4] {
+    let [bottom_left, bottom_right, top_right, top_left] = corners.map(|corner| corner - DVec2::splat(0.5));
+    [top_left, top_right, bottom_right, bottom_left]
+}
+
+/// Corners as printed from those of OpenCV, whose picture of the marker is the print turned by `quarter_turns`
+/// clockwise.
+pub(super) fn corners_from_aruco(
+    corners: [DVec2; 4],
+    quarter_turns: usize,
+    refinement: ArucoRefinement,
+) -> [DVec2; 4] {
+    let shift = match refinement {
+        ArucoRefinement::AprilTag => DVec2::splat(0.5),
+        ArucoRefinement::None | ArucoRefinement::Subpixel | ArucoRefinement::Contour => DVec2::ZERO,
+    };
+    std::array::from_fn(|k| corners[(k + quarter_turns) % 4] - shift)
+}
+
+/// How many quarter turns clockwise bring the print to OpenCV's picture; both are squares of `side` cells, rows from
+/// the top. `None` when no turn does.
+///
+/// Up to 4.x OpenCV's pictures of the AprilTag families stand on their heads, from 5 on they do not, so the installed
+/// dictionary is asked.
+pub(super) fn quarter_turns_between(print: &[bool], opencv: &[bool], side: usize) -> Option<usize> {
+    if print.len() != side * side || opencv.len() != side * side {
+        return None;
+    }
+    let mut turned = print.to_vec();
+    for quarter_turns in 0..4 {
+        if turned == opencv {
+            return Some(quarter_turns);
+        }
+        turned = (0..side * side)
+            .map(|k| turned[(side - 1 - k % side) * side + k / side])
+            .collect();
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turned_picture_tells_its_turn() {
+        // A cell at the top left; a quarter turn clockwise brings it to the top right.
+        let at = |k: usize| (0..9).map(|cell| cell == k).collect::<Vec<bool>>();
+        for (quarter_turns, corner) in [0, 2, 8, 6].into_iter().enumerate() {
+            assert_eq!(quarter_turns_between(&at(0), &at(corner), 3), Some(quarter_turns));
+        }
+        assert_eq!(quarter_turns_between(&at(0), &at(1), 3), None);
+    }
+
+    #[test]
+    fn the_top_left_of_the_print_comes_first() {
+        let [a, b, c, d] = [0.0, 1.0, 2.0, 3.0].map(DVec2::splat);
+        // The print turned by 90° clockwise: OpenCV's first corner (its top left) is the print's bottom left.
+        let as_printed = corners_from_aruco([d, a, b, c], 1, ArucoRefinement::None);
+        assert_eq!(as_printed, [a, b, c, d]);
+    }
+}
