@@ -94,7 +94,7 @@ impl AnchorReader {
         let family = Family::from_name(written).ok_or_else(|| {
             value.error(format!(
                 "unknown family{}",
-                suggestion(written, &Family::all_names())
+                suggestion(written, &Family::all_names().collect::<Vec<_>>())
             ))
         })?;
         let aruco = matches!(family, Family::Aruco { .. } | Family::ArucoOriginal);
