@@ -13,7 +13,7 @@ const FLOORS: [&str; 7] = [
 /// A word of code, and the only places (below `src/`) where it may stand.
 const HOMES: [(&str, &[&str]); 6] = [
     ("wgpu", &["render/"]),
-    ("naga", &[]),
+    ("naga", &["render/"]),
     ("opencv", &["capture/", "tracking/"]),
     ("nokhwa", &["capture/"]),
     ("Instant", &["app/stopwatch.rs"]),

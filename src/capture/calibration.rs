@@ -570,7 +570,7 @@ mod tests {
         assert_eq!(found.size_px, [640, 480]);
         assert_eq!(
             (found.focal_px.x, found.distortion[4]),
-            (4.5251072219637672e+02, 2.9542589406810080e+00)
+            (452.510_722_196_376_7, 2.954_258_940_681_008)
         );
         assert!(matches!(
             load_calibration(&params),

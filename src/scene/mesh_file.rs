@@ -9,10 +9,12 @@ use glam::{DVec3, Vec3};
 
 use super::error::SceneError;
 use super::obj_scan::{ScanError, ScannedObj, scan_mtl, scan_obj};
-use super::objects::DEFAULT_ALBEDO;
 use super::reader::Value;
 use crate::geometry::mesh::{Mesh, MeshReport, RawTriangle};
 use crate::light::Material;
+
+/// Diffuse reflectance where neither the scene nor a mesh's MTL file gives one.
+pub const DEFAULT_ALBEDO: f64 = 0.5;
 
 /// A mesh, what was done to it, and its materials (never none).
 #[derive(Debug)]

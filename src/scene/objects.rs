@@ -7,14 +7,12 @@ use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use super::anchors::{ANGLE, unique_name};
 use super::error::{SceneError, suggestion};
 use super::lights::POSITION;
-use super::mesh_file::{self, LoadedMesh};
+use super::mesh_file::{self, DEFAULT_ALBEDO, LoadedMesh};
 use super::reader::{Numbers, Table, Value};
 use super::{Anchor, Object};
 use crate::geometry::mesh::{Mesh, RawTriangle};
 use crate::light::Material;
 
-/// Diffuse reflectance where neither the scene nor a mesh's MTL file gives one.
-pub const DEFAULT_ALBEDO: f64 = 0.5;
 const ALBEDO: Numbers = Numbers::between(0.0, 1.0, "");
 const ROUGHNESS: Numbers = Numbers::above(0.0, 1.0, "");
 const CREASE: Numbers = Numbers::between(0.0, 180.0, "degrees");

@@ -38,7 +38,7 @@ pub fn flat_mesh(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Mesh {
         })
         .collect();
     let triangle_materials = vec![0; triangles.len()];
-    Mesh { positions, triangles, corner_normals, triangle_materials, ..Mesh::default() }
+    Mesh { positions, triangles, corner_normals, triangle_materials }
 }
 
 /// A mesh from the `v` and `f` lines of an OBJ file.
