@@ -12,7 +12,8 @@ use crate::scene::ArucoRefinement;
 
 /// Corners as printed from those of libapriltag.
 pub(super) fn corners_from_apriltag(corners: [DVec2; 4]) -> [DVec2; 4] {
-    let [bottom_left, bottom_right, top_right, top_left] = corners.map(|corner| corner - DVec2::splat(0.5));
+    let [bottom_left, bottom_right, top_right, top_left] =
+        corners.map(|corner| corner - DVec2::splat(0.5));
     [top_left, top_right, bottom_right, bottom_left]
 }
 
@@ -38,13 +39,23 @@ fn edge_from_contour(corners: [DVec2; 4]) -> [DVec2; 4] {
         let along = (corners[(k + 1) % 4] - corners[k]).normalize_or_zero();
         // Clockwise with y down: outside is on the left hand.
         let outward = DVec2::new(along.y, -along.x);
-        (outward, outward.dot(corners[k]) + 0.5 * outward.abs().max_element())
+        (
+            outward,
+            outward.dot(corners[k]) + 0.5 * outward.abs().max_element(),
+        )
     });
     std::array::from_fn(|k| {
         let ((a, a_offset), (b, b_offset)) = (sides[(k + 3) % 4], sides[k]);
         let sine = a.perp_dot(b);
-        let corner = DVec2::new(a_offset * b.y - b_offset * a.y, b_offset * a.x - a_offset * b.x) / sine;
-        if corner.is_finite() { corner } else { corners[k] }
+        let corner = DVec2::new(
+            a_offset * b.y - b_offset * a.y,
+            b_offset * a.x - a_offset * b.x,
+        ) / sine;
+        if corner.is_finite() {
+            corner
+        } else {
+            corners[k]
+        }
     })
 }
 
@@ -78,7 +89,10 @@ mod tests {
         // A cell at the top left; a quarter turn clockwise brings it to the top right.
         let at = |k: usize| (0..9).map(|cell| cell == k).collect::<Vec<bool>>();
         for (quarter_turns, corner) in [0, 2, 8, 6].into_iter().enumerate() {
-            assert_eq!(quarter_turns_between(&at(0), &at(corner), 3), Some(quarter_turns));
+            assert_eq!(
+                quarter_turns_between(&at(0), &at(corner), 3),
+                Some(quarter_turns)
+            );
         }
         assert_eq!(quarter_turns_between(&at(0), &at(1), 3), None);
     }
