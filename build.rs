@@ -52,7 +52,10 @@ fn aruco_is_in_contrib() -> bool {
         // Only OpenCV 5 and installations without pkg-config files come here.
         return false;
     };
-    let mut parts = library.version.split('.').map(|part| part.parse::<u32>().unwrap_or(0));
+    let mut parts = library
+        .version
+        .split('.')
+        .map(|part| part.parse::<u32>().unwrap_or(0));
     let version = (parts.next().unwrap_or(0), parts.next().unwrap_or(0));
     version < (4, 7)
 }

@@ -28,22 +28,118 @@ const NAMES: [(&str, Family); 21] = [
     ("tag25h9", Family::Tag25h9),
     ("tag36h10", Family::Tag36h10),
     ("tag36h11", Family::Tag36h11),
-    ("DICT_4X4_50", Family::Aruco { cells: 4, count: 50 }),
-    ("DICT_4X4_100", Family::Aruco { cells: 4, count: 100 }),
-    ("DICT_4X4_250", Family::Aruco { cells: 4, count: 250 }),
-    ("DICT_4X4_1000", Family::Aruco { cells: 4, count: 1000 }),
-    ("DICT_5X5_50", Family::Aruco { cells: 5, count: 50 }),
-    ("DICT_5X5_100", Family::Aruco { cells: 5, count: 100 }),
-    ("DICT_5X5_250", Family::Aruco { cells: 5, count: 250 }),
-    ("DICT_5X5_1000", Family::Aruco { cells: 5, count: 1000 }),
-    ("DICT_6X6_50", Family::Aruco { cells: 6, count: 50 }),
-    ("DICT_6X6_100", Family::Aruco { cells: 6, count: 100 }),
-    ("DICT_6X6_250", Family::Aruco { cells: 6, count: 250 }),
-    ("DICT_6X6_1000", Family::Aruco { cells: 6, count: 1000 }),
-    ("DICT_7X7_50", Family::Aruco { cells: 7, count: 50 }),
-    ("DICT_7X7_100", Family::Aruco { cells: 7, count: 100 }),
-    ("DICT_7X7_250", Family::Aruco { cells: 7, count: 250 }),
-    ("DICT_7X7_1000", Family::Aruco { cells: 7, count: 1000 }),
+    (
+        "DICT_4X4_50",
+        Family::Aruco {
+            cells: 4,
+            count: 50,
+        },
+    ),
+    (
+        "DICT_4X4_100",
+        Family::Aruco {
+            cells: 4,
+            count: 100,
+        },
+    ),
+    (
+        "DICT_4X4_250",
+        Family::Aruco {
+            cells: 4,
+            count: 250,
+        },
+    ),
+    (
+        "DICT_4X4_1000",
+        Family::Aruco {
+            cells: 4,
+            count: 1000,
+        },
+    ),
+    (
+        "DICT_5X5_50",
+        Family::Aruco {
+            cells: 5,
+            count: 50,
+        },
+    ),
+    (
+        "DICT_5X5_100",
+        Family::Aruco {
+            cells: 5,
+            count: 100,
+        },
+    ),
+    (
+        "DICT_5X5_250",
+        Family::Aruco {
+            cells: 5,
+            count: 250,
+        },
+    ),
+    (
+        "DICT_5X5_1000",
+        Family::Aruco {
+            cells: 5,
+            count: 1000,
+        },
+    ),
+    (
+        "DICT_6X6_50",
+        Family::Aruco {
+            cells: 6,
+            count: 50,
+        },
+    ),
+    (
+        "DICT_6X6_100",
+        Family::Aruco {
+            cells: 6,
+            count: 100,
+        },
+    ),
+    (
+        "DICT_6X6_250",
+        Family::Aruco {
+            cells: 6,
+            count: 250,
+        },
+    ),
+    (
+        "DICT_6X6_1000",
+        Family::Aruco {
+            cells: 6,
+            count: 1000,
+        },
+    ),
+    (
+        "DICT_7X7_50",
+        Family::Aruco {
+            cells: 7,
+            count: 50,
+        },
+    ),
+    (
+        "DICT_7X7_100",
+        Family::Aruco {
+            cells: 7,
+            count: 100,
+        },
+    ),
+    (
+        "DICT_7X7_250",
+        Family::Aruco {
+            cells: 7,
+            count: 250,
+        },
+    ),
+    (
+        "DICT_7X7_1000",
+        Family::Aruco {
+            cells: 7,
+            count: 1000,
+        },
+    ),
     ("DICT_ARUCO_ORIGINAL", Family::ArucoOriginal),
 ];
 
@@ -132,7 +228,10 @@ impl Family {
 
     /// Whether it is one of AprilTag's families, which both detectors know.
     pub fn is_april_tag(self) -> bool {
-        matches!(self, Self::Tag16h5 | Self::Tag25h9 | Self::Tag36h10 | Self::Tag36h11)
+        matches!(
+            self,
+            Self::Tag16h5 | Self::Tag25h9 | Self::Tag36h10 | Self::Tag36h11
+        )
     }
 }
 
@@ -146,7 +245,10 @@ mod tests {
             assert_eq!(Family::from_name(name).map(Family::name), Some(name));
         }
         assert_eq!(Family::from_name("TAG36H11"), Some(Family::Tag36h11));
-        assert_eq!(Family::from_name("DICT_APRILTAG_36h11"), Some(Family::Tag36h11));
+        assert_eq!(
+            Family::from_name("DICT_APRILTAG_36h11"),
+            Some(Family::Tag36h11)
+        );
         for wrong in ["", "tag36h12", "DICT_4X4_51", "DICT_8X8_50", "36h11"] {
             assert_eq!(Family::from_name(wrong), None);
         }

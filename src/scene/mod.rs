@@ -89,7 +89,7 @@ impl Default for TrackingSettings {
             decimation: 2.0,
             blur_px: 0.0,
             refine_edges: true,
-            aruco_refinement: ArucoRefinement::AprilTag,
+            aruco_refinement: ArucoRefinement::Contour,
             corrected_bits: 1,
             min_margin: 20.0,
             threads: 1,

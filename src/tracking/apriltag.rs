@@ -12,9 +12,6 @@ use crate::scene::{Family, TrackingSettings};
 /// More corrected bits cost libapriltag gigabytes of tables.
 const MAX_CORRECTED_BITS: u32 = 3;
 
-/// Below this libapriltag's tiles of thresholds have no room.
-const MIN_SIDE_PX: u32 = 16;
-
 /// A detector with its families; built once, used by one thread at a time.
 pub(super) struct AprilTagDetector {
     raw: NonNull<RawDetector>,
@@ -26,7 +23,10 @@ pub(super) struct AprilTagDetector {
 unsafe impl Send for AprilTagDetector {}
 
 impl AprilTagDetector {
-    pub(super) fn new(settings: &TrackingSettings, families: &[Family]) -> Result<Self, TrackingError> {
+    pub(super) fn new(
+        settings: &TrackingSettings,
+        families: &[Family],
+    ) -> Result<Self, TrackingError> {
         let names = families
             .iter()
             .map(|&family| {
@@ -56,7 +56,8 @@ impl AprilTagDetector {
                 settings.threads as i32,
             )
         };
-        let raw = NonNull::new(raw).ok_or_else(|| TrackingError::Library("libapriltag gave no detector".into()))?;
+        let raw = NonNull::new(raw)
+            .ok_or_else(|| TrackingError::Library("libapriltag gave no detector".into()))?;
         let detector = Self {
             raw,
             families: families.to_vec(),
@@ -66,25 +67,35 @@ impl AprilTagDetector {
             let bits = settings.corrected_bits.min(family.correctable_bits()) as i32;
             // SAFETY: `raw` lives, `name` ends in 0.
             if !unsafe { gnomon_apriltag_add_family(detector.raw.as_ptr(), name.as_ptr(), bits) } {
-                return Err(TrackingError::Library(format!("libapriltag did not take {}", family.name())));
+                return Err(TrackingError::Library(format!(
+                    "libapriltag did not take {}",
+                    family.name()
+                )));
             }
         }
         Ok(detector)
     }
 
-    pub(super) fn detect(&mut self, grey: &[u8], size_px: [u32; 2]) -> Result<Vec<Detection>, TrackingError> {
+    pub(super) fn detect(
+        &mut self,
+        grey: &[u8],
+        size_px: [u32; 2],
+    ) -> Result<Vec<Detection>, TrackingError> {
         let [width, height] = size_px;
-        if width < MIN_SIDE_PX || height < MIN_SIDE_PX {
-            return Ok(Vec::new());
-        }
         let mut found: *const RawDetection = ptr::null();
         // SAFETY: `Detector::detect` made sure that `grey` has width × height bytes and that both fit an i32; the shim
         // does not write to them.
         let count = unsafe {
-            gnomon_apriltag_detect(self.raw.as_ptr(), grey.as_ptr(), width as i32, height as i32, &mut found)
+            gnomon_apriltag_detect(
+                self.raw.as_ptr(),
+                grey.as_ptr(),
+                width as i32,
+                height as i32,
+                &mut found,
+            )
         };
-        let count =
-            usize::try_from(count).map_err(|_| TrackingError::Library("libapriltag ran out of memory".into()))?;
+        let count = usize::try_from(count)
+            .map_err(|_| TrackingError::Library("libapriltag ran out of memory".into()))?;
         let found = if count == 0 {
             &[]
         } else {
@@ -122,7 +133,14 @@ impl Drop for AprilTagDetector {
 pub(super) fn printed_cells(family: Family, id: u32) -> Option<Vec<bool>> {
     let mut picture = [0_u8; 256];
     // SAFETY: the name ends in 0 and the capacity is the picture's.
-    let side = unsafe { gnomon_apriltag_picture(c_name(family)?.as_ptr(), id, picture.as_mut_ptr(), picture.len()) };
+    let side = unsafe {
+        gnomon_apriltag_picture(
+            c_name(family)?.as_ptr(),
+            id,
+            picture.as_mut_ptr(),
+            picture.len(),
+        )
+    };
     let side = usize::try_from(side).ok()?;
     let inner = side.checked_sub(2)?;
     Some(
@@ -157,8 +175,17 @@ struct RawDetection {
 }
 
 unsafe extern "C" {
-    fn gnomon_apriltag_create(decimation: f32, blur_px: f32, refine_edges: bool, threads: i32) -> *mut RawDetector;
-    fn gnomon_apriltag_add_family(detector: *mut RawDetector, name: *const c_char, corrected_bits: i32) -> bool;
+    fn gnomon_apriltag_create(
+        decimation: f32,
+        blur_px: f32,
+        refine_edges: bool,
+        threads: i32,
+    ) -> *mut RawDetector;
+    fn gnomon_apriltag_add_family(
+        detector: *mut RawDetector,
+        name: *const c_char,
+        corrected_bits: i32,
+    ) -> bool;
     fn gnomon_apriltag_detect(
         detector: *mut RawDetector,
         grey: *const u8,
@@ -167,5 +194,10 @@ unsafe extern "C" {
         found: *mut *const RawDetection,
     ) -> i32;
     fn gnomon_apriltag_destroy(detector: *mut RawDetector);
-    fn gnomon_apriltag_picture(name: *const c_char, id: u32, cells: *mut u8, capacity: usize) -> i32;
+    fn gnomon_apriltag_picture(
+        name: *const c_char,
+        id: u32,
+        cells: *mut u8,
+        capacity: usize,
+    ) -> i32;
 }

@@ -16,19 +16,24 @@ pub(super) struct ArucoDetector {
 }
 
 impl ArucoDetector {
-    pub(super) fn new(settings: &TrackingSettings, families: &[Family]) -> Result<Self, TrackingError> {
+    pub(super) fn new(
+        settings: &TrackingSettings,
+        families: &[Family],
+    ) -> Result<Self, TrackingError> {
         // OpenCV has one pool of threads for the whole process.
         opencv::core::set_num_threads(settings.threads as i32)?;
         let dictionaries = families
             .iter()
             .map(|&family| {
-                let number = dictionary_number(family).ok_or_else(|| TrackingError::FamilyNotAvailable {
-                    family: family.name(),
-                    detector: "OpenCV's ArUco",
-                    allowed: Family::all_names().collect::<Vec<_>>().join(", "),
-                })?;
+                let number =
+                    dictionary_number(family).ok_or_else(|| TrackingError::FamilyNotAvailable {
+                        family: family.name(),
+                        detector: "OpenCV's ArUco",
+                        allowed: Family::all_names().collect::<Vec<_>>().join(", "),
+                    })?;
                 let bits = settings.corrected_bits.min(family.correctable_bits()) as i32;
-                let dictionary = installed::Dictionary::new(number, bits, settings.aruco_refinement)?;
+                let dictionary =
+                    installed::Dictionary::new(number, bits, settings.aruco_refinement)?;
                 Ok((family, quarter_turns(family, &dictionary)?, dictionary))
             })
             .collect::<Result<Vec<_>, TrackingError>>()?;
@@ -38,7 +43,11 @@ impl ArucoDetector {
         })
     }
 
-    pub(super) fn detect(&mut self, grey: &[u8], size_px: [u32; 2]) -> Result<Vec<Detection>, TrackingError> {
+    pub(super) fn detect(
+        &mut self,
+        grey: &[u8],
+        size_px: [u32; 2],
+    ) -> Result<Vec<Detection>, TrackingError> {
         let [width, height] = size_px;
         let image = Mat::new_rows_cols_with_data(height as i32, width as i32, grey)?;
         let mut detections = Vec::new();
@@ -51,7 +60,8 @@ impl ArucoDetector {
                     .iter()
                     .map(|corner| DVec2::new(f64::from(corner.x), f64::from(corner.y)))
                     .collect::<Vec<_>>();
-                let (Ok(id), Ok(corners)) = (u32::try_from(id), <[DVec2; 4]>::try_from(corners)) else {
+                let (Ok(id), Ok(corners)) = (u32::try_from(id), <[DVec2; 4]>::try_from(corners))
+                else {
                     continue;
                 };
                 detections.push(Detection {
@@ -68,7 +78,10 @@ impl ArucoDetector {
 }
 
 /// The turn of the installed dictionary against the prints; its own pictures are the prints of OpenCV's families.
-fn quarter_turns(family: Family, dictionary: &installed::Dictionary) -> Result<usize, TrackingError> {
+fn quarter_turns(
+    family: Family,
+    dictionary: &installed::Dictionary,
+) -> Result<usize, TrackingError> {
     if !family.is_april_tag() {
         return Ok(0);
     }
@@ -76,7 +89,9 @@ fn quarter_turns(family: Family, dictionary: &installed::Dictionary) -> Result<u
     let opencv = dictionary.cells(0, side)?;
     printed_cells(family, 0)
         .and_then(|print| quarter_turns_between(&print, &opencv, side))
-        .ok_or_else(|| TrackingError::Library(format!("OpenCV's {} is not AprilTag's", family.name())))
+        .ok_or_else(|| {
+            TrackingError::Library(format!("OpenCV's {} is not AprilTag's", family.name()))
+        })
 }
 
 /// The number of OpenCV's predefined dictionary, the same in all its releases.
@@ -88,7 +103,9 @@ fn dictionary_number(family: Family) -> Option<i32> {
         Family::Tag36h11 => 20,
         Family::ArucoOriginal => 16,
         Family::Aruco { cells, count } => {
-            let of_size = [50, 100, 250, 1000].iter().position(|&known| known == count)?;
+            let of_size = [50, 100, 250, 1000]
+                .iter()
+                .position(|&known| known == count)?;
             i32::from(cells.checked_sub(4).filter(|&size| size < 4)?) * 4 + of_size as i32
         }
     })
@@ -106,7 +123,11 @@ fn refinement_number(refinement: ArucoRefinement) -> i32 {
 
 /// White cells of a marker's picture of one pixel a cell.
 fn white_cells(picture: &Mat) -> opencv::Result<Vec<bool>> {
-    Ok(picture.data_typed::<u8>()?.iter().map(|&cell| cell != 0).collect())
+    Ok(picture
+        .data_typed::<u8>()?
+        .iter()
+        .map(|&cell| cell != 0)
+        .collect())
 }
 
 /// The contrib module `aruco`, OpenCV before 4.7.
@@ -125,13 +146,20 @@ mod installed {
     }
 
     impl Dictionary {
-        pub(super) fn new(number: i32, corrected_bits: i32, refinement: ArucoRefinement) -> opencv::Result<Self> {
+        pub(super) fn new(
+            number: i32,
+            corrected_bits: i32,
+            refinement: ArucoRefinement,
+        ) -> opencv::Result<Self> {
             let mut dictionary = aruco::get_predefined_dictionary_i32(number)?;
             dictionary.set_max_correction_bits(corrected_bits);
             let mut parameters = aruco::DetectorParameters::create()?;
             parameters.set_error_correction_rate(1.0);
             parameters.set_corner_refinement_method(refinement_number(refinement));
-            Ok(Self { dictionary, parameters })
+            Ok(Self {
+                dictionary,
+                parameters,
+            })
         }
 
         pub(super) fn detect(
@@ -140,7 +168,14 @@ mod installed {
             corners: &mut Vector<Vector<Point2f>>,
             ids: &mut Vector<i32>,
         ) -> opencv::Result<()> {
-            aruco::detect_markers(image, &self.dictionary, corners, ids, &self.parameters, &mut no_array())
+            aruco::detect_markers(
+                image,
+                &self.dictionary,
+                corners,
+                ids,
+                &self.parameters,
+                &mut no_array(),
+            )
         }
 
         pub(super) fn cells(&self, id: i32, side: usize) -> opencv::Result<Vec<bool>> {
@@ -167,7 +202,11 @@ mod installed {
     }
 
     impl Dictionary {
-        pub(super) fn new(number: i32, corrected_bits: i32, refinement: ArucoRefinement) -> opencv::Result<Self> {
+        pub(super) fn new(
+            number: i32,
+            corrected_bits: i32,
+            refinement: ArucoRefinement,
+        ) -> opencv::Result<Self> {
             let mut dictionary = objdetect::get_predefined_dictionary_i32(number)?;
             dictionary.set_max_correction_bits(corrected_bits);
             let mut parameters = objdetect::DetectorParameters::default()?;
@@ -175,7 +214,10 @@ mod installed {
             parameters.set_corner_refinement_method(refinement_number(refinement));
             let refine = objdetect::RefineParameters::new_def()?;
             let detector = objdetect::ArucoDetector::new(&dictionary, &parameters, refine)?;
-            Ok(Self { dictionary, detector })
+            Ok(Self {
+                dictionary,
+                detector,
+            })
         }
 
         pub(super) fn detect(
@@ -201,7 +243,12 @@ mod tests {
 
     #[test]
     fn every_april_tag_of_opencv_is_april_tags_own_up_to_one_turn() {
-        for family in [Family::Tag16h5, Family::Tag25h9, Family::Tag36h10, Family::Tag36h11] {
+        for family in [
+            Family::Tag16h5,
+            Family::Tag25h9,
+            Family::Tag36h10,
+            Family::Tag36h11,
+        ] {
             let number = dictionary_number(family).unwrap();
             let dictionary = installed::Dictionary::new(number, 0, ArucoRefinement::None).unwrap();
             let side = family.cells() as usize + 2;
@@ -209,7 +256,12 @@ mod tests {
             for id in 0..family.id_count() {
                 let print = printed_cells(family, id).unwrap();
                 let opencv = dictionary.cells(id as i32, side).unwrap();
-                assert_eq!(quarter_turns_between(&print, &opencv, side), Some(turn), "{} {id}", family.name());
+                assert_eq!(
+                    quarter_turns_between(&print, &opencv, side),
+                    Some(turn),
+                    "{} {id}",
+                    family.name()
+                );
             }
             assert!(printed_cells(family, family.id_count()).is_none());
         }
@@ -221,8 +273,16 @@ mod tests {
             let number = dictionary_number(family).unwrap();
             let dictionary = installed::Dictionary::new(number, 0, ArucoRefinement::None).unwrap();
             let side = family.cells() as usize + 2;
-            assert!(dictionary.cells(family.id_count() as i32 - 1, side).is_ok(), "{}", family.name());
-            assert!(dictionary.cells(family.id_count() as i32, side).is_err(), "{}", family.name());
+            assert!(
+                dictionary.cells(family.id_count() as i32 - 1, side).is_ok(),
+                "{}",
+                family.name()
+            );
+            assert!(
+                dictionary.cells(family.id_count() as i32, side).is_err(),
+                "{}",
+                family.name()
+            );
         }
     }
 }

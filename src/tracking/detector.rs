@@ -23,10 +23,15 @@ pub struct Detection {
     pub corrected_bits: u32,
 }
 
+/// No marker is smaller in a picture.
+const MIN_SIDE_PX: u32 = 16;
+
 /// A detector for some families, built once and used by one thread at a time.
 pub struct Detector(Backend);
 
 enum Backend {
+    /// Without a family there is nothing to look for.
+    Idle,
     AprilTag(AprilTagDetector),
     Aruco(ArucoDetector),
 }
@@ -38,14 +43,23 @@ impl Detector {
         let mut families = families.to_vec();
         families.sort_unstable();
         families.dedup();
+        if families.is_empty() {
+            return Ok(Self(Backend::Idle));
+        }
         Ok(Self(match settings.detector {
-            DetectorKind::AprilTag => Backend::AprilTag(AprilTagDetector::new(settings, &families)?),
+            DetectorKind::AprilTag => {
+                Backend::AprilTag(AprilTagDetector::new(settings, &families)?)
+            }
             DetectorKind::Aruco => Backend::Aruco(ArucoDetector::new(settings, &families)?),
         }))
     }
 
     /// The markers of an 8-bit grey picture (rows from the top, no padding), sorted by family and id.
-    pub fn detect(&mut self, grey: &[u8], size_px: [u32; 2]) -> Result<Vec<Detection>, TrackingError> {
+    pub fn detect(
+        &mut self,
+        grey: &[u8],
+        size_px: [u32; 2],
+    ) -> Result<Vec<Detection>, TrackingError> {
         let [width, height] = size_px;
         let fits = i32::try_from(width).is_ok() && i32::try_from(height).is_ok();
         if !fits || grey.len() as u64 != u64::from(width) * u64::from(height) {
@@ -54,10 +68,12 @@ impl Detector {
                 size_px,
             });
         }
-        if grey.is_empty() {
+        // OpenCV refuses an empty picture; libapriltag's tiles of thresholds need some room.
+        if width < MIN_SIDE_PX || height < MIN_SIDE_PX {
             return Ok(Vec::new());
         }
         let mut detections = match &mut self.0 {
+            Backend::Idle => Vec::new(),
             Backend::AprilTag(detector) => detector.detect(grey, size_px)?,
             Backend::Aruco(detector) => detector.detect(grey, size_px)?,
         };
@@ -77,7 +93,13 @@ impl Detector {
 
 /// What the types do not rule out; the scene refuses the same with file and line.
 fn check(settings: &TrackingSettings) -> Result<(), TrackingError> {
-    let wrong = |name, value: String, allowed| Err(TrackingError::Setting { name, value, allowed });
+    let wrong = |name, value: String, allowed| {
+        Err(TrackingError::Setting {
+            name,
+            value,
+            allowed,
+        })
+    };
     if !(1.0..=16.0).contains(&settings.decimation) {
         return wrong("decimation", settings.decimation.to_string(), "1 to 16");
     }

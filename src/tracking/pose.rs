@@ -58,12 +58,12 @@ pub(super) fn solve(intrinsics: &Intrinsics, sightings: &[Sighting]) -> Option<S
         .collect::<Vec<_>>();
     solutions.sort_by(|a, b| a.squared_error_px.total_cmp(&b.squared_error_px));
     let best = *solutions.first()?;
-    let alternative = solutions
-        .get(1)
-        .copied()
-        .filter(|other| rotation_between(&best.camera_from_anchor, &other.camera_from_anchor) > 1e-4);
+    let alternative = solutions.get(1).copied().filter(|other| {
+        rotation_between(&best.camera_from_anchor, &other.camera_from_anchor) > 1e-4
+    });
     let degrees_of_freedom = (2 * sightings.len()).saturating_sub(6).max(1) as f64;
-    let variance = (best.squared_error_px / degrees_of_freedom).max(CORNER_NOISE_PX * CORNER_NOISE_PX);
+    let variance =
+        (best.squared_error_px / degrees_of_freedom).max(CORNER_NOISE_PX * CORNER_NOISE_PX);
     let ambiguous = alternative
         .is_some_and(|other| other.squared_error_px - best.squared_error_px < DECISIVE * variance);
     Some(Solutions {
@@ -74,7 +74,11 @@ pub(super) fn solve(intrinsics: &Intrinsics, sightings: &[Sighting]) -> Option<S
 }
 
 /// Where the pose puts a point of the anchor's plane, undistorted pixels.
-pub(super) fn pixel_of(intrinsics: &Intrinsics, camera_from_anchor: &DAffine3, point_m: DVec2) -> DVec2 {
+pub(super) fn pixel_of(
+    intrinsics: &Intrinsics,
+    camera_from_anchor: &DAffine3,
+    point_m: DVec2,
+) -> DVec2 {
     let in_camera = camera_from_anchor.transform_point3(point_m.extend(0.0));
     intrinsics.pixel_from_plane(in_camera.truncate() / in_camera.z)
 }
@@ -108,7 +112,11 @@ fn ippe_starts(intrinsics: &Intrinsics, sightings: &[Sighting]) -> Option<[DAffi
         return None;
     }
     let count = sightings.len() as f64;
-    let center_m = sightings.iter().map(|sighting| sighting.point_m).sum::<DVec2>() / count;
+    let center_m = sightings
+        .iter()
+        .map(|sighting| sighting.point_m)
+        .sum::<DVec2>()
+        / count;
     let spread_m = (sightings
         .iter()
         .map(|sighting| (sighting.point_m - center_m).length_squared())
@@ -118,12 +126,18 @@ fn ippe_starts(intrinsics: &Intrinsics, sightings: &[Sighting]) -> Option<[DAffi
     let in_plane = |sighting: &Sighting| (sighting.point_m - center_m) / spread_m;
     let pairs = sightings
         .iter()
-        .map(|sighting| (in_plane(sighting), intrinsics.plane_from_pixel(sighting.pixel)))
+        .map(|sighting| {
+            (
+                in_plane(sighting),
+                intrinsics.plane_from_pixel(sighting.pixel),
+            )
+        })
         .collect::<Vec<_>>();
     let homography = homography(&pairs)?;
     // The picture of the centre, and the derivative there.
     let image_center = homography.z_axis.truncate() / homography.z_axis.z;
-    let derivative = |column: DVec3| (column.truncate() - image_center * column.z) / homography.z_axis.z;
+    let derivative =
+        |column: DVec3| (column.truncate() - image_center * column.z) / homography.z_axis.z;
     let jacobian = DMat2::from_cols(derivative(homography.x_axis), derivative(homography.y_axis));
     let rotations = ippe_rotations(image_center, jacobian)?;
     let mut poses = [DAffine3::IDENTITY; 2];
@@ -139,15 +153,26 @@ fn ippe_starts(intrinsics: &Intrinsics, sightings: &[Sighting]) -> Option<[DAffi
 fn homography(pairs: &[(DVec2, DVec2)]) -> Option<DMat3> {
     let count = pairs.len() as f64;
     let center = pairs.iter().map(|&(_, image)| image).sum::<DVec2>() / count;
-    let spread = (pairs.iter().map(|&(_, image)| (image - center).length_squared()).sum::<f64>() / count).sqrt();
+    let spread = (pairs
+        .iter()
+        .map(|&(_, image)| (image - center).length_squared())
+        .sum::<f64>()
+        / count)
+        .sqrt();
     let mut normal = [[0.0; 8]; 8];
     let mut right = [0.0; 8];
     for &(point, image) in pairs {
         let (x, y) = (point.x, point.y);
         let image = (image - center) / spread;
         for (row, value) in [
-            ([x, y, 1.0, 0.0, 0.0, 0.0, -image.x * x, -image.x * y], image.x),
-            ([0.0, 0.0, 0.0, x, y, 1.0, -image.y * x, -image.y * y], image.y),
+            (
+                [x, y, 1.0, 0.0, 0.0, 0.0, -image.x * x, -image.x * y],
+                image.x,
+            ),
+            (
+                [0.0, 0.0, 0.0, x, y, 1.0, -image.y * x, -image.y * y],
+                image.y,
+            ),
         ] {
             accumulate(&mut normal, &mut right, &row, value);
         }
@@ -176,7 +201,11 @@ fn ippe_rotations(image_center: DVec2, jacobian: DMat2) -> Option<[DMat3; 2]> {
     let scaled = basis.inverse() * jacobian;
     // The largest singular value is what remains of the depth.
     let (rows_x, rows_y) = (scaled.row(0), scaled.row(1));
-    let (xx, xy, yy) = (rows_x.length_squared(), rows_x.dot(rows_y), rows_y.length_squared());
+    let (xx, xy, yy) = (
+        rows_x.length_squared(),
+        rows_x.dot(rows_y),
+        rows_y.length_squared(),
+    );
     let largest = (0.5 * (xx + yy + ((xx - yy).powi(2) + 4.0 * xy * xy).sqrt())).sqrt();
     if !(largest.is_finite() && largest > 0.0) {
         return None;
@@ -185,7 +214,11 @@ fn ippe_rotations(image_center: DVec2, jacobian: DMat2) -> Option<[DMat3; 2]> {
     // Unit columns that are perpendicular give the last row up to its sign.
     let first = (1.0 - upper.x_axis.length_squared()).max(0.0).sqrt();
     let second = (1.0 - upper.y_axis.length_squared()).max(0.0).sqrt();
-    let second = if upper.x_axis.dot(upper.y_axis) > 0.0 { -second } else { second };
+    let second = if upper.x_axis.dot(upper.y_axis) > 0.0 {
+        -second
+    } else {
+        second
+    };
     let rotation = |sign: f64| {
         let x = upper.x_axis.extend(sign * first);
         let y = upper.y_axis.extend(sign * second);
@@ -194,18 +227,35 @@ fn ippe_rotations(image_center: DVec2, jacobian: DMat2) -> Option<[DMat3; 2]> {
         axis_to_ray * DMat3::from_cols(x, y, x.cross(y))
     };
     let rotations = [rotation(1.0), rotation(-1.0)];
-    rotations.iter().all(|rotation| rotation.is_finite()).then_some(rotations)
+    rotations
+        .iter()
+        .all(|rotation| rotation.is_finite())
+        .then_some(rotations)
 }
 
 /// The translation that fits best, linearly, once the rotation is known.
-fn translation_for(intrinsics: &Intrinsics, sightings: &[Sighting], rotation: &DMat3) -> Option<DVec3> {
+fn translation_for(
+    intrinsics: &Intrinsics,
+    sightings: &[Sighting],
+    rotation: &DMat3,
+) -> Option<DVec3> {
     let mut normal = [[0.0; 3]; 3];
     let mut right = [0.0; 3];
     for sighting in sightings {
         let image = intrinsics.plane_from_pixel(sighting.pixel);
         let turned = *rotation * sighting.point_m.extend(0.0);
-        accumulate(&mut normal, &mut right, &[1.0, 0.0, -image.x], image.x * turned.z - turned.x);
-        accumulate(&mut normal, &mut right, &[0.0, 1.0, -image.y], image.y * turned.z - turned.y);
+        accumulate(
+            &mut normal,
+            &mut right,
+            &[1.0, 0.0, -image.x],
+            image.x * turned.z - turned.x,
+        );
+        accumulate(
+            &mut normal,
+            &mut right,
+            &[0.0, 1.0, -image.y],
+            image.y * turned.z - turned.y,
+        );
     }
     solve_positive_definite(&normal, &right).map(DVec3::from)
 }
@@ -225,8 +275,11 @@ fn refine(intrinsics: &Intrinsics, sightings: &[Sighting], start: DAffine3) -> O
         }
         let [rx, ry, rz, tx, ty, tz] = solve_positive_definite(&damped, &right)?;
         let (turn, shift_m) = (DVec3::new(rx, ry, rz), DVec3::new(tx, ty, tz));
-        let small = turn.length() < STEP_TOLERANCE && shift_m.length() < STEP_TOLERANCE * pose.translation.length();
-        let rotation = (glam::DQuat::from_scaled_axis(turn) * glam::DQuat::from_mat3(&pose.matrix3)).normalize();
+        let small = turn.length() < STEP_TOLERANCE
+            && shift_m.length() < STEP_TOLERANCE * pose.translation.length();
+        let rotation = (glam::DQuat::from_scaled_axis(turn)
+            * glam::DQuat::from_mat3(&pose.matrix3))
+        .normalize();
         let candidate = DAffine3::from_rotation_translation(rotation, pose.translation + shift_m);
         match squared_error(intrinsics, sightings, &candidate) {
             Some(candidate_error) if candidate_error < error => {
@@ -262,7 +315,11 @@ fn squared_error(intrinsics: &Intrinsics, sightings: &[Sighting], pose: &DAffine
 }
 
 /// The normal equations of the Gauss-Newton step: a turn about the anchor's origin (left of the rotation), a shift.
-fn linearize(intrinsics: &Intrinsics, sightings: &[Sighting], pose: &DAffine3) -> ([[f64; 6]; 6], [f64; 6]) {
+fn linearize(
+    intrinsics: &Intrinsics,
+    sightings: &[Sighting],
+    pose: &DAffine3,
+) -> ([[f64; 6]; 6], [f64; 6]) {
     let mut normal = [[0.0; 6]; 6];
     let mut right = [0.0; 6];
     for sighting in sightings {
@@ -277,7 +334,9 @@ fn linearize(intrinsics: &Intrinsics, sightings: &[Sighting], pose: &DAffine3) -
         for (gradient, value) in by_position.into_iter().zip(missing.to_array()) {
             // gradient · (turn × turned) = turn · (turned × gradient)
             let by_turn = turned.cross(gradient);
-            let row = [by_turn.x, by_turn.y, by_turn.z, gradient.x, gradient.y, gradient.z];
+            let row = [
+                by_turn.x, by_turn.y, by_turn.z, gradient.x, gradient.y, gradient.z,
+            ];
             accumulate(&mut normal, &mut right, &row, value);
         }
     }
@@ -285,7 +344,12 @@ fn linearize(intrinsics: &Intrinsics, sightings: &[Sighting], pose: &DAffine3) -
 }
 
 /// Adds one equation `row · x = value` to the normal equations.
-fn accumulate<const N: usize>(normal: &mut [[f64; N]; N], right: &mut [f64; N], row: &[f64; N], value: f64) {
+fn accumulate<const N: usize>(
+    normal: &mut [[f64; N]; N],
+    right: &mut [f64; N],
+    row: &[f64; N],
+    value: f64,
+) {
     for i in 0..N {
         for j in 0..N {
             normal[i][j] += row[i] * row[j];
@@ -295,7 +359,10 @@ fn accumulate<const N: usize>(normal: &mut [[f64; N]; N], right: &mut [f64; N], 
 }
 
 /// Solves by Cholesky's decomposition; `None` when the matrix is not positive definite.
-fn solve_positive_definite<const N: usize>(matrix: &[[f64; N]; N], right: &[f64; N]) -> Option<[f64; N]> {
+fn solve_positive_definite<const N: usize>(
+    matrix: &[[f64; N]; N],
+    right: &[f64; N],
+) -> Option<[f64; N]> {
     let mut lower = [[0.0; N]; N];
     for i in 0..N {
         for j in 0..=i {
@@ -338,9 +405,13 @@ mod tests {
     /// A camera that looks at the anchor from above, turned and tilted.
     fn pose(tilt_deg: f64, turn_deg: f64, distance_m: f64) -> DAffine3 {
         let facing = DQuat::from_rotation_x(std::f64::consts::PI);
-        let tilt = DQuat::from_rotation_x(tilt_deg.to_radians()) * DQuat::from_rotation_y(0.3 * tilt_deg.to_radians());
+        let tilt = DQuat::from_rotation_x(tilt_deg.to_radians())
+            * DQuat::from_rotation_y(0.3 * tilt_deg.to_radians());
         let turn = DQuat::from_rotation_z(turn_deg.to_radians());
-        DAffine3::from_rotation_translation(tilt * facing * turn, DVec3::new(0.03, -0.02, distance_m))
+        DAffine3::from_rotation_translation(
+            tilt * facing * turn,
+            DVec3::new(0.03, -0.02, distance_m),
+        )
     }
 
     fn square(size_m: f64) -> Vec<DVec2> {
@@ -353,7 +424,11 @@ mod tests {
         ]
     }
 
-    fn sightings(points_m: &[DVec2], pose: &DAffine3, mut noise: impl FnMut() -> f64) -> Vec<Sighting> {
+    fn sightings(
+        points_m: &[DVec2],
+        pose: &DAffine3,
+        mut noise: impl FnMut() -> f64,
+    ) -> Vec<Sighting> {
         points_m
             .iter()
             .map(|&point_m| Sighting {
@@ -382,9 +457,13 @@ mod tests {
                 let truth = pose(tilt_deg, turn_deg, 0.5);
                 let seen = sightings(&square(0.04), &truth, || 0.0);
                 let found = solve(&CAMERA, &seen).unwrap();
-                let error_m = (found.best.camera_from_anchor.translation - truth.translation).length();
+                let error_m =
+                    (found.best.camera_from_anchor.translation - truth.translation).length();
                 let error = rotation_between(&found.best.camera_from_anchor, &truth);
-                assert!(error_m < 1e-8 && error < 1e-6, "tilt {tilt_deg} turn {turn_deg}: {error_m} m {error}");
+                assert!(
+                    error_m < 1e-8 && error < 1e-6,
+                    "tilt {tilt_deg} turn {turn_deg}: {error_m} m {error}"
+                );
                 assert!(found.best.rms_px(4) < 1e-8);
             }
         }
@@ -408,7 +487,10 @@ mod tests {
             };
             let difference = (moved(1e-6) - moved(-1e-6)) / 2e-6;
             // The error falls along the right side, by twice of it.
-            assert!((difference + 2.0 * gradient[k]).abs() < 1e-4 * (1.0 + difference.abs()), "parameter {k}");
+            assert!(
+                (difference + 2.0 * gradient[k]).abs() < 1e-4 * (1.0 + difference.abs()),
+                "parameter {k}"
+            );
         }
     }
 
@@ -417,7 +499,11 @@ mod tests {
         let mut noise = gaussian(0.2);
         let (mut sure, mut wrong, mut lost_truth) = (0, 0, 0);
         for k in 0..2000 {
-            let truth = pose(f64::from(k % 40) * 1.5, f64::from(k * 37 % 360), 0.3 + f64::from(k % 7) * 0.1);
+            let truth = pose(
+                f64::from(k % 40) * 1.5,
+                f64::from(k * 37 % 360),
+                0.3 + f64::from(k % 7) * 0.1,
+            );
             let found = solve(&CAMERA, &sightings(&square(0.036), &truth, &mut noise)).unwrap();
             let off = |solution: &Solution| rotation_between(&solution.camera_from_anchor, &truth);
             let other = found.alternative.as_ref().map(off);
@@ -431,16 +517,28 @@ mod tests {
         }
         assert!(sure > 700, "only {sure} of 2000 decided");
         assert!(wrong * 100 <= sure, "{wrong} wrong of {sure}");
-        assert!(lost_truth <= 20, "{lost_truth} of 2000 with neither pose near the truth");
+        assert!(
+            lost_truth <= 20,
+            "{lost_truth} of 2000 with neither pose near the truth"
+        );
     }
 
     #[test]
     fn a_board_is_hardly_ever_ambiguous() {
         let mut noise = gaussian(0.3);
-        let board = [(-0.175, 0.115), (0.0, 0.115), (0.175, -0.115), (-0.175, -0.115)]
-            .iter()
-            .flat_map(|&(x, y)| square(0.045).into_iter().map(move |corner| corner + DVec2::new(x, y)))
-            .collect::<Vec<_>>();
+        let board = [
+            (-0.175, 0.115),
+            (0.0, 0.115),
+            (0.175, -0.115),
+            (-0.175, -0.115),
+        ]
+        .iter()
+        .flat_map(|&(x, y)| {
+            square(0.045)
+                .into_iter()
+                .map(move |corner| corner + DVec2::new(x, y))
+        })
+        .collect::<Vec<_>>();
         for k in 0..200 {
             let truth = pose(f64::from(k % 50), f64::from(k * 37 % 360), 0.6);
             let found = solve(&CAMERA, &sightings(&board, &truth, &mut noise)).unwrap();
@@ -456,15 +554,27 @@ mod tests {
         let seen = sightings(&square(0.04), &truth, || 0.0);
         assert_eq!(solve(&CAMERA, &seen[..3]), None);
         let on_a_line = (0..4)
-            .map(|k| Sighting { point_m: seen[k].point_m, pixel: DVec2::splat(100.0 + 10.0 * k as f64) })
+            .map(|k| Sighting {
+                point_m: seen[k].point_m,
+                pixel: DVec2::splat(100.0 + 10.0 * k as f64),
+            })
             .collect::<Vec<_>>();
         assert_eq!(solve(&CAMERA, &on_a_line), None);
-        let at_a_point = seen.iter().map(|s| Sighting { pixel: DVec2::splat(9.0), ..*s }).collect::<Vec<_>>();
+        let at_a_point = seen
+            .iter()
+            .map(|s| Sighting {
+                pixel: DVec2::splat(9.0),
+                ..*s
+            })
+            .collect::<Vec<_>>();
         assert_eq!(solve(&CAMERA, &at_a_point), None);
         // A mirrored picture shows the back of the marker.
         let mirrored = seen
             .iter()
-            .map(|s| Sighting { pixel: DVec2::new(639.0 - s.pixel.x, s.pixel.y), ..*s })
+            .map(|s| Sighting {
+                pixel: DVec2::new(639.0 - s.pixel.x, s.pixel.y),
+                ..*s
+            })
             .collect::<Vec<_>>();
         assert_eq!(solve(&CAMERA, &mirrored), None);
     }

@@ -107,15 +107,23 @@ impl Layout {
         }
     }
 
-    fn locate(&self, intrinsics: &Intrinsics, detections: &[Detection], before: Option<DAffine3>) -> AnchorPose {
+    fn locate(
+        &self,
+        intrinsics: &Intrinsics,
+        detections: &[Detection],
+        before: Option<DAffine3>,
+    ) -> AnchorPose {
         let mut seen = Vec::new();
         let mut doubled = Vec::new();
         for &(family, id, corners_m) in &self.markers {
-            let start = detections.partition_point(|detection| (detection.family, detection.id) < (family, id));
+            let start = detections
+                .partition_point(|detection| (detection.family, detection.id) < (family, id));
             let mut candidates = detections[start..]
                 .iter()
                 .take_while(|detection| (detection.family, detection.id) == (family, id))
-                .filter_map(|detection| SeenMarker::new(intrinsics, corners_m, detection.corners_px))
+                .filter_map(|detection| {
+                    SeenMarker::new(intrinsics, corners_m, detection.corners_px)
+                })
                 .collect::<Vec<_>>();
             match candidates.len() {
                 0 => {}
@@ -131,9 +139,9 @@ impl Layout {
             let known = seen.len();
             let camera_from_anchor = solutions.best.camera_from_anchor;
             for candidates in doubled {
-                let mut fitting = candidates
-                    .into_iter()
-                    .filter(|marker| marker.distance_px(intrinsics, &camera_from_anchor) < SAME_MARKER_PX);
+                let mut fitting = candidates.into_iter().filter(|marker| {
+                    marker.distance_px(intrinsics, &camera_from_anchor) < SAME_MARKER_PX
+                });
                 if let (Some(marker), None) = (fitting.next(), fitting.next()) {
                     seen.push(marker);
                 }
@@ -155,7 +163,10 @@ impl SeenMarker {
             point_m: DVec2::ZERO,
             pixel: DVec2::ZERO,
         }; 4];
-        for (sighting, (point_m, corner_px)) in sightings.iter_mut().zip(corners_m.into_iter().zip(corners_px)) {
+        for (sighting, (point_m, corner_px)) in sightings
+            .iter_mut()
+            .zip(corners_m.into_iter().zip(corners_px))
+        {
             let pixel = undistorted_pixel(intrinsics, corner_px)?;
             *sighting = Sighting { point_m, pixel };
         }
@@ -166,7 +177,10 @@ impl SeenMarker {
     fn distance_px(&self, intrinsics: &Intrinsics, camera_from_anchor: &DAffine3) -> f64 {
         self.sightings
             .iter()
-            .map(|sighting| (pixel_of(intrinsics, camera_from_anchor, sighting.point_m) - sighting.pixel).length())
+            .map(|sighting| {
+                (pixel_of(intrinsics, camera_from_anchor, sighting.point_m) - sighting.pixel)
+                    .length()
+            })
             .fold(0.0, f64::max)
     }
 }
@@ -175,7 +189,9 @@ impl SeenMarker {
 /// (a wrong id, a corner under a pencil or a shadow's edge), as long as two others agree.
 fn solve_without_misfits(intrinsics: &Intrinsics, seen: &mut Vec<SeenMarker>) -> Option<Solutions> {
     let solve_for = |markers: &mut dyn Iterator<Item = &SeenMarker>| {
-        let sightings = markers.flat_map(|marker| marker.sightings).collect::<Vec<_>>();
+        let sightings = markers
+            .flat_map(|marker| marker.sightings)
+            .collect::<Vec<_>>();
         let solutions = pose::solve(intrinsics, &sightings)?;
         Some((solutions, solutions.best.rms_px(sightings.len())))
     };
@@ -187,7 +203,11 @@ fn solve_without_misfits(intrinsics: &Intrinsics, seen: &mut Vec<SeenMarker>) ->
         }
         let without = (0..seen.len())
             .filter_map(|left_out| {
-                let mut others = seen.iter().enumerate().filter(|&(k, _)| k != left_out).map(|(_, marker)| marker);
+                let mut others = seen
+                    .iter()
+                    .enumerate()
+                    .filter(|&(k, _)| k != left_out)
+                    .map(|(_, marker)| marker);
                 solve_for(&mut others).map(|(_, rms_px)| (left_out, rms_px))
             })
             .min_by(|a, b| a.1.total_cmp(&b.1));
@@ -212,7 +232,11 @@ fn anchor_pose(solutions: &Solutions, markers: usize, before: Option<DAffine3>) 
     }
     let corners = 4 * markers;
     AnchorPose {
-        status: if solutions.ambiguous { Status::Ambiguous } else { Status::Tracked },
+        status: if solutions.ambiguous {
+            Status::Ambiguous
+        } else {
+            Status::Tracked
+        },
         markers: markers as u32,
         camera_from_anchor: Some(chosen.camera_from_anchor),
         reprojection_px: chosen.rms_px(corners),

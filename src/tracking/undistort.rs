@@ -14,7 +14,8 @@ pub(super) fn undistorted_pixel(intrinsics: &Intrinsics, distorted_px: DVec2) ->
     let target = intrinsics.plane_from_pixel(distorted_px);
     let mut point = target;
     for _ in 0..ROUNDS {
-        let step = distortion_jacobian(intrinsics, point).inverse() * (intrinsics.distort(point) - target);
+        let step =
+            distortion_jacobian(intrinsics, point).inverse() * (intrinsics.distort(point) - target);
         if !step.is_finite() {
             return None;
         }
@@ -22,7 +23,8 @@ pub(super) fn undistorted_pixel(intrinsics: &Intrinsics, distorted_px: DVec2) ->
         if step.length() < TOLERANCE * (1.0 + point.length()) {
             // Behind the fold the map mirrors; its Jacobian is symmetric.
             let jacobian = distortion_jacobian(intrinsics, point);
-            let unfolded = jacobian.determinant() > 0.0 && jacobian.x_axis.x + jacobian.y_axis.y > 0.0;
+            let unfolded =
+                jacobian.determinant() > 0.0 && jacobian.x_axis.x + jacobian.y_axis.y > 0.0;
             return unfolded.then(|| intrinsics.pixel_from_plane(point));
         }
     }
@@ -58,12 +60,21 @@ mod tests {
 
     #[test]
     fn undistorting_inverts_distorting() {
-        for distortion in [[0.0; 5], [0.08, -0.19, 0.0008, -0.0005, 0.05], [-0.35, 0.15, -0.002, 0.001, -0.03]] {
+        for distortion in [
+            [0.0; 5],
+            [0.08, -0.19, 0.0008, -0.0005, 0.05],
+            [-0.35, 0.15, -0.002, 0.001, -0.03],
+        ] {
             let camera = camera(distortion);
-            for pixel in [(0.0, 0.0), (639.0, 0.0), (320.0, 240.0), (17.0, 461.0)].map(DVec2::from) {
+            for pixel in [(0.0, 0.0), (639.0, 0.0), (320.0, 240.0), (17.0, 461.0)].map(DVec2::from)
+            {
                 let undistorted = undistorted_pixel(&camera, pixel).unwrap();
-                let back = camera.pixel_from_plane(camera.distort(camera.plane_from_pixel(undistorted)));
-                assert!((back - pixel).length() < 1e-9, "{pixel} came back as {back}");
+                let back =
+                    camera.pixel_from_plane(camera.distort(camera.plane_from_pixel(undistorted)));
+                assert!(
+                    (back - pixel).length() < 1e-9,
+                    "{pixel} came back as {back}"
+                );
             }
         }
     }
@@ -71,6 +82,9 @@ mod tests {
     #[test]
     fn no_point_is_made_up_where_the_model_folds() {
         // r (1 - r²/2) never exceeds 0.55, the picture's corner lies at 0.65.
-        assert_eq!(undistorted_pixel(&camera([-0.5, 0.0, 0.0, 0.0, 0.0]), DVec2::ZERO), None);
+        assert_eq!(
+            undistorted_pixel(&camera([-0.5, 0.0, 0.0, 0.0, 0.0]), DVec2::ZERO),
+            None
+        );
     }
 }
