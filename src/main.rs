@@ -25,7 +25,9 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Plays a recording with the scene's virtual things in it.
-    #[command(after_help = "Example:\n  gnomon replay config/lamp.toml --out out/lamp.mp4 --sheet out/lamp.png")]
+    #[command(
+        after_help = "Example:\n  gnomon replay config/lamp.toml --out out/lamp.mp4 --sheet out/lamp.png"
+    )]
     Replay(ReplayArgs),
     /// Reads a scene, says what is wrong with it or what is in it.
     #[command(after_help = "Example:\n  gnomon check config/lamp.toml")]
@@ -123,7 +125,10 @@ fn run_replay(args: ReplayArgs) -> Result<()> {
         bail!("interrupted; what was done until then is whole");
     }
     if !report.notices.is_empty() {
-        bail!("the recording is damaged; all good frames were done: {}", report.notices.join("; "));
+        bail!(
+            "the recording is damaged; all good frames were done: {}",
+            report.notices.join("; ")
+        );
     }
     Ok(())
 }

@@ -24,7 +24,9 @@ pub struct PosesText {
 impl PosesText {
     /// The header alone.
     pub fn new() -> Self {
-        Self { text: format!("{HEADER}\n") }
+        Self {
+            text: format!("{HEADER}\n"),
+        }
     }
 
     /// Adds the rows of one frame; `render_ms` is `None` where nothing was drawn.
@@ -103,12 +105,19 @@ impl GivenPoses {
 
     fn parse(text: &str, anchors: &[Anchor]) -> Result<Self> {
         let mut lines = text.lines().enumerate();
-        let Some((_, header)) = lines.next() else { bail!("the file is empty") };
+        let Some((_, header)) = lines.next() else {
+            bail!("the file is empty")
+        };
         let columns: Vec<&str> = header.split(',').map(str::trim).collect();
         let column = |name: &str| {
-            columns.iter().position(|column| *column == name).with_context(|| {
-                format!("line 1: the column `{name}` is missing; the header is to be `{HEADER}`")
-            })
+            columns
+                .iter()
+                .position(|column| *column == name)
+                .with_context(|| {
+                    format!(
+                        "line 1: the column `{name}` is missing; the header is to be `{HEADER}`"
+                    )
+                })
         };
         let (frame, anchor) = (column("frame")?, column("anchor")?);
         let pose = ["tx_m", "ty_m", "tz_m", "rx", "ry", "rz"].map(column);
@@ -130,23 +139,34 @@ impl GivenPoses {
                 columns.len()
             );
             let index: u32 = fields[frame].parse().with_context(|| {
-                format!("line {line}: frame \"{}\" is not a whole number", fields[frame])
+                format!(
+                    "line {line}: frame \"{}\" is not a whole number",
+                    fields[frame]
+                )
             })?;
             let name = fields[anchor];
             let Some(anchor) = anchors.iter().position(|anchor| anchor.name == name) else {
                 let known: Vec<_> = anchors.iter().map(|anchor| anchor.name.as_str()).collect();
-                bail!("line {line}: the scene has no anchor \"{name}\"; it has {}", known.join(", "));
+                bail!(
+                    "line {line}: the scene has no anchor \"{name}\"; it has {}",
+                    known.join(", ")
+                );
             };
-            let poses = by_frame.entry(index).or_insert_with(|| vec![lost(); anchors.len()]);
+            let poses = by_frame
+                .entry(index)
+                .or_insert_with(|| vec![lost(); anchors.len()]);
             if pose.iter().all(|&column| fields[column].is_empty()) {
                 continue;
             }
             let mut numbers = [0.0; 6];
             for (number, &column) in numbers.iter_mut().zip(&pose) {
-                *number =
-                    fields[column].parse().ok().filter(|number: &f64| number.is_finite()).with_context(
-                        || format!("line {line}: \"{}\" is not a finite number", fields[column]),
-                    )?;
+                *number = fields[column]
+                    .parse()
+                    .ok()
+                    .filter(|number: &f64| number.is_finite())
+                    .with_context(|| {
+                        format!("line {line}: \"{}\" is not a finite number", fields[column])
+                    })?;
             }
             let [tx, ty, tz, rx, ry, rz] = numbers;
             let camera_from_anchor: DAffine3 =
@@ -156,17 +176,25 @@ impl GivenPoses {
                     Some("ambiguous") => Status::Ambiguous,
                     _ => Status::Tracked,
                 },
-                markers: markers.and_then(|column| fields[column].parse().ok()).unwrap_or(0),
+                markers: markers
+                    .and_then(|column| fields[column].parse().ok())
+                    .unwrap_or(0),
                 camera_from_anchor: Some(camera_from_anchor),
                 ..lost()
             };
         }
-        Ok(Self { by_frame, anchor_count: anchors.len() })
+        Ok(Self {
+            by_frame,
+            anchor_count: anchors.len(),
+        })
     }
 
     /// The poses of a frame; all lost where the file says nothing of it.
     pub fn of_frame(&self, index: u32) -> Vec<AnchorPose> {
-        self.by_frame.get(&index).cloned().unwrap_or_else(|| vec![lost(); self.anchor_count])
+        self.by_frame
+            .get(&index)
+            .cloned()
+            .unwrap_or_else(|| vec![lost(); self.anchor_count])
     }
 }
 
@@ -180,7 +208,10 @@ mod tests {
 
     fn anchors() -> Vec<Anchor> {
         ["table", "card"]
-            .map(|name| Anchor { name: name.to_owned(), markers: Vec::new() })
+            .map(|name| Anchor {
+                name: name.to_owned(),
+                markers: Vec::new(),
+            })
             .to_vec()
     }
 
@@ -196,10 +227,15 @@ mod tests {
         let mut text = PosesText::new();
         text.add_frame((7, 0.25), &anchors(), &[tracked, lost()], (Some(1.5), None));
         assert!(text.as_str().starts_with(HEADER));
-        assert_eq!(text.as_str().lines().nth(2), Some("7,0.250000,card,lost,0,,,,,,,,"));
+        assert_eq!(
+            text.as_str().lines().nth(2),
+            Some("7,0.250000,card,lost,0,,,,,,,,")
+        );
 
         let read = GivenPoses::parse(text.as_str(), &anchors()).expect("poses");
-        let [table, card] = &read.of_frame(7)[..] else { panic!("two anchors") };
+        let [table, card] = &read.of_frame(7)[..] else {
+            panic!("two anchors")
+        };
         let again = table.camera_from_anchor.expect("a pose");
         assert!(again.abs_diff_eq(pose, 1e-8) && table.markers == 5);
         assert_eq!(card.camera_from_anchor, None);
@@ -211,13 +247,28 @@ mod tests {
         let mistakes = [
             ("", "empty"),
             ("frame,anchor\n", "`tx_m` is missing"),
-            ("frame,anchor,tx_m,ty_m,tz_m,rx,ry,rz\n0,tabel,0,0,1,0,0,0\n", "line 2: the scene has no"),
-            ("frame,anchor,tx_m,ty_m,tz_m,rx,ry,rz\n0,table,0,0,NaN,0,0,0\n", "line 2: \"NaN\""),
-            ("frame,anchor,tx_m,ty_m,tz_m,rx,ry,rz\n\n0,table,0,0\n", "line 3: 4 fields"),
-            ("frame,anchor,tx_m,ty_m,tz_m,rx,ry,rz\n-1,table,0,0,0,0,0,0\n", "line 2: frame"),
+            (
+                "frame,anchor,tx_m,ty_m,tz_m,rx,ry,rz\n0,tabel,0,0,1,0,0,0\n",
+                "line 2: the scene has no",
+            ),
+            (
+                "frame,anchor,tx_m,ty_m,tz_m,rx,ry,rz\n0,table,0,0,NaN,0,0,0\n",
+                "line 2: \"NaN\"",
+            ),
+            (
+                "frame,anchor,tx_m,ty_m,tz_m,rx,ry,rz\n\n0,table,0,0\n",
+                "line 3: 4 fields",
+            ),
+            (
+                "frame,anchor,tx_m,ty_m,tz_m,rx,ry,rz\n-1,table,0,0,0,0,0,0\n",
+                "line 2: frame",
+            ),
         ];
         for (text, part) in mistakes {
-            let message = format!("{:#}", GivenPoses::parse(text, &anchors()).err().expect(part));
+            let message = format!(
+                "{:#}",
+                GivenPoses::parse(text, &anchors()).err().expect(part)
+            );
             assert!(message.contains(part), "{message}");
         }
     }

@@ -13,7 +13,10 @@ impl Progress {
                 ProgressBar::new(count.into()),
                 "{bar:40} {pos}/{len} frames  {per_sec}  {eta} left",
             ),
-            None => (ProgressBar::new_spinner(), "{spinner} {pos} frames  {per_sec}"),
+            None => (
+                ProgressBar::new_spinner(),
+                "{spinner} {pos} frames  {per_sec}",
+            ),
         };
         // A template that cannot be read falls back to the library's own.
         Self(match ProgressStyle::with_template(template) {

@@ -16,12 +16,12 @@ use crate::render::{Gpu, Layers, Renderer, Shown};
 use crate::scene::{DetectorKind, Scene, Technique};
 use crate::tracking::{AnchorPose, Tracker};
 
+use super::contact_sheet::ContactSheet;
 use super::layer_files::{Layer, write_layers};
 use super::output::FrameSink;
 use super::picture_files::write_text;
 use super::poses_file::{GivenPoses, PosesText};
 use super::progress::Progress;
-use super::contact_sheet::ContactSheet;
 use super::stats::{StageLog, Stats, peak_memory_mib};
 use super::stopwatch::Stopwatch;
 use super::video_writer::Codec;
@@ -81,7 +81,10 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
     if let (Some(out), false) = (&request.out, request.layers.is_empty())
         && Codec::of_path(out).is_some()
     {
-        bail!("--layers writes PNGs beside the pictures: give --out a folder, not {}", out.display());
+        bail!(
+            "--layers writes PNGs beside the pictures: give --out a folder, not {}",
+            out.display()
+        );
     }
     let poser = match &request.poses_from {
         Some(path) => Poser::Given(GivenPoses::read(path, &scene.anchors)?),
@@ -107,18 +110,29 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
         frames: 0,
         drawn: 0,
     };
-    let adapter = drawing.as_ref().map(|drawing| drawing.gpu.description().to_owned());
+    let adapter = drawing
+        .as_ref()
+        .map(|drawing| drawing.gpu.description().to_owned());
     let size_px = source.size_px();
-    let last = request.frames.as_ref().and_then(|frames| frames.last().copied());
+    let last = request
+        .frames
+        .as_ref()
+        .and_then(|frames| frames.last().copied());
     // What was done before a failure is kept: the files are finished either way.
     let (notices, failure) = match run.all_frames(source, poser, drawing, last, stop) {
-        Ok(notices) => (notices, run.missing_frames(last, stop).map(anyhow::Error::msg)),
+        Ok(notices) => (
+            notices,
+            run.missing_frames(last, stop).map(anyhow::Error::msg),
+        ),
         Err(error) => (Vec::new(), Some(error)),
     };
     if let Some(path) = &request.poses {
         write_text(path, run.poses.as_str())?;
     }
-    let dropped = notices.iter().map(crate::capture::Notice::lost_frames).sum();
+    let dropped = notices
+        .iter()
+        .map(crate::capture::Notice::lost_frames)
+        .sum();
     if let Some(path) = &request.stats {
         let stats = run.stats(size_px, dropped, adapter, watch.elapsed_ms() * 1e-3);
         let text = serde_json::to_string_pretty(&stats)?;
@@ -134,7 +148,10 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
         world_lost: run.lost[0],
         notices: notices.iter().map(ToString::to_string).collect(),
         interrupted: stop.load(Ordering::Relaxed),
-        reprojection_px: run.reprojections_px.get(run.reprojections_px.len() / 2).copied(),
+        reprojection_px: run
+            .reprojections_px
+            .get(run.reprojections_px.len() / 2)
+            .copied(),
     })
 }
 
@@ -210,7 +227,15 @@ impl Drawing {
             .map(|out| FrameSink::create(out, source.size_px(), source.fps()))
             .transpose()?;
         let sheet = request.sheet.as_ref().map(|_| ContactSheet::new(4, 3));
-        Ok(Self { gpu, renderer, files: Files { sink, sheet, size_px: source.size_px() } })
+        Ok(Self {
+            gpu,
+            renderer,
+            files: Files {
+                sink,
+                sheet,
+                size_px: source.size_px(),
+            },
+        })
     }
 }
 
@@ -245,16 +270,14 @@ impl Run<'_> {
             let (to_tracker, from_camera) = sync_channel(QUEUE);
             let (to_renderer, from_tracker) = sync_channel(QUEUE);
             let (to_files, from_renderer) = sync_channel(QUEUE);
-            let capture =
-                scope.spawn(move || capture_stage(source, &to_tracker, last, stop));
+            let capture = scope.spawn(move || capture_stage(source, &to_tracker, last, stop));
             let tracking = scope.spawn(move || track_stage(poser, &from_camera, &to_renderer));
             let (mut renderer, files) = match drawing {
                 Some(drawing) => (Some(drawing.renderer), Some(drawing.files)),
                 None => (None, None),
             };
             let request = self.request;
-            let writing =
-                scope.spawn(move || write_stage(request, files, &from_renderer));
+            let writing = scope.spawn(move || write_stage(request, files, &from_renderer));
 
             let mut outcome = Ok(());
             for tracked in &from_tracker {
@@ -288,7 +311,12 @@ impl Run<'_> {
         renderer: Option<&mut Renderer>,
         to_files: &SyncSender<DrawnFrame>,
     ) -> Result<()> {
-        let TrackedFrame { frame, poses, decode_ms, track_ms } = tracked;
+        let TrackedFrame {
+            frame,
+            poses,
+            decode_ms,
+            track_ms,
+        } = tracked;
         self.frames += 1;
         self.log.add("decode", decode_ms);
         if let Some(ms) = track_ms {
@@ -300,8 +328,11 @@ impl Run<'_> {
         for (lost, pose) in self.lost.iter_mut().zip(&poses) {
             *lost += u32::from(pose.camera_from_anchor.is_none());
         }
-        let wanted =
-            self.request.frames.as_ref().is_none_or(|frames| frames.contains(&frame.index));
+        let wanted = self
+            .request
+            .frames
+            .as_ref()
+            .is_none_or(|frames| frames.contains(&frame.index));
         let mut render_ms = None;
         if let (Some(renderer), true) = (renderer, wanted) {
             let (drawn, ms) = self
@@ -328,7 +359,11 @@ impl Run<'_> {
         frame: &Frame,
         poses: &[AnchorPose],
     ) -> Result<(DrawnFrame, f64)> {
-        let shown = if self.request.bare { Shown::Bare } else { Shown::Composite };
+        let shown = if self.request.bare {
+            Shown::Bare
+        } else {
+            Shown::Composite
+        };
         let placed: Vec<_> = poses.iter().map(|pose| pose.camera_from_anchor).collect();
         let whole = Stopwatch::start();
         let (uploaded, upload_ms) = Stopwatch::time(|| renderer.upload(frame));
@@ -353,9 +388,17 @@ impl Run<'_> {
         if let Some(ms) = gpu.composite_ms {
             self.log.add("composite", ms);
         }
-        let layers =
-            (!self.request.layers.is_empty()).then(|| renderer.layers()).transpose()?;
-        Ok((DrawnFrame { index: frame.index, rgba, layers }, render_ms))
+        let layers = (!self.request.layers.is_empty())
+            .then(|| renderer.layers())
+            .transpose()?;
+        Ok((
+            DrawnFrame {
+                index: frame.index,
+                rgba,
+                layers,
+            },
+            render_ms,
+        ))
     }
 
     /// What to say when frames that were asked for are not in the recording.
@@ -430,9 +473,18 @@ fn track_stage(
     to_renderer: &SyncSender<TrackedFrame>,
 ) -> Result<()> {
     for (frame, decode_ms) in from_camera {
-        let (poses, track_ms) =
-            poser.poses(&frame).with_context(|| format!("frame {}", frame.index))?;
-        if to_renderer.send(TrackedFrame { frame, poses, decode_ms, track_ms }).is_err() {
+        let (poses, track_ms) = poser
+            .poses(&frame)
+            .with_context(|| format!("frame {}", frame.index))?;
+        if to_renderer
+            .send(TrackedFrame {
+                frame,
+                poses,
+                decode_ms,
+                track_ms,
+            })
+            .is_err()
+        {
             break;
         }
     }
@@ -455,10 +507,22 @@ fn write_stage(
     files: Option<Files>,
     from_renderer: &Receiver<DrawnFrame>,
 ) -> Result<StageSamples> {
-    let Some(Files { mut sink, mut sheet, size_px }) = files else { return Ok(Vec::new()) };
+    let Some(Files {
+        mut sink,
+        mut sheet,
+        size_px,
+    }) = files
+    else {
+        return Ok(Vec::new());
+    };
     let mut encode_ms = Vec::new();
     let folder = request.out.as_deref().unwrap_or(Path::new("."));
-    for DrawnFrame { index, rgba, layers } in from_renderer {
+    for DrawnFrame {
+        index,
+        rgba,
+        layers,
+    } in from_renderer
+    {
         let (written, ms) = Stopwatch::time(|| -> Result<()> {
             if let Some(sink) = &mut sink {
                 sink.push(index, size_px, &rgba)?;
@@ -484,5 +548,7 @@ fn write_stage(
 }
 
 fn join<T>(handle: thread::ScopedJoinHandle<'_, Result<T>>) -> Result<T> {
-    handle.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    handle
+        .join()
+        .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }

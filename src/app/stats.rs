@@ -28,7 +28,10 @@ impl StageLog {
 
     /// The summary of each stage that worked.
     pub fn summary(&self) -> BTreeMap<&'static str, StageTimes> {
-        self.samples_ms.iter().map(|(&stage, samples)| (stage, summarise(samples))).collect()
+        self.samples_ms
+            .iter()
+            .map(|(&stage, samples)| (stage, summarise(samples)))
+            .collect()
     }
 }
 
@@ -87,9 +90,14 @@ mod tests {
     #[test]
     fn quantiles_are_samples() {
         let mut log = StageLog::default();
-        (1..=100).rev().for_each(|ms| log.add("track", f64::from(ms)));
+        (1..=100)
+            .rev()
+            .for_each(|ms| log.add("track", f64::from(ms)));
         let times = log.summary()["track"];
-        assert_eq!((times.median_ms, times.p95_ms, times.max_ms), (50.0, 95.0, 100.0));
+        assert_eq!(
+            (times.median_ms, times.p95_ms, times.max_ms),
+            (50.0, 95.0, 100.0)
+        );
         assert_eq!(summarise(&[3.0]).p95_ms, 3.0);
     }
 }

@@ -30,13 +30,20 @@ impl RayCaster {
     pub fn new(corners: &[[Vec3; 3]]) -> Self {
         let triangles: Vec<Triangle> = corners
             .iter()
-            .map(|&[v0, v1, v2]| Triangle { v0: v0.into(), v1: v1.into(), v2: v2.into() })
+            .map(|&[v0, v1, v2]| Triangle {
+                v0: v0.into(),
+                v1: v1.into(),
+                v2: v2.into(),
+            })
             .collect();
         let hierarchy = (!triangles.is_empty()).then(|| {
             let params = BvhBuildParams::medium_build();
             build_bvh2_from_tris(&triangles, params, &mut Duration::default())
         });
-        Self { triangles, hierarchy }
+        Self {
+            triangles,
+            hierarchy,
+        }
     }
 
     /// The first triangle within `reach` along a ray, if any; both sides of a triangle are hit.
@@ -55,7 +62,9 @@ impl RayCaster {
 
     /// Whether anything lies within `reach` along a ray.
     pub fn is_hidden(&self, origin: Vec3, direction: Vec3, reach: f32) -> bool {
-        let Some(hierarchy) = &self.hierarchy else { return false };
+        let Some(hierarchy) = &self.hierarchy else {
+            return false;
+        };
         let ray = Ray::new(Vec3A::from(origin), Vec3A::from(direction), 0.0, reach);
         !hierarchy.ray_traverse_miss(ray, |ray, id| {
             self.triangles[hierarchy.primitive_indices[id] as usize].intersect(ray)
@@ -78,8 +87,13 @@ mod tests {
         };
         let caster = RayCaster::new(&[square(-3.0), square(-1.0)].concat());
         let (origin, down) = (Vec3::new(0.25, 0.5, 1.0), Vec3::NEG_Z);
-        let hit = caster.first_hit(origin, down, f32::INFINITY).expect("a hit");
-        assert!(hit.triangle == 3 && (hit.distance - 2.0).abs() < 1e-6, "{hit:?}");
+        let hit = caster
+            .first_hit(origin, down, f32::INFINITY)
+            .expect("a hit");
+        assert!(
+            hit.triangle == 3 && (hit.distance - 2.0).abs() < 1e-6,
+            "{hit:?}"
+        );
         assert_eq!(caster.first_hit(origin, down, 1.9), None);
         assert!(caster.is_hidden(origin, down, 2.1) && !caster.is_hidden(origin, down, 1.9));
         assert_eq!(caster.first_hit(origin, Vec3::Z, f32::INFINITY), None);

@@ -78,14 +78,24 @@ impl Caster {
         for edge in 0..edges.len() {
             edge_starts[edge + 1] += edge_starts[edge];
         }
-        let edge_triangles: Vec<(u32, bool)> =
-            incidences.into_iter().map(|(_, triangle, forward)| (triangle, forward)).collect();
+        let edge_triangles: Vec<(u32, bool)> = incidences
+            .into_iter()
+            .map(|(_, triangle, forward)| (triangle, forward))
+            .collect();
         let closed = !edges.is_empty()
             && edge_starts.windows(2).all(|range| {
                 let around = &edge_triangles[range[0] as usize..range[1] as usize];
                 around.iter().filter(|(_, forward)| *forward).count() * 2 == around.len()
             });
-        Self { positions, triangles, planes, edges, edge_starts, edge_triangles, closed }
+        Self {
+            positions,
+            triangles,
+            planes,
+            edges,
+            edge_starts,
+            edge_triangles,
+            closed,
+        }
     }
 
     /// Whether each edge is run along as often one way as the other, so that a ray that enters the mesh leaves it
@@ -170,12 +180,26 @@ mod tests {
     fn cube() -> Caster {
         let positions = (0..8)
             .map(|corner| {
-                Vec3::new((corner & 1) as f32, (corner >> 1 & 1) as f32, (corner >> 2 & 1) as f32)
+                Vec3::new(
+                    (corner & 1) as f32,
+                    (corner >> 1 & 1) as f32,
+                    (corner >> 2 & 1) as f32,
+                )
             })
             .collect();
         let triangles = vec![
-            [0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4],
-            [2, 6, 7], [2, 7, 3], [0, 4, 6], [0, 6, 2], [1, 3, 7], [1, 7, 5],
+            [0, 2, 3],
+            [0, 3, 1],
+            [4, 5, 7],
+            [4, 7, 6],
+            [0, 1, 5],
+            [0, 5, 4],
+            [2, 6, 7],
+            [2, 7, 3],
+            [0, 4, 6],
+            [0, 6, 2],
+            [1, 3, 7],
+            [1, 7, 5],
         ];
         Caster::new(positions, triangles)
     }
@@ -184,7 +208,11 @@ mod tests {
     /// are one point.
     fn boundary(indices: &[u32], vertices: &[Vec4], distant: bool) -> usize {
         let name = |index: u32| {
-            if distant && vertices[index as usize].w == 0.0 { u32::MAX } else { index }
+            if distant && vertices[index as usize].w == 0.0 {
+                u32::MAX
+            } else {
+                index
+            }
         };
         let mut uses: HashMap<(u32, u32), i32> = HashMap::new();
         for triangle in indices.chunks(3) {
@@ -222,8 +250,11 @@ mod tests {
         for caster in [&closed, &open] {
             for light in lights() {
                 let distant = matches!(light, LightPlace::Along(_));
-                let open_edges =
-                    boundary(&caster.volume_indices(light), &caster.volume_vertices(light), distant);
+                let open_edges = boundary(
+                    &caster.volume_indices(light),
+                    &caster.volume_vertices(light),
+                    distant,
+                );
                 assert_eq!(open_edges, 0, "{light:?}");
             }
         }
@@ -263,7 +294,11 @@ mod tests {
                     let inside = [(a, b), (b, c), (c, a)]
                         .iter()
                         .all(|(p, q)| (*q - *p).cross(hit - *p).dot(normal) >= 0.0);
-                    if distance > 0.0 && inside { normal.dot(direction).signum() as i32 } else { 0 }
+                    if distance > 0.0 && inside {
+                        normal.dot(direction).signum() as i32
+                    } else {
+                        0
+                    }
                 })
                 .sum()
         };

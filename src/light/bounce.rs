@@ -50,12 +50,19 @@ pub struct Mover {
 impl Mover {
     /// Prepares what may hide or throw back light; `None` without triangles.
     pub fn new(reflectors: &[Reflector]) -> Option<Self> {
-        let corners: Vec<_> = reflectors.iter().map(|reflector| reflector.corners).collect();
+        let corners: Vec<_> = reflectors
+            .iter()
+            .map(|reflector| reflector.corners)
+            .collect();
         let share = 1.0 / reflectors.len().max(1) as f64;
         let points = corners.iter().flatten().map(|corner| corner.as_dvec3());
         (!corners.is_empty()).then(|| Self {
             center: points.sum::<DVec3>() * (share / 3.0),
-            albedo: reflectors.iter().map(|reflector| reflector.albedo).sum::<DVec3>() * share,
+            albedo: reflectors
+                .iter()
+                .map(|reflector| reflector.albedo)
+                .sum::<DVec3>()
+                * share,
             caster: RayCaster::new(&corners),
         })
     }
@@ -85,7 +92,10 @@ struct GatheredRay {
 impl Surroundings {
     /// Prepares what may hide or throw back light.
     pub fn new(reflectors: Vec<Reflector>, lights: Vec<Light>, ambient_radiance: DVec3) -> Self {
-        let corners: Vec<_> = reflectors.iter().map(|reflector| reflector.corners).collect();
+        let corners: Vec<_> = reflectors
+            .iter()
+            .map(|reflector| reflector.corners)
+            .collect();
         let points = || corners.iter().flatten();
         let size = points().copied().fold(Vec3::MIN, Vec3::max)
             - points().copied().fold(Vec3::MAX, Vec3::min);
@@ -114,7 +124,10 @@ impl Surroundings {
             lit.extend(share_lit);
         }
         Gathering {
-            starts: places.iter().map(|&place| self.start(place).as_vec3()).collect(),
+            starts: places
+                .iter()
+                .map(|&place| self.start(place).as_vec3())
+                .collect(),
             rays_per_point,
             rays,
             lit,
@@ -149,24 +162,47 @@ impl Surroundings {
 
     fn follow(&self, start: DVec3, direction: DVec3, lit: &mut Vec<Vec3>) -> GatheredRay {
         let single = direction.as_vec3();
-        let Some(hit) = self.caster.first_hit(start.as_vec3(), single, f32::INFINITY) else {
+        let Some(hit) = self
+            .caster
+            .first_hit(start.as_vec3(), single, f32::INFINITY)
+        else {
             lit.extend(self.lights.iter().map(|_| Vec3::ZERO));
             let unlit = self.ambient_radiance.as_vec3();
-            return GatheredRay { direction: single, distance_m: f32::INFINITY, unlit };
+            return GatheredRay {
+                direction: single,
+                distance_m: f32::INFINITY,
+                unlit,
+            };
         };
-        let Reflector { corners: [a, b, c], albedo } = self.reflectors[hit.triangle];
+        let Reflector {
+            corners: [a, b, c],
+            albedo,
+        } = self.reflectors[hit.triangle];
         let outward = (b - a).cross(c - a).as_dvec3().normalize_or_zero();
-        let normal = if outward.dot(direction) > 0.0 { -outward } else { outward };
-        let place =
-            start + direction * f64::from(hit.distance) + normal * self.start_offset_m;
+        let normal = if outward.dot(direction) > 0.0 {
+            -outward
+        } else {
+            outward
+        };
+        let place = start + direction * f64::from(hit.distance) + normal * self.start_offset_m;
         lit.extend(self.lights.iter().map(|light| {
             let (to_light, reach) = way_to(light, place);
-            let hidden = self.caster.is_hidden(place.as_vec3(), to_light.as_vec3(), reach);
-            let arriving = if hidden { DVec3::ZERO } else { irradiance(light, place, normal) };
+            let hidden = self
+                .caster
+                .is_hidden(place.as_vec3(), to_light.as_vec3(), reach);
+            let arriving = if hidden {
+                DVec3::ZERO
+            } else {
+                irradiance(light, place, normal)
+            };
             (albedo / PI * arriving).as_vec3()
         }));
         let unlit = (albedo * self.ambient_radiance).as_vec3();
-        GatheredRay { direction: single, distance_m: hit.distance, unlit }
+        GatheredRay {
+            direction: single,
+            distance_m: hit.distance,
+            unlit,
+        }
     }
 }
 
@@ -174,10 +210,14 @@ impl Gathering {
     /// Irradiance of each point, but for what the lights themselves give it: the cosine-weighted mean of the radiance
     /// that arrives, times π. `movers` come with where they are.
     pub fn irradiances(&self, movers: &[(&Mover, DAffine3)]) -> Vec<Vec3> {
-        let placed: Vec<PlacedMover> =
-            movers.iter().map(|&(mover, place)| self.place(mover, place)).collect();
+        let placed: Vec<PlacedMover> = movers
+            .iter()
+            .map(|&(mover, place)| self.place(mover, place))
+            .collect();
         let shares = on_all_cores(self.starts.len(), |range| {
-            range.map(|point| self.irradiance(point, &placed)).collect::<Vec<_>>()
+            range
+                .map(|point| self.irradiance(point, &placed))
+                .collect::<Vec<_>>()
         });
         shares.into_iter().flatten().collect()
     }
@@ -203,7 +243,9 @@ impl Gathering {
         let mut sum = Vec3::ZERO;
         for index in rays {
             let ray = self.rays[index];
-            let blocker = movers.iter().find(|m| m.hides(start, ray.direction, ray.distance_m));
+            let blocker = movers
+                .iter()
+                .find(|m| m.hides(start, ray.direction, ray.distance_m));
             if let Some(blocker) = blocker {
                 sum += blocker.radiance;
                 continue;
@@ -217,7 +259,10 @@ impl Gathering {
                 }
                 let end = start + ray.direction * ray.distance_m;
                 let (to_light, reach) = way_to(light, end.as_dvec3());
-                if !movers.iter().any(|m| m.hides(end, to_light.as_vec3(), reach)) {
+                if !movers
+                    .iter()
+                    .any(|m| m.hides(end, to_light.as_vec3(), reach))
+                {
                     sum += radiance;
                 }
             }
@@ -257,9 +302,13 @@ fn on_all_cores<T: Send>(
     let threads = std::thread::available_parallelism().map_or(1, |threads| threads.get());
     let share = count.div_ceil(threads).max(1);
     std::thread::scope(|scope| {
-        let ranges = (0..count).step_by(share).map(|first| first..count.min(first + share));
+        let ranges = (0..count)
+            .step_by(share)
+            .map(|first| first..count.min(first + share));
         let work = &work;
-        let workers: Vec<_> = ranges.map(|range| scope.spawn(move || work(range))).collect();
+        let workers: Vec<_> = ranges
+            .map(|range| scope.spawn(move || work(range)))
+            .collect();
         let join = |worker: std::thread::ScopedJoinHandle<'_, T>| {
             worker.join().unwrap_or_else(|panic| resume_unwind(panic))
         };
@@ -285,7 +334,10 @@ mod tests {
             [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0)],
             [corner(-1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
         ]
-        .map(|corners| Reflector { corners, albedo: DVec3::splat(albedo) })
+        .map(|corners| Reflector {
+            corners,
+            albedo: DVec3::splat(albedo),
+        })
     }
 
     #[test]
@@ -300,7 +352,10 @@ mod tests {
         let table = Surroundings::new(square(50.0, 0.0, 1.0).to_vec(), Vec::new(), DVec3::ONE);
         for normal in [DVec3::X, DVec3::Z, DVec3::NEG_Z] {
             let irradiance = irradiance_at(&table, DVec3::new(0.0, 0.0, 0.1), normal);
-            assert!((irradiance - PI).abs().max_element() < 1e-5, "{normal} {irradiance}");
+            assert!(
+                (irradiance - PI).abs().max_element() < 1e-5,
+                "{normal} {irradiance}"
+            );
         }
     }
 
@@ -308,12 +363,18 @@ mod tests {
     fn a_lit_table_lights_what_faces_it_by_its_form_factor() {
         // Distant light of irradiance E straight down on a wide table of albedo a: a surface facing down gets a E, one
         // that stands upright half of it.
-        let light = Light::Directional { direction: DVec3::NEG_Z, irradiance: DVec3::splat(2.0) };
+        let light = Light::Directional {
+            direction: DVec3::NEG_Z,
+            irradiance: DVec3::splat(2.0),
+        };
         let table = Surroundings::new(square(500.0, 0.0, 0.5).to_vec(), vec![light], DVec3::ZERO);
         let above = DVec3::new(0.3, 0.2, 0.5);
         let down = irradiance_at(&table, above, DVec3::NEG_Z).x;
         let aside = irradiance_at(&table, above, DVec3::X).x;
-        assert!((down - 1.0).abs() < 0.01 && (aside - 0.5).abs() < 0.01, "{down} {aside}");
+        assert!(
+            (down - 1.0).abs() < 0.01 && (aside - 0.5).abs() < 0.01,
+            "{down} {aside}"
+        );
         assert_eq!(irradiance_at(&table, above, DVec3::Z), DVec3::ZERO);
     }
 
@@ -322,33 +383,56 @@ mod tests {
         // Form factor from a point to a coaxial parallel square of side 2a at distance h (Howell's catalogue B-4, four
         // quarters): F = 4 / π · A/√(1+A²) · atan(A/√(1+A²)) with A = a/h.
         let (half_m, height) = (0.5, 0.4);
-        let walls = Surroundings::new(square(half_m as f32, height as f32, 0.0).to_vec(), Vec::new(), DVec3::ONE);
+        let walls = Surroundings::new(
+            square(half_m as f32, height as f32, 0.0).to_vec(),
+            Vec::new(),
+            DVec3::ONE,
+        );
         let ratio: f64 = half_m / height;
         let slant = ratio / (1.0 + ratio * ratio).sqrt();
         let hidden = 4.0 / PI * slant * slant.atan();
         // Walls without albedo throw nothing back of the ambient light: what they hide is missing.
         let found = irradiance_at(&walls, DVec3::ZERO, DVec3::Z).x / PI;
-        assert!((found - (1.0 - hidden)).abs() < 0.01, "{found} {}", 1.0 - hidden);
+        assert!(
+            (found - (1.0 - hidden)).abs() < 0.01,
+            "{found} {}",
+            1.0 - hidden
+        );
     }
 
     #[test]
     fn what_moves_takes_what_it_hides() {
         // The same plate, once as part of the standing surroundings and once as a mover, black both times.
-        let light = Light::Point { position_m: DVec3::new(0.2, 0.1, 2.0), intensity: DVec3::splat(3.0) };
+        let light = Light::Point {
+            position_m: DVec3::new(0.2, 0.1, 2.0),
+            intensity: DVec3::splat(3.0),
+        };
         let floor = square(2.0, 0.0, 0.8).to_vec();
         let plate = square(0.3, 0.0, 0.0);
         let lift = DAffine3::from_translation(DVec3::new(0.1, 0.0, 0.5));
         let lifted = plate.map(|reflector| Reflector {
-            corners: reflector.corners.map(|c| lift.transform_point3(c.as_dvec3()).as_vec3()),
+            corners: reflector
+                .corners
+                .map(|c| lift.transform_point3(c.as_dvec3()).as_vec3()),
             ..reflector
         });
-        let places = [(DVec3::new(-0.4, 0.1, 0.2), DVec3::X), (DVec3::new(0.5, 0.0, 0.3), DVec3::Z)];
+        let places = [
+            (DVec3::new(-0.4, 0.1, 0.2), DVec3::X),
+            (DVec3::new(0.5, 0.0, 0.3), DVec3::Z),
+        ];
         let lights = vec![light];
-        let standing = Surroundings::new([floor.clone(), lifted.to_vec()].concat(), lights.clone(), DVec3::ONE);
+        let standing = Surroundings::new(
+            [floor.clone(), lifted.to_vec()].concat(),
+            lights.clone(),
+            DVec3::ONE,
+        );
         let expected = standing.gather(&places, 1 << 20).irradiances(&[]);
         let floor_alone = Surroundings::new(floor, lights, DVec3::ONE).gather(&places, 1 << 20);
         let mover = Mover::new(&plate).expect("triangles");
-        for (expected, found) in expected.iter().zip(floor_alone.irradiances(&[(&mover, lift)])) {
+        for (expected, found) in expected
+            .iter()
+            .zip(floor_alone.irradiances(&[(&mover, lift)]))
+        {
             assert!((*expected - found).length() < 1e-3, "{expected} {found}");
         }
         assert!((expected[0] - floor_alone.irradiances(&[])[0]).length() > 0.05);

@@ -27,13 +27,19 @@ pub struct Material {
 /// Irradiance that an unhidden light gives to a point with a unit normal, both in world space.
 pub fn irradiance(light: &Light, point: DVec3, normal: DVec3) -> DVec3 {
     match *light {
-        Light::Point { position_m, intensity } => {
+        Light::Point {
+            position_m,
+            intensity,
+        } => {
             let to_light = position_m - point;
             let distance_squared = to_light.length_squared().max(1e-12);
             let cosine = normal.dot(to_light) / distance_squared.sqrt();
             intensity * (cosine.max(0.0) / distance_squared)
         }
-        Light::Directional { direction, irradiance } => irradiance * (-normal.dot(direction)).max(0.0),
+        Light::Directional {
+            direction,
+            irradiance,
+        } => irradiance * (-normal.dot(direction)).max(0.0),
     }
 }
 
@@ -43,7 +49,9 @@ pub fn irradiance(light: &Light, point: DVec3, normal: DVec3) -> DVec3 {
 pub fn reflectance(material: &Material, normal: DVec3, to_light: DVec3, to_camera: DVec3) -> DVec3 {
     let diffuse = material.albedo / PI;
     let cos_light = normal.dot(to_light);
-    let Some(alpha) = material.roughness.filter(|_| cos_light > 0.0) else { return diffuse };
+    let Some(alpha) = material.roughness.filter(|_| cos_light > 0.0) else {
+        return diffuse;
+    };
     let cos_camera = normal.dot(to_camera).max(1e-3);
     let halfway = (to_light + to_camera).normalize_or_zero();
     let cos_half = normal.dot(halfway).clamp(0.0, 1.0);
@@ -54,7 +62,8 @@ pub fn reflectance(material: &Material, normal: DVec3, to_light: DVec3, to_camer
     let visibility = 0.5 / (cos_light * smith(cos_camera) + cos_camera * smith(cos_light));
     let specular = distribution * visibility * fresnel(to_light.dot(halfway));
     // What the layer lets in and out again; the mean keeps a white material white.
-    let let_through = (1.0 - fresnel(cos_light)) * (1.0 - fresnel(cos_camera)) / (1.0 - MEAN_FRESNEL);
+    let let_through =
+        (1.0 - fresnel(cos_light)) * (1.0 - fresnel(cos_camera)) / (1.0 - MEAN_FRESNEL);
     diffuse * let_through + specular
 }
 
@@ -72,19 +81,28 @@ mod tests {
 
     #[test]
     fn light_falls_off_with_the_square_of_distance_and_the_cosine() {
-        let lamp = Light::Point { position_m: DVec3::new(0.0, 0.0, 2.0), intensity: DVec3::splat(8.0) };
+        let lamp = Light::Point {
+            position_m: DVec3::new(0.0, 0.0, 2.0),
+            intensity: DVec3::splat(8.0),
+        };
         assert!((irradiance(&lamp, DVec3::ZERO, DVec3::Z).x - 2.0).abs() < 1e-12);
         let tilted = DVec3::new(0.8, 0.0, 0.6);
         assert!((irradiance(&lamp, DVec3::ZERO, tilted).x - 1.2).abs() < 1e-12);
         assert_eq!(irradiance(&lamp, DVec3::ZERO, DVec3::NEG_Z), DVec3::ZERO);
-        let sun = Light::Directional { direction: DVec3::NEG_Z, irradiance: DVec3::splat(3.0) };
+        let sun = Light::Directional {
+            direction: DVec3::NEG_Z,
+            irradiance: DVec3::splat(3.0),
+        };
         assert!((irradiance(&sun, DVec3::splat(7.0), tilted).x - 1.8).abs() < 1e-12);
     }
 
     #[test]
     fn no_material_reflects_more_than_arrives_and_light_may_be_turned_round() {
         for alpha in [0.1, 0.3, 1.0] {
-            let material = Material { albedo: DVec3::ONE, roughness: Some(alpha) };
+            let material = Material {
+                albedo: DVec3::ONE,
+                roughness: Some(alpha),
+            };
             let at = |polar: f64, azimuth: f64| {
                 let (sine, cosine) = polar.sin_cos();
                 DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), cosine)
@@ -96,12 +114,19 @@ mod tests {
                 for i in 0..steps {
                     for j in 0..steps {
                         let polar = (f64::from(i) + 0.5) / f64::from(steps) * PI / 2.0;
-                        let to_light = at(polar, (f64::from(j) + 0.5) / f64::from(steps) * 2.0 * PI);
-                        let area = polar.sin() * PI / 2.0 / f64::from(steps) * 2.0 * PI / f64::from(steps);
-                        reflected += reflectance(&material, DVec3::Z, to_light, to_camera).x * polar.cos() * area;
+                        let to_light =
+                            at(polar, (f64::from(j) + 0.5) / f64::from(steps) * 2.0 * PI);
+                        let area =
+                            polar.sin() * PI / 2.0 / f64::from(steps) * 2.0 * PI / f64::from(steps);
+                        reflected += reflectance(&material, DVec3::Z, to_light, to_camera).x
+                            * polar.cos()
+                            * area;
                     }
                 }
-                assert!(reflected > 0.5 && reflected < 1.02, "alpha {alpha} camera {camera}: {reflected}");
+                assert!(
+                    reflected > 0.5 && reflected < 1.02,
+                    "alpha {alpha} camera {camera}: {reflected}"
+                );
             }
             let (one, other) = (at(0.4, 0.3), at(1.1, 2.0));
             let forth = reflectance(&material, DVec3::Z, one, other);

@@ -62,13 +62,19 @@ pub(super) struct AnchoredCaster {
 
 /// Surfaces, the real ones first.
 pub(super) fn surface_batches(device: &wgpu::Device, scene: &Scene) -> Vec<SurfaceBatch> {
-    let roles = [(Role::Real, &scene.phantoms), (Role::Virtual, &scene.virtuals)];
+    let roles = [
+        (Role::Real, &scene.phantoms),
+        (Role::Virtual, &scene.virtuals),
+    ];
     let ambient = (PI * scene.ambient_radiance).as_vec3();
     let mut batches = Vec::new();
     for (role, objects) in roles {
         for anchor in 0..scene.anchors.len() {
-            let corners: Vec<Corner> =
-                objects.iter().filter(|object| object.anchor == anchor).flat_map(corners).collect();
+            let corners: Vec<Corner> = objects
+                .iter()
+                .filter(|object| object.anchor == anchor)
+                .flat_map(corners)
+                .collect();
             if corners.is_empty() {
                 continue;
             }
@@ -108,7 +114,10 @@ pub(super) fn casters(scene: &Scene) -> Vec<AnchoredCaster> {
 
 fn positions_in_anchor(object: &Object) -> Vec<Vec3> {
     let place = |position: &Vec3| {
-        object.anchor_from_object.transform_point3(position.as_dvec3()).as_vec3()
+        object
+            .anchor_from_object
+            .transform_point3(position.as_dvec3())
+            .as_vec3()
     };
     object.mesh.positions.iter().map(place).collect()
 }
@@ -125,7 +134,9 @@ fn corners(object: &Object) -> Vec<Corner> {
             let material = object.materials[material as usize];
             [0, 1, 2].map(|corner| Corner {
                 position: positions[triangle[corner] as usize],
-                normal: (normal_matrix * normals[corner].as_dvec3()).normalize_or_zero().as_vec3(),
+                normal: (normal_matrix * normals[corner].as_dvec3())
+                    .normalize_or_zero()
+                    .as_vec3(),
                 albedo: material.albedo.as_vec3(),
                 roughness: material.roughness.unwrap_or(0.0) as f32,
             })
@@ -137,13 +148,18 @@ fn corners(object: &Object) -> Vec<Corner> {
 pub(super) fn reflectors(object: &Object) -> impl Iterator<Item = Reflector> {
     let positions = positions_in_anchor(object);
     let mesh = &object.mesh;
-    mesh.triangles.iter().zip(&mesh.triangle_materials).map(move |(triangle, &material)| Reflector {
-        corners: triangle.map(|index| positions[index as usize]),
-        albedo: object.materials[material as usize].albedo,
-    })
+    mesh.triangles
+        .iter()
+        .zip(&mesh.triangle_materials)
+        .map(move |(triangle, &material)| Reflector {
+            corners: triangle.map(|index| positions[index as usize]),
+            albedo: object.materials[material as usize].albedo,
+        })
 }
 
 /// Place and normal of each corner of an object's triangles, in its anchor's space; the same order as in a batch.
 pub(super) fn corner_places(object: &Object) -> impl Iterator<Item = (Vec3, Vec3)> {
-    corners(object).into_iter().map(|corner| (corner.position, corner.normal))
+    corners(object)
+        .into_iter()
+        .map(|corner| (corner.position, corner.normal))
 }

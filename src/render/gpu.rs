@@ -40,8 +40,7 @@ impl Gpu {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
         descriptor.backends = wgpu::Backends::PRIMARY;
         let instance = wgpu::Instance::new(descriptor);
-        let mut adapters =
-            pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
+        let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
         adapters.sort_by_key(|adapter| match adapter.get_info().device_type {
             wgpu::DeviceType::DiscreteGpu => 0,
             wgpu::DeviceType::IntegratedGpu => 1,
@@ -54,7 +53,11 @@ impl Gpu {
             None => adapters.first().ok_or(RenderError::NoAdapter)?,
             Some(wanted) => adapters
                 .iter()
-                .find(|adapter| name(adapter).to_lowercase().contains(&wanted.to_lowercase()))
+                .find(|adapter| {
+                    name(adapter)
+                        .to_lowercase()
+                        .contains(&wanted.to_lowercase())
+                })
                 .ok_or_else(|| RenderError::UnknownAdapter {
                     wanted: wanted.to_owned(),
                     found: adapters.iter().map(name).collect::<Vec<_>>().join(", "),
@@ -68,15 +71,17 @@ impl Gpu {
         let offered = adapter.features();
         let wished = wgpu::Features::DEPTH32FLOAT_STENCIL8 | wgpu::Features::TIMESTAMP_QUERY;
         let features = offered & wished;
-        let unusable = |reason: String| RenderError::Unusable { adapter: info.name.clone(), reason };
-        let (device, queue) =
-            pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
-                label: Some("gnomon"),
-                required_features: features,
-                required_limits: adapter.limits(),
-                ..Default::default()
-            }))
-            .map_err(|error| unusable(error.to_string()))?;
+        let unusable = |reason: String| RenderError::Unusable {
+            adapter: info.name.clone(),
+            reason,
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("gnomon"),
+            required_features: features,
+            required_limits: adapter.limits(),
+            ..Default::default()
+        }))
+        .map_err(|error| unusable(error.to_string()))?;
 
         // wgpu's own answer to an uncaught error is a panic; ours is a message when the frame is read.
         let failure = Arc::new(Mutex::new(None));
@@ -120,7 +125,11 @@ impl Gpu {
 
     /// The first failure that the device reported, if any.
     pub(super) fn check(&self) -> Result<(), RenderError> {
-        let failure = self.failure.lock().map(|first| first.clone()).unwrap_or_default();
+        let failure = self
+            .failure
+            .lock()
+            .map(|first| first.clone())
+            .unwrap_or_default();
         failure.map_or(Ok(()), |message| Err(RenderError::Failed(message)))
     }
 }

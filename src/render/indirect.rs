@@ -34,14 +34,20 @@ pub(super) struct Indirect {
 impl Indirect {
     /// Sends the rays; `None` where nothing virtual stands in the world.
     pub fn new(scene: &Scene) -> Option<Self> {
-        let corners: Vec<(Vec3, Vec3)> =
-            scene.virtuals.iter().filter(|object| object.anchor == 0).flat_map(corner_places).collect();
+        let corners: Vec<(Vec3, Vec3)> = scene
+            .virtuals
+            .iter()
+            .filter(|object| object.anchor == 0)
+            .flat_map(corner_places)
+            .collect();
         if corners.is_empty() {
             return None;
         }
         let on_anchor = |anchor: usize| {
             let all = scene.phantoms.iter().chain(&scene.virtuals);
-            all.filter(move |object| object.anchor == anchor).flat_map(reflectors).collect::<Vec<_>>()
+            all.filter(move |object| object.anchor == anchor)
+                .flat_map(reflectors)
+                .collect::<Vec<_>>()
         };
         let movers: Vec<(usize, Mover)> = (1..scene.anchors.len())
             .filter_map(|anchor| Some((anchor, Mover::new(&on_anchor(anchor))?)))
@@ -49,9 +55,18 @@ impl Indirect {
         let surroundings =
             Surroundings::new(on_anchor(0), scene.lights.clone(), scene.ambient_radiance);
         let (points, point_of_corner) = points(&corners);
-        let budget = if movers.is_empty() { STANDING_BUDGET } else { MOVING_BUDGET };
+        let budget = if movers.is_empty() {
+            STANDING_BUDGET
+        } else {
+            MOVING_BUDGET
+        };
         let gathering = surroundings.gather(&points, budget);
-        Some(Self { gathering, movers, point_of_corner, settled: false })
+        Some(Self {
+            gathering,
+            movers,
+            point_of_corner,
+            settled: false,
+        })
     }
 
     /// Brings the batch's light up to what moves in this frame.
@@ -74,8 +89,11 @@ impl Indirect {
             })
             .collect();
         let irradiances = self.gathering.irradiances(&placed);
-        let corners: Vec<Vec3> =
-            self.point_of_corner.iter().map(|&point| irradiances[point]).collect();
+        let corners: Vec<Vec3> = self
+            .point_of_corner
+            .iter()
+            .map(|&point| irradiances[point])
+            .collect();
         queue.write_buffer(batch, 0, bytemuck::cast_slice(&corners));
         self.settled = self.movers.is_empty();
     }
@@ -87,12 +105,19 @@ fn points(corners: &[(Vec3, Vec3)]) -> (Vec<(DVec3, DVec3)>, Vec<usize>) {
     let mut points = Vec::new();
     let mut point_of_corner = Vec::with_capacity(corners.len());
     for triangle in corners.chunks(3) {
-        let middle = triangle.iter().map(|(place, _)| place.as_dvec3()).sum::<DVec3>() / 3.0;
+        let middle = triangle
+            .iter()
+            .map(|(place, _)| place.as_dvec3())
+            .sum::<DVec3>()
+            / 3.0;
         for &(place, normal) in triangle {
             let [x, y, z] = place.to_array().map(f32::to_bits);
             let [nx, ny, nz] = normal.to_array().map(f32::to_bits);
             let point = *point_at.entry([x, y, z, nx, ny, nz]).or_insert_with(|| {
-                points.push((place.as_dvec3().lerp(middle, CORNER_INSET), normal.as_dvec3()));
+                points.push((
+                    place.as_dvec3().lerp(middle, CORNER_INSET),
+                    normal.as_dvec3(),
+                ));
                 points.len() - 1
             });
             point_of_corner.push(point);

@@ -131,7 +131,10 @@ impl LayerPasses {
                     compilation_options: Default::default(),
                     targets: &[Some(wgpu::ColorTargetState {
                         format: BITS_FORMAT,
-                        blend: Some(wgpu::BlendState { color: add, alpha: add }),
+                        blend: Some(wgpu::BlendState {
+                            color: add,
+                            alpha: add,
+                        }),
                         write_mask: wgpu::ColorWrites::ALL,
                     })],
                 }),
@@ -186,16 +189,20 @@ impl LayerPasses {
         self.depth_readback.copy_from(&mut encoder, &self.depth_m);
         gpu.queue.submit([encoder.finish()]);
         let depth_m = self.depth_readback.read(gpu)?;
-        Ok((self.role_readback.read(gpu)?, bytemuck::pod_collect_to_vec(&depth_m)))
+        Ok((
+            self.role_readback.read(gpu)?,
+            bytemuck::pod_collect_to_vec(&depth_m),
+        ))
     }
 
     /// The shadow bits of the light whose volumes `draw_volumes` draws.
     pub fn shadow(&self, gpu: &Gpu, draw_volumes: DrawRole<'_>) -> Result<Vec<u8>, RenderError> {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let bits = self.bits.create_view(&Default::default());
-        for (role, mark) in
-            [(Role::Real, &self.mark_real), (Role::Virtual, &self.mark_virtual)]
-        {
+        for (role, mark) in [
+            (Role::Real, &self.mark_real),
+            (Role::Virtual, &self.mark_virtual),
+        ] {
             let mut color = cleared(&bits);
             if role == Role::Virtual {
                 color.ops.load = wgpu::LoadOp::Load;
@@ -224,7 +231,10 @@ impl LayerPasses {
     ) -> wgpu::RenderPassDepthStencilAttachment<'_> {
         wgpu::RenderPassDepthStencilAttachment {
             view: &self.depth_stencil,
-            depth_ops: Some(wgpu::Operations { load: depth, store: wgpu::StoreOp::Store }),
+            depth_ops: Some(wgpu::Operations {
+                load: depth,
+                store: wgpu::StoreOp::Store,
+            }),
             stencil_ops: Some(wgpu::Operations {
                 load: wgpu::LoadOp::Clear(0),
                 store: wgpu::StoreOp::Discard,

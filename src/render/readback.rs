@@ -20,7 +20,12 @@ impl Readback {
             usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
             mapped_at_creation: false,
         });
-        Self { buffer, size_px, texel_bytes, padded_row_bytes }
+        Self {
+            buffer,
+            size_px,
+            texel_bytes,
+            padded_row_bytes,
+        }
     }
 
     pub fn copy_from(&self, encoder: &mut wgpu::CommandEncoder, texture: &wgpu::Texture) {
@@ -61,10 +66,12 @@ impl Readback {
 pub(super) fn map_for_reading(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<(), RenderError> {
     gpu.check()?;
     let (sender, receiver) = std::sync::mpsc::channel();
-    buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| {
-        // The receiver lives until the wait below is over.
-        let _ = sender.send(result);
-    });
+    buffer
+        .slice(..)
+        .map_async(wgpu::MapMode::Read, move |result| {
+            // The receiver lives until the wait below is over.
+            let _ = sender.send(result);
+        });
     gpu.device
         .poll(wgpu::PollType::wait_indefinitely())
         .map_err(|error| RenderError::Failed(error.to_string()))?;

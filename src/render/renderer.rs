@@ -77,13 +77,21 @@ impl Renderer {
         let [width, height] = intrinsics.size_px;
         let limit = device.limits().max_texture_dimension_2d;
         if width.max(height) > limit {
-            return Err(RenderError::TooLarge { width, height, limit });
+            return Err(RenderError::TooLarge {
+                width,
+                height,
+                limit,
+            });
         }
         let samples = scene.shadows.samples;
         let texture = |label, format, sample_count, usage| {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
-                size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+                size: wgpu::Extent3d {
+                    width,
+                    height,
+                    depth_or_array_layers: 1,
+                },
                 mip_level_count: 1,
                 sample_count,
                 dimension: wgpu::TextureDimension::D2,
@@ -100,13 +108,21 @@ impl Renderer {
             1,
             read | wgpu::TextureUsages::COPY_DST,
         );
-        let picture =
-            texture("composite", PICTURE_FORMAT, 1, target | wgpu::TextureUsages::COPY_SRC);
+        let picture = texture(
+            "composite",
+            PICTURE_FORMAT,
+            1,
+            target | wgpu::TextureUsages::COPY_SRC,
+        );
         let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
         let before = view(&texture("before", LIGHT_FORMAT, samples, target | read));
         let after = view(&texture("after", LIGHT_FORMAT, samples, target | read));
-        let depth_stencil =
-            view(&texture("depth and stencil", gpu.depth_format, samples, target));
+        let depth_stencil = view(&texture(
+            "depth and stencil",
+            gpu.depth_format,
+            samples,
+            target,
+        ));
 
         let views = UniformRow::new::<View>(device, "views", scene.anchors.len());
         let light_sources = UniformRow::new::<LightSource>(device, "lights", scene.lights.len());
@@ -168,7 +184,9 @@ impl Renderer {
                 .map(|_| casters.iter().map(|_| VolumeBuffers::default()).collect())
                 .collect(),
             picture_readback: Readback::new(device, intrinsics.size_px, 4),
-            clock: gpu.timestamp_period_ns.map(|period_ns| GpuClock::new(device, period_ns)),
+            clock: gpu
+                .timestamp_period_ns
+                .map(|period_ns| GpuClock::new(device, period_ns)),
             layer_passes: None,
             placed: vec![false; scene.anchors.len()],
             lights: scene.lights.clone(),
@@ -216,9 +234,10 @@ impl Renderer {
     pub fn draw(&mut self, camera_from_anchor: &[Option<DAffine3>], shown: Shown) {
         self.place(camera_from_anchor);
         let with_virtual = shown == Shown::Composite
-            && self.surfaces.iter().any(|batch| {
-                batch.role == Role::Virtual && self.placed[batch.anchor]
-            });
+            && self
+                .surfaces
+                .iter()
+                .any(|batch| batch.role == Role::Virtual && self.placed[batch.anchor]);
 
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         if with_virtual {
@@ -257,7 +276,9 @@ impl Renderer {
     /// # Errors
     /// The device failed since it was opened.
     pub fn gpu_times(&self) -> Result<GpuTimes, RenderError> {
-        self.clock.as_ref().map_or(Ok(GpuTimes::default()), |clock| clock.read(&self.gpu))
+        self.clock
+            .as_ref()
+            .map_or(Ok(GpuTimes::default()), |clock| clock.read(&self.gpu))
     }
 
     /// Role, depth, shadow bits and gain of the frame that was drawn last.
@@ -275,7 +296,11 @@ impl Renderer {
             pass.set_bind_group(1, &self.light_group, &[0]);
         };
         let (role, depth_m) = passes.role_and_depth(gpu, &|pass, role| {
-            for batch in self.surfaces.iter().filter(|b| b.role == role && placed[b.anchor]) {
+            for batch in self
+                .surfaces
+                .iter()
+                .filter(|b| b.role == role && placed[b.anchor])
+            {
                 set_view(pass, batch.anchor);
                 pass.set_vertex_buffer(0, batch.corners.slice(..));
                 pass.draw(0..batch.corner_count, 0..1);
@@ -298,10 +323,21 @@ impl Renderer {
             }
             shadow.push(bits);
         }
-        let virtual_placed =
-            self.surfaces.iter().any(|batch| batch.role == Role::Virtual && placed[batch.anchor]);
-        let gain = if virtual_placed { self.read_gain()? } else { vec![[1.0; 3]; role.len()] };
-        Ok(Layers { role, depth_m, shadow, gain })
+        let virtual_placed = self
+            .surfaces
+            .iter()
+            .any(|batch| batch.role == Role::Virtual && placed[batch.anchor]);
+        let gain = if virtual_placed {
+            self.read_gain()?
+        } else {
+            vec![[1.0; 3]; role.len()]
+        };
+        Ok(Layers {
+            role,
+            depth_m,
+            shadow,
+            gain,
+        })
     }
 
     /// Writes the frame's uniforms and makes the shadow volumes whose light has moved.
@@ -312,19 +348,35 @@ impl Renderer {
             let pose = camera_from_anchor.get(anchor).copied().flatten();
             *placed = pose.is_some() && camera_from_world.is_some();
             if let Some(camera_from_anchor) = pose {
-                self.views.write(queue, anchor, &View::new(&self.intrinsics, &camera_from_anchor));
+                self.views.write(
+                    queue,
+                    anchor,
+                    &View::new(&self.intrinsics, &camera_from_anchor),
+                );
             }
         }
-        let Some(camera_from_world) = camera_from_world else { return };
-        let world_virtuals =
-            self.surfaces.iter().find(|batch| batch.role == Role::Virtual && batch.anchor == 0);
+        let Some(camera_from_world) = camera_from_world else {
+            return;
+        };
+        let world_virtuals = self
+            .surfaces
+            .iter()
+            .find(|batch| batch.role == Role::Virtual && batch.anchor == 0);
         if let (Some(indirect), Some(batch)) = (&mut self.indirect, world_virtuals) {
-            indirect.update(queue, &batch.indirect, camera_from_anchor, &camera_from_world);
+            indirect.update(
+                queue,
+                &batch.indirect,
+                camera_from_anchor,
+                &camera_from_world,
+            );
         }
         for (index, (light, volumes)) in self.lights.iter().zip(&mut self.volumes).enumerate() {
-            self.light_sources.write(queue, index, &LightSource::new(light, &camera_from_world));
+            self.light_sources
+                .write(queue, index, &LightSource::new(light, &camera_from_world));
             for (volume, caster) in volumes.iter_mut().zip(&self.casters) {
-                let Some(camera_from_anchor) = camera_from_anchor[caster.anchor] else { continue };
+                let Some(camera_from_anchor) = camera_from_anchor[caster.anchor] else {
+                    continue;
+                };
                 // The world stands still to its lights: no camera may come between, or rounding would move them.
                 let anchor_from_world = if caster.anchor == 0 {
                     DAffine3::IDENTITY
@@ -365,7 +417,11 @@ impl Renderer {
                 depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                     view: &self.depth_stencil,
                     depth_ops: Some(wgpu::Operations {
-                        load: if first { wgpu::LoadOp::Clear(0.0) } else { wgpu::LoadOp::Load },
+                        load: if first {
+                            wgpu::LoadOp::Clear(0.0)
+                        } else {
+                            wgpu::LoadOp::Load
+                        },
                         store: wgpu::StoreOp::Store,
                     }),
                     stencil_ops: Some(wgpu::Operations {
@@ -373,7 +429,10 @@ impl Renderer {
                         store: wgpu::StoreOp::Discard,
                     }),
                 }),
-                timestamp_writes: self.clock.as_ref().map(|c| c.light(first, index + 1 == passes)),
+                timestamp_writes: self
+                    .clock
+                    .as_ref()
+                    .map(|c| c.light(first, index + 1 == passes)),
                 ..Default::default()
             });
             if first {
@@ -575,9 +634,15 @@ impl GpuClock {
             Some(ticks as f64 * f64::from(self.period_ns) * 1e-6)
         };
         Ok(if self.light_drawn {
-            GpuTimes { shadows_ms: stretch_ms(0), composite_ms: stretch_ms(2) }
+            GpuTimes {
+                shadows_ms: stretch_ms(0),
+                composite_ms: stretch_ms(2),
+            }
         } else {
-            GpuTimes { shadows_ms: None, composite_ms: stretch_ms(0) }
+            GpuTimes {
+                shadows_ms: None,
+                composite_ms: stretch_ms(0),
+            }
         })
     }
 }

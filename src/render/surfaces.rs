@@ -23,8 +23,11 @@ impl Surfaces {
         depth_format: wgpu::TextureFormat,
         samples: u32,
     ) -> Self {
-        let module =
-            shader::module(device, "surfaces", include_str!("../../shaders/surfaces.wgsl"));
+        let module = shader::module(
+            device,
+            "surfaces",
+            include_str!("../../shaders/surfaces.wgsl"),
+        );
         let add = wgpu::BlendState {
             color: wgpu::BlendComponent {
                 src_factor: wgpu::BlendFactor::One,
@@ -83,7 +86,10 @@ impl Surfaces {
                     },
                     bias: wgpu::DepthBiasState::default(),
                 }),
-                multisample: wgpu::MultisampleState { count: samples, ..Default::default() },
+                multisample: wgpu::MultisampleState {
+                    count: samples,
+                    ..Default::default()
+                },
                 fragment: Some(wgpu::FragmentState {
                     module: &module,
                     entry_point: Some(entry_point),

@@ -21,7 +21,10 @@ impl View {
     pub fn new(intrinsics: &Intrinsics, camera_from_anchor: &DAffine3) -> Self {
         let camera_from_anchor = glam::DMat4::from(*camera_from_anchor).as_mat4();
         let clip_from_camera = intrinsics.clip_from_camera(NEAR_M);
-        Self { clip_from_anchor: clip_from_camera * camera_from_anchor, camera_from_anchor }
+        Self {
+            clip_from_anchor: clip_from_camera * camera_from_anchor,
+            camera_from_anchor,
+        }
     }
 }
 
@@ -36,14 +39,27 @@ pub(super) struct LightSource {
 impl LightSource {
     pub fn new(light: &Light, camera_from_world: &DAffine3) -> Self {
         let (place, weight, power) = match *light {
-            Light::Point { position_m, intensity } => {
-                (camera_from_world.transform_point3(position_m), 1.0, intensity)
-            }
-            Light::Directional { direction, irradiance } => {
-                (-camera_from_world.transform_vector3(direction), 0.0, irradiance)
-            }
+            Light::Point {
+                position_m,
+                intensity,
+            } => (
+                camera_from_world.transform_point3(position_m),
+                1.0,
+                intensity,
+            ),
+            Light::Directional {
+                direction,
+                irradiance,
+            } => (
+                -camera_from_world.transform_vector3(direction),
+                0.0,
+                irradiance,
+            ),
         };
-        Self { place_in_camera: place.as_vec3().extend(weight), power: power.as_vec3().extend(0.0) }
+        Self {
+            place_in_camera: place.as_vec3().extend(weight),
+            power: power.as_vec3().extend(0.0),
+        }
     }
 }
 
@@ -83,19 +99,28 @@ pub(super) struct UniformRow {
 impl UniformRow {
     pub fn new<T: Pod>(device: &wgpu::Device, label: &str, count: usize) -> Self {
         let size = size_of::<T>() as u64;
-        let stride =
-            size.next_multiple_of(u64::from(device.limits().min_uniform_buffer_offset_alignment));
+        let stride = size.next_multiple_of(u64::from(
+            device.limits().min_uniform_buffer_offset_alignment,
+        ));
         let buffer = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
             size: stride * count.max(1) as u64,
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        Self { buffer, stride, size }
+        Self {
+            buffer,
+            stride,
+            size,
+        }
     }
 
     pub fn write<T: Pod>(&self, queue: &wgpu::Queue, index: usize, value: &T) {
-        queue.write_buffer(&self.buffer, self.stride * index as u64, bytemuck::bytes_of(value));
+        queue.write_buffer(
+            &self.buffer,
+            self.stride * index as u64,
+            bytemuck::bytes_of(value),
+        );
     }
 
     pub fn offset(&self, index: usize) -> u32 {
@@ -134,11 +159,22 @@ mod tests {
     /// Members of a WGSL struct as (name, offset), and the struct's size.
     fn wgsl_struct(source: &str, name: &str) -> (Vec<(String, u32)>, u32) {
         let module = naga::front::wgsl::parse_str(source).expect("WGSL");
-        let found = module.types.iter().find(|(_, kind)| kind.name.as_deref() == Some(name));
-        let Some((_, naga::Type { inner: naga::TypeInner::Struct { members, span }, .. })) = found else {
+        let found = module
+            .types
+            .iter()
+            .find(|(_, kind)| kind.name.as_deref() == Some(name));
+        let Some((
+            _,
+            naga::Type {
+                inner: naga::TypeInner::Struct { members, span },
+                ..
+            },
+        )) = found
+        else {
             panic!("no struct {name}");
         };
-        let named = |member: &naga::StructMember| (member.name.clone().expect("a name"), member.offset);
+        let named =
+            |member: &naga::StructMember| (member.name.clone().expect("a name"), member.offset);
         (members.iter().map(named).collect(), *span)
     }
 
@@ -156,6 +192,8 @@ mod tests {
         assert_twins!(common, View, clip_from_anchor, camera_from_anchor);
         assert_twins!(common, LightSource, place_in_camera, power);
         let composite = include_str!("../../shaders/composite.wgsl");
-        assert_twins!(composite, Lens, focal_px, center_px, distortion, k3, distorts, size_px);
+        assert_twins!(
+            composite, Lens, focal_px, center_px, distortion, k3, distorts, size_px
+        );
     }
 }

@@ -16,7 +16,11 @@ pub(super) fn pipeline(
     samples: u32,
     color_formats: &[wgpu::TextureFormat],
 ) -> wgpu::RenderPipeline {
-    let module = shader::module(device, "volumes", include_str!("../../shaders/volumes.wgsl"));
+    let module = shader::module(
+        device,
+        "volumes",
+        include_str!("../../shaders/volumes.wgsl"),
+    );
     let face = |depth_fail_op| wgpu::StencilFaceState {
         compare: wgpu::CompareFunction::Always,
         fail_op: wgpu::StencilOperation::Keep,
@@ -61,7 +65,10 @@ pub(super) fn pipeline(
             },
             bias: wgpu::DepthBiasState::default(),
         }),
-        multisample: wgpu::MultisampleState { count: samples, ..Default::default() },
+        multisample: wgpu::MultisampleState {
+            count: samples,
+            ..Default::default()
+        },
         fragment: Some(wgpu::FragmentState {
             module: &module,
             entry_point: Some("count"),

@@ -3,7 +3,10 @@
 //! [`Tracker`] goes from a frame to a pose per anchor; [`Detector`] is its first half, markers alone. What the two
 //! libraries behind it call a corner is told apart in `conventions.rs` and nowhere else; no type of theirs leaves.
 
-#[expect(unsafe_code, reason = "libapriltag is a C library; no other module may be unsafe")]
+#[expect(
+    unsafe_code,
+    reason = "libapriltag is a C library; no other module may be unsafe"
+)]
 mod apriltag;
 mod aruco;
 mod conventions;

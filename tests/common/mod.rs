@@ -26,7 +26,10 @@ pub fn project_file(path: &str) -> std::path::PathBuf {
 }
 
 /// The material of things whose colour does not matter.
-pub const GREY: Material = Material { albedo: DVec3::splat(0.5), roughness: None };
+pub const GREY: Material = Material {
+    albedo: DVec3::splat(0.5),
+    roughness: None,
+};
 
 /// A mesh with flat normals and one material.
 pub fn flat_mesh(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Mesh {
@@ -38,19 +41,36 @@ pub fn flat_mesh(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Mesh {
         })
         .collect();
     let triangle_materials = vec![0; triangles.len()];
-    Mesh { positions, triangles, corner_normals, triangle_materials }
+    Mesh {
+        positions,
+        triangles,
+        corner_normals,
+        triangle_materials,
+    }
 }
 
 /// A mesh from the `v` and `f` lines of an OBJ file.
 pub fn read_obj(path: &Path) -> Mesh {
-    let (models, _) = tobj::load_obj(path, &tobj::LoadOptions { triangulate: true, ..Default::default() })
-        .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let (models, _) = tobj::load_obj(
+        path,
+        &tobj::LoadOptions {
+            triangulate: true,
+            ..Default::default()
+        },
+    )
+    .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let mut positions = Vec::new();
     let mut triangles = Vec::new();
     for model in models {
         let first = positions.len() as u32;
         positions.extend(model.mesh.positions.chunks(3).map(Vec3::from_slice));
-        triangles.extend(model.mesh.indices.chunks(3).map(|t| [first + t[0], first + t[1], first + t[2]]));
+        triangles.extend(
+            model
+                .mesh
+                .indices
+                .chunks(3)
+                .map(|t| [first + t[0], first + t[1], first + t[2]]),
+        );
     }
     flat_mesh(positions, triangles)
 }
@@ -61,7 +81,10 @@ pub fn object(name: &str, mesh: Mesh, albedo: DVec3, world_from_object: DAffine3
         name: name.to_owned(),
         mesh,
         mesh_report: MeshReport::default(),
-        materials: vec![Material { albedo, roughness: None }],
+        materials: vec![Material {
+            albedo,
+            roughness: None,
+        }],
         anchor: 0,
         anchor_from_object: world_from_object,
         casts: true,
@@ -69,14 +92,26 @@ pub fn object(name: &str, mesh: Mesh, albedo: DVec3, world_from_object: DAffine3
 }
 
 /// A scene of four samples whose world is the only anchor.
-pub fn scene(phantoms: Vec<Object>, virtuals: Vec<Object>, lights: Vec<Light>, ambient: f64) -> Scene {
+pub fn scene(
+    phantoms: Vec<Object>,
+    virtuals: Vec<Object>,
+    lights: Vec<Light>,
+    ambient: f64,
+) -> Scene {
     Scene {
-        anchors: vec![Anchor { name: "world".to_owned(), markers: Vec::new() }],
+        anchors: vec![Anchor {
+            name: "world".to_owned(),
+            markers: Vec::new(),
+        }],
         phantoms,
         virtuals,
         lights,
         ambient_radiance: DVec3::splat(ambient),
-        shadows: ShadowSettings { technique: Technique::Auto, samples: 4, ..ShadowSettings::default() },
+        shadows: ShadowSettings {
+            technique: Technique::Auto,
+            samples: 4,
+            ..ShadowSettings::default()
+        },
         ..Scene::default()
     }
 }
@@ -96,7 +131,10 @@ pub fn stability_row(folder: &Path, name: &str) -> StabilityRow {
     let row: Value = serde_json::from_str(&text).expect("JSON");
     let k = |i: usize, j: usize| row["camera"]["K"][i][j].as_f64().expect("K");
     let intrinsics = Intrinsics {
-        size_px: [row["width"].as_u64().expect("width") as u32, row["height"].as_u64().expect("height") as u32],
+        size_px: [
+            row["width"].as_u64().expect("width") as u32,
+            row["height"].as_u64().expect("height") as u32,
+        ],
         focal_px: DVec2::new(k(0, 0), k(1, 1)),
         // There a pixel's centre is at .5.
         center_px: DVec2::new(k(0, 2), k(1, 2)) - 0.5,
@@ -109,7 +147,12 @@ pub fn stability_row(folder: &Path, name: &str) -> StabilityRow {
             .map(|(index, o)| {
                 let obj = folder.join(o["obj"].as_str().expect("obj"));
                 let pose = o.get("transform").map_or(DAffine3::IDENTITY, affine);
-                object(&format!("{key} {index}"), read_obj(&obj), vector(&o["albedo"]), pose)
+                object(
+                    &format!("{key} {index}"),
+                    read_obj(&obj),
+                    vector(&o["albedo"]),
+                    pose,
+                )
             })
             .collect()
     };
@@ -117,9 +160,14 @@ pub fn stability_row(folder: &Path, name: &str) -> StabilityRow {
         .as_array()
         .expect("lights")
         .iter()
-        .map(|l| Light::Point { position_m: vector(&l["position"]), intensity: vector(&l["intensity"]) })
+        .map(|l| Light::Point {
+            position_m: vector(&l["position"]),
+            intensity: vector(&l["intensity"]),
+        })
         .collect();
-    let exact = image::open(folder.join(format!("{name}_exact.png"))).expect("the exact mask").to_luma8();
+    let exact = image::open(folder.join(format!("{name}_exact.png")))
+        .expect("the exact mask")
+        .to_luma8();
     StabilityRow {
         scene: scene(objects("phantoms"), objects("virtuals"), lights, 0.05),
         intrinsics,
@@ -139,5 +187,7 @@ pub fn affine(matrix: &Value) -> DAffine3 {
 }
 
 fn vector(value: &Value) -> DVec3 {
-    DVec3::from_array(std::array::from_fn(|index| value[index].as_f64().expect("a vector")))
+    DVec3::from_array(std::array::from_fn(|index| {
+        value[index].as_f64().expect("a vector")
+    }))
 }

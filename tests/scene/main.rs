@@ -1,6 +1,9 @@
 //! Scenes: what a good one becomes, and where each mistake is pointed out.
 
-#![allow(clippy::unwrap_used, reason = "a test may stop where its own files fail")]
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test may stop where its own files fail"
+)]
 
 mod mistakes;
 mod mutations;
