@@ -215,7 +215,7 @@ fn assert_corners(
     for detection in found {
         let is_it =
             |marker: &&Marker| (marker.family, marker.id) == (detection.family, detection.id);
-        let true_corners_px = true_corners_px(camera, markers.iter().find(is_it).unwrap(), truth);
+        let true_corners_px = true_corners_px(camera, markers.iter().find(is_it).expect("a marker of this id"), truth);
         for (k, true_corner_px) in true_corners_px.into_iter().enumerate() {
             let off = detection.corners_px[k] - true_corner_px;
             assert!(
@@ -234,9 +234,9 @@ fn assert_corners(
 
 fn detect(settings: &TrackingSettings, families: &[Family], frame: &Frame) -> Vec<Detection> {
     Detector::new(settings, families)
-        .unwrap()
+        .expect("a detector")
         .detect(&grey_of(frame), frame.size_px)
-        .unwrap()
+        .expect("detections")
 }
 
 fn ids(detections: &[Detection]) -> Vec<u32> {
@@ -250,9 +250,9 @@ fn track_once(
     frame: &Frame,
 ) -> Vec<AnchorPose> {
     Tracker::new(settings, anchors, camera)
-        .unwrap()
+        .expect("a tracker")
         .track(frame)
-        .unwrap()
+        .expect("poses")
 }
 
 fn table() -> Vec<Marker> {
