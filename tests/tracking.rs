@@ -215,7 +215,11 @@ fn assert_corners(
     for detection in found {
         let is_it =
             |marker: &&Marker| (marker.family, marker.id) == (detection.family, detection.id);
-        let true_corners_px = true_corners_px(camera, markers.iter().find(is_it).expect("a marker of this id"), truth);
+        let true_corners_px = true_corners_px(
+            camera,
+            markers.iter().find(is_it).expect("a marker of this id"),
+            truth,
+        );
         for (k, true_corner_px) in true_corners_px.into_iter().enumerate() {
             let off = detection.corners_px[k] - true_corner_px;
             assert!(

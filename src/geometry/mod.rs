@@ -11,4 +11,5 @@ pub mod mesh;
 pub mod normals;
 pub mod pose;
 pub mod ray_caster;
+pub mod reach;
 pub mod shadow_volume;

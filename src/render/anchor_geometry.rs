@@ -7,6 +7,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use wgpu::util::DeviceExt as _;
 
+use crate::geometry::reach::Bounds;
 use crate::geometry::shadow_volume::Caster;
 use crate::light::bounce::Reflector;
 use crate::scene::{Object, Scene};
@@ -58,6 +59,34 @@ pub(super) struct AnchoredCaster {
     pub role: Role,
     pub anchor: usize,
     pub caster: Caster,
+}
+
+/// The box around one thing, in its anchor's space.
+pub(super) struct Extent {
+    pub role: Role,
+    pub anchor: usize,
+    pub bounds: Bounds,
+    pub casts: bool,
+}
+
+/// The extents of all things.
+pub(super) fn extents(scene: &Scene) -> Vec<Extent> {
+    let real = scene.phantoms.iter().map(|object| (Role::Real, object));
+    let seeming = scene.virtuals.iter().map(|object| (Role::Virtual, object));
+    real.chain(seeming)
+        .filter_map(|(role, object)| {
+            let points = positions_in_anchor(object)
+                .into_iter()
+                .map(|point| point.as_dvec3());
+            let bounds = Bounds::around(points)?;
+            Some(Extent {
+                role,
+                anchor: object.anchor,
+                bounds,
+                casts: object.casts,
+            })
+        })
+        .collect()
 }
 
 /// Surfaces, the real ones first.

@@ -2,15 +2,16 @@
 
 use std::sync::Arc;
 
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
+use crate::geometry::reach::{self, Bounds, PixelRect};
 use crate::geometry::shadow_volume::LightPlace;
 use crate::light::Light;
 use crate::scene::Scene;
 
-use super::anchor_geometry::{self, AnchoredCaster, Role, SurfaceBatch};
+use super::anchor_geometry::{self, AnchoredCaster, Extent, Role, SurfaceBatch};
 use super::composite::{Composite, GAIN_FORMAT, PICTURE_FORMAT};
 use super::gpu::{Gpu, RenderError};
 use super::indirect::Indirect;
@@ -43,6 +44,7 @@ pub struct Renderer {
     lights: Vec<Light>,
     surfaces: Vec<SurfaceBatch>,
     casters: Vec<AnchoredCaster>,
+    extents: Vec<Extent>,
     indirect: Option<Indirect>,
     /// For each light those of each caster.
     volumes: Vec<Vec<VolumeBuffers>>,
@@ -65,6 +67,8 @@ pub struct Renderer {
     layer_passes: Option<LayerPasses>,
     /// Whether each anchor has a pose in the frame that was drawn last, and so whether it is drawn.
     placed: Vec<bool>,
+    /// The pixels that virtual things and their shadows could reach in that frame.
+    touched: Option<PixelRect>,
 }
 
 impl Renderer {
@@ -177,6 +181,7 @@ impl Renderer {
                 &[LIGHT_FORMAT, LIGHT_FORMAT],
             ),
             surfaces: anchor_geometry::surface_batches(device, scene),
+            extents: anchor_geometry::extents(scene),
             indirect: Indirect::new(scene),
             volumes: scene
                 .lights
@@ -189,6 +194,7 @@ impl Renderer {
                 .map(|period_ns| GpuClock::new(device, period_ns)),
             layer_passes: None,
             placed: vec![false; scene.anchors.len()],
+            touched: None,
             lights: scene.lights.clone(),
             intrinsics,
             casters,
@@ -233,20 +239,19 @@ impl Renderer {
     /// the world's pose nobody knows where the light comes from, and the video is shown alone.
     pub fn draw(&mut self, camera_from_anchor: &[Option<DAffine3>], shown: Shown) {
         self.place(camera_from_anchor);
-        let with_virtual = shown == Shown::Composite
-            && self
-                .surfaces
-                .iter()
-                .any(|batch| batch.role == Role::Virtual && self.placed[batch.anchor]);
+        self.touched = match shown {
+            Shown::Composite => self.touched_by_virtual(camera_from_anchor),
+            Shown::Bare => None,
+        };
 
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        if with_virtual {
-            self.draw_light(&mut encoder);
+        if let Some(touched) = self.touched {
+            self.draw_light(&mut encoder, touched);
         }
-        self.draw_picture(&mut encoder, with_virtual);
+        self.draw_picture(&mut encoder, self.touched);
         self.picture_readback.copy_from(&mut encoder, &self.picture);
         if let Some(clock) = &mut self.clock {
-            clock.resolve(&mut encoder, with_virtual);
+            clock.resolve(&mut encoder, self.touched.is_some());
         }
         self.gpu.queue.submit([encoder.finish()]);
     }
@@ -323,14 +328,9 @@ impl Renderer {
             }
             shadow.push(bits);
         }
-        let virtual_placed = self
-            .surfaces
-            .iter()
-            .any(|batch| batch.role == Role::Virtual && placed[batch.anchor]);
-        let gain = if virtual_placed {
-            self.read_gain()?
-        } else {
-            vec![[1.0; 3]; role.len()]
+        let gain = match self.touched {
+            Some(_) => self.read_gain()?,
+            None => vec![[1.0; 3]; role.len()],
         };
         Ok(Layers {
             role,
@@ -389,10 +389,56 @@ impl Renderer {
         }
     }
 
+    /// The pixels that virtual things and their shadows can reach; `None` if there are none.
+    fn touched_by_virtual(&self, camera_from_anchor: &[Option<DAffine3>]) -> Option<PixelRect> {
+        let camera_from_world = (*camera_from_anchor.first()?)?;
+        let world_from_camera = camera_from_world.inverse();
+        let corners_in_world = |extent: &Extent| {
+            let world_from_anchor = world_from_camera * camera_from_anchor[extent.anchor]?;
+            Some(
+                extent
+                    .bounds
+                    .corners()
+                    .map(|corner| world_from_anchor.transform_point3(corner)),
+            )
+        };
+        let placed: Vec<(&Extent, [DVec3; 8])> = self
+            .extents
+            .iter()
+            .filter_map(|extent| Some((extent, corners_in_world(extent)?)))
+            .collect();
+        let receivers = Bounds::around(placed.iter().flat_map(|(_, corners)| *corners))?;
+        let mut touched = PixelRect {
+            low: [0; 2],
+            high: [0; 2],
+        };
+        for (extent, corners) in placed
+            .iter()
+            .filter(|(extent, _)| extent.role == Role::Virtual)
+        {
+            touched = touched.union(reach::covered(
+                corners,
+                &camera_from_world,
+                &self.intrinsics,
+            ));
+            for light in self.lights.iter().filter(|_| extent.casts) {
+                let light = light_place(light, &DAffine3::IDENTITY);
+                touched = touched.union(reach::shadowed(
+                    corners,
+                    light,
+                    &receivers,
+                    &camera_from_world,
+                    &self.intrinsics,
+                ));
+            }
+        }
+        (!touched.is_empty()).then_some(touched)
+    }
+
     /// Haller et al. 2003, section 3.2, light by light: phantoms and virtual things into depth; *real onto real* is
     /// counted; what is lit then is lit in the video; *virtual onto real* is counted on top; what is lit then, real
     /// or virtual, is lit past all casters.
-    fn draw_light(&self, encoder: &mut wgpu::CommandEncoder) {
+    fn draw_light(&self, encoder: &mut wgpu::CommandEncoder, touched: PixelRect) {
         let passes = self.lights.len().max(1);
         for index in 0..passes {
             let first = index == 0;
@@ -435,6 +481,7 @@ impl Renderer {
                     .map(|c| c.light(first, index + 1 == passes)),
                 ..Default::default()
             });
+            set_scissor(&mut pass, touched);
             if first {
                 for role in [Role::Real, Role::Virtual] {
                     self.draw_surfaces(&mut pass, self.surface_pass.ambient(role), role, 0);
@@ -487,44 +534,19 @@ impl Renderer {
         }
     }
 
-    fn draw_picture(&self, encoder: &mut wgpu::CommandEncoder, with_virtual: bool) {
-        let pipeline = if with_virtual {
-            &self.composite_pass.composite
-        } else {
-            &self.composite_pass.bare
-        };
-        self.draw_whole(
-            encoder,
-            pipeline,
-            &self.picture.create_view(&Default::default()),
-            self.clock.as_ref().map(GpuClock::composite),
-        );
-    }
-
-    fn draw_whole(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        pipeline: &wgpu::RenderPipeline,
-        target: &wgpu::TextureView,
-        timestamp_writes: Option<wgpu::RenderPassTimestampWrites<'_>>,
-    ) {
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("composite"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: target,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
-            timestamp_writes,
-            ..Default::default()
-        });
-        pass.set_pipeline(pipeline);
+    /// The video everywhere, and over it the composite where virtual things reach.
+    fn draw_picture(&self, encoder: &mut wgpu::CommandEncoder, touched: Option<PixelRect>) {
+        let view = self.picture.create_view(&Default::default());
+        let timestamps = self.clock.as_ref().map(GpuClock::composite);
+        let mut pass = whole_pass(encoder, &view, timestamps);
         pass.set_bind_group(0, &self.composite_group, &[]);
+        pass.set_pipeline(&self.composite_pass.bare);
         pass.draw(0..3, 0..1);
+        if let Some(touched) = touched {
+            set_scissor(&mut pass, touched);
+            pass.set_pipeline(&self.composite_pass.composite);
+            pass.draw(0..3, 0..1);
+        }
     }
 
     /// The factor that the picture's own samples put on the video.
@@ -543,12 +565,43 @@ impl Renderer {
         let readback = Readback::new(device, self.intrinsics.size_px, 16);
         let mut encoder = device.create_command_encoder(&Default::default());
         let view = texture.create_view(&Default::default());
-        self.draw_whole(&mut encoder, &self.composite_pass.gain, &view, None);
+        let mut pass = whole_pass(&mut encoder, &view, None);
+        pass.set_bind_group(0, &self.composite_group, &[]);
+        pass.set_pipeline(&self.composite_pass.gain);
+        pass.draw(0..3, 0..1);
+        drop(pass);
         readback.copy_from(&mut encoder, &texture);
         self.gpu.queue.submit([encoder.finish()]);
         let texels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&readback.read(&self.gpu)?);
         Ok(texels.into_iter().map(|[r, g, b, _]| [r, g, b]).collect())
     }
+}
+
+fn set_scissor(pass: &mut wgpu::RenderPass<'_>, rect: PixelRect) {
+    let [x, y] = rect.low;
+    pass.set_scissor_rect(x, y, rect.high[0] - x, rect.high[1] - y);
+}
+
+/// A pass over a whole texture, which is cleared.
+fn whole_pass<'a>(
+    encoder: &'a mut wgpu::CommandEncoder,
+    target: &wgpu::TextureView,
+    timestamp_writes: Option<wgpu::RenderPassTimestampWrites<'_>>,
+) -> wgpu::RenderPass<'a> {
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some("composite"),
+        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+            view: target,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations {
+                load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                store: wgpu::StoreOp::Store,
+            },
+        })],
+        timestamp_writes,
+        ..Default::default()
+    })
 }
 
 fn light_place(light: &Light, anchor_from_world: &DAffine3) -> LightPlace {

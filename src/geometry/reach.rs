@@ -1,0 +1,269 @@
+//! How far a thing and its shadow reach in the picture, so that nothing is drawn where neither can be.
+
+use glam::{DAffine3, DVec3};
+
+use super::camera::Intrinsics;
+use super::shadow_volume::LightPlace;
+
+/// Nearer than this in front of the camera a point's pixel says nothing of its neighbours', metres.
+const NEAREST_M: f64 = 1e-3;
+
+/// A box along the axes of its space, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    pub low: DVec3,
+    pub high: DVec3,
+}
+
+impl Bounds {
+    /// The smallest box around points; `None` without any.
+    pub fn around(points: impl IntoIterator<Item = DVec3>) -> Option<Self> {
+        points
+            .into_iter()
+            .fold(None, |bounds: Option<Self>, point| {
+                let Self { low, high } = bounds.unwrap_or(Self {
+                    low: point,
+                    high: point,
+                });
+                Some(Self {
+                    low: low.min(point),
+                    high: high.max(point),
+                })
+            })
+    }
+
+    /// Its eight corners.
+    pub fn corners(&self) -> [DVec3; 8] {
+        let pick = |bit: usize, low: f64, high: f64| if bit == 0 { low } else { high };
+        std::array::from_fn(|corner| {
+            DVec3::new(
+                pick(corner & 1, self.low.x, self.high.x),
+                pick(corner >> 1 & 1, self.low.y, self.high.y),
+                pick(corner >> 2 & 1, self.low.z, self.high.z),
+            )
+        })
+    }
+}
+
+/// A rectangle of pixels: the first column and row, and those past the last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PixelRect {
+    pub low: [u32; 2],
+    pub high: [u32; 2],
+}
+
+impl PixelRect {
+    /// The whole picture.
+    pub fn whole(size_px: [u32; 2]) -> Self {
+        Self {
+            low: [0; 2],
+            high: size_px,
+        }
+    }
+
+    /// Whether it has no pixel.
+    pub fn is_empty(&self) -> bool {
+        (0..2).any(|axis| self.low[axis] >= self.high[axis])
+    }
+
+    /// The smallest rectangle around both.
+    pub fn union(self, other: Self) -> Self {
+        if self.is_empty() || other.is_empty() {
+            return if self.is_empty() { other } else { self };
+        }
+        Self {
+            low: [0, 1].map(|axis| self.low[axis].min(other.low[axis])),
+            high: [0, 1].map(|axis| self.high[axis].max(other.high[axis])),
+        }
+    }
+
+    fn intersection(self, other: Self) -> Self {
+        Self {
+            low: [0, 1].map(|axis| self.low[axis].max(other.low[axis])),
+            high: [0, 1].map(|axis| self.high[axis].min(other.high[axis])),
+        }
+    }
+}
+
+/// The pixels that a thing with these world-space corners can cover, with a margin for its edges' samples.
+pub fn covered(
+    corners: &[DVec3],
+    camera_from_world: &DAffine3,
+    intrinsics: &Intrinsics,
+) -> PixelRect {
+    const MARGIN_PX: f64 = 2.0;
+    let whole = PixelRect::whole(intrinsics.size_px);
+    let mut pixels = Vec::with_capacity(corners.len());
+    for corner in corners {
+        let place = camera_from_world.transform_point3(*corner);
+        if place.z < NEAREST_M {
+            return whole;
+        }
+        pixels.push(
+            intrinsics
+                .pixel_from_plane(place.truncate() / place.z)
+                .extend(0.0),
+        );
+    }
+    let Some(bounds) = Bounds::around(pixels) else {
+        return PixelRect {
+            low: [0; 2],
+            high: [0; 2],
+        };
+    };
+    // Casts saturate: what lies outside the picture becomes its edge.
+    let [left, top] = [bounds.low.x, bounds.low.y].map(|low| (low - MARGIN_PX).floor() as u32);
+    let [right, bottom] =
+        [bounds.high.x, bounds.high.y].map(|high| (high + MARGIN_PX).ceil() as u32 + 1);
+    whole.intersection(PixelRect {
+        low: [left, top],
+        high: [right, bottom],
+    })
+}
+
+/// The pixels in which the shadow of a thing with these corners can fall on anything within `receivers`, the thing
+/// itself included; all of world space.
+///
+/// The shadow is a cone from the light. Cut off at a side of the receivers' box that lies beyond the thing, it is the
+/// hull of the corners and of their images on that side. Each such side gives a rectangle that holds the shadow, and so
+/// does what all of them share.
+pub fn shadowed(
+    corners: &[DVec3; 8],
+    light: LightPlace,
+    receivers: &Bounds,
+    camera_from_world: &DAffine3,
+    intrinsics: &Intrinsics,
+) -> PixelRect {
+    let mut rect = PixelRect::whole(intrinsics.size_px);
+    for axis in 0..3 {
+        for side in [receivers.low[axis], receivers.high[axis]] {
+            // How many times the way from the light to the corner leads to the side.
+            let cast = corners.map(|corner| match light {
+                LightPlace::Point(light) => {
+                    let stretch = (side - light[axis]) / (corner[axis] - light[axis]);
+                    (stretch >= 1.0).then(|| light + (corner - light) * stretch)
+                }
+                LightPlace::Along(direction) => {
+                    let way = (side - corner[axis]) / direction[axis];
+                    (way >= 0.0).then(|| corner + direction * way)
+                }
+            });
+            let images: Vec<DVec3> = cast.iter().flatten().copied().collect();
+            if images.len() == corners.len() && images.iter().all(|image| image.is_finite()) {
+                let hull = [&images[..], &corners[..]].concat();
+                rect = rect.intersection(covered(&hull, camera_from_world, intrinsics));
+            }
+        }
+    }
+    rect
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DQuat, DVec2};
+
+    const CAMERA: Intrinsics = Intrinsics {
+        size_px: [640, 480],
+        focal_px: DVec2::new(600.0, 600.0),
+        center_px: DVec2::new(319.5, 239.5),
+        distortion: [0.0; 5],
+    };
+
+    fn looking_down() -> DAffine3 {
+        // From one metre above, x right.
+        let turned = DQuat::from_rotation_x(std::f64::consts::PI);
+        DAffine3::from_rotation_translation(turned, DVec3::new(0.0, 0.0, 1.0))
+    }
+
+    fn unit_box() -> Bounds {
+        Bounds {
+            low: DVec3::new(-0.05, -0.05, 0.0),
+            high: DVec3::new(0.05, 0.05, 0.1),
+        }
+    }
+
+    #[test]
+    fn every_point_of_a_shadow_lies_in_its_rectangle() {
+        let caster = unit_box();
+        let receivers = Bounds {
+            low: DVec3::new(-0.4, -0.3, -0.02),
+            high: DVec3::new(0.4, 0.3, 0.2),
+        };
+        let lights = [
+            LightPlace::Point(DVec3::new(-0.3, 0.1, 0.5)),
+            LightPlace::Point(DVec3::new(0.2, 0.2, 0.15)),
+            LightPlace::Point(DVec3::new(0.0, 0.0, 0.05)),
+            LightPlace::Along(DVec3::new(0.6, 0.0, -0.8)),
+            LightPlace::Along(DVec3::new(1.0, 0.0, 0.0)),
+        ];
+        for light in lights {
+            let rect = shadowed(
+                &caster.corners(),
+                light,
+                &receivers,
+                &looking_down(),
+                &CAMERA,
+            );
+            // Points of the box, carried away from the light, as far as the receivers' box goes.
+            for step in 0..4000 {
+                let grid = |divisor: usize, sides: usize| {
+                    (step / divisor % sides) as f64 / (sides - 1) as f64
+                };
+                let share = DVec3::new(grid(1, 5), grid(5, 5), grid(25, 4));
+                let point = caster.low + (caster.high - caster.low) * share;
+                let way = grid(100, 40) * 4.0;
+                let shadow = match light {
+                    LightPlace::Point(light) => point + (point - light) * way,
+                    LightPlace::Along(direction) => point + direction * way,
+                };
+                if shadow.cmplt(receivers.low).any() || shadow.cmpgt(receivers.high).any() {
+                    continue;
+                }
+                let place = looking_down().transform_point3(shadow);
+                let pixel = CAMERA.pixel_from_plane(place.truncate() / place.z);
+                let inside_picture =
+                    pixel.cmpge(DVec2::ZERO).all() && pixel.x < 640.0 && pixel.y < 480.0;
+                let inside = (0..2).all(|axis| {
+                    f64::from(rect.low[axis]) <= pixel[axis]
+                        && pixel[axis] <= f64::from(rect.high[axis])
+                });
+                assert!(
+                    inside || !inside_picture,
+                    "{light:?} {shadow} {pixel} {rect:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_lamp_above_keeps_the_rectangle_small_and_a_thing_behind_the_camera_does_not() {
+        let receivers = Bounds {
+            low: DVec3::new(-0.6, -0.5, 0.0),
+            high: DVec3::new(0.6, 0.5, 0.1),
+        };
+        let lamp = LightPlace::Point(DVec3::new(0.0, 0.0, 0.6));
+        let rect = shadowed(
+            &unit_box().corners(),
+            lamp,
+            &receivers,
+            &looking_down(),
+            &CAMERA,
+        );
+        // Shadow of the top's edge: 0.05 · 0.6 / 0.5 = 0.06 m on the table, 36 px; the top itself: 33 px.
+        assert_eq!(
+            rect,
+            PixelRect {
+                low: [281, 201],
+                high: [359, 279]
+            }
+        );
+        let behind = [DVec3::new(0.0, 0.0, 2.0)];
+        assert_eq!(
+            covered(&behind, &looking_down(), &CAMERA),
+            PixelRect::whole([640, 480])
+        );
+        let aside = [DVec3::new(9.0, 0.0, 0.0)];
+        assert!(covered(&aside, &looking_down(), &CAMERA).is_empty());
+    }
+}
