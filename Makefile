@@ -1,4 +1,7 @@
 # Both targets set up what they need first (scripts/setup) and use the release profile, so dependencies compile once.
+# Mesa's layer that asks the desktop for its favourite card complains on machines without a desktop; gnomon chooses itself.
+export NODEVICE_SELECT = 1
+
 .PHONY: demo test setup
 
 demo: setup
