@@ -6,15 +6,18 @@
 mod anchor_geometry;
 mod composite;
 mod gpu;
+mod gpu_clock;
 mod indirect;
 mod layers;
 mod readback;
 mod renderer;
 mod shader;
 mod surfaces;
+mod touched;
 mod uniforms;
 mod volumes;
 
 pub use gpu::{Gpu, RenderError};
+pub use gpu_clock::GpuTimes;
 pub use layers::Layers;
-pub use renderer::{GpuTimes, Renderer, Shown};
+pub use renderer::{Renderer, Shown};

@@ -2,22 +2,23 @@
 
 use std::sync::Arc;
 
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
-use crate::geometry::reach::{self, Bounds, PixelRect};
-use crate::geometry::shadow_volume::LightPlace;
+use crate::geometry::reach::PixelRect;
 use crate::light::Light;
 use crate::scene::Scene;
 
 use super::anchor_geometry::{self, AnchoredCaster, Extent, Role, SurfaceBatch};
 use super::composite::{Composite, GAIN_FORMAT, PICTURE_FORMAT};
 use super::gpu::{Gpu, RenderError};
+use super::gpu_clock::{GpuClock, GpuTimes};
 use super::indirect::Indirect;
 use super::layers::{LayerPasses, Layers};
-use super::readback::{self, Readback};
+use super::readback::Readback;
 use super::surfaces::{LIGHT_FORMAT, Surfaces};
+use super::touched::{light_place, touched_by_virtual};
 use super::uniforms::{Lens, LightSource, UniformRow, View, uniform_entry};
 use super::volumes::{self, VolumeBuffers};
 
@@ -28,13 +29,6 @@ pub enum Shown {
     Composite,
     /// The undistorted video alone.
     Bare,
-}
-
-/// What the last frame cost on the GPU, milliseconds; `None` where the adapter has no timestamps.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct GpuTimes {
-    pub shadows_ms: Option<f64>,
-    pub composite_ms: Option<f64>,
 }
 
 /// Draws the frames of one scene through one camera.
@@ -240,7 +234,12 @@ impl Renderer {
     pub fn draw(&mut self, camera_from_anchor: &[Option<DAffine3>], shown: Shown) {
         self.place(camera_from_anchor);
         self.touched = match shown {
-            Shown::Composite => self.touched_by_virtual(camera_from_anchor),
+            Shown::Composite => touched_by_virtual(
+                &self.extents,
+                &self.lights,
+                camera_from_anchor,
+                &self.intrinsics,
+            ),
             Shown::Bare => None,
         };
 
@@ -387,52 +386,6 @@ impl Renderer {
                 volume.update(&self.gpu.device, queue, &caster.caster, light);
             }
         }
-    }
-
-    /// The pixels that virtual things and their shadows can reach; `None` if there are none.
-    fn touched_by_virtual(&self, camera_from_anchor: &[Option<DAffine3>]) -> Option<PixelRect> {
-        let camera_from_world = (*camera_from_anchor.first()?)?;
-        let world_from_camera = camera_from_world.inverse();
-        let corners_in_world = |extent: &Extent| {
-            let world_from_anchor = world_from_camera * camera_from_anchor[extent.anchor]?;
-            Some(
-                extent
-                    .bounds
-                    .corners()
-                    .map(|corner| world_from_anchor.transform_point3(corner)),
-            )
-        };
-        let placed: Vec<(&Extent, [DVec3; 8])> = self
-            .extents
-            .iter()
-            .filter_map(|extent| Some((extent, corners_in_world(extent)?)))
-            .collect();
-        let receivers = Bounds::around(placed.iter().flat_map(|(_, corners)| *corners))?;
-        let mut touched = PixelRect {
-            low: [0; 2],
-            high: [0; 2],
-        };
-        for (extent, corners) in placed
-            .iter()
-            .filter(|(extent, _)| extent.role == Role::Virtual)
-        {
-            touched = touched.union(reach::covered(
-                corners,
-                &camera_from_world,
-                &self.intrinsics,
-            ));
-            for light in self.lights.iter().filter(|_| extent.casts) {
-                let light = light_place(light, &DAffine3::IDENTITY);
-                touched = touched.union(reach::shadowed(
-                    corners,
-                    light,
-                    &receivers,
-                    &camera_from_world,
-                    &self.intrinsics,
-                ));
-            }
-        }
-        (!touched.is_empty()).then_some(touched)
     }
 
     /// Haller et al. 2003, section 3.2, light by light: phantoms and virtual things into depth; *real onto real* is
@@ -602,100 +555,4 @@ fn whole_pass<'a>(
         timestamp_writes,
         ..Default::default()
     })
-}
-
-fn light_place(light: &Light, anchor_from_world: &DAffine3) -> LightPlace {
-    match *light {
-        Light::Point { position_m, .. } => {
-            LightPlace::Point(anchor_from_world.transform_point3(position_m))
-        }
-        Light::Directional { direction, .. } => {
-            LightPlace::Along(anchor_from_world.transform_vector3(direction))
-        }
-    }
-}
-
-/// Timestamps at the ends of the frame's two stretches: light (0, 1) and composite (2, 3).
-struct GpuClock {
-    queries: wgpu::QuerySet,
-    resolved: wgpu::Buffer,
-    readable: wgpu::Buffer,
-    period_ns: f32,
-    light_drawn: bool,
-}
-
-impl GpuClock {
-    const BYTES: u64 = 4 * 8;
-
-    fn new(device: &wgpu::Device, period_ns: f32) -> Self {
-        let buffer = |usage| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("timestamps"),
-                size: Self::BYTES,
-                usage,
-                mapped_at_creation: false,
-            })
-        };
-        Self {
-            queries: device.create_query_set(&wgpu::QuerySetDescriptor {
-                label: Some("timestamps"),
-                ty: wgpu::QueryType::Timestamp,
-                count: 4,
-            }),
-            resolved: buffer(wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC),
-            readable: buffer(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
-            period_ns,
-            light_drawn: false,
-        }
-    }
-
-    fn light(&self, first: bool, last: bool) -> wgpu::RenderPassTimestampWrites<'_> {
-        wgpu::RenderPassTimestampWrites {
-            query_set: &self.queries,
-            beginning_of_pass_write_index: first.then_some(0),
-            end_of_pass_write_index: last.then_some(1),
-        }
-    }
-
-    fn composite(&self) -> wgpu::RenderPassTimestampWrites<'_> {
-        wgpu::RenderPassTimestampWrites {
-            query_set: &self.queries,
-            beginning_of_pass_write_index: Some(2),
-            end_of_pass_write_index: Some(3),
-        }
-    }
-
-    fn resolve(&mut self, encoder: &mut wgpu::CommandEncoder, light_drawn: bool) {
-        self.light_drawn = light_drawn;
-        let first = if light_drawn { 0 } else { 2 };
-        encoder.resolve_query_set(&self.queries, first..4, &self.resolved, 0);
-        encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.readable, 0, Self::BYTES);
-    }
-
-    fn read(&self, gpu: &Gpu) -> Result<GpuTimes, RenderError> {
-        readback::map_for_reading(gpu, &self.readable)?;
-        let mapped = self
-            .readable
-            .slice(..)
-            .get_mapped_range()
-            .map_err(|error| RenderError::Failed(error.to_string()))?;
-        let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&mapped);
-        drop(mapped);
-        self.readable.unmap();
-        let stretch_ms = |begin: usize| {
-            let ticks = ticks[begin + 1].saturating_sub(ticks[begin]);
-            Some(ticks as f64 * f64::from(self.period_ns) * 1e-6)
-        };
-        Ok(if self.light_drawn {
-            GpuTimes {
-                shadows_ms: stretch_ms(0),
-                composite_ms: stretch_ms(2),
-            }
-        } else {
-            GpuTimes {
-                shadows_ms: None,
-                composite_ms: stretch_ms(0),
-            }
-        })
-    }
 }
