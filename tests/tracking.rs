@@ -72,7 +72,7 @@ fn is_white(marker: &Marker, point_m: DVec2) -> Option<bool> {
     Some(cell(row - 1, column - 1).unwrap_or(false))
 }
 
-/// Brightness of a sheet: its markers on white paper that reaches half a marker beyond them; `None` beside the paper.
+/// Linear light from a sheet: its markers on white paper that reaches half a marker beyond them; `None` beside the paper.
 fn sheet_level(markers: &[Marker], point_m: DVec2) -> Option<f64> {
     let print = markers.iter().find_map(|marker| is_white(marker, point_m));
     let on_paper = || {
@@ -89,7 +89,7 @@ fn sheet_level(markers: &[Marker], point_m: DVec2) -> Option<f64> {
     };
     print
         .or_else(on_paper)
-        .map(|white| if white { 225.0 } else { 25.0 })
+        .map(|white| if white { 0.8 } else { 0.02 })
 }
 
 /// A camera on which the sheet stands upright, tilted by `tilt_deg` about the picture's x and turned by `turn_deg`.
@@ -130,9 +130,11 @@ fn photograph(camera: &Intrinsics, sheets: &[(&[Marker], DAffine3)], time_secs: 
                         sheet_level(markers, on_sheet)
                     },
                 );
-                sum += level.unwrap_or(130.0);
+                sum += level.unwrap_or(0.25);
             }
-            let grey = (sum / (SAMPLES * SAMPLES) as f64).round() as u8;
+            let linear: f64 = sum / (SAMPLES * SAMPLES) as f64;
+            let encoded = 1.055 * linear.powf(1.0 / 2.4) - 0.055;
+            let grey = (255.0 * encoded).round() as u8;
             rgba.extend([grey, grey, grey, 255]);
         }
     }

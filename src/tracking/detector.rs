@@ -5,7 +5,8 @@ use glam::DVec2;
 use super::TrackingError;
 use super::apriltag::AprilTagDetector;
 use super::aruco::ArucoDetector;
-use crate::scene::{DetectorKind, Family, TrackingSettings};
+use super::refine::{Grey, refined};
+use crate::scene::{ArucoRefinement, DetectorKind, Family, TrackingSettings};
 
 /// A marker seen in a picture.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,7 +28,11 @@ pub struct Detection {
 const MIN_SIDE_PX: u32 = 16;
 
 /// A detector for some families, built once and used by one thread at a time.
-pub struct Detector(Backend);
+pub struct Detector {
+    backend: Backend,
+    /// Whether corners are fitted again in linear light.
+    refines: bool,
+}
 
 enum Backend {
     /// Without a family there is nothing to look for.
@@ -44,14 +49,22 @@ impl Detector {
         families.sort_unstable();
         families.dedup();
         if families.is_empty() {
-            return Ok(Self(Backend::Idle));
+            return Ok(Self {
+                backend: Backend::Idle,
+                refines: false,
+            });
         }
-        Ok(Self(match settings.detector {
-            DetectorKind::AprilTag => {
-                Backend::AprilTag(AprilTagDetector::new(settings, &families)?)
-            }
-            DetectorKind::Aruco => Backend::Aruco(ArucoDetector::new(settings, &families)?),
-        }))
+        let (backend, refines) = match settings.detector {
+            DetectorKind::AprilTag => (
+                Backend::AprilTag(AprilTagDetector::new(settings, &families)?),
+                settings.refine_edges,
+            ),
+            DetectorKind::Aruco => (
+                Backend::Aruco(ArucoDetector::new(settings, &families)?),
+                settings.aruco_refinement != ArucoRefinement::None,
+            ),
+        };
+        Ok(Self { backend, refines })
     }
 
     /// The markers of an 8-bit grey picture (rows from the top, no padding), sorted by family and id.
@@ -72,12 +85,21 @@ impl Detector {
         if width < MIN_SIDE_PX || height < MIN_SIDE_PX {
             return Ok(Vec::new());
         }
-        let mut detections = match &mut self.0 {
+        let mut detections = match &mut self.backend {
             Backend::Idle => Vec::new(),
             Backend::AprilTag(detector) => detector.detect(grey, size_px)?,
             Backend::Aruco(detector) => detector.detect(grey, size_px)?,
         };
         detections.retain(|detection| detection.corners_px.iter().all(|corner| corner.is_finite()));
+        if self.refines {
+            let picture = Grey {
+                levels: grey,
+                size_px,
+            };
+            for detection in &mut detections {
+                detection.corners_px = refined(picture, detection.corners_px);
+            }
+        }
         // Threads may find them in any order; of one id the upper left one comes first.
         let key = |detection: &Detection| (detection.family, detection.id);
         detections.sort_by(|a, b| {

@@ -12,6 +12,7 @@ mod aruco;
 mod conventions;
 mod detector;
 mod pose;
+mod refine;
 mod tracker;
 mod undistort;
 
