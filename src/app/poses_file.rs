@@ -47,11 +47,12 @@ impl PosesText {
             );
             match &pose.camera_from_anchor {
                 Some(camera_from_anchor) => {
+                    // Finer than single precision, so that poses read again draw the same picture.
                     let t = camera_from_anchor.translation;
                     let r = rodrigues_from_pose(camera_from_anchor);
                     let _ = write!(
                         self.text,
-                        "{:.9},{:.9},{:.9},{:.9},{:.9},{:.9},",
+                        "{:.12},{:.12},{:.12},{:.12},{:.12},{:.12},",
                         t.x, t.y, t.z, r.x, r.y, r.z
                     );
                 }

@@ -78,13 +78,15 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
     let scene = Scene::load(&request.scene)?;
     let source = FrameSource::open(&scene.camera.source)?;
     let intrinsics = calibration(&scene, &source)?;
-    if let (Some(out), false) = (&request.out, request.layers.is_empty())
-        && Codec::of_path(out).is_some()
-    {
-        bail!(
-            "--layers writes PNGs beside the pictures: give --out a folder, not {}",
-            out.display()
-        );
+    if !request.layers.is_empty() {
+        match &request.out {
+            Some(out) if Codec::of_path(out).is_some() => bail!(
+                "--layers writes PNGs beside the pictures: give --out a folder, not {}",
+                out.display()
+            ),
+            Some(_) => {}
+            None => bail!("--layers writes PNGs beside the pictures: give --out a folder for them"),
+        }
     }
     let poser = match &request.poses_from {
         Some(path) => Poser::Given(GivenPoses::read(path, &scene.anchors)?),
@@ -108,6 +110,7 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
         lost: vec![0; scene.anchors.len()],
         reprojections_px: Vec::new(),
         frames: 0,
+        last_read: None,
         drawn: 0,
     };
     let adapter = drawing
@@ -248,6 +251,8 @@ struct Run<'a> {
     lost: Vec<u32>,
     reprojections_px: Vec<f64>,
     frames: u32,
+    /// Index of the frame that was read last; a damaged recording lacks some before it.
+    last_read: Option<u32>,
     drawn: u32,
 }
 
@@ -318,6 +323,7 @@ impl Run<'_> {
             track_ms,
         } = tracked;
         self.frames += 1;
+        self.last_read = Some(frame.index);
         self.log.add("decode", decode_ms);
         if let Some(ms) = track_ms {
             self.log.add("track", ms);
@@ -404,7 +410,7 @@ impl Run<'_> {
     /// What to say when frames that were asked for are not in the recording.
     fn missing_frames(&self, last: Option<u32>, stop: &AtomicBool) -> Option<String> {
         let last = last?;
-        (self.frames <= last && !stop.load(Ordering::Relaxed)).then(|| {
+        (self.last_read < Some(last) && !stop.load(Ordering::Relaxed)).then(|| {
             format!(
                 "--frames asks for frame {last}, but {} ends after {} frames",
                 self.scene.camera.source, self.frames
