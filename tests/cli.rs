@@ -591,3 +591,59 @@ fn only_drawing_needs_a_gpu() {
     assert_eq!(stats["adapter"], serde_json::Value::Null);
     assert_eq!(stats["drawn"], 0);
 }
+
+#[test]
+fn a_recording_is_never_written_over() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let recording = folder.path().join("recording");
+    std::fs::create_dir(&recording).expect("a folder");
+    for file in ["video.mp4", "camera.toml"] {
+        let from = project_file("recordings/lamp").join(file);
+        std::fs::copy(from, recording.join(file)).expect("a copy");
+    }
+    let before = read(recording.join("video.mp4"));
+    let scene = lamp_scene_with(folder.path(), &recording);
+    let targets = [
+        ["--out", "recording/video.mp4"],
+        ["--out", "recording"],
+        ["--out", "recording/new/place"],
+        ["--poses", "recording/camera.toml"],
+    ];
+    for target in targets {
+        refused(
+            folder.path(),
+            &[&[scene.as_str()], &target[..]].concat(),
+            &["write elsewhere"],
+        );
+    }
+    assert_eq!(read(recording.join("video.mp4")), before);
+    assert_eq!(
+        files(&recording),
+        BTreeSet::from(["camera.toml".to_owned(), "video.mp4".to_owned()])
+    );
+}
+
+#[test]
+fn bare_layers_know_no_virtual_thing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let lamp = config("lamp");
+    let arguments = [
+        lamp.as_str(),
+        "--bare",
+        "--frames",
+        "0",
+        "--layers",
+        "role,shadow,gain",
+        "--out",
+        "out",
+    ];
+    replay(folder.path(), &arguments);
+    let layer = |name: &str| {
+        let path = folder.path().join("out").join(format!("000000_{name}.png"));
+        image::open(path).expect("a layer")
+    };
+    let (role, shadow) = (layer("role").to_luma8(), layer("shadow_0").to_luma8());
+    assert!(role.iter().all(|&role| role == 0 || role == 100));
+    assert!(shadow.iter().all(|&bits| bits & 2 == 0) && shadow.iter().any(|&bits| bits == 1));
+    assert!(layer("gain").to_rgb16().iter().all(|&gain| gain == 32768));
+}

@@ -88,6 +88,9 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
             None => bail!("--layers writes PNGs beside the pictures: give --out a folder for them"),
         }
     }
+    for written in [&request.out, &request.sheet, &request.poses, &request.stats] {
+        refuse_to_overwrite(&source, written.as_deref())?;
+    }
     let poser = match &request.poses_from {
         Some(path) => Poser::Given(GivenPoses::read(path, &scene.anchors)?),
         None => Poser::Tracker(Box::new(Tracker::new(
@@ -171,6 +174,37 @@ fn calibration(scene: &Scene, source: &FrameSource) -> Result<Intrinsics> {
     };
     check_frame_size(&intrinsics, source.size_px(), &scene.camera.source)?;
     Ok(intrinsics)
+}
+
+/// A recording is never written over: not the video that is played, nor anything in its folder.
+fn refuse_to_overwrite(source: &FrameSource, written: Option<&Path>) -> Result<()> {
+    let Some(written) = written else {
+        return Ok(());
+    };
+    let (Ok(recording), Some(target)) = (source.path().canonicalize(), resolved(written)) else {
+        return Ok(());
+    };
+    let lies_in = target == recording || (recording.is_dir() && target.starts_with(&recording));
+    if lies_in {
+        bail!(
+            "{} is, or lies in, the recording {} that is being played; write elsewhere",
+            written.display(),
+            source.path().display()
+        );
+    }
+    Ok(())
+}
+
+/// The real place of a file that may not be there yet.
+fn resolved(path: &Path) -> Option<PathBuf> {
+    if let Ok(real) = path.canonicalize() {
+        return Some(real);
+    }
+    let parent = path
+        .parent()
+        .filter(|parent| !parent.as_os_str().is_empty());
+    let parent = parent.unwrap_or(Path::new("."));
+    Some(resolved(parent)?.join(path.file_name()?))
 }
 
 /// Where poses come from.

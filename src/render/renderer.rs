@@ -61,6 +61,8 @@ pub struct Renderer {
     layer_passes: Option<LayerPasses>,
     /// Whether each anchor has a pose in the frame that was drawn last, and so whether it is drawn.
     placed: Vec<bool>,
+    /// What that frame showed.
+    shown: Shown,
     /// The pixels that virtual things and their shadows could reach in that frame.
     touched: Option<PixelRect>,
 }
@@ -188,6 +190,7 @@ impl Renderer {
                 .map(|period_ns| GpuClock::new(device, period_ns)),
             layer_passes: None,
             placed: vec![false; scene.anchors.len()],
+            shown: Shown::Bare,
             touched: None,
             lights: scene.lights.clone(),
             intrinsics,
@@ -233,6 +236,7 @@ impl Renderer {
     /// the world's pose nobody knows where the light comes from, and the video is shown alone.
     pub fn draw(&mut self, camera_from_anchor: &[Option<DAffine3>], shown: Shown) {
         self.place(camera_from_anchor);
+        self.shown = shown;
         self.touched = match shown {
             Shown::Composite => touched_by_virtual(
                 &self.extents,
@@ -294,7 +298,10 @@ impl Renderer {
             LayerPasses::new(&self.gpu, &self.geometry_layout, self.intrinsics.size_px)
         });
         let gpu = &self.gpu;
-        let (views, view_group, placed) = (&self.views, &self.view_group, &self.placed);
+        let (views, view_group) = (&self.views, &self.view_group);
+        let drawn = |role: Role, anchor: usize| {
+            self.placed[anchor] && (role == Role::Real || self.shown == Shown::Composite)
+        };
         let set_view = |pass: &mut wgpu::RenderPass<'_>, anchor: usize| {
             pass.set_bind_group(0, view_group, &[views.offset(anchor)]);
             pass.set_bind_group(1, &self.light_group, &[0]);
@@ -303,7 +310,7 @@ impl Renderer {
             for batch in self
                 .surfaces
                 .iter()
-                .filter(|b| b.role == role && placed[b.anchor])
+                .filter(|b| b.role == role && drawn(role, b.anchor))
             {
                 set_view(pass, batch.anchor);
                 pass.set_vertex_buffer(0, batch.corners.slice(..));
@@ -315,7 +322,7 @@ impl Renderer {
             let mut bits = passes.shadow(gpu, &|pass, role| {
                 set_view(pass, 0);
                 for (volume, caster) in volumes.iter().zip(&self.casters) {
-                    if caster.role == role && placed[caster.anchor] {
+                    if caster.role == role && drawn(role, caster.anchor) {
                         set_view(pass, caster.anchor);
                         volume.draw(pass);
                     }
