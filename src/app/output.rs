@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 pub use super::output_error::OutputError;
 use super::picture_files;
-use super::video_writer::VideoWriter;
+use super::video_writer::{Codec, VideoWriter};
 
 /// Takes frames one by one.
 pub enum FrameSink {
@@ -19,15 +19,11 @@ const FOREIGN_FILES: [&str; 8] = ["webm", "m4v", "mpg", "mpeg", "gif", "ts", "wm
 impl FrameSink {
     /// Opens `path`: by its extension a video, else a folder of PNGs. Folders on the way are made.
     pub fn create(path: &Path, size_px: [u32; 2], fps: f64) -> Result<Self, OutputError> {
-        let extension = path
-            .extension()
-            .and_then(|extension| extension.to_str())
-            .unwrap_or_default()
-            .to_ascii_lowercase();
-        if let Some(codec) = super::video_writer::Codec::of_extension(&extension) {
+        if let Some(codec) = Codec::of_path(path) {
             return Ok(Self::Video(VideoWriter::create(path, codec, size_px, fps)?));
         }
-        if FOREIGN_FILES.contains(&extension.as_str()) && !path.is_dir() {
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        if FOREIGN_FILES.iter().any(|foreign| extension == *foreign) && !path.is_dir() {
             return Err(OutputError::UnknownFormat {
                 path: path.to_owned(),
             });

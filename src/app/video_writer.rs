@@ -20,13 +20,7 @@ pub enum Codec {
 impl Codec {
     /// The codec for a file of this name; `None` where no video is meant.
     pub fn of_path(path: &Path) -> Option<Self> {
-        let extension = path.extension()?.to_str()?;
-        Self::of_extension(&extension.to_ascii_lowercase())
-    }
-
-    /// The codec for a lower-case extension; `None` where no video is meant.
-    pub fn of_extension(extension: &str) -> Option<Self> {
-        match extension {
+        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "mp4" | "mov" => Some(Self::H264),
             "mkv" | "avi" => Some(Self::Ffv1),
             _ => None,
