@@ -57,7 +57,9 @@ pub struct Request {
 /// What a replay did.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report {
+    /// Frames that were read.
     pub frames: u32,
+    /// Frames that were drawn.
     pub drawn: u32,
     /// Frames in which the world had no pose.
     pub world_lost: u32,

@@ -7,8 +7,11 @@ use serde::Serialize;
 /// Times of one stage over all frames, milliseconds.
 #[derive(Debug, Clone, Copy, Serialize, PartialEq)]
 pub struct StageTimes {
+    /// The time that half of the frames keep.
     pub median_ms: f64,
+    /// The time that 95 % of the frames keep.
     pub p95_ms: f64,
+    /// The longest time.
     pub max_ms: f64,
     /// Frames that the stage worked on.
     pub frames: usize,
@@ -54,7 +57,9 @@ fn summarise(samples_ms: &[f64]) -> StageTimes {
 /// The whole of `--stats`.
 #[derive(Debug, Serialize)]
 pub struct Stats {
+    /// The recording, as the scene names it.
     pub source: String,
+    /// Width and height of its pictures, pixels.
     pub size_px: [u32; 2],
     /// Frames that were read.
     pub frames: u32,
@@ -64,10 +69,13 @@ pub struct Stats {
     pub drops: u32,
     /// For each anchor the frames without a pose.
     pub lost: BTreeMap<String, u32>,
+    /// The detector and its decimation, or where the poses came from.
     pub detector: String,
+    /// How shadows were made.
     pub technique: String,
     /// `None` where nothing was drawn.
     pub adapter: Option<String>,
+    /// Times by stage.
     pub stages: BTreeMap<&'static str, StageTimes>,
     /// From the first frame to the last file, seconds.
     pub total_secs: f64,

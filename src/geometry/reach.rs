@@ -11,7 +11,9 @@ const NEAREST_M: f64 = 1e-3;
 /// A box along the axes of its space, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
+    /// The smallest coordinates.
     pub low: DVec3,
+    /// The largest coordinates.
     pub high: DVec3,
 }
 
@@ -48,7 +50,9 @@ impl Bounds {
 /// A rectangle of pixels: the first column and row, and those past the last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PixelRect {
+    /// First column and row.
     pub low: [u32; 2],
+    /// Column and row past the last.
     pub high: [u32; 2],
 }
 

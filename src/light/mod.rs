@@ -10,9 +10,19 @@ use glam::DVec3;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Light {
     /// Radiant intensity (W/sr up to the camera's exposure) from a point in metres.
-    Point { position_m: DVec3, intensity: DVec3 },
+    Point {
+        /// Metres.
+        position_m: DVec3,
+        /// W/sr, linear RGB.
+        intensity: DVec3,
+    },
     /// Irradiance (W/m² up to the camera's exposure) on a plane across the unit direction in which the light travels.
-    Directional { direction: DVec3, irradiance: DVec3 },
+    Directional {
+        /// Unit direction in which the light travels.
+        direction: DVec3,
+        /// W/m², linear RGB.
+        irradiance: DVec3,
+    },
 }
 
 /// How a surface reflects light.

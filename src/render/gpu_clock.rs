@@ -6,7 +6,9 @@ use super::readback::map_for_reading;
 /// What the last frame cost on the GPU, milliseconds; `None` where the adapter has no timestamps.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct GpuTimes {
+    /// Surfaces, shadow volumes and light.
     pub shadows_ms: Option<f64>,
+    /// Undistortion and composite.
     pub composite_ms: Option<f64>,
 }
 

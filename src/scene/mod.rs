@@ -24,15 +24,21 @@ pub use family::Family;
 /// What one scene file says, checked.
 #[derive(Debug, Clone, Default)]
 pub struct Scene {
+    /// Where the pictures come from.
     pub camera: CameraSettings,
+    /// How the anchors are found.
     pub tracking: TrackingSettings,
     /// Boards first, then lone markers; the first is the world.
     pub anchors: Vec<Anchor>,
+    /// Coarse models of real things.
     pub phantoms: Vec<Object>,
+    /// What the picture alone shows.
     pub virtuals: Vec<Object>,
+    /// Lights in world space.
     pub lights: Vec<Light>,
     /// Radiance of the constant surrounding light, linear RGB.
     pub ambient_radiance: DVec3,
+    /// How shadows are made.
     pub shadows: ShadowSettings,
 }
 
@@ -57,15 +63,20 @@ pub enum DetectorKind {
 /// Where the corners of OpenCV's detector are refined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ArucoRefinement {
+    /// As the contour's polygon gives them.
     None,
+    /// By the saddle of the gradient in a window (`cornerSubPix`).
     Subpixel,
+    /// By lines fitted to the contour.
     Contour,
+    /// By AprilTag's own edge fit: slow.
     AprilTag,
 }
 
 /// How markers are found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackingSettings {
+    /// The library.
     pub detector: DetectorKind,
     /// libapriltag: factor by which the picture is shrunk for the search; 1 is full resolution.
     pub decimation: f64,
@@ -79,6 +90,7 @@ pub struct TrackingSettings {
     pub corrected_bits: u32,
     /// libapriltag: detections with a smaller decision margin are dropped.
     pub min_margin: f64,
+    /// libapriltag: threads of the search.
     pub threads: u32,
 }
 
@@ -100,10 +112,13 @@ impl Default for TrackingSettings {
 /// A marker in its anchor's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Marker {
+    /// Its family or dictionary.
     pub family: Family,
+    /// Its number in the family.
     pub id: u32,
     /// Side of the black square, metres.
     pub size_m: f64,
+    /// Its centre in the anchor's frame, metres.
     pub center_m: DVec2,
     /// Counter-clockwise turn in the board's plane, radians.
     pub rotation_rad: f64,
@@ -112,17 +127,21 @@ pub struct Marker {
 /// A board of markers or a lone marker, with its own frame (x right, y up as printed, z towards the viewer).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Anchor {
+    /// Its name, unique in the scene.
     pub name: String,
+    /// Its markers; a lone one lies at the origin.
     pub markers: Vec<Marker>,
 }
 
 /// A phantom or a virtual thing.
 #[derive(Debug, Clone)]
 pub struct Object {
+    /// Its name, unique among the things.
     pub name: String,
     /// Its triangles are counter-clockwise seen from outside *in the anchor's frame*: where `anchor_from_object` mirrors,
     /// they are turned round against the file's.
     pub mesh: Mesh,
+    /// What was found and mended when the mesh was read.
     pub mesh_report: MeshReport,
     /// As many as `mesh.triangle_materials` names; never empty.
     pub materials: Vec<Material>,
@@ -139,12 +158,14 @@ pub struct Object {
 pub enum Technique {
     /// What the scene's lights call for.
     Auto,
+    /// Shadow volumes (Haller, Drab & Hartmann 2003).
     Volumes,
 }
 
 /// How shadows are made and how finely.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShadowSettings {
+    /// The technique that is asked for.
     pub technique: Technique,
     /// Samples per pixel: 1 or 4.
     pub samples: u32,
