@@ -76,7 +76,8 @@ pub(super) fn map_for_reading(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<(), Re
         .poll(wgpu::PollType::wait_indefinitely())
         .map_err(|error| RenderError::Failed(error.to_string()))?;
     gpu.check()?;
-    match receiver.try_recv() {
+    // Another thread's wait may have taken our call-back along and be about to make it.
+    match receiver.recv() {
         Ok(Ok(())) => Ok(()),
         Ok(Err(error)) => Err(RenderError::Failed(error.to_string())),
         Err(error) => Err(RenderError::Failed(error.to_string())),
