@@ -82,7 +82,7 @@ pub struct TrackingSettings {
     pub decimation: f64,
     /// libapriltag: standard deviation of the blur before the search, pixels.
     pub blur_px: f64,
-    /// libapriltag: snap edges to strong gradients at full resolution.
+    /// libapriltag: fit the edges of what decodes at full resolution, in linear light.
     pub refine_edges: bool,
     /// OpenCV's ArUco: corner refinement.
     pub aruco_refinement: ArucoRefinement,

@@ -52,7 +52,6 @@ impl AprilTagDetector {
             gnomon_apriltag_create(
                 settings.decimation as f32,
                 settings.blur_px as f32,
-                settings.refine_edges,
                 settings.threads as i32,
             )
         };
@@ -175,12 +174,7 @@ struct RawDetection {
 }
 
 unsafe extern "C" {
-    fn gnomon_apriltag_create(
-        decimation: f32,
-        blur_px: f32,
-        refine_edges: bool,
-        threads: i32,
-    ) -> *mut RawDetector;
+    fn gnomon_apriltag_create(decimation: f32, blur_px: f32, threads: i32) -> *mut RawDetector;
     fn gnomon_apriltag_add_family(
         detector: *mut RawDetector,
         name: *const c_char,
