@@ -522,8 +522,9 @@ fn stop_midway(signal: &str) {
         std::thread::sleep(Duration::from_millis(20));
     }
     std::thread::sleep(Duration::from_millis(1500));
-    let told = Process::new("kill")
-        .args([signal, &child.id().to_string()])
+    // The shell's own `kill`: a small system has no other.
+    let told = Process::new("sh")
+        .args(["-c", &format!("kill {signal} {}", child.id())])
         .status()
         .expect("a run that can be stopped");
     assert!(told.success(), "it was over already");
