@@ -1,4 +1,5 @@
 // The composite: video · gain + added in linear light, undistorted at the same camera matrix K.
+//!include "whole_picture.wgsl"
 
 struct Lens {
     focal_px: vec2f,
@@ -16,13 +17,8 @@ override SAMPLES: i32 = 4;
 
 @group(0) @binding(0) var<uniform> lens: Lens;
 @group(0) @binding(1) var video: texture_2d<f32>;
-@group(0) @binding(2) var before: texture_multisampled_2d<f32>;
-@group(0) @binding(3) var after: texture_multisampled_2d<f32>;
-
-@vertex
-fn whole_picture(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
-    return vec4f(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, 0.0, 1.0);
-}
+@group(0) @binding(2) var reaching: texture_multisampled_2d<f32>;
+@group(0) @binding(3) var changes: texture_multisampled_2d<f32>;
 
 // What the virtual things do to a pixel: a real surface's light is scaled, a virtual one's is added.
 struct Change {
@@ -39,19 +35,21 @@ fn change(pixel: vec2i) -> Change {
     var kept = 0.0;
     var touched = false;
     for (var sample = 0; sample < SAMPLES; sample++) {
-        let with_virtual = textureLoad(after, pixel, sample);
-        if with_virtual.a > 0.5 {
-            added += with_virtual.rgb;
+        let change = textureLoad(changes, pixel, sample);
+        if change.a > 0.5 {
+            added += change.rgb;
             touched = true;
             continue;
         }
         kept += 1.0;
-        let without = textureLoad(before, pixel, sample);
-        // The same lights were added in the same order, so an equal sum means that nothing is hidden. A surface
-        // that no light reaches has nothing to lose.
-        let hidden = (without.rgb > with_virtual.rgb) & vec3<bool>(without.a > 0.5);
-        gain += select(vec3f(1.0), with_virtual.rgb / max(without.rgb, vec3f(1e-6)), hidden);
-        touched = touched || any(hidden);
+        // A surface that loses nothing keeps its picture bit for bit.
+        if all(change.rgb <= vec3f(0.0)) {
+            gain += 1.0;
+            continue;
+        }
+        let light = textureLoad(reaching, pixel, sample).rgb;
+        gain += max(light - change.rgb, vec3f(0.0)) / max(light, vec3f(1e-6));
+        touched = true;
     }
     let weight = 1.0 / f32(SAMPLES);
     return Change(gain * weight, added * weight, kept * weight, touched);

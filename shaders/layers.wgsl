@@ -1,5 +1,6 @@
 // Layers for tests and tools, at the pixels' centres: role and depth of the visible surface, and shadow bits.
 //!include "common.wgsl"
+//!include "whole_picture.wgsl"
 
 @group(0) @binding(0) var<uniform> view: View;
 
@@ -27,11 +28,6 @@ fn real(surface: Surface) -> Layers {
 @fragment
 fn virtual_thing(surface: Surface) -> Layers {
     return Layers(vec4f(200.0 / 255.0), vec4f(surface.depth_m));
-}
-
-@vertex
-fn whole_picture(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
-    return vec4f(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, 0.0, 1.0);
 }
 
 // Drawn where the stencil counts a volume; the bits add up by blending.

@@ -1,4 +1,4 @@
-// Real and virtual surfaces: first what the ambient light gives them, then each light added where the stencil lets it.
+// Real and virtual surfaces: first depth, and what the ambient light gives them, then each light where the stencil lets it.
 //!include "common.wgsl"
 
 @group(0) @binding(0) var<uniform> view: View;
@@ -24,11 +24,25 @@ struct Surface {
 }
 
 struct Light {
-    // Irradiance on a real surface without virtual things; a = 1 where the surface is real.
-    @location(0) before: vec4f,
-    // Irradiance on a real surface, or radiance of a virtual one, with them; a = 1 where the surface is virtual.
-    @location(1) after: vec4f,
+    // Irradiance on a real surface without virtual things; a = 1 where it is known.
+    @location(0) reaching: vec4f,
+    // Irradiance that virtual things take from a real surface, or the radiance of a virtual one; a = 1 where the surface is
+    // virtual.
+    @location(1) change: vec4f,
 }
+
+struct Place {
+    @invariant @builtin(position) clip: vec4f,
+}
+
+@vertex
+fn place_alone(@location(0) position: vec3f) -> Place {
+    return Place(clip_from_point(view, vec4f(position, 1.0)));
+}
+
+// Phantoms write no colour: the video already shows them.
+@fragment
+fn depth_alone() {}
 
 @vertex
 fn place(corner: Corner) -> Surface {
@@ -45,7 +59,7 @@ fn place(corner: Corner) -> Surface {
 
 @fragment
 fn ambient_on_real(surface: Surface) -> Light {
-    return Light(vec4f(surface.indirect, 1.0), vec4f(surface.indirect, 0.0));
+    return Light(vec4f(surface.indirect, 1.0), vec4f(0.0));
 }
 
 @fragment
@@ -53,12 +67,24 @@ fn ambient_on_virtual(surface: Surface) -> Light {
     return Light(vec4f(0.0), vec4f(surface.albedo / PI * surface.indirect, 1.0));
 }
 
+// Once where the light reaches the surface in the video, and once where virtual things then hide it.
 @fragment
 fn light_on_real(surface: Surface, @builtin(front_facing) outside: bool) -> Light {
+    let irradiance = vec4f(irradiance(surface, outside), 0.0);
+    return Light(irradiance, irradiance);
+}
+
+// The only light of a scene, where virtual things hide it: no other pixel needs to know what reaches it.
+@fragment
+fn only_light_hidden(surface: Surface, @builtin(front_facing) outside: bool) -> Light {
+    let irradiance = irradiance(surface, outside);
+    return Light(vec4f(surface.indirect + irradiance, 1.0), vec4f(irradiance, 0.0));
+}
+
+fn irradiance(surface: Surface, outside: bool) -> vec3f {
     let arriving = incidence(light, surface.point_in_camera);
     let normal = normalize(surface.normal_in_camera) * select(-1.0, 1.0, outside);
-    let irradiance = arriving.irradiance * max(dot(normal, arriving.direction), 0.0);
-    return Light(vec4f(irradiance, 0.0), vec4f(irradiance, 0.0));
+    return arriving.irradiance * max(dot(normal, arriving.direction), 0.0);
 }
 
 @fragment

@@ -6,7 +6,9 @@
 //! *camera* x right, y down, z forward (OpenCV). A pixel's integer coordinate is its centre.
 //! `a_from_b` maps b to a.
 
+pub mod bounds;
 pub mod camera;
+pub mod counting;
 pub mod mesh;
 pub mod normals;
 pub mod pose;

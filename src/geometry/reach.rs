@@ -2,50 +2,12 @@
 
 use glam::{DAffine3, DVec3};
 
+use super::bounds::Bounds;
 use super::camera::Intrinsics;
 use super::shadow_volume::LightPlace;
 
 /// Nearer than this in front of the camera a point's pixel says nothing of its neighbours', metres.
 const NEAREST_M: f64 = 1e-3;
-
-/// A box along the axes of its space, metres.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bounds {
-    /// The smallest coordinates.
-    pub low: DVec3,
-    /// The largest coordinates.
-    pub high: DVec3,
-}
-
-impl Bounds {
-    /// The smallest box around points; `None` without any.
-    pub fn around(points: impl IntoIterator<Item = DVec3>) -> Option<Self> {
-        points
-            .into_iter()
-            .fold(None, |bounds: Option<Self>, point| {
-                let Self { low, high } = bounds.unwrap_or(Self {
-                    low: point,
-                    high: point,
-                });
-                Some(Self {
-                    low: low.min(point),
-                    high: high.max(point),
-                })
-            })
-    }
-
-    /// Its eight corners.
-    pub fn corners(&self) -> [DVec3; 8] {
-        let pick = |bit: usize, low: f64, high: f64| if bit == 0 { low } else { high };
-        std::array::from_fn(|corner| {
-            DVec3::new(
-                pick(corner & 1, self.low.x, self.high.x),
-                pick(corner >> 1 & 1, self.low.y, self.high.y),
-                pick(corner >> 2 & 1, self.low.z, self.high.z),
-            )
-        })
-    }
-}
 
 /// A rectangle of pixels: the first column and row, and those past the last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,7 +43,8 @@ impl PixelRect {
         }
     }
 
-    fn intersection(self, other: Self) -> Self {
+    /// The pixels in both.
+    pub fn intersection(self, other: Self) -> Self {
         Self {
             low: [0, 1].map(|axis| self.low[axis].max(other.low[axis])),
             high: [0, 1].map(|axis| self.high[axis].min(other.high[axis])),

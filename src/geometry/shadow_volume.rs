@@ -2,13 +2,16 @@
 //! (Crow 1977; Everitt & Kilgard 2002, section 3; Kim, Kim & Turk 2008 for meshes that are not closed).
 //!
 //! The volume of one triangle is its cap turned to the light, the same cap cast to infinity, and three sides. A mesh's
-//! volume is the sum over its triangles; sides that two triangles share cancel, so only edges with a net *signed
-//! multiplicity* keep a side. For a closed, well-wound mesh the triangles facing the light are enough and the edges
-//! that remain are its silhouette, each once.
+//! volume is the sum over the triangles that cast; sides that two of them share cancel, so only edges with a net
+//! *signed multiplicity* keep a side. The sum is closed whichever triangles cast, and counts at each point how many of
+//! them lie between it and the light.
 
 use std::collections::HashMap;
+use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3, Vec4};
+
+use super::bounds::Bounds;
 
 /// Where a light is, in the mesh's own space.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,7 +24,7 @@ pub enum LightPlace {
 
 impl LightPlace {
     /// As a homogeneous point: a distant light lies at infinity against its direction.
-    fn homogeneous(self) -> (DVec3, f64) {
+    pub fn homogeneous(self) -> (DVec3, f64) {
         match self {
             Self::Point(position) => (position, 1.0),
             Self::Along(direction) => (-direction, 0.0),
@@ -29,148 +32,439 @@ impl LightPlace {
     }
 }
 
+/// Which triangles of a mesh cast.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Casting {
+    /// Those facing the light. Enough if each directed edge has its opposite and both light and camera are outside:
+    /// along the way from the light to a point that the camera sees, as many triangles are entered as left.
+    Facing,
+    /// All of them. Right for any soup, light and camera.
+    All,
+}
+
+/// Closer than this to edge-on, as the sine of the angle, a triangle hides nothing that a pixel could show.
+const EDGE_ON: f64 = 1e-6;
+
 /// A mesh prepared for casting shadows: welded triangles, their planes, and which triangles meet at each edge.
 #[derive(Debug, Clone)]
 pub struct Caster {
     positions: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
-    /// Unnormalised plane of each triangle: `dot(normal, p) = offset` on it.
+    /// Unit normal and offset of each triangle: `dot(normal, p) = offset` on it.
     planes: Vec<(DVec3, f64)>,
-    /// Vertex indices of each edge, the smaller one first.
-    edges: Vec<[u32; 2]>,
-    /// For each edge the range of its entries in `edge_triangles`, as a start; one more at the end.
-    edge_starts: Vec<u32>,
-    /// Triangle, and whether it runs along the edge from the smaller index to the larger.
-    edge_triangles: Vec<(u32, bool)>,
+    /// Edges that two triangles pass, one each way.
+    paired_edges: Vec<PairedEdge>,
+    /// All other edges.
+    odd_edges: Vec<OddEdge>,
+    bounds: Option<Bounds>,
     closed: bool,
+}
+
+/// An edge that one triangle passes from the first vertex to the second, and one other the other way.
+#[derive(Debug, Clone, Copy)]
+struct PairedEdge {
+    ends: [u32; 2],
+    forward: u32,
+    backward: u32,
+}
+
+/// An edge with any triangles about it, and whether each passes it from the first vertex to the second.
+#[derive(Debug, Clone)]
+struct OddEdge {
+    ends: [u32; 2],
+    triangles: Vec<(u32, bool)>,
+}
+
+/// What casts for one light, and the edges that bound it as the light sees it.
+#[derive(Debug, Clone)]
+pub struct Silhouette {
+    light: LightPlace,
+    /// For each triangle: 1, it casts as it is wound; -1, turned over; 0, not.
+    casts: Vec<i8>,
+    /// Edges in the direction in which the casting triangles pass them, each as often as its multiplicity.
+    edges: Vec<[u32; 2]>,
 }
 
 impl Caster {
     /// Prepares a mesh whose equal positions share one index. Any soup of triangles will do.
     pub fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Self {
-        let planes = triangles
-            .iter()
-            .map(|triangle| {
-                let [a, b, c] = triangle.map(|index| positions[index as usize].as_dvec3());
-                let normal = (b - a).cross(c - a);
-                (normal, normal.dot(a))
-            })
-            .collect();
-
-        let mut index_of_edge: HashMap<[u32; 2], u32> = HashMap::new();
-        let mut edges = Vec::new();
-        let mut incidences: Vec<(u32, u32, bool)> = Vec::new();
-        for (triangle_index, &[a, b, c]) in triangles.iter().enumerate() {
+        let mut around: HashMap<[u32; 2], Vec<(u32, bool)>> =
+            HashMap::with_capacity(3 * triangles.len() / 2);
+        let mut order = Vec::with_capacity(3 * triangles.len() / 2);
+        for (triangle, &[a, b, c]) in triangles.iter().enumerate() {
             for (from, to) in [(a, b), (b, c), (c, a)] {
-                let key = [from.min(to), from.max(to)];
-                let edge = *index_of_edge.entry(key).or_insert_with(|| {
-                    edges.push(key);
-                    edges.len() as u32 - 1
+                let ends = [from.min(to), from.max(to)];
+                let known = around.entry(ends).or_insert_with(|| {
+                    order.push(ends);
+                    Vec::with_capacity(2)
                 });
-                incidences.push((edge, triangle_index as u32, from < to));
+                known.push((triangle as u32, from < to));
             }
         }
-        incidences.sort_unstable();
-        let mut edge_starts = vec![0; edges.len() + 1];
-        for &(edge, _, _) in &incidences {
-            edge_starts[edge as usize + 1] += 1;
+        let mut paired_edges = Vec::with_capacity(order.len());
+        let mut odd_edges = Vec::new();
+        let mut closed = !triangles.is_empty();
+        for ends in order {
+            let triangles = around.remove(&ends).unwrap_or_default();
+            match triangles[..] {
+                [(forward, true), (backward, false)] | [(backward, false), (forward, true)] => {
+                    paired_edges.push(PairedEdge {
+                        ends,
+                        forward,
+                        backward,
+                    });
+                }
+                _ => {
+                    let forward = triangles.iter().filter(|(_, forward)| *forward).count();
+                    closed &= 2 * forward == triangles.len();
+                    odd_edges.push(OddEdge { ends, triangles });
+                }
+            }
         }
-        for edge in 0..edges.len() {
-            edge_starts[edge + 1] += edge_starts[edge];
-        }
-        let edge_triangles: Vec<(u32, bool)> = incidences
-            .into_iter()
-            .map(|(_, triangle, forward)| (triangle, forward))
-            .collect();
-        let closed = !edges.is_empty()
-            && edge_starts.windows(2).all(|range| {
-                let around = &edge_triangles[range[0] as usize..range[1] as usize];
-                around.iter().filter(|(_, forward)| *forward).count() * 2 == around.len()
-            });
+        let planes = planes(&positions, &triangles, &paired_edges);
         Self {
+            bounds: Bounds::around(positions.iter().map(|position| position.as_dvec3())),
             positions,
             triangles,
             planes,
-            edges,
-            edge_starts,
-            edge_triangles,
+            paired_edges,
+            odd_edges,
             closed,
         }
     }
 
-    /// Whether each edge is run along as often one way as the other, so that a ray that enters the mesh leaves it
-    /// again and the triangles facing the light are enough.
+    /// Whether each edge is passed as often one way as the other, so that a way that enters the mesh leaves it again.
     pub fn is_closed(&self) -> bool {
         self.closed
     }
 
-    /// Homogeneous vertices for [`Caster::volume_indices`]: the mesh's own (w = 1), then each cast away from the
-    /// light to infinity (w = 0).
-    pub fn volume_vertices(&self, light: LightPlace) -> Vec<Vec4> {
+    /// The box around it, metres; `None` without triangles.
+    pub fn bounds(&self) -> Option<&Bounds> {
+        self.bounds.as_ref()
+    }
+
+    /// The fewest triangles that are known to cast the right shadow for an eye at `eye`, which sees the scene.
+    pub fn casting(&self, light: LightPlace, eye: DVec3) -> Casting {
+        let outside = |point: DVec3| !self.bounds.is_some_and(|bounds| bounds.contains(point));
+        let lit_from_outside = match light {
+            LightPlace::Point(light) => outside(light),
+            LightPlace::Along(_) => true,
+        };
+        if self.closed && lit_from_outside && outside(eye) {
+            Casting::Facing
+        } else {
+            Casting::All
+        }
+    }
+
+    /// Homogeneous vertices that [`Caster::side_indices`] and [`Caster::cap_indices`] point to: the mesh's own
+    /// (w = 1), and each again (w = 0), to be cast away from the light to infinity.
+    pub fn volume_vertices(&self) -> Vec<Vec4> {
         let near = self.positions.iter().map(|position| position.extend(1.0));
-        let far = self.positions.iter().map(|position| match light {
-            LightPlace::Point(light) => (position.as_dvec3() - light).as_vec3().extend(0.0),
-            LightPlace::Along(direction) => direction.as_vec3().extend(0.0),
-        });
+        let far = self.positions.iter().map(|position| position.extend(0.0));
         near.chain(far).collect()
     }
 
-    /// Triangles of the closed shadow volume, counter-clockwise seen from outside it, as indices into
-    /// [`Caster::volume_vertices`].
-    ///
-    /// The near cap is made of the mesh's own triangles with their own vertex order, so that it covers the same
-    /// pixels at the same depths as the mesh does.
-    pub fn volume_indices(&self, light: LightPlace) -> Vec<u32> {
+    /// What casts, and its outline.
+    pub fn silhouette(&self, light: LightPlace, casting: Casting) -> Silhouette {
         let (light_point, light_weight) = light.homogeneous();
-        // +1: the triangle casts as it is wound; -1: it casts turned over; 0: it does not cast.
+        let edge_on = match (light, &self.bounds) {
+            (LightPlace::Point(light), Some(bounds)) => {
+                EDGE_ON
+                    * (bounds.low - light)
+                        .abs()
+                        .max((bounds.high - light).abs())
+                        .length()
+            }
+            _ => EDGE_ON,
+        };
+        let turned_away = match casting {
+            Casting::Facing => 0,
+            Casting::All => -1,
+        };
         let casts: Vec<i8> = self
             .planes
             .iter()
             .map(|(normal, offset)| {
-                let faces_light = normal.dot(light_point) - offset * light_weight > 0.0;
-                match (faces_light, self.closed) {
-                    (true, _) => 1,
-                    (false, true) => 0,
-                    (false, false) => -1,
+                let above = normal.dot(light_point) - offset * light_weight;
+                if above > edge_on {
+                    1
+                } else if above < -edge_on {
+                    turned_away
+                } else {
+                    0
                 }
             })
             .collect();
 
+        self.outline(light, casts)
+    }
+
+    fn outline(&self, light: LightPlace, casts: Vec<i8>) -> Silhouette {
+        let mut edges = Vec::new();
+        let mut push = |[a, b]: [u32; 2], multiplicity: i32| {
+            let edge = if multiplicity > 0 { [a, b] } else { [b, a] };
+            edges.extend((0..multiplicity.unsigned_abs()).map(|_| edge));
+        };
+        for edge in &self.paired_edges {
+            let multiplicity =
+                i32::from(casts[edge.forward as usize]) - i32::from(casts[edge.backward as usize]);
+            if multiplicity != 0 {
+                push(edge.ends, multiplicity);
+            }
+        }
+        for edge in &self.odd_edges {
+            let net = |&(triangle, forward): &(u32, bool)| {
+                let cast = i32::from(casts[triangle as usize]);
+                if forward { cast } else { -cast }
+            };
+            push(edge.ends, edge.triangles.iter().map(net).sum());
+        }
+        Silhouette {
+            light,
+            casts,
+            edges,
+        }
+    }
+
+    /// Triangles of the volume's sides, counter-clockwise seen from outside it.
+    pub fn side_indices(&self, silhouette: &Silhouette) -> Vec<u32> {
         let far = self.positions.len() as u32;
-        let point_light = matches!(light, LightPlace::Point(_));
+        let mut indices = Vec::with_capacity(6 * silhouette.edges.len());
+        for &[from, to] in &silhouette.edges {
+            // The caps run from `from` to `to`; the side must run back.
+            indices.extend([to, from, far + from]);
+            // Parallel light meets itself in one point at infinity.
+            if matches!(silhouette.light, LightPlace::Point(_)) {
+                indices.extend([to, far + from, far + to]);
+            }
+        }
+        indices
+    }
+
+    /// Triangles of the volume's near and far caps, counter-clockwise seen from outside it.
+    ///
+    /// The near cap is made of the mesh's own triangles with their own vertex order, so that it covers the same
+    /// pixels at the same depths as the mesh does.
+    pub fn cap_indices(&self, silhouette: &Silhouette) -> Vec<u32> {
+        let far = self.positions.len() as u32;
         let mut indices = Vec::with_capacity(6 * self.triangles.len());
-        for (&[a, b, c], &cast) in self.triangles.iter().zip(&casts) {
+        for (&[a, b, c], &cast) in self.triangles.iter().zip(&silhouette.casts) {
             let (b, c) = match cast {
                 0 => continue,
                 1 => (b, c),
                 _ => (c, b),
             };
             indices.extend([a, b, c]);
-            // Parallel light meets itself in one point at infinity: there is no far cap to draw.
-            if point_light {
+            // The far cap of parallel light is a point.
+            if matches!(silhouette.light, LightPlace::Point(_)) {
                 indices.extend([far + a, far + c, far + b]);
-            }
-        }
-        for (edge, &[a, b]) in self.edges.iter().enumerate() {
-            let around = self.edge_starts[edge] as usize..self.edge_starts[edge + 1] as usize;
-            let multiplicity: i32 = self.edge_triangles[around]
-                .iter()
-                .map(|&(triangle, forward)| {
-                    let cast = i32::from(casts[triangle as usize]);
-                    if forward { cast } else { -cast }
-                })
-                .sum();
-            // The caps run from `from` to `to`; the side must run back.
-            let (from, to) = if multiplicity > 0 { (a, b) } else { (b, a) };
-            for _ in 0..multiplicity.unsigned_abs() {
-                indices.extend([to, from, far + from]);
-                if point_light {
-                    indices.extend([to, far + from, far + to]);
-                }
             }
         }
         indices
     }
+
+    /// Triangles turned away from the light, so that they lie in their own shadow, of whose `corner_normals` some face
+    /// it: smooth shading lights them up to the line where the normals turn away.
+    pub fn terminator(&self, silhouette: &Silhouette, corner_normals: &[[Vec3; 3]]) -> Vec<usize> {
+        let (light_point, light_weight) = silhouette.light.homogeneous();
+        let (light_point, light_weight) = (light_point.as_vec3(), light_weight as f32);
+        let faces_light = |vertex: u32, normal: Vec3| {
+            let place = self.positions[vertex as usize];
+            normal.dot(light_point - place * light_weight) > 0.0
+        };
+        let smooth = |triangle: &usize| {
+            let corners = self.triangles[*triangle]
+                .iter()
+                .zip(&corner_normals[*triangle]);
+            corners
+                .into_iter()
+                .any(|(&vertex, &normal)| faces_light(vertex, normal))
+        };
+        (0..self.triangles.len())
+            .filter(|&triangle| silhouette.casts[triangle] < 1)
+            .filter(smooth)
+            .collect()
+    }
+}
+
+impl Silhouette {
+    /// Whether nothing casts.
+    pub fn is_empty(&self) -> bool {
+        self.casts.iter().all(|&cast| cast == 0)
+    }
+}
+
+/// How many volumes can lie one in another, so that a narrow counter never wraps.
+impl Caster {
+    /// The silhouette, cut into as many parts as it takes that no point lies in more than `most` (at least 1) volumes
+    /// of one part, each with a bound of that number. A point is in the shadow if it lies in any part's volume.
+    pub fn parts(&self, silhouette: Silhouette, most: u32) -> Vec<(Silhouette, u32)> {
+        let bound = self.most_layers(&silhouette, most);
+        if bound <= most {
+            return vec![(silhouette, bound)];
+        }
+        let casting = silhouette.casts.iter().filter(|&&cast| cast != 0).count();
+        let mut seen = 0;
+        let mut halves = [silhouette.casts.clone(), silhouette.casts];
+        for triangle in 0..self.triangles.len() {
+            if halves[0][triangle] != 0 {
+                let other = usize::from(2 * seen < casting);
+                halves[other][triangle] = 0;
+                seen += 1;
+            }
+        }
+        halves
+            .into_iter()
+            .flat_map(|casts| self.parts(self.outline(silhouette.light, casts), most))
+            .collect()
+    }
+
+    /// An upper bound of the number of casting triangles between the light and any point; the first found that is at
+    /// most `enough`, which is all that the caller asks.
+    ///
+    /// On the sphere of directions about the light that number changes at silhouette edges alone, and a great circle
+    /// crosses them as often inwards as outwards: no direction can have more than half the edges that a great circle
+    /// through it and a pole meets, besides what the pole has.
+    fn most_layers(&self, silhouette: &Silhouette, enough: u32) -> u32 {
+        let casting = silhouette.casts.iter().filter(|&&cast| cast != 0).count() as u32;
+        let at_pole;
+        let mut spans: Vec<[f64; 2]> = Vec::new();
+        let place = |index: u32| self.positions[index as usize].as_dvec3();
+        match (silhouette.light, &self.bounds) {
+            (LightPlace::Point(light), Some(bounds)) => {
+                let away = light - light.clamp(bounds.low, bounds.high);
+                let pole = away.try_normalize().unwrap_or(SOME_DIRECTION);
+                at_pole = match away == DVec3::ZERO {
+                    true => self.casting_towards(silhouette, light, pole),
+                    false => 0,
+                };
+                let quick = casting.min(at_pole + silhouette.edges.len() as u32 / 2);
+                if quick <= enough {
+                    return quick;
+                }
+                let (first, second) = pole.any_orthonormal_pair();
+                let angle = |index: u32| {
+                    let way = place(index) - light;
+                    way.dot(second).atan2(way.dot(first)) / PI
+                };
+                spans.extend(silhouette.edges.iter().map(|&[from, to]| {
+                    // In half turns: a great circle is two opposite meridians. The arc takes the shorter way.
+                    let from = angle(from);
+                    let turn = (angle(to) - from + 1.0).rem_euclid(2.0) - 1.0;
+                    [from + turn.min(0.0), from + turn.max(0.0)]
+                }));
+            }
+            (LightPlace::Along(direction), Some(bounds)) => {
+                at_pole = 0;
+                let quick = casting.min(silhouette.edges.len() as u32 / 2);
+                if quick <= enough {
+                    return quick;
+                }
+                // Seen from afar the great circles are parallel lines.
+                let across =
+                    direction.any_orthonormal_vector() / (bounds.high - bounds.low).length();
+                spans.extend(silhouette.edges.iter().map(|&[from, to]| {
+                    let ends =
+                        [from, to].map(|index| (place(index) - bounds.low).dot(across) / 2.0);
+                    [ends[0].min(ends[1]), ends[0].max(ends[1])]
+                }));
+            }
+            (_, None) => return 0,
+        }
+        casting.min(at_pole + most_overlapping(&spans) / 2)
+    }
+
+    /// Casting triangles that the ray from the light meets (Möller & Trumbore 1997).
+    fn casting_towards(&self, silhouette: &Silhouette, light: DVec3, direction: DVec3) -> u32 {
+        let meets = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|index| self.positions[index as usize].as_dvec3());
+            let (first, second) = (b - a, c - a);
+            let across = direction.cross(second);
+            let determinant = first.dot(across);
+            let u = (light - a).dot(across) / determinant;
+            let aside = (light - a).cross(first);
+            let v = direction.dot(aside) / determinant;
+            u >= 0.0 && v >= 0.0 && u + v <= 1.0 && second.dot(aside) / determinant > 0.0
+        };
+        let casting = self.triangles.iter().zip(&silhouette.casts);
+        casting
+            .filter(|(triangle, cast)| **cast != 0 && meets(triangle))
+            .count() as u32
+    }
+}
+
+/// A direction along which no mesh has a reason to put a vertex.
+const SOME_DIRECTION: DVec3 = DVec3::new(
+    0.267_261_241_912_424,
+    0.534_522_483_824_849,
+    0.801_783_725_737_273,
+);
+
+/// An upper bound of how many of the spans share a point, where whole numbers are one and the same.
+fn most_overlapping(spans: &[[f64; 2]]) -> u32 {
+    let bins = (4 * spans.len()).max(64);
+    let mut change = vec![0_i64; bins + 1];
+    let mut wrapped = 0;
+    for &[low, high] in spans {
+        // A bin more on both sides leaves rounding no say.
+        let first = (low * bins as f64).floor() as i64 - 1;
+        let last = (high * bins as f64).floor() as i64 + 1;
+        if last - first >= bins as i64 {
+            wrapped += 1;
+            continue;
+        }
+        let first = first.rem_euclid(bins as i64) as usize;
+        let last = last.rem_euclid(bins as i64) as usize;
+        change[first] += 1;
+        change[last + 1] -= 1;
+        wrapped += i64::from(first > last);
+    }
+    let mut overlapping = wrapped;
+    let mut most = 0;
+    for change in change {
+        overlapping += change;
+        most = most.max(overlapping);
+    }
+    most as u32
+}
+
+/// A triangle whose height is a smaller part than this of its longest edge has no orientation that rounding left whole.
+const NEEDLE: f64 = 1e-5;
+
+/// Planes of the triangles. A triangle without area has none; it takes that of a neighbour, so that it casts with it
+/// and no slit opens between.
+fn planes(positions: &[Vec3], triangles: &[[u32; 3]], edges: &[PairedEdge]) -> Vec<(DVec3, f64)> {
+    let mut planes: Vec<(DVec3, f64)> = triangles
+        .iter()
+        .map(|triangle| {
+            let [a, b, c] = triangle.map(|index| positions[index as usize].as_dvec3());
+            let across = (b - a).cross(c - a);
+            let longest = (b - a).length().max((c - a).length()).max((c - b).length());
+            let normal = match across.length() > NEEDLE * longest * longest {
+                true => across.normalize(),
+                false => DVec3::ZERO,
+            };
+            (normal, normal.dot(a))
+        })
+        .collect();
+    let length = |[a, b]: [u32; 2]| positions[a as usize].distance(positions[b as usize]);
+    let is_flat = |plane: &(DVec3, f64)| plane.0 == DVec3::ZERO;
+    if !planes.iter().any(is_flat) {
+        return planes;
+    }
+    // The longest edge first: it is the one that the slit would run along.
+    let mut longest_first: Vec<&PairedEdge> = edges.iter().collect();
+    longest_first.sort_by(|a, b| length(b.ends).total_cmp(&length(a.ends)));
+    for edge in longest_first {
+        let [forward, backward] = [edge.forward as usize, edge.backward as usize];
+        match (is_flat(&planes[forward]), is_flat(&planes[backward])) {
+            (true, false) => planes[forward] = planes[backward],
+            (false, true) => planes[backward] = planes[forward],
+            _ => {}
+        }
+    }
+    planes
 }
 
 #[cfg(test)]
@@ -202,6 +496,14 @@ mod tests {
             [1, 7, 5],
         ];
         Caster::new(positions, triangles)
+    }
+
+    /// The caps and sides for a light.
+    fn volume(caster: &Caster, light: LightPlace, casting: Casting) -> Vec<u32> {
+        let silhouette = caster.silhouette(light, casting);
+        let mut indices = caster.cap_indices(&silhouette);
+        indices.extend(caster.side_indices(&silhouette));
+        indices
     }
 
     /// How often each directed edge is used, less the uses of its opposite; all points at infinity of a distant light
@@ -241,21 +543,18 @@ mod tests {
     #[test]
     fn the_volume_is_closed_for_every_light_and_any_soup() {
         let closed = cube();
-        let mut open = cube();
-        open.triangles.truncate(9);
-        open.triangles.push([0, 1, 7]);
-        open.triangles.push([7, 1, 3]);
-        let open = Caster::new(open.positions, open.triangles);
+        let mut triangles = closed.triangles[..9].to_vec();
+        triangles.extend([[0, 1, 7], [7, 1, 3]]);
+        let open = Caster::new(closed.positions.clone(), triangles);
         assert!(closed.is_closed() && !open.is_closed());
         for caster in [&closed, &open] {
             for light in lights() {
-                let distant = matches!(light, LightPlace::Along(_));
-                let open_edges = boundary(
-                    &caster.volume_indices(light),
-                    &caster.volume_vertices(light),
-                    distant,
-                );
-                assert_eq!(open_edges, 0, "{light:?}");
+                for casting in [Casting::Facing, Casting::All] {
+                    let distant = matches!(light, LightPlace::Along(_));
+                    let indices = volume(caster, light, casting);
+                    let open_edges = boundary(&indices, &caster.volume_vertices(), distant);
+                    assert_eq!(open_edges, 0, "{light:?} {casting:?}");
+                }
             }
         }
     }
@@ -264,25 +563,25 @@ mod tests {
     fn a_cube_lit_from_above_has_the_outline_of_its_top() {
         let light = LightPlace::Along(DVec3::new(0.0, 0.0, -1.0));
         // Two triangles of cap, four sides that meet at infinity.
-        assert_eq!(cube().volume_indices(light).len() / 3, 2 + 4);
+        assert_eq!(volume(&cube(), light, Casting::Facing).len() / 3, 2 + 4);
     }
 
     #[test]
-    fn the_winding_number_tells_shadow_from_light() {
-        // A ray from a point in shadow, away from everything, crosses the volume once outward.
+    fn the_winding_number_counts_the_triangles_towards_the_light() {
+        // A ray from a point, away from everything, crosses the volumes outward once for each that it lies in.
         let caster = cube();
-        let light = LightPlace::Point(DVec3::new(0.4, 0.3, 5.0));
-        let (vertices, indices) = (caster.volume_vertices(light), caster.volume_indices(light));
-        let far = 1e4;
-        let place = |index: u32| {
-            let vertex = vertices[index as usize];
-            if vertex.w == 0.0 {
-                DVec3::new(0.4, 0.3, 5.0) + vertex.truncate().as_dvec3() * far
-            } else {
-                vertex.truncate().as_dvec3()
-            }
-        };
-        let crossings = |origin: DVec3| -> i32 {
+        let crossings = |light: DVec3, casting: Casting, origin: DVec3| -> i32 {
+            let indices = volume(&caster, LightPlace::Point(light), casting);
+            let vertices = caster.volume_vertices();
+            let place = |index: u32| {
+                let vertex = vertices[index as usize];
+                let place = vertex.truncate().as_dvec3();
+                if vertex.w == 0.0 {
+                    light + (place - light) * 1e4
+                } else {
+                    place
+                }
+            };
             let direction = DVec3::new(1.0, 0.123, 0.0456);
             indices
                 .chunks(3)
@@ -302,8 +601,156 @@ mod tests {
                 })
                 .sum()
         };
-        assert_eq!(crossings(DVec3::new(0.5, 0.5, -1.0)), 1);
-        assert_eq!(crossings(DVec3::new(0.5, 0.5, 2.0)), 0);
-        assert_eq!(crossings(DVec3::new(-3.0, 0.5, -1.0)), 0);
+        let above = DVec3::new(0.4, 0.3, 5.0);
+        let (below, over, beside) = (
+            DVec3::new(0.5, 0.55, -1.0),
+            DVec3::new(0.5, 0.55, 2.0),
+            DVec3::new(-3.0, 0.5, -1.0),
+        );
+        for (point, facing, all) in [(below, 1, 2), (over, 0, 0), (beside, 0, 0)] {
+            assert_eq!(crossings(above, Casting::Facing, point), facing, "{point}");
+            assert_eq!(crossings(above, Casting::All, point), all, "{point}");
+        }
+        // From within, each way out meets one triangle.
+        let within = DVec3::new(0.4, 0.3, 0.5);
+        for point in [below, over, beside] {
+            assert_eq!(crossings(within, Casting::All, point), 1, "{point}");
+        }
+        assert_eq!(
+            crossings(within, Casting::All, DVec3::new(0.2, 0.7, 0.3)),
+            0
+        );
+    }
+
+    #[test]
+    fn the_cheap_way_is_taken_only_with_light_and_eye_outside_a_closed_mesh() {
+        let (light, eye) = (DVec3::new(0.3, 0.4, 5.0), DVec3::new(4.0, 0.0, 2.0));
+        let inside = DVec3::splat(0.4);
+        let closed = cube();
+        let open = Caster::new(closed.positions.clone(), closed.triangles[1..].to_vec());
+        let point = LightPlace::Point;
+        assert_eq!(closed.casting(point(light), eye), Casting::Facing);
+        assert_eq!(
+            closed.casting(LightPlace::Along(DVec3::X), eye),
+            Casting::Facing
+        );
+        assert_eq!(closed.casting(point(light), inside), Casting::All);
+        assert_eq!(closed.casting(point(inside), eye), Casting::All);
+        assert_eq!(open.casting(point(light), eye), Casting::All);
+    }
+
+    /// Cubes one around another, in the middle of the unit cube.
+    fn nested(count: usize) -> Caster {
+        let cube = cube();
+        let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+        for shell in 0..count {
+            let scale = 1.0 - 0.9 * shell as f32 / count as f32;
+            let first = positions.len() as u32;
+            positions.extend(cube.positions.iter().map(|p| 0.5 + (*p - 0.5) * scale));
+            triangles.extend(cube.triangles.iter().map(|t| t.map(|index| first + index)));
+        }
+        Caster::new(positions, triangles)
+    }
+
+    #[test]
+    fn the_bound_of_layers_holds_and_is_not_far_off() {
+        for count in [1, 7, 40] {
+            let caster = nested(count);
+            for light in lights() {
+                for (casting, each) in [(Casting::Facing, 1), (Casting::All, 2)] {
+                    let silhouette = caster.silhouette(light, casting);
+                    // The innermost cube lies behind all the others.
+                    let (origin, way) = match light {
+                        LightPlace::Point(light) => {
+                            (light, DVec3::new(0.501, 0.502, 0.5003) - light)
+                        }
+                        LightPlace::Along(way) => {
+                            (DVec3::new(0.501, 0.502, 0.5003) - way * 9.0, way)
+                        }
+                    };
+                    let layers = caster.casting_towards(&silhouette, origin, way);
+                    let bound = caster.most_layers(&silhouette, 0);
+                    let from_within = light == lights()[1];
+                    if !from_within {
+                        assert_eq!(layers as usize, each * count, "{light:?}");
+                    }
+                    assert!(bound >= layers, "{bound} {layers} {light:?} {casting:?}");
+                    assert!(
+                        bound <= 3 * layers + 3,
+                        "{bound} {layers} {light:?} {casting:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn deep_nests_are_cut_into_parts_that_cast_the_same_triangles() {
+        let caster = nested(40);
+        for light in lights() {
+            let whole = caster.silhouette(light, Casting::All);
+            let parts = caster.parts(whole.clone(), 15);
+            assert!(parts.len() >= 2, "{light:?}");
+            let mut casts = vec![0; whole.casts.len()];
+            for (part, layers) in &parts {
+                assert!(*layers <= 15);
+                for (sum, cast) in casts.iter_mut().zip(&part.casts) {
+                    *sum += cast;
+                }
+            }
+            assert_eq!(casts, whole.casts);
+        }
+        let shallow = cube().silhouette(lights()[0], Casting::All);
+        assert_eq!(cube().parts(shallow, 15).len(), 1);
+    }
+
+    #[test]
+    fn overlapping_spans_are_bounded_from_above() {
+        assert_eq!(most_overlapping(&[]), 0);
+        assert_eq!(most_overlapping(&[[0.1, 0.2], [0.5, 0.6], [0.15, 0.55]]), 2);
+        // Whole numbers are one and the same.
+        assert_eq!(
+            most_overlapping(&[[0.9, 1.1], [-0.02, 0.02], [0.4, 0.5]]),
+            2
+        );
+        assert_eq!(most_overlapping(&[[0.0, 1.0], [0.3, 0.4]]), 2);
+    }
+
+    #[test]
+    fn a_needle_casts_as_its_neighbour_does() {
+        // A square of which one triangle has a vertex in the middle of the diagonal, joined by a needle.
+        let positions = vec![
+            Vec3::ZERO,
+            Vec3::X,
+            Vec3::new(1.0, 1.0, 0.0),
+            Vec3::Y,
+            Vec3::new(0.5, 0.5, 0.0),
+        ];
+        let triangles = vec![[0, 1, 2], [0, 4, 3], [4, 2, 3], [0, 2, 4]];
+        let caster = Caster::new(positions, triangles);
+        let light = LightPlace::Point(DVec3::new(0.3, 0.2, 2.0));
+        let silhouette = caster.silhouette(light, Casting::All);
+        assert_eq!(silhouette.casts, [1; 4]);
+        assert_eq!(silhouette.edges.len(), 4);
+    }
+
+    #[test]
+    fn the_terminator_is_where_smooth_normals_still_face_the_light() {
+        let caster = cube();
+        let light = LightPlace::Point(DVec3::new(0.5, 0.5, 9.0));
+        let silhouette = caster.silhouette(light, Casting::Facing);
+        // As on a ball about the cube: the sides' upper corners face the light, the bottom's do not.
+        let normals: Vec<[Vec3; 3]> = caster
+            .triangles
+            .iter()
+            .map(|t| t.map(|index| (caster.positions[index as usize] - 0.5).normalize()))
+            .collect();
+        let is_side = |triangle: &usize| {
+            let corners =
+                caster.triangles[*triangle].map(|index| caster.positions[index as usize].z);
+            corners.iter().sum::<f32>() % 3.0 != 0.0
+        };
+        let terminator = caster.terminator(&silhouette, &normals);
+        assert_eq!(terminator, (0..12).filter(is_side).collect::<Vec<_>>());
     }
 }

@@ -1,13 +1,14 @@
 //! The scene's meshes on the GPU. Objects stand still on their anchor, so their vertices are kept in the anchor's
 //! space: one matrix per anchor draws all that it carries.
 
+use std::collections::HashMap;
 use std::f64::consts::PI;
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use wgpu::util::DeviceExt as _;
 
-use crate::geometry::reach::Bounds;
+use crate::geometry::bounds::Bounds;
 use crate::geometry::shadow_volume::Caster;
 use crate::light::bounce::Reflector;
 use crate::scene::{Object, Scene};
@@ -48,10 +49,12 @@ pub(super) const INDIRECT_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::Vert
 pub(super) struct SurfaceBatch {
     pub role: Role,
     pub anchor: usize,
+    /// What triangles share: corners of the same place, normal and material.
     pub corners: wgpu::Buffer,
     /// For each corner the irradiance that no light gives it.
     pub indirect: wgpu::Buffer,
-    pub corner_count: u32,
+    pub indices: wgpu::Buffer,
+    pub index_count: u32,
 }
 
 /// One thing that takes light away, in its anchor's space.
@@ -59,6 +62,18 @@ pub(super) struct AnchoredCaster {
     pub role: Role,
     pub anchor: usize,
     pub caster: Caster,
+    /// See [`Caster::volume_vertices`].
+    pub vertices: wgpu::Buffer,
+    /// Of a virtual thing with smooth shading.
+    pub smooth: Option<SmoothSurface>,
+}
+
+/// A surface that smooth normals light beyond the triangles that face the light.
+pub(super) struct SmoothSurface {
+    /// Unit normals of each triangle's corners, in the anchor's space.
+    pub corner_normals: Vec<[Vec3; 3]>,
+    /// Each triangle's corners in its batch.
+    pub triangles: Vec<[u32; 3]>,
 }
 
 /// The box around one thing, in its anchor's space.
@@ -66,24 +81,24 @@ pub(super) struct Extent {
     pub role: Role,
     pub anchor: usize,
     pub bounds: Bounds,
-    pub casts: bool,
+    /// Which caster it is, if it casts.
+    pub caster: Option<usize>,
 }
 
 /// The extents of all things.
 pub(super) fn extents(scene: &Scene) -> Vec<Extent> {
-    let real = scene.phantoms.iter().map(|object| (Role::Real, object));
-    let seeming = scene.virtuals.iter().map(|object| (Role::Virtual, object));
-    real.chain(seeming)
+    let mut casters = 0..;
+    objects(scene)
         .filter_map(|(role, object)| {
+            let caster = object.casts.then(|| casters.next()).flatten();
             let points = positions_in_anchor(object)
                 .into_iter()
                 .map(|point| point.as_dvec3());
-            let bounds = Bounds::around(points)?;
             Some(Extent {
                 role,
                 anchor: object.anchor,
-                bounds,
-                casts: object.casts,
+                bounds: Bounds::around(points)?,
+                caster,
             })
         })
         .collect()
@@ -91,36 +106,46 @@ pub(super) fn extents(scene: &Scene) -> Vec<Extent> {
 
 /// Surfaces, the real ones first.
 pub(super) fn surface_batches(device: &wgpu::Device, scene: &Scene) -> Vec<SurfaceBatch> {
-    let roles = [
-        (Role::Real, &scene.phantoms),
-        (Role::Virtual, &scene.virtuals),
-    ];
     let ambient = (PI * scene.ambient_radiance).as_vec3();
+    let buffer = |label, contents: &[u8], usage| {
+        device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some(label),
+            contents,
+            usage,
+        })
+    };
     let mut batches = Vec::new();
-    for (role, objects) in roles {
+    for role in [Role::Real, Role::Virtual] {
         for anchor in 0..scene.anchors.len() {
-            let corners: Vec<Corner> = objects
-                .iter()
-                .filter(|object| object.anchor == anchor)
-                .flat_map(corners)
-                .collect();
-            if corners.is_empty() {
+            let mut shared = SharedCorners::default();
+            for object in batch(scene, role, anchor) {
+                shared.add(object);
+            }
+            let SharedCorners {
+                corners, triangles, ..
+            } = shared;
+            if triangles.is_empty() {
                 continue;
             }
             batches.push(SurfaceBatch {
                 role,
                 anchor,
-                corner_count: corners.len() as u32,
-                corners: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                    label: Some("surface corners"),
-                    contents: bytemuck::cast_slice(&corners),
-                    usage: wgpu::BufferUsages::VERTEX,
-                }),
-                indirect: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                    label: Some("indirect light"),
-                    contents: bytemuck::cast_slice(&vec![ambient; corners.len()]),
-                    usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
-                }),
+                index_count: 3 * triangles.len() as u32,
+                corners: buffer(
+                    "surface corners",
+                    bytemuck::cast_slice(&corners),
+                    wgpu::BufferUsages::VERTEX,
+                ),
+                indirect: buffer(
+                    "indirect light",
+                    bytemuck::cast_slice(&vec![ambient; corners.len()]),
+                    wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+                ),
+                indices: buffer(
+                    "surface triangles",
+                    bytemuck::cast_slice(&triangles),
+                    wgpu::BufferUsages::INDEX,
+                ),
             });
         }
     }
@@ -128,17 +153,88 @@ pub(super) fn surface_batches(device: &wgpu::Device, scene: &Scene) -> Vec<Surfa
 }
 
 /// Casters, the real ones first.
-pub(super) fn casters(scene: &Scene) -> Vec<AnchoredCaster> {
+pub(super) fn casters(device: &wgpu::Device, scene: &Scene) -> Vec<AnchoredCaster> {
+    let mut smooth = smooth_surfaces(scene);
+    objects(scene)
+        .filter(|(_, object)| object.casts)
+        .map(|(role, object)| {
+            let caster = Caster::new(positions_in_anchor(object), object.mesh.triangles.clone());
+            AnchoredCaster {
+                role,
+                anchor: object.anchor,
+                vertices: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                    label: Some("shadow volume"),
+                    contents: bytemuck::cast_slice(&caster.volume_vertices()),
+                    usage: wgpu::BufferUsages::VERTEX,
+                }),
+                caster,
+                smooth: match role {
+                    Role::Real => None,
+                    Role::Virtual => smooth.remove(object.name.as_str()),
+                },
+            }
+        })
+        .collect()
+}
+
+/// All things, the real ones first.
+fn objects(scene: &Scene) -> impl Iterator<Item = (Role, &Object)> {
     let real = scene.phantoms.iter().map(|object| (Role::Real, object));
     let seeming = scene.virtuals.iter().map(|object| (Role::Virtual, object));
     real.chain(seeming)
-        .filter(|(_, object)| object.casts)
-        .map(|(role, object)| AnchoredCaster {
-            role,
-            anchor: object.anchor,
-            caster: Caster::new(positions_in_anchor(object), object.mesh.triangles.clone()),
-        })
-        .collect()
+}
+
+/// The things of one batch, in their order in it.
+fn batch(scene: &Scene, role: Role, anchor: usize) -> impl Iterator<Item = &Object> {
+    objects(scene)
+        .filter(move |(found, object)| *found == role && object.anchor == anchor)
+        .map(|(_, object)| object)
+}
+
+/// The surfaces of the virtual things that are not flatly shaded, by name.
+fn smooth_surfaces(scene: &Scene) -> HashMap<&str, SmoothSurface> {
+    let mut surfaces = HashMap::new();
+    for anchor in 0..scene.anchors.len() {
+        let mut shared = SharedCorners::default();
+        for object in batch(scene, Role::Virtual, anchor) {
+            let first = shared.triangles.len();
+            shared.add(object);
+            let normals: Vec<Vec3> = corners(object).map(|corner| corner.normal).collect();
+            let (corner_normals, _) = normals.as_chunks::<3>();
+            if corner_normals.iter().any(|[a, b, c]| a != b || b != c) {
+                let surface = SmoothSurface {
+                    corner_normals: corner_normals.to_vec(),
+                    triangles: shared.triangles[first..].to_vec(),
+                };
+                surfaces.insert(object.name.as_str(), surface);
+            }
+        }
+    }
+    surfaces
+}
+
+/// Corners that triangles share, and the triangles.
+#[derive(Default)]
+struct SharedCorners {
+    corners: Vec<Corner>,
+    triangles: Vec<[u32; 3]>,
+    index_of: HashMap<[u32; 10], u32>,
+}
+
+impl SharedCorners {
+    fn add(&mut self, object: &Object) {
+        let indices: Vec<u32> = corners(object).map(|corner| self.index(corner)).collect();
+        self.triangles.extend(indices.as_chunks::<3>().0);
+    }
+
+    fn index(&mut self, corner: Corner) -> u32 {
+        let next = self.corners.len() as u32;
+        let index = *self.index_of.entry(bytemuck::cast(corner)).or_insert(next);
+        if index == next {
+            self.corners.push(corner);
+        }
+        index
+    }
 }
 
 fn positions_in_anchor(object: &Object) -> Vec<Vec3> {
@@ -151,7 +247,8 @@ fn positions_in_anchor(object: &Object) -> Vec<Vec3> {
     object.mesh.positions.iter().map(place).collect()
 }
 
-fn corners(object: &Object) -> Vec<Corner> {
+/// Three corners for each triangle.
+fn corners(object: &Object) -> impl Iterator<Item = Corner> {
     let positions = positions_in_anchor(object);
     let normal_matrix = object.anchor_from_object.matrix3.inverse().transpose();
     let mesh = &object.mesh;
@@ -159,7 +256,7 @@ fn corners(object: &Object) -> Vec<Corner> {
         .iter()
         .zip(&mesh.corner_normals)
         .zip(&mesh.triangle_materials)
-        .flat_map(|((triangle, normals), &material)| {
+        .flat_map(move |((triangle, normals), &material)| {
             let material = object.materials[material as usize];
             [0, 1, 2].map(|corner| Corner {
                 position: positions[triangle[corner] as usize],
@@ -170,7 +267,6 @@ fn corners(object: &Object) -> Vec<Corner> {
                 roughness: material.roughness.unwrap_or(0.0) as f32,
             })
         })
-        .collect()
 }
 
 /// The triangles of an object as what light meets there, in its anchor's space.
@@ -186,9 +282,15 @@ pub(super) fn reflectors(object: &Object) -> impl Iterator<Item = Reflector> {
         })
 }
 
-/// Place and normal of each corner of an object's triangles, in its anchor's space; the same order as in a batch.
-pub(super) fn corner_places(object: &Object) -> impl Iterator<Item = (Vec3, Vec3)> {
-    corners(object)
-        .into_iter()
+/// The virtual things of one anchor as their batch has them: place and normal of each shared corner, and the triangles.
+pub(super) fn virtual_corners(scene: &Scene, anchor: usize) -> (Vec<(Vec3, Vec3)>, Vec<[u32; 3]>) {
+    let mut shared = SharedCorners::default();
+    for object in batch(scene, Role::Virtual, anchor) {
+        shared.add(object);
+    }
+    let places = shared.corners.iter();
+    let places = places
         .map(|corner| (corner.position, corner.normal))
+        .collect();
+    (places, shared.triangles)
 }

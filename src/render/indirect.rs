@@ -10,7 +10,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use crate::light::bounce::{Gathering, Mover, Surroundings};
 use crate::scene::Scene;
 
-use super::anchor_geometry::{corner_places, reflectors};
+use super::anchor_geometry::{reflectors, virtual_corners};
 
 /// Rays for a scene in which nothing moves: gathered once, in a second or so.
 const STANDING_BUDGET: usize = 1_000_000;
@@ -34,12 +34,7 @@ pub(super) struct Indirect {
 impl Indirect {
     /// Sends the rays; `None` where nothing virtual stands in the world.
     pub fn new(scene: &Scene) -> Option<Self> {
-        let corners: Vec<(Vec3, Vec3)> = scene
-            .virtuals
-            .iter()
-            .filter(|object| object.anchor == 0)
-            .flat_map(corner_places)
-            .collect();
+        let (corners, triangles) = virtual_corners(scene, 0);
         if corners.is_empty() {
             return None;
         }
@@ -54,7 +49,7 @@ impl Indirect {
             .collect();
         let surroundings =
             Surroundings::new(on_anchor(0), scene.lights.clone(), scene.ambient_radiance);
-        let (points, point_of_corner) = points(&corners);
+        let (points, point_of_corner) = points(&corners, &triangles);
         let budget = if movers.is_empty() {
             STANDING_BUDGET
         } else {
@@ -100,17 +95,18 @@ impl Indirect {
 }
 
 /// One point for all corners that share place and normal, and for each corner its point.
-fn points(corners: &[(Vec3, Vec3)]) -> (Vec<(DVec3, DVec3)>, Vec<usize>) {
+fn points(corners: &[(Vec3, Vec3)], triangles: &[[u32; 3]]) -> (Vec<(DVec3, DVec3)>, Vec<usize>) {
     let mut point_at: HashMap<[u32; 6], usize> = HashMap::new();
     let mut points = Vec::new();
-    let mut point_of_corner = Vec::with_capacity(corners.len());
-    for triangle in corners.chunks(3) {
-        let middle = triangle
+    let mut point_of_corner = vec![0; corners.len()];
+    for triangle in triangles {
+        let corners = triangle.map(|corner| corners[corner as usize]);
+        let middle = corners
             .iter()
             .map(|(place, _)| place.as_dvec3())
             .sum::<DVec3>()
             / 3.0;
-        for &(place, normal) in triangle {
+        for (&index, (place, normal)) in triangle.iter().zip(corners) {
             let [x, y, z] = place.to_array().map(f32::to_bits);
             let [nx, ny, nz] = normal.to_array().map(f32::to_bits);
             let point = *point_at.entry([x, y, z, nx, ny, nz]).or_insert_with(|| {
@@ -120,7 +116,7 @@ fn points(corners: &[(Vec3, Vec3)]) -> (Vec<(DVec3, DVec3)>, Vec<usize>) {
                 ));
                 points.len() - 1
             });
-            point_of_corner.push(point);
+            point_of_corner[index as usize] = point;
         }
     }
     (points, point_of_corner)

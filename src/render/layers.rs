@@ -4,7 +4,9 @@
 use super::anchor_geometry::{CORNER_LAYOUT, Role};
 use super::gpu::{Gpu, RenderError};
 use super::readback::Readback;
-use super::{shader, volumes};
+use super::shader;
+use super::stencil::SHADOW;
+use super::volumes::Volumes;
 
 const ROLE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
 const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
@@ -27,7 +29,7 @@ pub struct Layers {
 pub(super) struct LayerPasses {
     real: wgpu::RenderPipeline,
     seeming: wgpu::RenderPipeline,
-    volumes: wgpu::RenderPipeline,
+    volumes: Volumes,
     mark_real: wgpu::RenderPipeline,
     mark_virtual: wgpu::RenderPipeline,
     role: wgpu::Texture,
@@ -39,8 +41,10 @@ pub(super) struct LayerPasses {
     bits_readback: Readback,
 }
 
-/// Draws all surfaces of a role, or all volumes of a role's casters for one light, into the pass.
-pub(super) type DrawRole<'a> = &'a dyn Fn(&mut wgpu::RenderPass<'_>, Role);
+/// Draws all surfaces of a role into the pass.
+pub(super) type DrawSurfaces<'a> = &'a dyn Fn(&mut wgpu::RenderPass<'_>, Role);
+/// Counts all volumes of a role's casters for one light.
+pub(super) type CountVolumes<'a> = &'a dyn Fn(&mut wgpu::RenderPass<'_>, &Volumes, Role);
 
 impl LayerPasses {
     pub fn new(gpu: &Gpu, layout: &wgpu::PipelineLayout, size_px: [u32; 2]) -> Self {
@@ -92,6 +96,7 @@ impl LayerPasses {
                 cache: None,
             })
         };
+        let no_bindings = shader::no_bindings(device);
         let mark = |entry_point: &str| {
             let shadowed = wgpu::StencilFaceState {
                 compare: wgpu::CompareFunction::NotEqual,
@@ -104,7 +109,7 @@ impl LayerPasses {
             };
             device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(entry_point),
-                layout: Some(layout),
+                layout: Some(&no_bindings),
                 vertex: wgpu::VertexState {
                     module: &module,
                     entry_point: Some("whole_picture"),
@@ -119,7 +124,7 @@ impl LayerPasses {
                     stencil: wgpu::StencilState {
                         front: shadowed,
                         back: shadowed,
-                        read_mask: 0xff,
+                        read_mask: SHADOW,
                         write_mask: 0,
                     },
                     bias: wgpu::DepthBiasState::default(),
@@ -145,7 +150,7 @@ impl LayerPasses {
         Self {
             real: surface("real"),
             seeming: surface("virtual_thing"),
-            volumes: volumes::pipeline(device, layout, gpu.depth_format, 1, &[BITS_FORMAT]),
+            volumes: Volumes::new(device, layout, gpu.depth_format, 1, &[BITS_FORMAT]),
             mark_real: mark("in_real_shadow"),
             mark_virtual: mark("in_virtual_shadow"),
             depth_stencil: texture(
@@ -167,7 +172,7 @@ impl LayerPasses {
     pub fn role_and_depth(
         &self,
         gpu: &Gpu,
-        draw_surfaces: DrawRole<'_>,
+        draw_surfaces: DrawSurfaces<'_>,
     ) -> Result<(Vec<u8>, Vec<f32>), RenderError> {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let (role, depth_m) = (
@@ -195,8 +200,12 @@ impl LayerPasses {
         ))
     }
 
-    /// The shadow bits of the light whose volumes `draw_volumes` draws.
-    pub fn shadow(&self, gpu: &Gpu, draw_volumes: DrawRole<'_>) -> Result<Vec<u8>, RenderError> {
+    /// The shadow bits of the light whose volumes `count_volumes` counts.
+    pub fn shadow(
+        &self,
+        gpu: &Gpu,
+        count_volumes: CountVolumes<'_>,
+    ) -> Result<Vec<u8>, RenderError> {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let bits = self.bits.create_view(&Default::default());
         for (role, mark) in [
@@ -213,8 +222,7 @@ impl LayerPasses {
                 depth_stencil_attachment: Some(self.depth_stencil(wgpu::LoadOp::Load)),
                 ..Default::default()
             });
-            pass.set_pipeline(&self.volumes);
-            draw_volumes(&mut pass, role);
+            count_volumes(&mut pass, &self.volumes, role);
             pass.set_pipeline(mark);
             pass.set_stencil_reference(0);
             pass.draw(0..3, 0..1);

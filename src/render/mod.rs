@@ -4,6 +4,7 @@
 //! from top to bottom.
 
 mod anchor_geometry;
+mod casters;
 mod composite;
 mod gpu;
 mod gpu_clock;
@@ -12,6 +13,7 @@ mod layers;
 mod readback;
 mod renderer;
 mod shader;
+mod stencil;
 mod surfaces;
 mod touched;
 mod uniforms;

@@ -10,7 +10,8 @@ use crate::geometry::reach::PixelRect;
 use crate::light::Light;
 use crate::scene::Scene;
 
-use super::anchor_geometry::{self, AnchoredCaster, Extent, Role, SurfaceBatch};
+use super::anchor_geometry::{self, Extent, Role, SurfaceBatch};
+use super::casters::Casters;
 use super::composite::{Composite, GAIN_FORMAT, PICTURE_FORMAT};
 use super::gpu::{Gpu, RenderError};
 use super::gpu_clock::{GpuClock, GpuTimes};
@@ -18,9 +19,9 @@ use super::indirect::Indirect;
 use super::layers::{LayerPasses, Layers};
 use super::readback::Readback;
 use super::surfaces::{LIGHT_FORMAT, Surfaces};
-use super::touched::{light_place, touched_by_virtual};
+use super::touched::{Touched, everywhere, touched_by_virtual};
 use super::uniforms::{Lens, LightSource, UniformRow, View, uniform_entry};
-use super::volumes::{self, VolumeBuffers};
+use super::volumes::{Among, Volumes, set_scissor};
 
 /// What a frame shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,34 +38,32 @@ pub struct Renderer {
     intrinsics: Intrinsics,
     lights: Vec<Light>,
     surfaces: Vec<SurfaceBatch>,
-    casters: Vec<AnchoredCaster>,
+    casters: Casters,
     extents: Vec<Extent>,
     indirect: Option<Indirect>,
-    /// For each light those of each caster.
-    volumes: Vec<Vec<VolumeBuffers>>,
     views: UniformRow,
     light_sources: UniformRow,
     view_group: wgpu::BindGroup,
     light_group: wgpu::BindGroup,
     geometry_layout: wgpu::PipelineLayout,
     surface_pass: Surfaces,
-    volume_pipeline: wgpu::RenderPipeline,
+    volume_pass: Volumes,
     composite_pass: Composite,
     composite_group: wgpu::BindGroup,
     recorded: wgpu::Texture,
     picture: wgpu::Texture,
-    before: wgpu::TextureView,
-    after: wgpu::TextureView,
+    reaching: wgpu::TextureView,
+    change: wgpu::TextureView,
     depth_stencil: wgpu::TextureView,
     picture_readback: Readback,
     clock: Option<GpuClock>,
     layer_passes: Option<LayerPasses>,
-    /// Whether each anchor has a pose in the frame that was drawn last, and so whether it is drawn.
-    placed: Vec<bool>,
+    /// The poses of the frame that was drawn last.
+    camera_from_anchor: Vec<Option<DAffine3>>,
     /// What that frame showed.
     shown: Shown,
-    /// The pixels that virtual things and their shadows could reach in that frame.
-    touched: Option<PixelRect>,
+    /// What virtual things and their shadows could reach in that frame.
+    touched: Option<Touched>,
 }
 
 impl Renderer {
@@ -115,8 +114,8 @@ impl Renderer {
             target | wgpu::TextureUsages::COPY_SRC,
         );
         let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
-        let before = view(&texture("before", LIGHT_FORMAT, samples, target | read));
-        let after = view(&texture("after", LIGHT_FORMAT, samples, target | read));
+        let reaching = view(&texture("reaching", LIGHT_FORMAT, samples, target | read));
+        let change = view(&texture("change", LIGHT_FORMAT, samples, target | read));
         let depth_stencil = view(&texture(
             "depth and stencil",
             gpu.depth_format,
@@ -155,7 +154,14 @@ impl Renderer {
             immediate_size: 0,
         });
         let composite_pass = Composite::new(device, samples);
-        let casters = anchor_geometry::casters(scene);
+        let casters = Casters::new(
+            device,
+            anchor_geometry::casters(device, scene),
+            scene.lights.len(),
+            scene.anchors.len(),
+            &light_layout,
+            scene.shadows.counting,
+        );
         Ok(Self {
             view_group: group(&view_layout, vec![views.binding()]),
             light_group: group(&light_layout, vec![light_sources.binding()]),
@@ -164,12 +170,12 @@ impl Renderer {
                 vec![
                     lens.binding(),
                     wgpu::BindingResource::TextureView(&view(&recorded)),
-                    wgpu::BindingResource::TextureView(&before),
-                    wgpu::BindingResource::TextureView(&after),
+                    wgpu::BindingResource::TextureView(&reaching),
+                    wgpu::BindingResource::TextureView(&change),
                 ],
             ),
             surface_pass: Surfaces::new(device, &geometry_layout, gpu.depth_format, samples),
-            volume_pipeline: volumes::pipeline(
+            volume_pass: Volumes::new(
                 device,
                 &geometry_layout,
                 gpu.depth_format,
@@ -179,17 +185,12 @@ impl Renderer {
             surfaces: anchor_geometry::surface_batches(device, scene),
             extents: anchor_geometry::extents(scene),
             indirect: Indirect::new(scene),
-            volumes: scene
-                .lights
-                .iter()
-                .map(|_| casters.iter().map(|_| VolumeBuffers::default()).collect())
-                .collect(),
             picture_readback: Readback::new(device, intrinsics.size_px, 4),
             clock: gpu
                 .timestamp_period_ns
                 .map(|period_ns| GpuClock::new(device, period_ns)),
             layer_passes: None,
-            placed: vec![false; scene.anchors.len()],
+            camera_from_anchor: vec![None; scene.anchors.len()],
             shown: Shown::Bare,
             touched: None,
             lights: scene.lights.clone(),
@@ -201,8 +202,8 @@ impl Renderer {
             composite_pass,
             recorded,
             picture,
-            before,
-            after,
+            reaching,
+            change,
             depth_stencil,
             gpu,
         })
@@ -248,10 +249,20 @@ impl Renderer {
         };
 
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        if let Some(touched) = self.touched {
-            self.draw_light(&mut encoder, touched);
+        if let Some(touched) = &self.touched {
+            self.casters.update(
+                &self.gpu,
+                &self.lights,
+                camera_from_anchor,
+                &self.intrinsics,
+                touched,
+            );
+            self.draw_light(&mut encoder, touched.pixels);
         }
-        self.draw_picture(&mut encoder, self.touched);
+        self.draw_picture(
+            &mut encoder,
+            self.touched.as_ref().map(|touched| touched.pixels),
+        );
         self.picture_readback.copy_from(&mut encoder, &self.picture);
         if let Some(clock) = &mut self.clock {
             clock.resolve(&mut encoder, self.touched.is_some());
@@ -294,39 +305,44 @@ impl Renderer {
     /// # Errors
     /// The device failed since it was opened.
     pub fn layers(&mut self) -> Result<Layers, RenderError> {
-        let passes = self.layer_passes.get_or_insert_with(|| {
+        let passes = self.layer_passes.take().unwrap_or_else(|| {
             LayerPasses::new(&self.gpu, &self.geometry_layout, self.intrinsics.size_px)
         });
+        let layers = self.layers_by(&passes);
+        self.layer_passes = Some(passes);
+        layers
+    }
+
+    fn layers_by(&mut self, passes: &LayerPasses) -> Result<Layers, RenderError> {
+        // The whole picture is asked for, not only what the virtual things touch.
+        self.casters.update(
+            &self.gpu,
+            &self.lights,
+            &self.camera_from_anchor,
+            &self.intrinsics,
+            &everywhere(
+                &self.extents,
+                &self.lights,
+                &self.camera_from_anchor,
+                &self.intrinsics,
+            ),
+        );
         let gpu = &self.gpu;
-        let (views, view_group) = (&self.views, &self.view_group);
-        let drawn = |role: Role, anchor: usize| {
-            self.placed[anchor] && (role == Role::Real || self.shown == Shown::Composite)
-        };
-        let set_view = |pass: &mut wgpu::RenderPass<'_>, anchor: usize| {
-            pass.set_bind_group(0, view_group, &[views.offset(anchor)]);
-            pass.set_bind_group(1, &self.light_group, &[0]);
-        };
+        let shown = |role: Role| role == Role::Real || self.shown == Shown::Composite;
         let (role, depth_m) = passes.role_and_depth(gpu, &|pass, role| {
-            for batch in self
-                .surfaces
-                .iter()
-                .filter(|b| b.role == role && drawn(role, b.anchor))
-            {
-                set_view(pass, batch.anchor);
-                pass.set_vertex_buffer(0, batch.corners.slice(..));
-                pass.draw(0..batch.corner_count, 0..1);
+            pass.set_bind_group(1, &self.light_group, &[0]);
+            for batch in self.placed(role).filter(|_| shown(role)) {
+                self.draw_batch(pass, batch);
             }
         })?;
         let mut shadow = Vec::new();
-        for volumes in &self.volumes {
-            let mut bits = passes.shadow(gpu, &|pass, role| {
-                set_view(pass, 0);
-                for (volume, caster) in volumes.iter().zip(&self.casters) {
-                    if caster.role == role && drawn(role, caster.anchor) {
-                        set_view(pass, caster.anchor);
-                        volume.draw(pass);
-                    }
-                }
+        for light in 0..self.lights.len() {
+            let mut bits = passes.shadow(gpu, &|pass, volumes, role| {
+                let groups = [&self.view_group, self.casters.light_group()];
+                let counted = self.casters.counted(role, light, &self.views);
+                let counted = counted.filter(|_| shown(role));
+                let whole = PixelRect::whole(self.intrinsics.size_px);
+                volumes.count(pass, Among::All, role, groups, whole, counted);
             })?;
             // Where nothing is modelled nothing can be shadowed.
             for (bits, &role) in bits.iter_mut().zip(&role) {
@@ -346,22 +362,17 @@ impl Renderer {
         })
     }
 
-    /// Writes the frame's uniforms and makes the shadow volumes whose light has moved.
+    /// Writes the frame's uniforms.
     fn place(&mut self, camera_from_anchor: &[Option<DAffine3>]) {
         let queue = &self.gpu.queue;
-        let camera_from_world = camera_from_anchor.first().copied().flatten();
-        for (anchor, placed) in self.placed.iter_mut().enumerate() {
-            let pose = camera_from_anchor.get(anchor).copied().flatten();
-            *placed = pose.is_some() && camera_from_world.is_some();
+        self.camera_from_anchor = camera_from_anchor.to_vec();
+        for (anchor, pose) in camera_from_anchor.iter().enumerate() {
             if let Some(camera_from_anchor) = pose {
-                self.views.write(
-                    queue,
-                    anchor,
-                    &View::new(&self.intrinsics, &camera_from_anchor),
-                );
+                let view = View::new(&self.intrinsics, camera_from_anchor);
+                self.views.write(queue, anchor, &view);
             }
         }
-        let Some(camera_from_world) = camera_from_world else {
+        let Some(camera_from_world) = camera_from_anchor.first().copied().flatten() else {
             return;
         };
         let world_virtuals = self
@@ -376,91 +387,136 @@ impl Renderer {
                 &camera_from_world,
             );
         }
-        for (index, (light, volumes)) in self.lights.iter().zip(&mut self.volumes).enumerate() {
-            self.light_sources
-                .write(queue, index, &LightSource::new(light, &camera_from_world));
-            for (volume, caster) in volumes.iter_mut().zip(&self.casters) {
-                let Some(camera_from_anchor) = camera_from_anchor[caster.anchor] else {
-                    continue;
-                };
-                // The world stands still to its lights: no camera may come between, or rounding would move them.
-                let anchor_from_world = if caster.anchor == 0 {
-                    DAffine3::IDENTITY
-                } else {
-                    camera_from_anchor.inverse() * camera_from_world
-                };
-                let light = light_place(light, &anchor_from_world);
-                volume.update(&self.gpu.device, queue, &caster.caster, light);
-            }
+        for (index, light) in self.lights.iter().enumerate() {
+            let light = LightSource::new(light, &camera_from_world);
+            self.light_sources.write(queue, index, &light);
         }
     }
 
     /// Haller et al. 2003, section 3.2, light by light: phantoms and virtual things into depth; *real onto real* is
-    /// counted; what is lit then is lit in the video; *virtual onto real* is counted on top; what is lit then, real
-    /// or virtual, is lit past all casters.
+    /// counted, and what is lit then is lit in the video; *virtual onto real* is counted where it is lit, and what is
+    /// counted has lost its light; *all onto virtual* is what both have counted there.
     fn draw_light(&self, encoder: &mut wgpu::CommandEncoder, touched: PixelRect) {
         let passes = self.lights.len().max(1);
-        for index in 0..passes {
-            let first = index == 0;
-            let color = |view| {
-                Some(wgpu::RenderPassColorAttachment {
-                    view,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations {
-                        load: if first {
-                            wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT)
-                        } else {
-                            wgpu::LoadOp::Load
-                        },
-                        store: wgpu::StoreOp::Store,
-                    },
-                })
-            };
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("light"),
-                color_attachments: &[color(&self.before), color(&self.after)],
-                depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                    view: &self.depth_stencil,
-                    depth_ops: Some(wgpu::Operations {
-                        load: if first {
-                            wgpu::LoadOp::Clear(0.0)
-                        } else {
-                            wgpu::LoadOp::Load
-                        },
-                        store: wgpu::StoreOp::Store,
-                    }),
-                    stencil_ops: Some(wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(0),
-                        store: wgpu::StoreOp::Discard,
-                    }),
-                }),
-                timestamp_writes: self
-                    .clock
-                    .as_ref()
-                    .map(|c| c.light(first, index + 1 == passes)),
-                ..Default::default()
-            });
+        for light in 0..passes {
+            let mut pass = self.light_pass(encoder, light, passes);
             set_scissor(&mut pass, touched);
-            if first {
-                for role in [Role::Real, Role::Virtual] {
-                    self.draw_surfaces(&mut pass, self.surface_pass.ambient(role), role, 0);
-                }
-            }
-            if index < self.lights.len() {
-                self.draw_volumes(&mut pass, Role::Real, index);
+            pass.set_stencil_reference(0);
+            pass.set_bind_group(1, &self.light_group, &[self.light_sources.offset(light)]);
+            if light == 0 {
+                let real = match self.lights.len() {
+                    0 | 1 => &self.surface_pass.depth_of_real,
+                    _ => &self.surface_pass.ambient_on_real,
+                };
+                self.draw_surfaces(&mut pass, real, Role::Real);
                 self.draw_surfaces(
                     &mut pass,
-                    self.surface_pass.light_before(),
-                    Role::Real,
-                    index,
+                    &self.surface_pass.ambient_on_virtual,
+                    Role::Virtual,
                 );
-                self.draw_volumes(&mut pass, Role::Virtual, index);
-                for role in [Role::Real, Role::Virtual] {
-                    self.draw_surfaces(&mut pass, self.surface_pass.light_after(role), role, index);
-                }
+            }
+            if !self.lights.is_empty() {
+                self.draw_one_light(&mut pass, light, touched);
             }
         }
+    }
+
+    fn draw_one_light(&self, pass: &mut wgpu::RenderPass<'_>, light: usize, touched: PixelRect) {
+        let surfaces = &self.surface_pass;
+        self.count_volumes(pass, Among::All, Role::Real, light, touched);
+        if self.lights.len() > 1 {
+            self.draw_surfaces(pass, &surfaces.light_reaching_real, Role::Real);
+        }
+        if self.count_volumes(pass, Among::LitByReal, Role::Virtual, light, touched) {
+            let hidden = match self.lights.len() {
+                1 => &surfaces.only_light_hidden_from_real,
+                _ => &surfaces.light_hidden_from_real,
+            };
+            self.draw_surfaces(pass, hidden, Role::Real);
+        }
+        self.draw_surfaces(pass, &surfaces.light_on_virtual, Role::Virtual);
+        // What one volume hides, and that its own, smooth shading lights all the same: otherwise the facets would draw
+        // a jagged line where the light ends.
+        pass.set_stencil_reference(1);
+        for terminator in self.casters.terminators(light) {
+            if let Some(batch) = self
+                .placed(Role::Virtual)
+                .find(|batch| batch.anchor == terminator.anchor)
+            {
+                self.set_batch(pass, batch);
+                terminator.indices.draw(pass, terminator.indices.count);
+            }
+        }
+    }
+
+    /// Counts a role's volumes, and leaves the stencil's reference and the light as they were. Returns whether there
+    /// were any.
+    fn count_volumes(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        among: Among,
+        role: Role,
+        light: usize,
+        touched: PixelRect,
+    ) -> bool {
+        let groups = [&self.view_group, self.casters.light_group()];
+        let counted = self.casters.counted(role, light, &self.views);
+        let any = self
+            .volume_pass
+            .count(pass, among, role, groups, touched, counted);
+        if any && role == Role::Real {
+            self.volume_pass.keep(pass, role, touched);
+        }
+        pass.set_stencil_reference(0);
+        pass.set_bind_group(1, &self.light_group, &[self.light_sources.offset(light)]);
+        any
+    }
+
+    /// The pass of one of the lights; the first clears what the others add to.
+    fn light_pass<'a>(
+        &self,
+        encoder: &'a mut wgpu::CommandEncoder,
+        light: usize,
+        passes: usize,
+    ) -> wgpu::RenderPass<'a> {
+        let first = light == 0;
+        let color = |view| {
+            Some(wgpu::RenderPassColorAttachment {
+                view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: match first {
+                        true => wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                        false => wgpu::LoadOp::Load,
+                    },
+                    store: wgpu::StoreOp::Store,
+                },
+            })
+        };
+        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("light"),
+            color_attachments: &[color(&self.reaching), color(&self.change)],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &self.depth_stencil,
+                depth_ops: Some(wgpu::Operations {
+                    load: match first {
+                        true => wgpu::LoadOp::Clear(0.0),
+                        false => wgpu::LoadOp::Load,
+                    },
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(0),
+                    store: wgpu::StoreOp::Discard,
+                }),
+            }),
+            timestamp_writes: self
+                .clock
+                .as_ref()
+                .map(|clock| clock.light(first, light + 1 == passes)),
+            ..Default::default()
+        })
     }
 
     fn draw_surfaces(
@@ -468,30 +524,30 @@ impl Renderer {
         pass: &mut wgpu::RenderPass<'_>,
         pipeline: &wgpu::RenderPipeline,
         role: Role,
-        light: usize,
     ) {
         pass.set_pipeline(pipeline);
-        pass.set_stencil_reference(0);
-        pass.set_bind_group(1, &self.light_group, &[self.light_sources.offset(light)]);
-        for batch in &self.surfaces {
-            if batch.role == role && self.placed[batch.anchor] {
-                pass.set_bind_group(0, &self.view_group, &[self.views.offset(batch.anchor)]);
-                pass.set_vertex_buffer(0, batch.corners.slice(..));
-                pass.set_vertex_buffer(1, batch.indirect.slice(..));
-                pass.draw(0..batch.corner_count, 0..1);
-            }
+        for batch in self.placed(role) {
+            self.draw_batch(pass, batch);
         }
     }
 
-    fn draw_volumes(&self, pass: &mut wgpu::RenderPass<'_>, role: Role, light: usize) {
-        pass.set_pipeline(&self.volume_pipeline);
-        pass.set_bind_group(1, &self.light_group, &[self.light_sources.offset(light)]);
-        for (volume, caster) in self.volumes[light].iter().zip(&self.casters) {
-            if caster.role == role && self.placed[caster.anchor] {
-                pass.set_bind_group(0, &self.view_group, &[self.views.offset(caster.anchor)]);
-                volume.draw(pass);
-            }
-        }
+    /// The batches of a role whose anchor has a pose, in a world that has one.
+    fn placed(&self, role: Role) -> impl Iterator<Item = &SurfaceBatch> {
+        let has_pose = |anchor: usize| self.camera_from_anchor[anchor].is_some();
+        let batches = self.surfaces.iter();
+        batches.filter(move |b| b.role == role && has_pose(0) && has_pose(b.anchor))
+    }
+
+    fn set_batch(&self, pass: &mut wgpu::RenderPass<'_>, batch: &SurfaceBatch) {
+        pass.set_bind_group(0, &self.view_group, &[self.views.offset(batch.anchor)]);
+        pass.set_vertex_buffer(0, batch.corners.slice(..));
+        pass.set_vertex_buffer(1, batch.indirect.slice(..));
+    }
+
+    fn draw_batch(&self, pass: &mut wgpu::RenderPass<'_>, batch: &SurfaceBatch) {
+        self.set_batch(pass, batch);
+        pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..batch.index_count, 0, 0..1);
     }
 
     /// The video everywhere, and over it the composite where virtual things reach.
@@ -535,11 +591,6 @@ impl Renderer {
         let texels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&readback.read(&self.gpu)?);
         Ok(texels.into_iter().map(|[r, g, b, _]| [r, g, b]).collect())
     }
-}
-
-fn set_scissor(pass: &mut wgpu::RenderPass<'_>, rect: PixelRect) {
-    let [x, y] = rect.low;
-    pass.set_scissor_rect(x, y, rect.high[0] - x, rect.high[1] - y);
 }
 
 /// A pass over a whole texture, which is cleared.

@@ -1,21 +1,36 @@
-//! Where in the picture virtual things and their shadows can be: the passes leave the rest alone.
+//! Where in the picture virtual things and shadows can be: the passes leave the rest alone.
 
 use glam::{DAffine3, DVec3};
 
+use crate::geometry::bounds::Bounds;
 use crate::geometry::camera::Intrinsics;
-use crate::geometry::reach::{self, Bounds, PixelRect};
+use crate::geometry::reach::{self, PixelRect};
 use crate::geometry::shadow_volume::LightPlace;
 use crate::light::Light;
 
 use super::anchor_geometry::{Extent, Role};
 
-/// The pixels that virtual things and their shadows can reach; `None` if there are none.
+const NOWHERE: PixelRect = PixelRect {
+    low: [0; 2],
+    high: [0; 2],
+};
+
+/// Where the things of a frame can change its picture.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Touched {
+    /// All of it.
+    pub pixels: PixelRect,
+    /// For each light and each caster where in `pixels` its shadow can be; empty where it need not be counted.
+    pub shadows: Vec<Vec<PixelRect>>,
+}
+
+/// What virtual things and their shadows can change; `None` if nothing.
 pub(super) fn touched_by_virtual(
     extents: &[Extent],
     lights: &[Light],
     camera_from_anchor: &[Option<DAffine3>],
     intrinsics: &Intrinsics,
-) -> Option<PixelRect> {
+) -> Option<Touched> {
     let camera_from_world = (*camera_from_anchor.first()?)?;
     let world_from_camera = camera_from_world.inverse();
     let corners_in_world = |extent: &Extent| {
@@ -32,27 +47,49 @@ pub(super) fn touched_by_virtual(
         .filter_map(|extent| Some((extent, corners_in_world(extent)?)))
         .collect();
     let receivers = Bounds::around(placed.iter().flat_map(|(_, corners)| *corners))?;
-    let mut touched = PixelRect {
-        low: [0; 2],
-        high: [0; 2],
-    };
-    for (extent, corners) in placed
-        .iter()
-        .filter(|(extent, _)| extent.role == Role::Virtual)
-    {
-        touched = touched.union(reach::covered(corners, &camera_from_world, intrinsics));
-        for light in lights.iter().filter(|_| extent.casts) {
+
+    let casters = extents.iter().filter_map(|extent| extent.caster).count();
+    let mut shadows = vec![vec![NOWHERE; casters]; lights.len()];
+    let mut pixels = NOWHERE;
+    for (extent, corners) in &placed {
+        if extent.role == Role::Virtual {
+            pixels = pixels.union(reach::covered(corners, &camera_from_world, intrinsics));
+        }
+        let Some(caster) = extent.caster else {
+            continue;
+        };
+        for (light, shadows) in lights.iter().zip(&mut shadows) {
             let light = light_place(light, &DAffine3::IDENTITY);
-            touched = touched.union(reach::shadowed(
-                corners,
-                light,
-                &receivers,
-                &camera_from_world,
-                intrinsics,
-            ));
+            shadows[caster] =
+                reach::shadowed(corners, light, &receivers, &camera_from_world, intrinsics);
+            if extent.role == Role::Virtual {
+                pixels = pixels.union(shadows[caster]);
+            }
         }
     }
-    (!touched.is_empty()).then_some(touched)
+    for shadow in shadows.iter_mut().flatten() {
+        *shadow = shadow.intersection(pixels);
+    }
+    (!pixels.is_empty()).then_some(Touched { pixels, shadows })
+}
+
+/// The whole picture, as far as things have poses.
+pub(super) fn everywhere(
+    extents: &[Extent],
+    lights: &[Light],
+    camera_from_anchor: &[Option<DAffine3>],
+    intrinsics: &Intrinsics,
+) -> Touched {
+    let pixels = PixelRect::whole(intrinsics.size_px);
+    let world = camera_from_anchor.first().copied().flatten();
+    let placed = |extent: &Extent| world.is_some() && camera_from_anchor[extent.anchor].is_some();
+    let of_caster = |extent: &Extent| match placed(extent) {
+        true => pixels,
+        false => NOWHERE,
+    };
+    let casters = extents.iter().filter(|extent| extent.caster.is_some());
+    let shadows = vec![casters.map(of_caster).collect(); lights.len()];
+    Touched { pixels, shadows }
 }
 
 /// A light as its shadow volumes see it from an anchor.

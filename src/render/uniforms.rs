@@ -4,6 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, Mat4, Vec4};
 
 use crate::geometry::camera::Intrinsics;
+use crate::geometry::shadow_volume::LightPlace;
 use crate::light::Light;
 
 /// Nearest depth that is drawn, metres. Reversed floating depth keeps its precision however near this is.
@@ -59,6 +60,22 @@ impl LightSource {
         Self {
             place_in_camera: place.as_vec3().extend(weight),
             power: power.as_vec3().extend(0.0),
+        }
+    }
+}
+
+/// Twin of `CastingLight` in volumes.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(super) struct CastingLight {
+    pub place_in_anchor: Vec4,
+}
+
+impl CastingLight {
+    pub fn new(light: LightPlace) -> Self {
+        let (place, weight) = light.homogeneous();
+        Self {
+            place_in_anchor: place.as_vec3().extend(weight as f32),
         }
     }
 }
@@ -154,6 +171,7 @@ pub(super) fn uniform_entry(binding: u32, dynamic: bool) -> wgpu::BindGroupLayou
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::shader;
     use std::mem::offset_of;
 
     /// Members of a WGSL struct as (name, offset), and the struct's size.
@@ -191,9 +209,11 @@ mod tests {
         let common = include_str!("../../shaders/common.wgsl");
         assert_twins!(common, View, clip_from_anchor, camera_from_anchor);
         assert_twins!(common, LightSource, place_in_camera, power);
-        let composite = include_str!("../../shaders/composite.wgsl");
+        let volumes = shader::source(include_str!("../../shaders/volumes.wgsl"));
+        assert_twins!(&volumes, CastingLight, place_in_anchor);
+        let composite = shader::source(include_str!("../../shaders/composite.wgsl"));
         assert_twins!(
-            composite, Lens, focal_px, center_px, distortion, k3, distorts, size_px
+            &composite, Lens, focal_px, center_px, distortion, k3, distorts, size_px
         );
     }
 }

@@ -1,153 +1,355 @@
-//! Counts, per sample, the shadow volumes that the visible surface lies in (depth-fail stencil; Everitt & Kilgard
-//! 2002; the passes are those of Haller, Drab & Hartmann 2003, section 3.2).
-//! Reads depth. Writes the stencil.
+//! Counts, per sample, the shadow volumes that the visible surface lies in (depth-pass and depth-fail stencil; Everitt
+//! & Kilgard 2002; the passes are those of Haller, Drab & Hartmann 2003, section 3.2).
+//! Reads depth. Writes the stencil (stencil.rs).
 
 use glam::Vec4;
 
-use crate::geometry::shadow_volume::{Caster, LightPlace};
+use crate::geometry::counting::Counting;
+use crate::geometry::reach::PixelRect;
+use crate::geometry::shadow_volume::{Caster, Casting, LightPlace, Silhouette};
 
+use super::anchor_geometry::Role;
 use super::shader;
+use super::stencil::{self, COUNT, MOST_LAYERS, REAL_HIDES};
 
-/// The pipeline that counts.
-pub(super) fn pipeline(
-    device: &wgpu::Device,
-    layout: &wgpu::PipelineLayout,
-    depth_format: wgpu::TextureFormat,
-    samples: u32,
-    color_formats: &[wgpu::TextureFormat],
-) -> wgpu::RenderPipeline {
-    let module = shader::module(
-        device,
-        "volumes",
-        include_str!("../../shaders/volumes.wgsl"),
-    );
-    let face = |depth_fail_op| wgpu::StencilFaceState {
-        compare: wgpu::CompareFunction::Always,
-        fail_op: wgpu::StencilOperation::Keep,
-        depth_fail_op,
-        pass_op: wgpu::StencilOperation::Keep,
-    };
-    let untouched: Vec<_> = color_formats
-        .iter()
-        .map(|&format| {
-            Some(wgpu::ColorTargetState {
-                format,
-                blend: None,
-                write_mask: wgpu::ColorWrites::empty(),
+/// Where volumes are counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Among {
+    /// On all surfaces.
+    All,
+    /// Where no real thing hides the light already.
+    LitByReal,
+}
+
+/// The pipelines that count, and those that keep what a batch has counted.
+pub(super) struct Volumes {
+    among_all: Counters,
+    among_lit: Counters,
+    keep_real: wgpu::RenderPipeline,
+    keep_virtual: wgpu::RenderPipeline,
+}
+
+struct Counters {
+    depth_pass: wgpu::RenderPipeline,
+    depth_fail: wgpu::RenderPipeline,
+}
+
+/// One volume of a batch, as it is to be drawn.
+pub(super) struct Counted<'a> {
+    pub volume: &'a Volume,
+    pub counting: Counting,
+    /// Pixels outside which it cannot matter.
+    pub scissor: PixelRect,
+    /// Dynamic offsets of its anchor's view and of the light in its anchor.
+    pub offsets: [u32; 2],
+    pub vertices: &'a wgpu::Buffer,
+}
+
+impl Volumes {
+    pub fn new(
+        device: &wgpu::Device,
+        layout: &wgpu::PipelineLayout,
+        depth_format: wgpu::TextureFormat,
+        samples: u32,
+        color_formats: &[wgpu::TextureFormat],
+    ) -> Self {
+        let module = shader::module(
+            device,
+            "volumes",
+            include_str!("../../shaders/volumes.wgsl"),
+        );
+        let untouched: Vec<_> = color_formats
+            .iter()
+            .map(|&format| {
+                Some(wgpu::ColorTargetState {
+                    format,
+                    blend: None,
+                    write_mask: wgpu::ColorWrites::empty(),
+                })
             })
-        })
-        .collect();
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("volumes"),
-        layout: Some(layout),
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("place"),
-            compilation_options: Default::default(),
-            buffers: &[Some(wgpu::VertexBufferLayout {
-                array_stride: size_of::<Vec4>() as u64,
-                step_mode: wgpu::VertexStepMode::Vertex,
-                attributes: &wgpu::vertex_attr_array![0 => Float32x4],
-            })],
-        },
-        primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: depth_format,
-            depth_write_enabled: Some(false),
-            // Strict: a lit surface lies at the very depth of its own cap, which then counts as beyond it and
-            // cancels the volume's far side. No bias is needed, and none is right.
-            depth_compare: Some(wgpu::CompareFunction::Greater),
-            stencil: wgpu::StencilState {
-                front: face(wgpu::StencilOperation::DecrementWrap),
-                back: face(wgpu::StencilOperation::IncrementWrap),
-                read_mask: 0xff,
-                write_mask: 0xff,
-            },
-            bias: wgpu::DepthBiasState::default(),
-        }),
-        multisample: wgpu::MultisampleState {
-            count: samples,
-            ..Default::default()
-        },
-        fragment: Some(wgpu::FragmentState {
-            module: &module,
-            entry_point: Some("count"),
-            compilation_options: Default::default(),
-            targets: &untouched,
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
+            .collect();
+        let build = |layout, entry_point, buffers: &[_], depth_compare, stencil| {
+            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some("shadow volumes"),
+                layout: Some(layout),
+                vertex: wgpu::VertexState {
+                    module: &module,
+                    entry_point: Some(entry_point),
+                    compilation_options: Default::default(),
+                    buffers,
+                },
+                primitive: wgpu::PrimitiveState::default(),
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: depth_format,
+                    depth_write_enabled: Some(false),
+                    depth_compare: Some(depth_compare),
+                    stencil,
+                    bias: wgpu::DepthBiasState::default(),
+                }),
+                multisample: wgpu::MultisampleState {
+                    count: samples,
+                    ..Default::default()
+                },
+                fragment: Some(wgpu::FragmentState {
+                    module: &module,
+                    entry_point: Some("count"),
+                    compilation_options: Default::default(),
+                    targets: &untouched,
+                }),
+                multiview_mask: None,
+                cache: None,
+            })
+        };
+        let corners = Some(wgpu::VertexBufferLayout {
+            array_stride: size_of::<Vec4>() as u64,
+            step_mode: wgpu::VertexStepMode::Vertex,
+            attributes: &wgpu::vertex_attr_array![0 => Float32x4],
+        });
+        let counter = |among: Among, counting: Counting| {
+            // Counts what lies in front or what does not: entering and leaving change sides.
+            let face = |in_front, otherwise| wgpu::StencilFaceState {
+                compare: match among {
+                    Among::All => wgpu::CompareFunction::Always,
+                    Among::LitByReal => wgpu::CompareFunction::Equal,
+                },
+                fail_op: wgpu::StencilOperation::Keep,
+                pass_op: match counting {
+                    Counting::DepthPass => in_front,
+                    Counting::DepthFail => wgpu::StencilOperation::Keep,
+                },
+                depth_fail_op: match counting {
+                    Counting::DepthPass => wgpu::StencilOperation::Keep,
+                    Counting::DepthFail => otherwise,
+                },
+            };
+            let more = wgpu::StencilOperation::IncrementWrap;
+            let less = wgpu::StencilOperation::DecrementWrap;
+            build(
+                layout,
+                "place",
+                std::slice::from_ref(&corners),
+                // Strict: a lit surface lies at the very depth of its own cap, which then counts as not in front. No
+                // bias is needed, and none is right.
+                wgpu::CompareFunction::Greater,
+                wgpu::StencilState {
+                    front: face(more, less),
+                    back: face(less, more),
+                    read_mask: REAL_HIDES,
+                    write_mask: COUNT,
+                },
+            )
+        };
+        let counters = |among| Counters {
+            depth_pass: counter(among, Counting::DepthPass),
+            depth_fail: counter(among, Counting::DepthFail),
+        };
+        let no_bindings = shader::no_bindings(device);
+        let keep = |role| {
+            let counted = wgpu::StencilFaceState {
+                compare: wgpu::CompareFunction::NotEqual,
+                pass_op: wgpu::StencilOperation::Replace,
+                ..Default::default()
+            };
+            build(
+                &no_bindings,
+                "whole_picture",
+                &[],
+                wgpu::CompareFunction::Always,
+                wgpu::StencilState {
+                    front: counted,
+                    back: counted,
+                    read_mask: COUNT,
+                    write_mask: COUNT | stencil::hides(role),
+                },
+            )
+        };
+        Self {
+            among_all: counters(Among::All),
+            among_lit: counters(Among::LitByReal),
+            keep_real: keep(Role::Real),
+            keep_virtual: keep(Role::Virtual),
+        }
+    }
+
+    /// Counts the volumes of one role's casters, whose bits start at 0. Returns whether anything was counted.
+    pub fn count<'a>(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        among: Among,
+        role: Role,
+        groups: [&wgpu::BindGroup; 2],
+        within: PixelRect,
+        counted: impl Iterator<Item = Counted<'a>>,
+    ) -> bool {
+        let counters = match among {
+            Among::All => &self.among_all,
+            Among::LitByReal => &self.among_lit,
+        };
+        let mut layers = 0;
+        let mut any = false;
+        for Counted {
+            volume,
+            counting,
+            scissor,
+            offsets,
+            vertices,
+        } in counted
+        {
+            for part in &volume.parts {
+                if layers + part.layers > MOST_LAYERS {
+                    self.keep(pass, role, within);
+                    layers = 0;
+                }
+                layers += part.layers;
+                any = true;
+                pass.set_pipeline(match counting {
+                    Counting::DepthPass => &counters.depth_pass,
+                    Counting::DepthFail => &counters.depth_fail,
+                });
+                pass.set_stencil_reference(0);
+                set_scissor(pass, scissor);
+                for (index, (group, offset)) in groups.iter().zip(offsets).enumerate() {
+                    pass.set_bind_group(index as u32, *group, &[offset]);
+                }
+                pass.set_vertex_buffer(0, vertices.slice(..));
+                part.draw(pass, counting);
+            }
+        }
+        set_scissor(pass, within);
+        any
+    }
+
+    /// Makes the role's own bit of what was counted, and leaves the count at 0.
+    pub fn keep(&self, pass: &mut wgpu::RenderPass<'_>, role: Role, within: PixelRect) {
+        pass.set_pipeline(match role {
+            Role::Real => &self.keep_real,
+            Role::Virtual => &self.keep_virtual,
+        });
+        set_scissor(pass, within);
+        pass.set_stencil_reference(stencil::hides(role));
+        pass.draw(0..3, 0..1);
+    }
 }
 
-/// The shadow volume of one caster and one light on the GPU, kept while the two stand still to each other.
+/// Keeps a pass to a rectangle.
+pub(super) fn set_scissor(pass: &mut wgpu::RenderPass<'_>, rect: PixelRect) {
+    let [x, y] = rect.low;
+    pass.set_scissor_rect(x, y, rect.high[0] - x, rect.high[1] - y);
+}
+
+/// The shadow volume of one caster and one light, kept while the two stand still to each other.
 #[derive(Default)]
-pub(super) struct VolumeBuffers {
-    light: Option<LightPlace>,
-    vertices: Option<wgpu::Buffer>,
-    indices: Option<wgpu::Buffer>,
-    index_count: u32,
+pub(super) struct Volume {
+    made_for: Option<(LightPlace, Casting)>,
+    parts: Vec<Part>,
 }
 
-impl VolumeBuffers {
-    /// Makes the volume anew if the light has moved in the caster's space.
+/// Volumes that never lie more than [`MOST_LAYERS`] deep one in another.
+struct Part {
+    silhouette: Silhouette,
+    layers: u32,
+    /// Triangles of the sides, then those of the caps where they are needed.
+    indices: IndexBuffer,
+    side_index_count: u32,
+    has_caps: bool,
+}
+
+impl Volume {
+    /// Makes anew what has changed. Returns whether the silhouette has.
     pub fn update(
         &mut self,
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         caster: &Caster,
-        light: LightPlace,
-    ) {
-        if self.light == Some(light) {
-            return;
+        made_for: (LightPlace, Casting),
+        counting: Counting,
+    ) -> bool {
+        let changed = self.made_for != Some(made_for);
+        if changed {
+            let silhouette = caster.silhouette(made_for.0, made_for.1);
+            let mut buffers: Vec<IndexBuffer> =
+                self.parts.drain(..).map(|part| part.indices).collect();
+            self.parts = caster
+                .parts(silhouette, MOST_LAYERS)
+                .into_iter()
+                .map(|(silhouette, layers)| Part {
+                    silhouette,
+                    layers,
+                    indices: buffers.pop().unwrap_or_default(),
+                    side_index_count: 0,
+                    has_caps: false,
+                })
+                .collect();
+            self.made_for = Some(made_for);
         }
-        let (vertices, indices) = (caster.volume_vertices(light), caster.volume_indices(light));
-        upload(
-            device,
-            queue,
-            &mut self.vertices,
-            wgpu::BufferUsages::VERTEX,
-            bytemuck::cast_slice(&vertices),
-        );
-        upload(
-            device,
-            queue,
-            &mut self.indices,
-            wgpu::BufferUsages::INDEX,
-            bytemuck::cast_slice(&indices),
-        );
-        self.index_count = indices.len() as u32;
-        self.light = Some(light);
+        let needs_caps = counting == Counting::DepthFail;
+        for part in &mut self.parts {
+            if changed || (needs_caps && !part.has_caps) {
+                let mut indices = caster.side_indices(&part.silhouette);
+                part.side_index_count = indices.len() as u32;
+                if needs_caps {
+                    indices.extend(caster.cap_indices(&part.silhouette));
+                }
+                part.has_caps = needs_caps;
+                part.indices.write(device, queue, &indices);
+            }
+        }
+        changed
     }
 
-    /// Draws the volume with whatever pipeline and view are set.
-    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
-        if let (Some(vertices), Some(indices)) = (&self.vertices, &self.indices) {
-            pass.set_vertex_buffer(0, vertices.slice(..));
-            pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
-            pass.draw_indexed(0..self.index_count, 0, 0..1);
-        }
+    /// What casts, part by part.
+    pub fn silhouettes(&self) -> impl Iterator<Item = &Silhouette> {
+        self.parts.iter().map(|part| &part.silhouette)
     }
 }
 
-/// Writes into the buffer, after making a larger one if it is too small.
-fn upload(
-    device: &wgpu::Device,
-    queue: &wgpu::Queue,
-    buffer: &mut Option<wgpu::Buffer>,
-    usage: wgpu::BufferUsages,
-    contents: &[u8],
-) {
-    let size = contents.len().max(4) as u64;
-    if buffer.as_ref().is_none_or(|buffer| buffer.size() < size) {
-        *buffer = Some(device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("shadow volume"),
-            size: size.next_power_of_two(),
-            usage: usage | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        }));
+impl Part {
+    fn draw(&self, pass: &mut wgpu::RenderPass<'_>, counting: Counting) {
+        let count = match counting {
+            Counting::DepthPass => self.side_index_count,
+            Counting::DepthFail => self.indices.count,
+        };
+        self.indices.draw(pass, count);
     }
-    if let Some(buffer) = buffer {
-        queue.write_buffer(buffer, 0, contents);
+}
+
+/// Indices that change, in a buffer that grows.
+#[derive(Default)]
+pub(super) struct IndexBuffer {
+    buffer: Option<wgpu::Buffer>,
+    pub count: u32,
+}
+
+impl IndexBuffer {
+    pub fn write(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, indices: &[u32]) {
+        let contents: &[u8] = bytemuck::cast_slice(indices);
+        let size = contents.len() as u64;
+        self.count = indices.len() as u32;
+        if indices.is_empty() {
+            return;
+        }
+        if self
+            .buffer
+            .as_ref()
+            .is_none_or(|buffer| buffer.size() < size)
+        {
+            self.buffer = Some(device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("shadow volume"),
+                size: size.next_power_of_two(),
+                usage: wgpu::BufferUsages::INDEX | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }));
+        }
+        if let Some(buffer) = &self.buffer {
+            queue.write_buffer(buffer, 0, contents);
+        }
+    }
+
+    /// Draws the first `count` indices with whatever pipeline, view and vertices are set.
+    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, count: u32) {
+        if let (Some(buffer), 1..) = (&self.buffer, count) {
+            pass.set_index_buffer(buffer.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed(0..count, 0, 0..1);
+        }
     }
 }

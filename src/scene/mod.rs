@@ -162,6 +162,15 @@ pub enum Technique {
     Volumes,
 }
 
+/// How shadow volumes are counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Counting {
+    /// Depth-pass where it is known to be right, depth-fail elsewhere: the same picture for less.
+    Auto,
+    /// Depth-fail everywhere.
+    DepthFail,
+}
+
 /// How shadows are made and how finely.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShadowSettings {
@@ -169,6 +178,8 @@ pub struct ShadowSettings {
     pub technique: Technique,
     /// Samples per pixel: 1 or 4.
     pub samples: u32,
+    /// How volumes are counted.
+    pub counting: Counting,
     /// What a frame may take, milliseconds; `None`: no limit is asked for.
     pub frame_budget_ms: Option<f64>,
 }
@@ -178,6 +189,7 @@ impl Default for ShadowSettings {
         Self {
             technique: Technique::Auto,
             samples: 4,
+            counting: Counting::Auto,
             frame_budget_ms: None,
         }
     }

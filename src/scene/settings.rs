@@ -3,7 +3,8 @@
 use super::error::SceneError;
 use super::reader::{Numbers, Table, Value};
 use super::{
-    ArucoRefinement, CameraSettings, DetectorKind, ShadowSettings, Technique, TrackingSettings,
+    ArucoRefinement, CameraSettings, Counting, DetectorKind, ShadowSettings, Technique,
+    TrackingSettings,
 };
 
 pub fn camera(root: &Table) -> Result<CameraSettings, SceneError> {
@@ -99,13 +100,21 @@ pub fn tracking(root: &Table) -> Result<TrackingSettings, SceneError> {
 pub fn shadows(root: &Table) -> Result<ShadowSettings, SceneError> {
     const TECHNIQUES: [(&str, Technique); 2] =
         [("auto", Technique::Auto), ("volumes", Technique::Volumes)];
+    const COUNTINGS: [(&str, Counting); 2] = [
+        ("auto", Counting::Auto),
+        ("depth-fail", Counting::DepthFail),
+    ];
     if let Some(probe) = root.optional("probe") {
         return Err(probe.error_without_value(
             "this version renders `volumes`, which takes [[light]] and [ambient] and no probe; allowed: no [probe]",
         ));
     }
     let default = ShadowSettings::default();
-    let Some(shadows) = root.table("shadows", &["technique", "samples", "frame_budget_ms"])? else {
+    let Some(shadows) = root.table(
+        "shadows",
+        &["technique", "samples", "counting", "frame_budget_ms"],
+    )?
+    else {
         return Ok(default);
     };
     let technique = |value: Value| match value.text()? {
@@ -118,6 +127,7 @@ pub fn shadows(root: &Table) -> Result<ShadowSettings, SceneError> {
         samples @ (1 | 4) => Ok(samples),
         _ => Err(value.error("not a number of samples; allowed: 1, 4")),
     };
+    let counting = |value: Value| value.one_of("way of counting", &COUNTINGS);
     let budget = |value: Value| value.number(&Numbers::above(0.0, 1e6, "ms"));
     Ok(ShadowSettings {
         technique: shadows
@@ -130,6 +140,11 @@ pub fn shadows(root: &Table) -> Result<ShadowSettings, SceneError> {
             .map(samples)
             .transpose()?
             .unwrap_or(default.samples),
+        counting: shadows
+            .optional("counting")
+            .map(counting)
+            .transpose()?
+            .unwrap_or(default.counting),
         frame_budget_ms: shadows
             .optional("frame_budget_ms")
             .map(budget)

@@ -1,0 +1,193 @@
+//! What takes light away: the volumes of each caster and light, and how each is counted in the present frame.
+
+use glam::DAffine3;
+
+use crate::geometry::camera::Intrinsics;
+use crate::geometry::counting::{self, Counting};
+use crate::geometry::reach::PixelRect;
+use crate::light::Light;
+use crate::scene;
+
+use super::anchor_geometry::{AnchoredCaster, Role};
+use super::gpu::Gpu;
+use super::touched::{Touched, light_place};
+use super::uniforms::{CastingLight, NEAR_M, UniformRow};
+use super::volumes::{Counted, IndexBuffer, Volume};
+
+/// The casters of a scene and their shadows.
+pub(super) struct Casters {
+    casters: Vec<AnchoredCaster>,
+    /// For each light those of each caster.
+    shadows: Vec<Vec<Shadow>>,
+    anchor_count: usize,
+    /// For each light that light in each anchor.
+    lights: UniformRow,
+    light_group: wgpu::BindGroup,
+    counting: scene::Counting,
+}
+
+/// What one caster does to one light.
+struct Shadow {
+    volume: Volume,
+    counting: Counting,
+    scissor: PixelRect,
+    /// The caster's surface where it lies in its own shadow and smooth shading lights it; corners of its batch.
+    terminator: IndexBuffer,
+}
+
+/// A virtual surface that its own caster hides from the light, and that smooth shading lights all the same.
+pub(super) struct Terminator<'a> {
+    pub anchor: usize,
+    pub indices: &'a IndexBuffer,
+}
+
+impl Casters {
+    /// `light_layout` has one uniform with a dynamic offset.
+    pub fn new(
+        device: &wgpu::Device,
+        casters: Vec<AnchoredCaster>,
+        light_count: usize,
+        anchor_count: usize,
+        light_layout: &wgpu::BindGroupLayout,
+        counting: scene::Counting,
+    ) -> Self {
+        let lights =
+            UniformRow::new::<CastingLight>(device, "casting lights", light_count * anchor_count);
+        let shadow = |_: &AnchoredCaster| Shadow {
+            volume: Volume::default(),
+            counting: Counting::DepthFail,
+            scissor: PixelRect::whole([0; 2]),
+            terminator: IndexBuffer::default(),
+        };
+        Self {
+            shadows: (0..light_count)
+                .map(|_| casters.iter().map(shadow).collect())
+                .collect(),
+            light_group: device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("casting light"),
+                layout: light_layout,
+                entries: &[wgpu::BindGroupEntry {
+                    binding: 0,
+                    resource: lights.binding(),
+                }],
+            }),
+            casters,
+            anchor_count,
+            lights,
+            counting,
+        }
+    }
+
+    /// Makes the volumes that `touched` asks for, where light or caster has moved, and chooses how they are counted.
+    pub fn update(
+        &mut self,
+        gpu: &Gpu,
+        lights: &[Light],
+        camera_from_anchor: &[Option<DAffine3>],
+        intrinsics: &Intrinsics,
+        touched: &Touched,
+    ) {
+        let (device, queue) = (&gpu.device, &gpu.queue);
+        let Some(camera_from_world) = camera_from_anchor.first().copied().flatten() else {
+            return;
+        };
+        for (index, light) in lights.iter().enumerate() {
+            for (anchor, camera_from_anchor) in camera_from_anchor.iter().enumerate() {
+                let Some(camera_from_anchor) = camera_from_anchor else {
+                    continue;
+                };
+                let anchor_from_camera = camera_from_anchor.inverse();
+                // The world stands still to its lights: no camera may come between, or rounding would move them.
+                let anchor_from_world = match anchor {
+                    0 => DAffine3::IDENTITY,
+                    _ => anchor_from_camera * camera_from_world,
+                };
+                let light = light_place(light, &anchor_from_world);
+                let slot = index * self.anchor_count + anchor;
+                self.lights.write(queue, slot, &CastingLight::new(light));
+                let near =
+                    counting::near_corners(intrinsics, f64::from(NEAR_M), &anchor_from_camera);
+                let eye = anchor_from_camera.translation;
+
+                let of_light = self.shadows[index].iter_mut().zip(&touched.shadows[index]);
+                for (caster, (shadow, &scissor)) in self.casters.iter().zip(of_light) {
+                    if caster.anchor != anchor {
+                        continue;
+                    }
+                    shadow.scissor = scissor;
+                    let Some(bounds) = caster.caster.bounds().filter(|_| !scissor.is_empty())
+                    else {
+                        continue;
+                    };
+                    shadow.counting = match self.counting {
+                        scene::Counting::Auto => counting::counting(bounds, light, &near),
+                        scene::Counting::DepthFail => Counting::DepthFail,
+                    };
+                    let made_for = (light, caster.caster.casting(light, eye));
+                    let changed = shadow.volume.update(
+                        device,
+                        queue,
+                        &caster.caster,
+                        made_for,
+                        shadow.counting,
+                    );
+                    if let (true, Some(smooth)) = (changed, &caster.smooth) {
+                        let of_part = |part| caster.caster.terminator(part, &smooth.corner_normals);
+                        let indices: Vec<u32> = shadow
+                            .volume
+                            .silhouettes()
+                            .flat_map(of_part)
+                            .flat_map(|triangle| smooth.triangles[triangle])
+                            .collect();
+                        shadow.terminator.write(device, queue, &indices);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The volumes of a role and light, for [`super::volumes::Volumes::count`].
+    pub fn counted<'a>(
+        &'a self,
+        role: Role,
+        light: usize,
+        views: &'a UniformRow,
+    ) -> impl Iterator<Item = Counted<'a>> {
+        self.present(role, light).map(move |(caster, shadow)| {
+            let slot = light * self.anchor_count + caster.anchor;
+            Counted {
+                volume: &shadow.volume,
+                counting: shadow.counting,
+                scissor: shadow.scissor,
+                offsets: [views.offset(caster.anchor), self.lights.offset(slot)],
+                vertices: &caster.vertices,
+            }
+        })
+    }
+
+    /// What is to be lit although it lies in its own shadow.
+    pub fn terminators(&self, light: usize) -> impl Iterator<Item = Terminator<'_>> {
+        self.present(Role::Virtual, light)
+            .filter(|(_, shadow)| shadow.terminator.count > 0)
+            .map(|(caster, shadow)| Terminator {
+                anchor: caster.anchor,
+                indices: &shadow.terminator,
+            })
+    }
+
+    /// The light in the anchors of casters.
+    pub fn light_group(&self) -> &wgpu::BindGroup {
+        &self.light_group
+    }
+
+    fn present(
+        &self,
+        role: Role,
+        light: usize,
+    ) -> impl Iterator<Item = (&AnchoredCaster, &Shadow)> {
+        self.casters
+            .iter()
+            .zip(&self.shadows[light])
+            .filter(move |(caster, shadow)| caster.role == role && !shadow.scissor.is_empty())
+    }
+}

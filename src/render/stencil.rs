@@ -1,0 +1,24 @@
+//! What the stencil's bits mean while one light is worked on.
+
+use super::anchor_geometry::Role;
+
+/// How many volumes of the present batch the surface lies in.
+pub(super) const COUNT: u32 = 0x3f;
+/// The largest number that the count can hold: a batch never has more volumes one in another.
+pub(super) const MOST_LAYERS: u32 = COUNT;
+/// Whatever the counts say: a virtual thing of an earlier batch hides the light.
+const VIRTUAL_HIDES: u32 = 0x40;
+/// A real thing hides the light; virtual things can then hide no more of it, and are not counted.
+pub(super) const REAL_HIDES: u32 = 0x80;
+/// A virtual thing hides the light.
+pub(super) const VIRTUAL_SHADOW: u32 = COUNT | VIRTUAL_HIDES;
+/// Anything hides the light.
+pub(super) const SHADOW: u32 = COUNT | VIRTUAL_HIDES | REAL_HIDES;
+
+/// The bit that keeps what a finished batch of this role has counted.
+pub(super) fn hides(role: Role) -> u32 {
+    match role {
+        Role::Real => REAL_HIDES,
+        Role::Virtual => VIRTUAL_HIDES,
+    }
+}
