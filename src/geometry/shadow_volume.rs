@@ -305,16 +305,17 @@ impl Caster {
             return vec![(silhouette, bound)];
         }
         let casting = silhouette.casts.iter().filter(|&&cast| cast != 0).count();
+        let mut first = silhouette.casts.clone();
+        let mut second = silhouette.casts;
         let mut seen = 0;
-        let mut halves = [silhouette.casts.clone(), silhouette.casts];
-        for triangle in 0..self.triangles.len() {
-            if halves[0][triangle] != 0 {
-                let other = usize::from(2 * seen < casting);
-                halves[other][triangle] = 0;
+        for (first, second) in first.iter_mut().zip(&mut second) {
+            if *first != 0 {
+                let dropped = if 2 * seen < casting { second } else { first };
+                *dropped = 0;
                 seen += 1;
             }
         }
-        halves
+        [first, second]
             .into_iter()
             .flat_map(|casts| self.parts(self.outline(silhouette.light, casts), most))
             .collect()

@@ -54,7 +54,7 @@ pub fn irradiance(light: &Light, point: DVec3, normal: DVec3) -> DVec3 {
 }
 
 /// The BRDF of a material for unit directions to the light and to the camera; the twin of `reflectance` in
-/// surfaces.wgsl. Lambert under a dielectric GGX layer (Walter et al. 2007, Schlick's Fresnel term, height-correlated
+/// shading.wgsl. Lambert under a dielectric GGX layer (Walter et al. 2007, Schlick's Fresnel term, height-correlated
 /// Smith term), coupled so that both ways of light are equal and none is made (Ashikhmin & Shirley 2000, section 3).
 pub fn reflectance(material: &Material, normal: DVec3, to_light: DVec3, to_camera: DVec3) -> DVec3 {
     let diffuse = material.albedo / PI;

@@ -20,7 +20,7 @@ pub(super) enum Role {
     Virtual,
 }
 
-/// A corner of a triangle, as `Corner` in surfaces.wgsl reads it.
+/// A corner of a triangle, as `Corner` in shading.wgsl reads it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 struct Corner {

@@ -3,7 +3,7 @@
 use super::gpu::{Gpu, RenderError};
 use super::readback::map_for_reading;
 
-/// What the last frame cost on the GPU, milliseconds; `None` where the adapter has no timestamps.
+/// What the last frame cost on the GPU, milliseconds; `None` where nothing was drawn or the adapter has no timestamps.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct GpuTimes {
     /// Surfaces, shadow volumes and light.
@@ -12,23 +12,33 @@ pub struct GpuTimes {
     pub composite_ms: Option<f64>,
 }
 
-/// Timestamps at the ends of the frame's two stretches: light (0, 1) and composite (2, 3).
+/// A part of the frame between two timestamps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stretch {
+    Background,
+    Light,
+    Composite,
+}
+
+const STRETCHES: [Stretch; 3] = [Stretch::Background, Stretch::Light, Stretch::Composite];
+
+/// Two timestamps for each stretch of the frame.
 pub(super) struct GpuClock {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
     readable: wgpu::Buffer,
     period_ns: f32,
-    light_drawn: bool,
+    drawn: Vec<Stretch>,
 }
 
 impl GpuClock {
-    const BYTES: u64 = 4 * 8;
+    const STRIDE: u64 = wgpu::QUERY_RESOLVE_BUFFER_ALIGNMENT;
 
     pub fn new(device: &wgpu::Device, period_ns: f32) -> Self {
         let buffer = |usage| {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("timestamps"),
-                size: Self::BYTES,
+                size: Self::STRIDE * STRETCHES.len() as u64,
                 usage,
                 mapped_at_creation: false,
             })
@@ -37,36 +47,38 @@ impl GpuClock {
             queries: device.create_query_set(&wgpu::QuerySetDescriptor {
                 label: Some("timestamps"),
                 ty: wgpu::QueryType::Timestamp,
-                count: 4,
+                count: 2 * STRETCHES.len() as u32,
             }),
             resolved: buffer(wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC),
             readable: buffer(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
             period_ns,
-            light_drawn: false,
+            drawn: Vec::new(),
         }
     }
 
-    pub fn light(&self, first: bool, last: bool) -> wgpu::RenderPassTimestampWrites<'_> {
+    /// For a pass that is the first of a stretch, the last, or both.
+    pub fn pass(
+        &self,
+        stretch: Stretch,
+        first: bool,
+        last: bool,
+    ) -> wgpu::RenderPassTimestampWrites<'_> {
+        let begin = 2 * stretch as u32;
         wgpu::RenderPassTimestampWrites {
             query_set: &self.queries,
-            beginning_of_pass_write_index: first.then_some(0),
-            end_of_pass_write_index: last.then_some(1),
+            beginning_of_pass_write_index: first.then_some(begin),
+            end_of_pass_write_index: last.then_some(begin + 1),
         }
     }
 
-    pub fn composite(&self) -> wgpu::RenderPassTimestampWrites<'_> {
-        wgpu::RenderPassTimestampWrites {
-            query_set: &self.queries,
-            beginning_of_pass_write_index: Some(2),
-            end_of_pass_write_index: Some(3),
+    pub fn resolve(&mut self, encoder: &mut wgpu::CommandEncoder, drawn: &[Stretch]) {
+        self.drawn = drawn.to_vec();
+        for &stretch in drawn {
+            let begin = 2 * stretch as u32;
+            let offset = Self::STRIDE * stretch as u64;
+            encoder.resolve_query_set(&self.queries, begin..begin + 2, &self.resolved, offset);
         }
-    }
-
-    pub fn resolve(&mut self, encoder: &mut wgpu::CommandEncoder, light_drawn: bool) {
-        self.light_drawn = light_drawn;
-        let first = if light_drawn { 0 } else { 2 };
-        encoder.resolve_query_set(&self.queries, first..4, &self.resolved, 0);
-        encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.readable, 0, Self::BYTES);
+        encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.readable, 0, self.readable.size());
     }
 
     pub fn read(&self, gpu: &Gpu) -> Result<GpuTimes, RenderError> {
@@ -79,20 +91,19 @@ impl GpuClock {
         let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&mapped);
         drop(mapped);
         self.readable.unmap();
-        let stretch_ms = |begin: usize| {
+        let stretch_ms = |stretch: Stretch| {
+            let begin = stretch as usize * (Self::STRIDE / 8) as usize;
             let ticks = ticks[begin + 1].saturating_sub(ticks[begin]);
-            Some(ticks as f64 * f64::from(self.period_ns) * 1e-6)
+            let drawn = self.drawn.contains(&stretch);
+            drawn.then(|| ticks as f64 * f64::from(self.period_ns) * 1e-6)
         };
-        Ok(if self.light_drawn {
-            GpuTimes {
-                shadows_ms: stretch_ms(0),
-                composite_ms: stretch_ms(2),
-            }
-        } else {
-            GpuTimes {
-                shadows_ms: None,
-                composite_ms: stretch_ms(0),
-            }
+        let picture = [Stretch::Background, Stretch::Composite];
+        Ok(GpuTimes {
+            shadows_ms: stretch_ms(Stretch::Light),
+            composite_ms: picture
+                .into_iter()
+                .filter_map(stretch_ms)
+                .reduce(|a, b| a + b),
         })
     }
 }

@@ -41,8 +41,9 @@ pub(super) struct LayerPasses {
     bits_readback: Readback,
 }
 
-/// Draws all surfaces of a role into the pass.
-pub(super) type DrawSurfaces<'a> = &'a dyn Fn(&mut wgpu::RenderPass<'_>, Role);
+/// Draws all surfaces of a role into the pass by a pipeline.
+pub(super) type DrawSurfaces<'a> =
+    &'a dyn Fn(&mut wgpu::RenderPass<'_>, &wgpu::RenderPipeline, Role);
 /// Counts all volumes of a role's casters for one light.
 pub(super) type CountVolumes<'a> = &'a dyn Fn(&mut wgpu::RenderPass<'_>, &Volumes, Role);
 
@@ -186,8 +187,7 @@ impl LayerPasses {
             ..Default::default()
         });
         for (role, pipeline) in [(Role::Real, &self.real), (Role::Virtual, &self.seeming)] {
-            pass.set_pipeline(pipeline);
-            draw_surfaces(&mut pass, role);
+            draw_surfaces(&mut pass, pipeline, role);
         }
         drop(pass);
         self.role_readback.copy_from(&mut encoder, &self.role);

@@ -3,9 +3,12 @@
 //! Each pass is one file here and one WGSL file of the same name under `shaders/`; [`Renderer::draw`] tells the frame
 //! from top to bottom.
 
+mod accumulation;
 mod anchor_geometry;
+mod background;
 mod casters;
 mod composite;
+mod direct;
 mod gpu;
 mod gpu_clock;
 mod indirect;
@@ -13,6 +16,7 @@ mod layers;
 mod readback;
 mod renderer;
 mod shader;
+mod stage;
 mod stencil;
 mod surfaces;
 mod touched;

@@ -1,6 +1,15 @@
 //! The WGSL sources, built into the program; a line `//!include "NAME.wgsl"` stands for that file.
 
-const INCLUDED: [(&str, &str); 2] = [
+/// What others include, each after those that it is included by.
+const INCLUDED: [(&str, &str); 4] = [
+    (
+        "//!include \"shading.wgsl\"",
+        include_str!("../../shaders/shading.wgsl"),
+    ),
+    (
+        "//!include \"video.wgsl\"",
+        include_str!("../../shaders/video.wgsl"),
+    ),
     (
         "//!include \"common.wgsl\"",
         include_str!("../../shaders/common.wgsl"),
@@ -32,5 +41,40 @@ pub(super) fn no_bindings(device: &wgpu::Device) -> wgpu::PipelineLayout {
         label: Some("no bindings"),
         bind_group_layouts: &[],
         immediate_size: 0,
+    })
+}
+
+/// A pipeline that draws one triangle over the whole of a target.
+pub(super) fn whole_picture(
+    device: &wgpu::Device,
+    layout: &wgpu::PipelineLayout,
+    module: &wgpu::ShaderModule,
+    entry_point: &str,
+    format: wgpu::TextureFormat,
+    constants: &[(&str, f64)],
+) -> wgpu::RenderPipeline {
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(entry_point),
+        layout: Some(layout),
+        vertex: wgpu::VertexState {
+            module,
+            entry_point: Some("whole_picture"),
+            compilation_options: Default::default(),
+            buffers: &[],
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: None,
+        multisample: wgpu::MultisampleState::default(),
+        fragment: Some(wgpu::FragmentState {
+            module,
+            entry_point: Some(entry_point),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants,
+                ..Default::default()
+            },
+            targets: &[Some(format.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
     })
 }

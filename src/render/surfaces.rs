@@ -8,10 +8,8 @@ use super::stencil::{REAL_HIDES, SHADOW, VIRTUAL_SHADOW};
 /// Format of `reaching` and `change`.
 pub(super) const LIGHT_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 
-/// Pipelines of the pass.
+/// Pipelines of the pass where several samples or lights are added up.
 pub(super) struct Surfaces {
-    /// Depth of real surfaces, for a scene whose only light needs to be known where it is hidden alone.
-    pub depth_of_real: wgpu::RenderPipeline,
     /// Depth and ambient light of real surfaces.
     pub ambient_on_real: wgpu::RenderPipeline,
     /// Depth and ambient light of virtual surfaces.
@@ -20,20 +18,75 @@ pub(super) struct Surfaces {
     pub light_reaching_real: wgpu::RenderPipeline,
     /// A light where virtual things hide it from real surfaces.
     pub light_hidden_from_real: wgpu::RenderPipeline,
-    /// Both at once, and the ambient light, for the only light of a scene.
-    pub only_light_hidden_from_real: wgpu::RenderPipeline,
     /// A light on virtual surfaces past all casters; the stencil's reference is 0, or 1 for surfaces that lie in no
     /// shadow but their own.
     pub light_on_virtual: wgpu::RenderPipeline,
 }
 
 /// What a pipeline does besides its shader.
-struct Use {
-    writes_depth: bool,
-    stencil: wgpu::CompareFunction,
-    stencil_bits: u32,
-    /// Whether it writes `reaching`, and whether `change`.
-    targets: [bool; 2],
+pub(super) struct Use<'a> {
+    pub vertex: &'a str,
+    pub fragment: &'a str,
+    /// The first to draw a surface; all others draw what is there once more.
+    pub writes_depth: bool,
+    pub stencil: wgpu::CompareFunction,
+    pub stencil_bits: u32,
+    pub targets: &'a [Option<wgpu::ColorTargetState>],
+}
+
+impl Use<'_> {
+    /// The pipeline that draws surface batches so.
+    pub fn pipeline(
+        &self,
+        device: &wgpu::Device,
+        layout: &wgpu::PipelineLayout,
+        module: &wgpu::ShaderModule,
+        depth_format: wgpu::TextureFormat,
+        samples: u32,
+    ) -> wgpu::RenderPipeline {
+        let face = wgpu::StencilFaceState {
+            compare: self.stencil,
+            ..Default::default()
+        };
+        device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(self.fragment),
+            layout: Some(layout),
+            vertex: wgpu::VertexState {
+                module,
+                entry_point: Some(self.vertex),
+                compilation_options: Default::default(),
+                buffers: &[Some(CORNER_LAYOUT), Some(INDIRECT_LAYOUT)],
+            },
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: depth_format,
+                depth_write_enabled: Some(self.writes_depth),
+                depth_compare: Some(match self.writes_depth {
+                    true => wgpu::CompareFunction::Greater,
+                    false => wgpu::CompareFunction::Equal,
+                }),
+                stencil: wgpu::StencilState {
+                    front: face,
+                    back: face,
+                    read_mask: self.stencil_bits,
+                    write_mask: 0,
+                },
+                bias: wgpu::DepthBiasState::default(),
+            }),
+            multisample: wgpu::MultisampleState {
+                count: samples,
+                ..Default::default()
+            },
+            fragment: Some(wgpu::FragmentState {
+                module,
+                entry_point: Some(self.fragment),
+                compilation_options: Default::default(),
+                targets: self.targets,
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+    }
 }
 
 impl Surfaces {
@@ -53,11 +106,12 @@ impl Surfaces {
             dst_factor: wgpu::BlendFactor::One,
             operation: wgpu::BlendOperation::Add,
         };
-        let build = |vertex: &str, fragment: &str, usage: Use| {
+        let build = |fragment: &str, stencil, stencil_bits, targets: [bool; 2]| {
+            let writes_depth = stencil == wgpu::CompareFunction::Always;
             let target = |written: bool| {
                 Some(wgpu::ColorTargetState {
                     format: LIGHT_FORMAT,
-                    blend: (!usage.writes_depth).then_some(wgpu::BlendState {
+                    blend: (!writes_depth).then_some(wgpu::BlendState {
                         color: add,
                         alpha: add,
                     }),
@@ -67,83 +121,27 @@ impl Surfaces {
                     },
                 })
             };
-            let face = wgpu::StencilFaceState {
-                compare: usage.stencil,
-                ..Default::default()
+            let usage = Use {
+                vertex: "place",
+                fragment,
+                writes_depth,
+                stencil,
+                stencil_bits,
+                targets: &targets.map(target),
             };
-            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some(fragment),
-                layout: Some(layout),
-                vertex: wgpu::VertexState {
-                    module: &module,
-                    entry_point: Some(vertex),
-                    compilation_options: Default::default(),
-                    buffers: &[Some(CORNER_LAYOUT), Some(INDIRECT_LAYOUT)],
-                },
-                primitive: wgpu::PrimitiveState::default(),
-                depth_stencil: Some(wgpu::DepthStencilState {
-                    format: depth_format,
-                    depth_write_enabled: Some(usage.writes_depth),
-                    depth_compare: Some(match usage.writes_depth {
-                        true => wgpu::CompareFunction::Greater,
-                        false => wgpu::CompareFunction::Equal,
-                    }),
-                    stencil: wgpu::StencilState {
-                        front: face,
-                        back: face,
-                        read_mask: usage.stencil_bits,
-                        write_mask: 0,
-                    },
-                    bias: wgpu::DepthBiasState::default(),
-                }),
-                multisample: wgpu::MultisampleState {
-                    count: samples,
-                    ..Default::default()
-                },
-                fragment: Some(wgpu::FragmentState {
-                    module: &module,
-                    entry_point: Some(fragment),
-                    compilation_options: Default::default(),
-                    targets: &usage.targets.map(target),
-                }),
-                multiview_mask: None,
-                cache: None,
-            })
+            usage.pipeline(device, layout, &module, depth_format, samples)
         };
-        let first = |targets| Use {
-            writes_depth: true,
-            stencil: wgpu::CompareFunction::Always,
-            stencil_bits: 0,
-            targets,
-        };
-        // The stencil's reference is 0, except for what lies in its own shadow.
-        let lit = |stencil, stencil_bits, targets| Use {
-            writes_depth: false,
-            stencil,
-            stencil_bits,
-            targets,
-        };
-        let (equal, other) = (
+        let (always, equal, other) = (
+            wgpu::CompareFunction::Always,
             wgpu::CompareFunction::Equal,
             wgpu::CompareFunction::NotEqual,
         );
-        let hidden = |targets| lit(other, VIRTUAL_SHADOW, targets);
         Self {
-            depth_of_real: build("place_alone", "depth_alone", first([false, false])),
-            ambient_on_real: build("place", "ambient_on_real", first([true, true])),
-            ambient_on_virtual: build("place", "ambient_on_virtual", first([true, true])),
-            light_reaching_real: build(
-                "place",
-                "light_on_real",
-                lit(equal, REAL_HIDES, [true, false]),
-            ),
-            light_hidden_from_real: build("place", "light_on_real", hidden([false, true])),
-            only_light_hidden_from_real: build("place", "only_light_hidden", hidden([true, true])),
-            light_on_virtual: build(
-                "place",
-                "light_on_virtual",
-                lit(equal, SHADOW, [false, true]),
-            ),
+            ambient_on_real: build("ambient_on_real", always, 0, [true, true]),
+            ambient_on_virtual: build("ambient_on_virtual", always, 0, [true, true]),
+            light_reaching_real: build("light_on_real", equal, REAL_HIDES, [true, false]),
+            light_hidden_from_real: build("light_on_real", other, VIRTUAL_SHADOW, [false, true]),
+            light_on_virtual: build("light_on_virtual", equal, SHADOW, [false, true]),
         }
     }
 }

@@ -80,7 +80,7 @@ impl CastingLight {
     }
 }
 
-/// Twin of `Lens` in composite.wgsl.
+/// Twin of `Lens` in video.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(super) struct Lens {
@@ -211,9 +211,9 @@ mod tests {
         assert_twins!(common, LightSource, place_in_camera, power);
         let volumes = shader::source(include_str!("../../shaders/volumes.wgsl"));
         assert_twins!(&volumes, CastingLight, place_in_anchor);
-        let composite = shader::source(include_str!("../../shaders/composite.wgsl"));
+        let video = include_str!("../../shaders/video.wgsl");
         assert_twins!(
-            &composite, Lens, focal_px, center_px, distortion, k3, distorts, size_px
+            video, Lens, focal_px, center_px, distortion, k3, distorts, size_px
         );
     }
 }

@@ -17,7 +17,8 @@ use gnomon::app::check::summary;
 use gnomon::geometry::mesh::Mesh;
 use gnomon::light::{Light, Material};
 use gnomon::scene::{
-    ArucoRefinement, DetectorKind, Family, Object, Scene, SceneError, ShadowSettings, Technique,
+    ArucoRefinement, Counting, DetectorKind, Family, Object, Scene, SceneError, ShadowSettings,
+    Technique,
 };
 use tempfile::TempDir;
 
@@ -133,6 +134,7 @@ fn a_small_scene_has_the_defaults() {
         ShadowSettings {
             technique: Technique::Auto,
             samples: 4,
+            counting: Counting::Auto,
             frame_budget_ms: None
         }
     );
@@ -202,6 +204,7 @@ radiance = 0.5
 [shadows]
 technique = \"volumes\"
 samples = 1
+counting = \"depth-fail\"
 frame_budget_ms = 16
 ";
     let scene = load_in(&project, text).unwrap();
@@ -289,6 +292,7 @@ frame_budget_ms = 16
         ShadowSettings {
             technique: Technique::Volumes,
             samples: 1,
+            counting: Counting::DepthFail,
             frame_budget_ms: Some(16.0)
         }
     );

@@ -1,0 +1,39 @@
+// Real and virtual surfaces drawn straight over the video, where one light and one sample leave nothing to add up.
+//!include "shading.wgsl"
+//!include "video.wgsl"
+
+struct Place {
+    @invariant @builtin(position) clip: vec4f,
+}
+
+@vertex
+fn place_alone(@location(0) position: vec3f) -> Place {
+    return Place(clip_from_point(view, vec4f(position, 1.0)));
+}
+
+// Phantoms write no colour: the video already shows them.
+@fragment
+fn depth_alone() {}
+
+// A real surface from which virtual things take the light: video · gain in linear light.
+@fragment
+fn hidden_on_real(surface: Surface, @builtin(front_facing) outside: bool) -> @location(0) vec4f {
+    let taken = irradiance(surface, outside);
+    // A surface that loses nothing keeps its picture bit for bit.
+    if all(taken <= vec3f(0.0)) {
+        discard;
+    }
+    let gain = surface.indirect / max(surface.indirect + taken, vec3f(1e-6));
+    return vec4f(srgb_from_linear(linear_from_srgb(undistorted(vec2i(surface.clip.xy))) * gain), 1.0);
+}
+
+@fragment
+fn ambient_on_virtual(surface: Surface) -> @location(0) vec4f {
+    return vec4f(srgb_from_linear(surface.albedo / PI * surface.indirect), 1.0);
+}
+
+@fragment
+fn light_on_virtual(surface: Surface, @builtin(front_facing) outside: bool) -> @location(0) vec4f {
+    let ambient = surface.albedo / PI * surface.indirect;
+    return vec4f(srgb_from_linear(ambient + radiance(surface, outside)), 1.0);
+}

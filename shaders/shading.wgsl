@@ -1,0 +1,85 @@
+// Surfaces and how they reflect one light, for all passes that shade.
+//!include "common.wgsl"
+
+@group(0) @binding(0) var<uniform> view: View;
+@group(1) @binding(0) var<uniform> light: LightSource;
+
+struct Corner {
+    @location(0) position: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) albedo: vec3f,
+    @location(3) roughness: f32,
+    @location(4) indirect: vec3f,
+}
+
+struct Surface {
+    @invariant @builtin(position) clip: vec4f,
+    // Centroid: at the edge of a triangle the pixel's centre may lie outside it.
+    @location(0) @interpolate(perspective, centroid) point_in_camera: vec3f,
+    @location(1) @interpolate(perspective, centroid) normal_in_camera: vec3f,
+    @location(2) @interpolate(flat) albedo: vec3f,
+    @location(3) @interpolate(flat) roughness: f32,
+    // Irradiance from the surroundings, lights aside (light::bounce).
+    @location(4) @interpolate(perspective, centroid) indirect: vec3f,
+}
+
+@vertex
+fn place(corner: Corner) -> Surface {
+    let point = vec4f(corner.position, 1.0);
+    return Surface(
+        clip_from_point(view, point),
+        (view.camera_from_anchor * point).xyz,
+        (view.camera_from_anchor * vec4f(corner.normal, 0.0)).xyz,
+        corner.albedo,
+        corner.roughness,
+        corner.indirect,
+    );
+}
+
+fn irradiance(surface: Surface, outside: bool) -> vec3f {
+    let arriving = incidence(light, surface.point_in_camera);
+    let normal = normalize(surface.normal_in_camera) * select(-1.0, 1.0, outside);
+    return arriving.irradiance * max(dot(normal, arriving.direction), 0.0);
+}
+
+// Radiance of a virtual surface towards the camera.
+fn radiance(surface: Surface, outside: bool) -> vec3f {
+    let arriving = incidence(light, surface.point_in_camera);
+    let normal = normalize(surface.normal_in_camera) * select(-1.0, 1.0, outside);
+    let to_camera = normalize(-surface.point_in_camera);
+    let reflected = reflectance(surface.albedo, surface.roughness, normal, arriving.direction, to_camera);
+    return arriving.irradiance * max(dot(normal, arriving.direction), 0.0) * reflected;
+}
+
+// The BRDF; its CPU twin is `light::reflectance`. Lambert under a dielectric GGX layer (Walter et al. 2007, with Schlick's
+// Fresnel term and the height-correlated Smith term); roughness 0 means Lambert alone.
+fn reflectance(albedo: vec3f, roughness: f32, normal: vec3f, to_light: vec3f, to_camera: vec3f) -> vec3f {
+    let diffuse = albedo / PI;
+    let cos_light = dot(normal, to_light);
+    if roughness <= 0.0 || cos_light <= 0.0 {
+        return diffuse;
+    }
+    let cos_camera = max(dot(normal, to_camera), 1e-3);
+    let halfway = normalize(to_light + to_camera);
+    let cos_half = clamp(dot(normal, halfway), 0.0, 1.0);
+    let alpha_squared = roughness * roughness;
+    let spread = cos_half * cos_half * (alpha_squared - 1.0) + 1.0;
+    let distribution = alpha_squared / (PI * spread * spread);
+    let visibility = 0.5
+        / (cos_light * sqrt(cos_camera * cos_camera * (1.0 - alpha_squared) + alpha_squared)
+            + cos_camera * sqrt(cos_light * cos_light * (1.0 - alpha_squared) + alpha_squared));
+    let specular = distribution * visibility * fresnel(dot(to_light, halfway));
+    // What the layer lets in and out again; the mean keeps a white material white.
+    let let_through = (1.0 - fresnel(cos_light)) * (1.0 - fresnel(cos_camera)) / (1.0 - MEAN_FRESNEL);
+    return diffuse * let_through + specular;
+}
+
+// Cosine-weighted mean of `fresnel` over the hemisphere.
+const MEAN_FRESNEL: f32 = 0.04 + 0.96 / 21.0;
+
+// Schlick's approximation for a dielectric of index 1.5.
+fn fresnel(cosine: f32) -> f32 {
+    let grazing = 1.0 - clamp(cosine, 0.0, 1.0);
+    let grazing_squared = grazing * grazing;
+    return 0.04 + 0.96 * grazing_squared * grazing_squared * grazing;
+}

@@ -1,0 +1,65 @@
+//! Shades straight into the picture, where one light and one sample per pixel leave nothing to add up or average: only
+//! pixels that a virtual thing changes are touched, and once.
+//! Reads the recorded picture and the stencil (stencil.rs). Writes depth, stencil and the picture.
+
+use super::background::PICTURE_FORMAT;
+use super::shader;
+use super::stencil::{SHADOW, VIRTUAL_SHADOW};
+use super::surfaces::Use;
+use super::volumes::Volumes;
+
+/// Pipelines and depth buffer of the pass.
+pub(super) struct Direct {
+    /// Depth of real surfaces.
+    pub depth_of_real: wgpu::RenderPipeline,
+    /// Depth and ambient light of virtual surfaces.
+    pub ambient_on_virtual: wgpu::RenderPipeline,
+    /// Real surfaces where virtual things hide the light.
+    pub hidden_on_real: wgpu::RenderPipeline,
+    /// All light on virtual surfaces, where it reaches them; for the stencil's reference see
+    /// [`super::surfaces::Surfaces::light_on_virtual`].
+    pub light_on_virtual: wgpu::RenderPipeline,
+    pub volumes: Volumes,
+    pub depth_stencil: wgpu::TextureView,
+}
+
+impl Direct {
+    /// `layout` is that of geometry with the video in group 2.
+    pub fn new(
+        device: &wgpu::Device,
+        layout: &wgpu::PipelineLayout,
+        depth_stencil: &wgpu::Texture,
+    ) -> Self {
+        let depth_format = depth_stencil.format();
+        let module = shader::module(device, "direct", include_str!("../../shaders/direct.wgsl"));
+        let build = |vertex: &str, fragment: &str, stencil, stencil_bits, written| {
+            let usage = Use {
+                vertex,
+                fragment,
+                writes_depth: stencil == wgpu::CompareFunction::Always,
+                stencil,
+                stencil_bits,
+                targets: &[Some(wgpu::ColorTargetState {
+                    format: PICTURE_FORMAT,
+                    blend: None,
+                    write_mask: written,
+                })],
+            };
+            usage.pipeline(device, layout, &module, depth_format, 1)
+        };
+        let (always, equal, other) = (
+            wgpu::CompareFunction::Always,
+            wgpu::CompareFunction::Equal,
+            wgpu::CompareFunction::NotEqual,
+        );
+        let (all, none) = (wgpu::ColorWrites::ALL, wgpu::ColorWrites::empty());
+        Self {
+            depth_of_real: build("place_alone", "depth_alone", always, 0, none),
+            ambient_on_virtual: build("place", "ambient_on_virtual", always, 0, all),
+            hidden_on_real: build("place", "hidden_on_real", other, VIRTUAL_SHADOW, all),
+            light_on_virtual: build("place", "light_on_virtual", equal, SHADOW, all),
+            volumes: Volumes::new(device, layout, depth_format, 1, &[PICTURE_FORMAT]),
+            depth_stencil: depth_stencil.create_view(&Default::default()),
+        }
+    }
+}

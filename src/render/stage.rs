@@ -1,0 +1,213 @@
+//! What stands where in a frame: the scene's surfaces, casters and lights on the GPU, and how passes draw them.
+
+use glam::DAffine3;
+
+use crate::geometry::camera::Intrinsics;
+use crate::geometry::reach::PixelRect;
+use crate::light::Light;
+use crate::scene::Scene;
+
+use super::anchor_geometry::{self, Extent, Role, SurfaceBatch};
+use super::casters::Casters;
+use super::gpu::Gpu;
+use super::indirect::Indirect;
+use super::touched::{Touched, everywhere, touched_by_virtual};
+use super::uniforms::{LightSource, UniformRow, View, uniform_entry};
+use super::volumes::{Among, Volumes};
+
+/// The scene as the present frame has it.
+pub(super) struct Stage {
+    intrinsics: Intrinsics,
+    lights: Vec<Light>,
+    surfaces: Vec<SurfaceBatch>,
+    casters: Casters,
+    extents: Vec<Extent>,
+    indirect: Option<Indirect>,
+    views: UniformRow,
+    light_sources: UniformRow,
+    view_group: wgpu::BindGroup,
+    light_group: wgpu::BindGroup,
+    /// Layouts of groups 0 and 1 of every shader that draws geometry: the anchor's view, and a light.
+    pub layouts: [wgpu::BindGroupLayout; 2],
+    camera_from_anchor: Vec<Option<DAffine3>>,
+}
+
+impl Stage {
+    pub fn new(gpu: &Gpu, scene: &Scene, intrinsics: Intrinsics) -> Self {
+        let device = &gpu.device;
+        let layouts = ["view", "light"].map(|label| {
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some(label),
+                entries: &[uniform_entry(0, true)],
+            })
+        });
+        let group = |layout, row: &UniformRow| {
+            device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout,
+                entries: &[wgpu::BindGroupEntry {
+                    binding: 0,
+                    resource: row.binding(),
+                }],
+            })
+        };
+        let views = UniformRow::new::<View>(device, "views", scene.anchors.len());
+        let light_sources = UniformRow::new::<LightSource>(device, "lights", scene.lights.len());
+        Self {
+            surfaces: anchor_geometry::surface_batches(device, scene),
+            casters: Casters::new(
+                device,
+                anchor_geometry::casters(device, scene),
+                scene.lights.len(),
+                scene.anchors.len(),
+                &layouts[1],
+                scene.shadows.counting,
+            ),
+            extents: anchor_geometry::extents(scene),
+            indirect: Indirect::new(scene),
+            view_group: group(&layouts[0], &views),
+            light_group: group(&layouts[1], &light_sources),
+            camera_from_anchor: vec![None; scene.anchors.len()],
+            lights: scene.lights.clone(),
+            intrinsics,
+            layouts,
+            views,
+            light_sources,
+        }
+    }
+
+    /// Number of lights.
+    pub fn light_count(&self) -> usize {
+        self.lights.len()
+    }
+
+    /// Places what stands on the anchors.
+    pub fn place(&mut self, gpu: &Gpu, camera_from_anchor: &[Option<DAffine3>]) {
+        let queue = &gpu.queue;
+        self.camera_from_anchor = camera_from_anchor.to_vec();
+        for (anchor, pose) in camera_from_anchor.iter().enumerate() {
+            if let Some(camera_from_anchor) = pose {
+                let view = View::new(&self.intrinsics, camera_from_anchor);
+                self.views.write(queue, anchor, &view);
+            }
+        }
+        let Some(camera_from_world) = camera_from_anchor.first().copied().flatten() else {
+            return;
+        };
+        let world_virtuals = self
+            .surfaces
+            .iter()
+            .find(|batch| batch.role == Role::Virtual && batch.anchor == 0);
+        if let (Some(indirect), Some(batch)) = (&mut self.indirect, world_virtuals) {
+            indirect.update(
+                queue,
+                &batch.indirect,
+                camera_from_anchor,
+                &camera_from_world,
+            );
+        }
+        for (index, light) in self.lights.iter().enumerate() {
+            let light = LightSource::new(light, &camera_from_world);
+            self.light_sources.write(queue, index, &light);
+        }
+    }
+
+    /// Makes the shadow volumes that matter to the picture. Returns what virtual things touch in it, if anything.
+    pub fn cast_on_touched(&mut self, gpu: &Gpu) -> Option<Touched> {
+        let touched = touched_by_virtual(
+            &self.extents,
+            &self.lights,
+            &self.camera_from_anchor,
+            &self.intrinsics,
+        )?;
+        self.cast(gpu, &touched);
+        Some(touched)
+    }
+
+    /// Makes all shadow volumes, wherever they are.
+    pub fn cast_everywhere(&mut self, gpu: &Gpu) {
+        let everywhere = everywhere(
+            &self.extents,
+            &self.lights,
+            &self.camera_from_anchor,
+            &self.intrinsics,
+        );
+        self.cast(gpu, &everywhere);
+    }
+
+    /// Makes the shadow volumes that `touched` asks for.
+    pub fn cast(&mut self, gpu: &Gpu, touched: &Touched) {
+        self.casters.update(
+            gpu,
+            &self.lights,
+            &self.camera_from_anchor,
+            &self.intrinsics,
+            touched,
+        );
+    }
+
+    /// Draws all surfaces of a role, with the light in group 1 if the pipeline wants one.
+    pub fn draw_surfaces(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        pipeline: &wgpu::RenderPipeline,
+        role: Role,
+        light: usize,
+    ) {
+        pass.set_pipeline(pipeline);
+        pass.set_stencil_reference(0);
+        pass.set_bind_group(1, &self.light_group, &[self.light_sources.offset(light)]);
+        for batch in self.placed(role) {
+            self.set_batch(pass, batch);
+            pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed(0..batch.index_count, 0, 0..1);
+        }
+    }
+
+    /// Lights virtual surfaces: those in no shadow, and those that lie in one volume, which is then their own, and that
+    /// smooth shading lights all the same. Otherwise the facets would draw a jagged line where the light ends.
+    pub fn draw_lit_virtuals(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        pipeline: &wgpu::RenderPipeline,
+        light: usize,
+    ) {
+        self.draw_surfaces(pass, pipeline, Role::Virtual, light);
+        pass.set_stencil_reference(1);
+        for terminator in self.casters.terminators(light) {
+            let mut batches = self.placed(Role::Virtual);
+            if let Some(batch) = batches.find(|batch| batch.anchor == terminator.anchor) {
+                self.set_batch(pass, batch);
+                terminator.indices.draw(pass, terminator.indices.count);
+            }
+        }
+    }
+
+    /// Counts a role's shadow volumes. Returns whether there are any.
+    pub fn count_volumes(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        volumes: &Volumes,
+        among: Among,
+        role: Role,
+        light: usize,
+        within: PixelRect,
+    ) -> bool {
+        let groups = [&self.view_group, self.casters.light_group()];
+        let counted = self.casters.counted(role, light, &self.views);
+        volumes.count(pass, among, role, groups, within, counted)
+    }
+
+    /// The batches of a role whose anchor has a pose, in a world that has one.
+    fn placed(&self, role: Role) -> impl Iterator<Item = &SurfaceBatch> {
+        let has_pose = |anchor: usize| self.camera_from_anchor[anchor].is_some();
+        let batches = self.surfaces.iter();
+        batches.filter(move |b| b.role == role && has_pose(0) && has_pose(b.anchor))
+    }
+
+    fn set_batch(&self, pass: &mut wgpu::RenderPass<'_>, batch: &SurfaceBatch) {
+        pass.set_bind_group(0, &self.view_group, &[self.views.offset(batch.anchor)]);
+        pass.set_vertex_buffer(0, batch.corners.slice(..));
+        pass.set_vertex_buffer(1, batch.indirect.slice(..));
+    }
+}
