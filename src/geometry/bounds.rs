@@ -1,6 +1,6 @@
 //! Boxes along the axes.
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
 /// A box along the axes of its space, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,5 +43,29 @@ impl Bounds {
                 pick(corner >> 2 & 1, self.low.z, self.high.z),
             )
         })
+    }
+}
+
+/// All points on one side of a plane: `dot(inward, point) >= offset_m`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HalfSpace {
+    /// Unit normal of the plane.
+    pub inward: DVec3,
+    /// Metres.
+    pub offset_m: f64,
+}
+
+impl HalfSpace {
+    /// How far inside the plane a point is, metres.
+    pub fn depth_of(&self, point: DVec3) -> f64 {
+        self.inward.dot(point) - self.offset_m
+    }
+
+    /// The same in another space, which is turned and moved against this one.
+    pub fn in_space(&self, here_from_there: &DAffine3) -> Self {
+        Self {
+            inward: here_from_there.matrix3.transpose() * self.inward,
+            offset_m: self.offset_m - self.inward.dot(here_from_there.translation),
+        }
     }
 }

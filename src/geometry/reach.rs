@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 
-use super::bounds::Bounds;
+use super::bounds::{Bounds, HalfSpace};
 use super::camera::Intrinsics;
 use super::shadow_volume::LightPlace;
 
@@ -125,6 +125,50 @@ pub fn shadowed(
     rect
 }
 
+/// A half-space that holds all receivers, and that all shadow of a thing with these corners leaves for good: its shadow
+/// volume may end there. `None` where there is none. All in world space.
+///
+/// Of the receivers' sides it is the one that the thing's shadow reaches first.
+pub fn shadow_end(
+    corners: &[DVec3; 8],
+    light: LightPlace,
+    receivers: &Bounds,
+) -> Option<HalfSpace> {
+    // What lies on a side is not to be lost to rounding.
+    let margin_m = 1e-2 * (receivers.high - receivers.low).length();
+    let sides = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|axis| {
+        [
+            HalfSpace {
+                inward: axis,
+                offset_m: axis.dot(receivers.low) - margin_m,
+            },
+            HalfSpace {
+                inward: -axis,
+                offset_m: -axis.dot(receivers.high) - margin_m,
+            },
+        ]
+    });
+    // How many times the way from the light to a corner leads from there to the side: the longest of all corners.
+    let stretch = |side: &HalfSpace| {
+        let stretches = corners.map(|corner| {
+            let way = match light {
+                LightPlace::Point(light) => corner - light,
+                LightPlace::Along(direction) => direction,
+            };
+            match side.inward.dot(way) {
+                falling if falling < -1e-3 * way.length() => side.depth_of(corner) / -falling,
+                _ => f64::INFINITY,
+            }
+        });
+        stretches.into_iter().fold(0.0, f64::max)
+    };
+    sides
+        .map(|side| (stretch(&side), side))
+        .filter(|(stretch, _)| stretch.is_finite())
+        .min_by(|(one, _), (other, _)| one.total_cmp(other))
+        .map(|(_, side)| side)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -201,6 +245,35 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn beyond_the_end_of_a_shadow_nothing_can_be_shaded() {
+        let receivers = Bounds {
+            low: DVec3::new(-0.4, -0.3, -0.02),
+            high: DVec3::new(0.4, 0.3, 0.2),
+        };
+        let corners = unit_box().corners();
+        let from = |light: LightPlace| shadow_end(&corners, light, &receivers);
+        // From above the table ends it, from the side a wall.
+        let above = from(LightPlace::Point(DVec3::new(-0.3, 0.1, 0.5))).expect("an end");
+        assert_eq!(above.inward, DVec3::Z);
+        let aside = from(LightPlace::Along(DVec3::new(-0.9, 0.0, 0.1).normalize()));
+        assert_eq!(aside.expect("an end").inward, DVec3::X);
+        // All receivers and the thing lie before it.
+        for point in receivers.corners().iter().chain(&corners) {
+            assert!(above.depth_of(*point) > 0.0);
+        }
+        // From within the box light goes all ways.
+        assert_eq!(from(LightPlace::Point(DVec3::new(0.0, 0.0, 0.05))), None);
+        // Another space tells the same.
+        let turned = DAffine3::from_rotation_translation(
+            DQuat::from_rotation_y(0.7),
+            DVec3::new(0.1, -0.2, 0.3),
+        );
+        let there = turned.inverse().transform_point3(corners[3]);
+        let depth = above.in_space(&turned).depth_of(there);
+        assert!((depth - above.depth_of(corners[3])).abs() < 1e-12);
     }
 
     #[test]

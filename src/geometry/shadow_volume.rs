@@ -158,7 +158,7 @@ impl Caster {
     }
 
     /// Homogeneous vertices that [`Caster::side_indices`] and [`Caster::cap_indices`] point to: the mesh's own
-    /// (w = 1), and each again (w = 0), to be cast away from the light to infinity.
+    /// (w = 1), and each again (w = 0), to be cast away from the light: to infinity, or as far as matters.
     pub fn volume_vertices(&self) -> Vec<Vec4> {
         let near = self.positions.iter().map(|position| position.extend(1.0));
         let far = self.positions.iter().map(|position| position.extend(0.0));
@@ -233,11 +233,7 @@ impl Caster {
         let mut indices = Vec::with_capacity(6 * silhouette.edges.len());
         for &[from, to] in &silhouette.edges {
             // The caps run from `from` to `to`; the side must run back.
-            indices.extend([to, from, far + from]);
-            // Parallel light meets itself in one point at infinity.
-            if matches!(silhouette.light, LightPlace::Point(_)) {
-                indices.extend([to, far + from, far + to]);
-            }
+            indices.extend([to, from, far + from, to, far + from, far + to]);
         }
         indices
     }
@@ -255,11 +251,7 @@ impl Caster {
                 1 => (b, c),
                 _ => (c, b),
             };
-            indices.extend([a, b, c]);
-            // The far cap of parallel light is a point.
-            if matches!(silhouette.light, LightPlace::Point(_)) {
-                indices.extend([far + a, far + c, far + b]);
-            }
+            indices.extend([a, b, c, far + a, far + c, far + b]);
         }
         indices
     }
@@ -563,8 +555,8 @@ mod tests {
     #[test]
     fn a_cube_lit_from_above_has_the_outline_of_its_top() {
         let light = LightPlace::Along(DVec3::new(0.0, 0.0, -1.0));
-        // Two triangles of cap, four sides that meet at infinity.
-        assert_eq!(volume(&cube(), light, Casting::Facing).len() / 3, 2 + 4);
+        // Two triangles for each cap and each of four sides.
+        assert_eq!(volume(&cube(), light, Casting::Facing).len() / 3, 12);
     }
 
     #[test]

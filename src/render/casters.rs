@@ -1,7 +1,8 @@
 //! What takes light away: the volumes of each caster and light, and how each is counted in the present frame.
 
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 
+use crate::geometry::bounds::HalfSpace;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::counting::{self, Counting};
 use crate::geometry::reach::PixelRect;
@@ -19,8 +20,7 @@ pub(super) struct Casters {
     casters: Vec<AnchoredCaster>,
     /// For each light those of each caster.
     shadows: Vec<Vec<Shadow>>,
-    anchor_count: usize,
-    /// For each light that light in each anchor.
+    /// For each light, that light as each caster meets it.
     lights: UniformRow,
     light_group: wgpu::BindGroup,
     counting: scene::Counting,
@@ -47,12 +47,11 @@ impl Casters {
         device: &wgpu::Device,
         casters: Vec<AnchoredCaster>,
         light_count: usize,
-        anchor_count: usize,
         light_layout: &wgpu::BindGroupLayout,
         counting: scene::Counting,
     ) -> Self {
         let lights =
-            UniformRow::new::<CastingLight>(device, "casting lights", light_count * anchor_count);
+            UniformRow::new::<CastingLight>(device, "casting lights", light_count * casters.len());
         let shadow = |_: &AnchoredCaster| Shadow {
             volume: Volume::default(),
             counting: Counting::DepthFail,
@@ -72,7 +71,6 @@ impl Casters {
                 }],
             }),
             casters,
-            anchor_count,
             lights,
             counting,
         }
@@ -91,56 +89,74 @@ impl Casters {
         let Some(camera_from_world) = camera_from_anchor.first().copied().flatten() else {
             return;
         };
-        for (index, light) in lights.iter().enumerate() {
-            for (anchor, camera_from_anchor) in camera_from_anchor.iter().enumerate() {
-                let Some(camera_from_anchor) = camera_from_anchor else {
+        let placed: Vec<Option<Placed>> = camera_from_anchor
+            .iter()
+            .enumerate()
+            .map(|(anchor, camera_from_anchor)| {
+                let anchor_from_camera = (*camera_from_anchor)?.inverse();
+                Some(Placed {
+                    // The world stands still to its lights: no camera may come between, or rounding would move them.
+                    anchor_from_world: match anchor {
+                        0 => DAffine3::IDENTITY,
+                        _ => anchor_from_camera * camera_from_world,
+                    },
+                    near: counting::near_corners(
+                        intrinsics,
+                        f64::from(NEAR_M),
+                        &anchor_from_camera,
+                    ),
+                    eye: anchor_from_camera.translation,
+                })
+            })
+            .collect();
+        let count = self.casters.len();
+        for (index, (light, shadows)) in lights.iter().zip(&mut self.shadows).enumerate() {
+            for (number, (caster, shadow)) in self.casters.iter().zip(shadows).enumerate() {
+                let reach = &touched.shadows[index][number];
+                shadow.scissor = reach.pixels;
+                let (Some(bounds), Some(placed), false) = (
+                    caster.caster.bounds(),
+                    &placed[caster.anchor],
+                    reach.pixels.is_empty(),
+                ) else {
                     continue;
                 };
-                let anchor_from_camera = camera_from_anchor.inverse();
-                // The world stands still to its lights: no camera may come between, or rounding would move them.
-                let anchor_from_world = match anchor {
-                    0 => DAffine3::IDENTITY,
-                    _ => anchor_from_camera * camera_from_world,
+                let light = light_place(light, &placed.anchor_from_world);
+                let end = reach
+                    .end
+                    .map(|end| end.in_space(&placed.anchor_from_world.inverse()));
+                self.lights.write(
+                    queue,
+                    index * count + number,
+                    &CastingLight::new(light, end),
+                );
+                // Beyond its end a volume is open: no ray may come from there.
+                let sees_past_end = |end: HalfSpace| {
+                    placed
+                        .near
+                        .iter()
+                        .any(|corner| end.depth_of(*corner) <= 0.0)
                 };
-                let light = light_place(light, &anchor_from_world);
-                let slot = index * self.anchor_count + anchor;
-                self.lights.write(queue, slot, &CastingLight::new(light));
-                let near =
-                    counting::near_corners(intrinsics, f64::from(NEAR_M), &anchor_from_camera);
-                let eye = anchor_from_camera.translation;
-
-                let of_light = self.shadows[index].iter_mut().zip(&touched.shadows[index]);
-                for (caster, (shadow, &scissor)) in self.casters.iter().zip(of_light) {
-                    if caster.anchor != anchor {
-                        continue;
+                shadow.counting = match self.counting {
+                    scene::Counting::Auto if !end.is_some_and(sees_past_end) => {
+                        counting::counting(bounds, light, &placed.near)
                     }
-                    shadow.scissor = scissor;
-                    let Some(bounds) = caster.caster.bounds().filter(|_| !scissor.is_empty())
-                    else {
-                        continue;
-                    };
-                    shadow.counting = match self.counting {
-                        scene::Counting::Auto => counting::counting(bounds, light, &near),
-                        scene::Counting::DepthFail => Counting::DepthFail,
-                    };
-                    let made_for = (light, caster.caster.casting(light, eye));
-                    let changed = shadow.volume.update(
-                        device,
-                        queue,
-                        &caster.caster,
-                        made_for,
-                        shadow.counting,
-                    );
-                    if let (true, Some(smooth)) = (changed, &caster.smooth) {
-                        let of_part = |part| caster.caster.terminator(part, &smooth.corner_normals);
-                        let indices: Vec<u32> = shadow
-                            .volume
-                            .silhouettes()
-                            .flat_map(of_part)
-                            .flat_map(|triangle| smooth.triangles[triangle])
-                            .collect();
-                        shadow.terminator.write(device, queue, &indices);
-                    }
+                    _ => Counting::DepthFail,
+                };
+                let made_for = (light, caster.caster.casting(light, placed.eye));
+                let changed =
+                    shadow
+                        .volume
+                        .update(device, queue, &caster.caster, made_for, shadow.counting);
+                if let (true, Some(smooth)) = (changed, &caster.smooth) {
+                    let of_part = |part| caster.caster.terminator(part, &smooth.corner_normals);
+                    let indices: Vec<u32> = shadow
+                        .volume
+                        .silhouettes()
+                        .flat_map(of_part)
+                        .flat_map(|triangle| smooth.triangles[triangle])
+                        .collect();
+                    shadow.terminator.write(device, queue, &indices);
                 }
             }
         }
@@ -153,23 +169,25 @@ impl Casters {
         light: usize,
         views: &'a UniformRow,
     ) -> impl Iterator<Item = Counted<'a>> {
-        self.present(role, light).map(move |(caster, shadow)| {
-            let slot = light * self.anchor_count + caster.anchor;
-            Counted {
+        let count = self.casters.len();
+        self.present(role, light)
+            .map(move |(number, caster, shadow)| Counted {
                 volume: &shadow.volume,
                 counting: shadow.counting,
                 scissor: shadow.scissor,
-                offsets: [views.offset(caster.anchor), self.lights.offset(slot)],
+                offsets: [
+                    views.offset(caster.anchor),
+                    self.lights.offset(light * count + number),
+                ],
                 vertices: &caster.vertices,
-            }
-        })
+            })
     }
 
     /// What is to be lit although it lies in its own shadow.
     pub fn terminators(&self, light: usize) -> impl Iterator<Item = Terminator<'_>> {
         self.present(Role::Virtual, light)
-            .filter(|(_, shadow)| shadow.terminator.count > 0)
-            .map(|(caster, shadow)| Terminator {
+            .filter(|(_, _, shadow)| shadow.terminator.count > 0)
+            .map(|(_, caster, shadow)| Terminator {
                 anchor: caster.anchor,
                 indices: &shadow.terminator,
             })
@@ -184,10 +202,17 @@ impl Casters {
         &self,
         role: Role,
         light: usize,
-    ) -> impl Iterator<Item = (&AnchoredCaster, &Shadow)> {
-        self.casters
-            .iter()
-            .zip(&self.shadows[light])
-            .filter(move |(caster, shadow)| caster.role == role && !shadow.scissor.is_empty())
+    ) -> impl Iterator<Item = (usize, &AnchoredCaster, &Shadow)> {
+        let casters = self.casters.iter().zip(&self.shadows[light]).enumerate();
+        casters
+            .filter(move |(_, (caster, shadow))| caster.role == role && !shadow.scissor.is_empty())
+            .map(|(number, (caster, shadow))| (number, caster, shadow))
     }
+}
+
+/// Where an anchor's casters have the light and the camera.
+struct Placed {
+    anchor_from_world: DAffine3,
+    near: [DVec3; 4],
+    eye: DVec3,
 }

@@ -59,7 +59,6 @@ impl Stage {
                 device,
                 anchor_geometry::casters(device, scene),
                 scene.lights.len(),
-                scene.anchors.len(),
                 &layouts[1],
                 scene.shadows.counting,
             ),
@@ -136,7 +135,7 @@ impl Stage {
     }
 
     /// Makes the shadow volumes that `touched` asks for.
-    pub fn cast(&mut self, gpu: &Gpu, touched: &Touched) {
+    fn cast(&mut self, gpu: &Gpu, touched: &Touched) {
         self.casters.update(
             gpu,
             &self.lights,

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 
-use crate::geometry::bounds::Bounds;
+use crate::geometry::bounds::{Bounds, HalfSpace};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::{self, PixelRect};
 use crate::geometry::shadow_volume::LightPlace;
@@ -20,8 +20,17 @@ const NOWHERE: PixelRect = PixelRect {
 pub(super) struct Touched {
     /// All of it.
     pub pixels: PixelRect,
-    /// For each light and each caster where in `pixels` its shadow can be; empty where it need not be counted.
-    pub shadows: Vec<Vec<PixelRect>>,
+    /// For each light and each caster.
+    pub shadows: Vec<Vec<ShadowReach>>,
+}
+
+/// How far a caster's shadow matters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ShadowReach {
+    /// Where in the picture it can be; empty where it need not be counted.
+    pub pixels: PixelRect,
+    /// Where in the world it may end.
+    pub end: Option<HalfSpace>,
 }
 
 /// What virtual things and their shadows can change; `None` if nothing.
@@ -48,8 +57,12 @@ pub(super) fn touched_by_virtual(
         .collect();
     let receivers = Bounds::around(placed.iter().flat_map(|(_, corners)| *corners))?;
 
+    let unseen = ShadowReach {
+        pixels: NOWHERE,
+        end: None,
+    };
     let casters = extents.iter().filter_map(|extent| extent.caster).count();
-    let mut shadows = vec![vec![NOWHERE; casters]; lights.len()];
+    let mut shadows = vec![vec![unseen; casters]; lights.len()];
     let mut pixels = NOWHERE;
     for (extent, corners) in &placed {
         if extent.role == Role::Virtual {
@@ -60,15 +73,17 @@ pub(super) fn touched_by_virtual(
         };
         for (light, shadows) in lights.iter().zip(&mut shadows) {
             let light = light_place(light, &DAffine3::IDENTITY);
-            shadows[caster] =
-                reach::shadowed(corners, light, &receivers, &camera_from_world, intrinsics);
+            shadows[caster] = ShadowReach {
+                pixels: reach::shadowed(corners, light, &receivers, &camera_from_world, intrinsics),
+                end: reach::shadow_end(corners, light, &receivers),
+            };
             if extent.role == Role::Virtual {
-                pixels = pixels.union(shadows[caster]);
+                pixels = pixels.union(shadows[caster].pixels);
             }
         }
     }
     for shadow in shadows.iter_mut().flatten() {
-        *shadow = shadow.intersection(pixels);
+        shadow.pixels = shadow.pixels.intersection(pixels);
     }
     (!pixels.is_empty()).then_some(Touched { pixels, shadows })
 }
@@ -83,9 +98,12 @@ pub(super) fn everywhere(
     let pixels = PixelRect::whole(intrinsics.size_px);
     let world = camera_from_anchor.first().copied().flatten();
     let placed = |extent: &Extent| world.is_some() && camera_from_anchor[extent.anchor].is_some();
-    let of_caster = |extent: &Extent| match placed(extent) {
-        true => pixels,
-        false => NOWHERE,
+    let of_caster = |extent: &Extent| ShadowReach {
+        pixels: match placed(extent) {
+            true => pixels,
+            false => NOWHERE,
+        },
+        end: None,
     };
     let casters = extents.iter().filter(|extent| extent.caster.is_some());
     let shadows = vec![casters.map(of_caster).collect(); lights.len()];

@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, Mat4, Vec4};
 
+use crate::geometry::bounds::HalfSpace;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::shadow_volume::LightPlace;
 use crate::light::Light;
@@ -69,13 +70,17 @@ impl LightSource {
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(super) struct CastingLight {
     pub place_in_anchor: Vec4,
+    pub end_in_anchor: Vec4,
 }
 
 impl CastingLight {
-    pub fn new(light: LightPlace) -> Self {
+    pub fn new(light: LightPlace, end: Option<HalfSpace>) -> Self {
         let (place, weight) = light.homogeneous();
         Self {
             place_in_anchor: place.as_vec3().extend(weight as f32),
+            end_in_anchor: end.map_or(Vec4::ZERO, |end| {
+                end.inward.as_vec3().extend(end.offset_m as f32)
+            }),
         }
     }
 }
@@ -210,7 +215,7 @@ mod tests {
         assert_twins!(common, View, clip_from_anchor, camera_from_anchor);
         assert_twins!(common, LightSource, place_in_camera, power);
         let volumes = shader::source(include_str!("../../shaders/volumes.wgsl"));
-        assert_twins!(&volumes, CastingLight, place_in_anchor);
+        assert_twins!(&volumes, CastingLight, place_in_anchor, end_in_anchor);
         let video = include_str!("../../shaders/video.wgsl");
         assert_twins!(
             video, Lens, focal_px, center_px, distortion, k3, distorts, size_px
