@@ -27,9 +27,19 @@ fn hidden_on_real(surface: Surface, @builtin(front_facing) outside: bool) -> @lo
     return vec4f(srgb_from_linear(linear_from_srgb(undistorted(vec2i(surface.clip.xy))) * gain), 1.0);
 }
 
+struct AmbientSurface {
+    @invariant @builtin(position) clip: vec4f,
+    @location(0) radiance: vec3f,
+}
+
+@vertex
+fn place_in_ambient_light(@location(0) position: vec3f, @location(2) albedo: vec3f, @location(4) indirect: vec3f) -> AmbientSurface {
+    return AmbientSurface(clip_from_point(view, vec4f(position, 1.0)), albedo / PI * indirect);
+}
+
 @fragment
-fn ambient_on_virtual(surface: Surface) -> @location(0) vec4f {
-    return vec4f(srgb_from_linear(surface.albedo / PI * surface.indirect), 1.0);
+fn ambient_on_virtual(surface: AmbientSurface) -> @location(0) vec4f {
+    return vec4f(srgb_from_linear(surface.radiance), 1.0);
 }
 
 @fragment

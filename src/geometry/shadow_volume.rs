@@ -281,9 +281,12 @@ impl Caster {
 }
 
 impl Silhouette {
-    /// Whether nothing casts.
-    pub fn is_empty(&self) -> bool {
-        self.casts.iter().all(|&cast| cast == 0)
+    /// The triangles that cast.
+    pub fn casting_triangles(&self) -> impl Iterator<Item = usize> {
+        let casts = self.casts.iter().enumerate();
+        casts
+            .filter(|(_, cast)| **cast != 0)
+            .map(|(triangle, _)| triangle)
     }
 }
 
@@ -296,7 +299,7 @@ impl Caster {
         if bound <= most {
             return vec![(silhouette, bound)];
         }
-        let casting = silhouette.casts.iter().filter(|&&cast| cast != 0).count();
+        let casting = silhouette.casting_triangles().count();
         let mut first = silhouette.casts.clone();
         let mut second = silhouette.casts;
         let mut seen = 0;
@@ -320,7 +323,7 @@ impl Caster {
     /// crosses them as often inwards as outwards: no direction can have more than half the edges that a great circle
     /// through it and a pole meets, besides what the pole has.
     fn most_layers(&self, silhouette: &Silhouette, enough: u32) -> u32 {
-        let casting = silhouette.casts.iter().filter(|&&cast| cast != 0).count() as u32;
+        let casting = silhouette.casting_triangles().count() as u32;
         let at_pole;
         let mut spans: Vec<[f64; 2]> = Vec::new();
         let place = |index: u32| self.positions[index as usize].as_dvec3();

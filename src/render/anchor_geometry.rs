@@ -3,6 +3,7 @@
 
 use std::collections::HashMap;
 use std::f64::consts::PI;
+use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -64,16 +65,19 @@ pub(super) struct AnchoredCaster {
     pub caster: Caster,
     /// See [`Caster::volume_vertices`].
     pub vertices: wgpu::Buffer,
-    /// Of a virtual thing with smooth shading.
-    pub smooth: Option<SmoothSurface>,
+    /// Where a virtual thing's surface is in its batch.
+    pub surface: Option<SurfacePart>,
 }
 
-/// A surface that smooth normals light beyond the triangles that face the light.
-pub(super) struct SmoothSurface {
-    /// Unit normals of each triangle's corners, in the anchor's space.
-    pub corner_normals: Vec<[Vec3; 3]>,
-    /// Each triangle's corners in its batch.
+/// The surface of one thing as part of its batch.
+pub(super) struct SurfacePart {
+    /// Each triangle's corners in the batch.
     pub triangles: Vec<[u32; 3]>,
+    /// Its place among the batch's indices.
+    pub range: Range<u32>,
+    /// Unit normals of each triangle's corners, in the anchor's space, if they light more than the triangles that face
+    /// the light.
+    pub smooth_normals: Option<Vec<[Vec3; 3]>>,
 }
 
 /// The box around one thing, in its anchor's space.
@@ -154,7 +158,7 @@ pub(super) fn surface_batches(device: &wgpu::Device, scene: &Scene) -> Vec<Surfa
 
 /// Casters, the real ones first.
 pub(super) fn casters(device: &wgpu::Device, scene: &Scene) -> Vec<AnchoredCaster> {
-    let mut smooth = smooth_surfaces(scene);
+    let mut surfaces = virtual_surfaces(scene);
     objects(scene)
         .filter(|(_, object)| object.casts)
         .map(|(role, object)| {
@@ -168,9 +172,9 @@ pub(super) fn casters(device: &wgpu::Device, scene: &Scene) -> Vec<AnchoredCaste
                     usage: wgpu::BufferUsages::VERTEX,
                 }),
                 caster,
-                smooth: match role {
+                surface: match role {
                     Role::Real => None,
-                    Role::Virtual => smooth.remove(object.name.as_str()),
+                    Role::Virtual => surfaces.remove(object.name.as_str()),
                 },
             }
         })
@@ -191,8 +195,17 @@ fn batch(scene: &Scene, role: Role, anchor: usize) -> impl Iterator<Item = &Obje
         .map(|(_, object)| object)
 }
 
-/// The surfaces of the virtual things that are not flatly shaded, by name.
-fn smooth_surfaces(scene: &Scene) -> HashMap<&str, SmoothSurface> {
+/// Anchor and place in their batches of the virtual things that hide no light.
+pub(super) fn virtuals_without_shadow(scene: &Scene) -> Vec<(usize, Range<u32>)> {
+    let mut surfaces = virtual_surfaces(scene);
+    let virtuals = scene.virtuals.iter().filter(|object| !object.casts);
+    virtuals
+        .filter_map(|object| Some((object.anchor, surfaces.remove(object.name.as_str())?.range)))
+        .collect()
+}
+
+/// The surfaces of virtual things, by name.
+fn virtual_surfaces(scene: &Scene) -> HashMap<&str, SurfacePart> {
     let mut surfaces = HashMap::new();
     for anchor in 0..scene.anchors.len() {
         let mut shared = SharedCorners::default();
@@ -201,13 +214,13 @@ fn smooth_surfaces(scene: &Scene) -> HashMap<&str, SmoothSurface> {
             shared.add(object);
             let normals: Vec<Vec3> = corners(object).map(|corner| corner.normal).collect();
             let (corner_normals, _) = normals.as_chunks::<3>();
-            if corner_normals.iter().any(|[a, b, c]| a != b || b != c) {
-                let surface = SmoothSurface {
-                    corner_normals: corner_normals.to_vec(),
-                    triangles: shared.triangles[first..].to_vec(),
-                };
-                surfaces.insert(object.name.as_str(), surface);
-            }
+            let is_smooth = corner_normals.iter().any(|[a, b, c]| a != b || b != c);
+            let surface = SurfacePart {
+                triangles: shared.triangles[first..].to_vec(),
+                range: 3 * first as u32..3 * shared.triangles.len() as u32,
+                smooth_normals: is_smooth.then(|| corner_normals.to_vec()),
+            };
+            surfaces.insert(object.name.as_str(), surface);
         }
     }
     surfaces

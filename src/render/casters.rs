@@ -1,15 +1,18 @@
 //! What takes light away: the volumes of each caster and light, and how each is counted in the present frame.
 
+use std::ops::Range;
+
 use glam::{DAffine3, DVec3};
 
 use crate::geometry::bounds::HalfSpace;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::counting::{self, Counting};
 use crate::geometry::reach::PixelRect;
+use crate::geometry::shadow_volume::{Caster, Casting};
 use crate::light::Light;
 use crate::scene;
 
-use super::anchor_geometry::{AnchoredCaster, Role};
+use super::anchor_geometry::{AnchoredCaster, Role, SurfacePart};
 use super::gpu::Gpu;
 use super::touched::{Touched, light_place};
 use super::uniforms::{CastingLight, NEAR_M, UniformRow};
@@ -31,14 +34,24 @@ struct Shadow {
     volume: Volume,
     counting: Counting,
     scissor: PixelRect,
-    /// The caster's surface where it lies in its own shadow and smooth shading lights it; corners of its batch.
+    /// Corners of its batch: a virtual caster's triangles that face the light, and those that lie in its own shadow and
+    /// that smooth shading lights all the same.
+    facing: IndexBuffer,
     terminator: IndexBuffer,
 }
 
-/// A virtual surface that its own caster hides from the light, and that smooth shading lights all the same.
-pub(super) struct Terminator<'a> {
+/// The part of a virtual caster's surface that a light may reach.
+pub(super) struct Lit<'a> {
     pub anchor: usize,
-    pub indices: &'a IndexBuffer,
+    pub facing: Facing<'a>,
+    pub terminator: &'a IndexBuffer,
+}
+
+/// Triangles that a light may reach if nothing hides it.
+pub(super) enum Facing<'a> {
+    /// A part of the batch's own indices.
+    Whole(Range<u32>),
+    Listed(&'a IndexBuffer),
 }
 
 impl Casters {
@@ -56,6 +69,7 @@ impl Casters {
             volume: Volume::default(),
             counting: Counting::DepthFail,
             scissor: PixelRect::whole([0; 2]),
+            facing: IndexBuffer::default(),
             terminator: IndexBuffer::default(),
         };
         Self {
@@ -148,15 +162,8 @@ impl Casters {
                     shadow
                         .volume
                         .update(device, queue, &caster.caster, made_for, shadow.counting);
-                if let (true, Some(smooth)) = (changed, &caster.smooth) {
-                    let of_part = |part| caster.caster.terminator(part, &smooth.corner_normals);
-                    let indices: Vec<u32> = shadow
-                        .volume
-                        .silhouettes()
-                        .flat_map(of_part)
-                        .flat_map(|triangle| smooth.triangles[triangle])
-                        .collect();
-                    shadow.terminator.write(device, queue, &indices);
+                if let (true, Some(surface)) = (changed, &caster.surface) {
+                    shadow.list_lit(gpu, &caster.caster, surface);
                 }
             }
         }
@@ -183,13 +190,18 @@ impl Casters {
             })
     }
 
-    /// What is to be lit although it lies in its own shadow.
-    pub fn terminators(&self, light: usize) -> impl Iterator<Item = Terminator<'_>> {
+    /// The surfaces of virtual casters that the light may reach.
+    pub fn lit(&self, light: usize) -> impl Iterator<Item = Lit<'_>> {
         self.present(Role::Virtual, light)
-            .filter(|(_, _, shadow)| shadow.terminator.count > 0)
-            .map(|(_, caster, shadow)| Terminator {
-                anchor: caster.anchor,
-                indices: &shadow.terminator,
+            .filter_map(|(_, caster, shadow)| {
+                Some(Lit {
+                    anchor: caster.anchor,
+                    facing: match shadow.volume.casting() {
+                        Casting::Facing => Facing::Listed(&shadow.facing),
+                        Casting::All => Facing::Whole(caster.surface.as_ref()?.range.clone()),
+                    },
+                    terminator: &shadow.terminator,
+                })
             })
     }
 
@@ -207,6 +219,27 @@ impl Casters {
         casters
             .filter(move |(_, (caster, shadow))| caster.role == role && !shadow.scissor.is_empty())
             .map(|(number, (caster, shadow))| (number, caster, shadow))
+    }
+}
+
+impl Shadow {
+    /// Lists what the light may reach of the caster's own surface. Where all triangles cast, all may be lit, for the
+    /// camera may see either side of them.
+    fn list_lit(&mut self, gpu: &Gpu, caster: &Caster, surface: &SurfacePart) {
+        let mut terminator: Vec<u32> = Vec::new();
+        let mut facing: Vec<u32> = Vec::new();
+        for silhouette in self.volume.silhouettes() {
+            if let Some(normals) = &surface.smooth_normals {
+                let triangles = caster.terminator(silhouette, normals).into_iter();
+                terminator.extend(triangles.flat_map(|triangle| surface.triangles[triangle]));
+            }
+            if self.volume.casting() == Casting::Facing {
+                let triangles = silhouette.casting_triangles();
+                facing.extend(triangles.flat_map(|triangle| surface.triangles[triangle]));
+            }
+        }
+        self.terminator.write(&gpu.device, &gpu.queue, &terminator);
+        self.facing.write(&gpu.device, &gpu.queue, &facing);
     }
 }
 

@@ -12,13 +12,12 @@ use super::volumes::Volumes;
 pub(super) struct Direct {
     /// Depth of real surfaces.
     pub depth_of_real: wgpu::RenderPipeline,
-    /// Depth and ambient light of virtual surfaces.
-    pub ambient_on_virtual: wgpu::RenderPipeline,
+    /// Depth and all light of virtual surfaces, as if nothing hid it.
+    pub light_on_virtual: wgpu::RenderPipeline,
     /// Real surfaces where virtual things hide the light.
     pub hidden_on_real: wgpu::RenderPipeline,
-    /// All light on virtual surfaces, where it reaches them; for the stencil's reference see
-    /// [`super::surfaces::Surfaces::light_on_virtual`].
-    pub light_on_virtual: wgpu::RenderPipeline,
+    /// The ambient light alone on virtual surfaces that lie in more volumes than the stencil's reference says.
+    pub shadow_on_virtual: wgpu::RenderPipeline,
     pub volumes: Volumes,
     pub depth_stencil: wgpu::TextureView,
 }
@@ -47,17 +46,19 @@ impl Direct {
             };
             usage.pipeline(device, layout, &module, depth_format, 1)
         };
-        let (always, equal, other) = (
-            wgpu::CompareFunction::Always,
-            wgpu::CompareFunction::Equal,
-            wgpu::CompareFunction::NotEqual,
-        );
+        let (always, less) = (wgpu::CompareFunction::Always, wgpu::CompareFunction::Less);
         let (all, none) = (wgpu::ColorWrites::ALL, wgpu::ColorWrites::empty());
         Self {
             depth_of_real: build("place_alone", "depth_alone", always, 0, none),
-            ambient_on_virtual: build("place", "ambient_on_virtual", always, 0, all),
-            hidden_on_real: build("place", "hidden_on_real", other, VIRTUAL_SHADOW, all),
-            light_on_virtual: build("place", "light_on_virtual", equal, SHADOW, all),
+            light_on_virtual: build("place", "light_on_virtual", always, 0, all),
+            hidden_on_real: build("place", "hidden_on_real", less, VIRTUAL_SHADOW, all),
+            shadow_on_virtual: build(
+                "place_in_ambient_light",
+                "ambient_on_virtual",
+                less,
+                SHADOW,
+                all,
+            ),
             volumes: Volumes::new(device, layout, depth_format, 1, &[PICTURE_FORMAT]),
             depth_stencil: depth_stencil.create_view(&Default::default()),
         }

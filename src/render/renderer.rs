@@ -168,7 +168,6 @@ impl Renderer {
                 drawn.push(Stretch::Composite);
             }
         }
-        self.picture_readback.copy_from(&mut encoder, &self.picture);
         if let Some(clock) = &mut self.clock {
             clock.resolve(&mut encoder, &drawn);
         }
@@ -192,6 +191,9 @@ impl Renderer {
     /// # Errors
     /// The device failed since it was opened.
     pub fn read_picture(&self) -> Result<Vec<u8>, RenderError> {
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        self.picture_readback.copy_from(&mut encoder, &self.picture);
+        self.gpu.queue.submit([encoder.finish()]);
         self.picture_readback.read(&self.gpu)
     }
 
@@ -248,9 +250,9 @@ impl Renderer {
         })
     }
 
-    /// Haller et al. 2003, section 3.2, for one light and one sample: phantoms and virtual things into depth; *real onto
-    /// real* is counted; *virtual onto real* is counted where the light arrives, and what is counted loses it; *all
-    /// onto virtual* is what both have counted there.
+    /// Haller et al. 2003, section 3.2, for one light and one sample: phantoms and lit virtual things into depth; *real
+    /// onto real* is counted; *virtual onto real* is counted where the light arrives, and what is counted loses it;
+    /// *all onto virtual* is what both have counted there.
     fn draw_direct(&self, encoder: &mut wgpu::CommandEncoder, direct: &Direct, touched: PixelRect) {
         let picture = self.picture.create_view(&Default::default());
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -267,7 +269,7 @@ impl Renderer {
         pass.set_bind_group(2, &self.background.group, &[]);
         let stage = &self.stage;
         stage.draw_surfaces(&mut pass, &direct.depth_of_real, Role::Real, 0);
-        stage.draw_surfaces(&mut pass, &direct.ambient_on_virtual, Role::Virtual, 0);
+        stage.draw_surfaces(&mut pass, &direct.light_on_virtual, Role::Virtual, 0);
 
         let volumes = &direct.volumes;
         if stage.count_volumes(&mut pass, volumes, Among::All, Role::Real, 0, touched) {
@@ -277,7 +279,7 @@ impl Renderer {
         if stage.count_volumes(&mut pass, volumes, lit, Role::Virtual, 0, touched) {
             stage.draw_surfaces(&mut pass, &direct.hidden_on_real, Role::Real, 0);
         }
-        stage.draw_lit_virtuals(&mut pass, &direct.light_on_virtual, 0);
+        stage.draw_virtuals_facing(&mut pass, &direct.shadow_on_virtual, 0);
     }
 
     /// The same light by light and sample by sample: what arrives in the video is added up on real surfaces, and what
@@ -336,7 +338,7 @@ impl Renderer {
                     light,
                 );
             }
-            stage.draw_lit_virtuals(&mut pass, &surfaces.light_on_virtual, light);
+            stage.draw_virtuals_facing(&mut pass, &surfaces.light_on_virtual, light);
         }
     }
 

@@ -1,5 +1,7 @@
 //! What stands where in a frame: the scene's surfaces, casters and lights on the GPU, and how passes draw them.
 
+use std::ops::Range;
+
 use glam::DAffine3;
 
 use crate::geometry::camera::Intrinsics;
@@ -8,7 +10,7 @@ use crate::light::Light;
 use crate::scene::Scene;
 
 use super::anchor_geometry::{self, Extent, Role, SurfaceBatch};
-use super::casters::Casters;
+use super::casters::{Casters, Facing};
 use super::gpu::Gpu;
 use super::indirect::Indirect;
 use super::touched::{Touched, everywhere, touched_by_virtual};
@@ -21,6 +23,8 @@ pub(super) struct Stage {
     lights: Vec<Light>,
     surfaces: Vec<SurfaceBatch>,
     casters: Casters,
+    /// Anchor and indices of virtual things that hide no light.
+    without_shadow: Vec<(usize, Range<u32>)>,
     extents: Vec<Extent>,
     indirect: Option<Indirect>,
     views: UniformRow,
@@ -62,6 +66,7 @@ impl Stage {
                 &layouts[1],
                 scene.shadows.counting,
             ),
+            without_shadow: anchor_geometry::virtuals_without_shadow(scene),
             extents: anchor_geometry::extents(scene),
             indirect: Indirect::new(scene),
             view_group: group(&layouts[0], &views),
@@ -163,22 +168,43 @@ impl Stage {
         }
     }
 
-    /// Lights virtual surfaces: those in no shadow, and those that lie in one volume, which is then their own, and that
-    /// smooth shading lights all the same. Otherwise the facets would draw a jagged line where the light ends.
-    pub fn draw_lit_virtuals(
+    /// Draws the virtual surfaces that a light may reach: with the stencil's reference 0, and once more with 1 those that
+    /// lie in one volume, which is then their own, and that smooth shading lights all the same. Otherwise the facets
+    /// would draw a jagged line where the light ends.
+    pub fn draw_virtuals_facing(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         pipeline: &wgpu::RenderPipeline,
         light: usize,
     ) {
-        self.draw_surfaces(pass, pipeline, Role::Virtual, light);
-        pass.set_stencil_reference(1);
-        for terminator in self.casters.terminators(light) {
-            let mut batches = self.placed(Role::Virtual);
-            if let Some(batch) = batches.find(|batch| batch.anchor == terminator.anchor) {
-                self.set_batch(pass, batch);
-                terminator.indices.draw(pass, terminator.indices.count);
+        pass.set_pipeline(pipeline);
+        pass.set_stencil_reference(0);
+        pass.set_bind_group(1, &self.light_group, &[self.light_sources.offset(light)]);
+        for batch in self.placed(Role::Virtual) {
+            self.set_batch(pass, batch);
+            let of_batch = |anchor: usize| anchor == batch.anchor;
+            let lit = || self.casters.lit(light).filter(|lit| of_batch(lit.anchor));
+            let without_shadow = self.without_shadow.iter();
+            let without_shadow = without_shadow.filter(|(anchor, _)| of_batch(*anchor));
+            pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
+            for (_, range) in without_shadow {
+                pass.draw_indexed(range.clone(), 0, 0..1);
             }
+            for lit in lit() {
+                if let Facing::Whole(range) = lit.facing {
+                    pass.draw_indexed(range, 0, 0..1);
+                }
+            }
+            for lit in lit() {
+                if let Facing::Listed(indices) = lit.facing {
+                    indices.draw(pass, indices.count);
+                }
+            }
+            pass.set_stencil_reference(1);
+            for lit in lit() {
+                lit.terminator.draw(pass, lit.terminator.count);
+            }
+            pass.set_stencil_reference(0);
         }
     }
 

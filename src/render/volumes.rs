@@ -297,6 +297,11 @@ impl Volume {
         changed
     }
 
+    /// Which triangles cast.
+    pub fn casting(&self) -> Casting {
+        self.made_for.map_or(Casting::All, |(_, casting)| casting)
+    }
+
     /// What casts, part by part.
     pub fn silhouettes(&self) -> impl Iterator<Item = &Silhouette> {
         self.parts.iter().map(|part| &part.silhouette)
