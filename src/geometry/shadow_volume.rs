@@ -75,15 +75,29 @@ struct OddEdge {
     triangles: Vec<(u32, bool)>,
 }
 
-/// What casts for one light, and the edges that bound it as the light sees it.
+/// Triangles that cast for one light, and the edges that bound them as the light sees them.
 #[derive(Debug, Clone)]
 pub struct Silhouette {
-    light: LightPlace,
     /// For each triangle: 1, it casts as it is wound; -1, turned over; 0, not.
     casts: Vec<i8>,
     /// Edges in the direction in which the casting triangles pass them, each as often as its multiplicity.
     edges: Vec<[u32; 2]>,
 }
+
+/// A part of what casts for one light.
+#[derive(Debug, Clone)]
+pub struct Part {
+    /// What casts in it.
+    pub silhouette: Silhouette,
+    /// No point lies in more of its volumes, one in another.
+    pub layers: u32,
+    /// Whether it must be counted before all others and apart from those that are not: where it counts nothing, no other
+    /// part, of this caster or another, counts less than nothing.
+    pub counted_apart: bool,
+}
+
+/// What it costs to count something apart, in edges.
+const KEEPING_IN_EDGES: usize = 100;
 
 impl Caster {
     /// Prepares a mesh whose equal positions share one index. Any soup of triangles will do.
@@ -165,8 +179,33 @@ impl Caster {
         near.chain(far).collect()
     }
 
-    /// What casts, and its outline.
-    pub fn silhouette(&self, light: LightPlace, casting: Casting) -> Silhouette {
+    /// What casts for a light, as few sides as it takes, in parts of which no point lies in more than `most` (at least 1)
+    /// volumes, one in another. A point is in the shadow if it lies in any part's volume.
+    ///
+    /// Where all triangles cast, the outline between those that face the light and those that do not counts twice. In a
+    /// mesh that is nearly closed it is cheaper to count those that face it, and apart from that how many more do not:
+    /// that number changes at open edges alone. Both are 0 where nothing hides the light, and only there.
+    pub fn parts(&self, light: LightPlace, casting: Casting, most: u32) -> Vec<Part> {
+        let facing = self.silhouette(light, [1, 0]);
+        let whole = match casting {
+            Casting::Facing => facing,
+            Casting::All => {
+                let all = self.silhouette(light, [1, -1]);
+                let surplus = self.silhouette(light, [-1, -1]);
+                if facing.edges.len() + surplus.edges.len() + KEEPING_IN_EDGES < all.edges.len() {
+                    let mut parts = self.shallow(light, facing, most, true);
+                    parts.extend(self.shallow(light, surplus, most, false));
+                    return parts;
+                }
+                all
+            }
+        };
+        self.shallow(light, whole, most, false)
+    }
+
+    /// How far above each triangle's plane the light is, as the sine of the angle for a distant one; exactly 0 where it
+    /// sees the triangle edge-on.
+    fn light_heights(&self, light: LightPlace) -> impl Iterator<Item = f64> {
         let (light_point, light_weight) = light.homogeneous();
         let edge_on = match (light, &self.bounds) {
             (LightPlace::Point(light), Some(bounds)) => {
@@ -178,29 +217,30 @@ impl Caster {
             }
             _ => EDGE_ON,
         };
-        let turned_away = match casting {
-            Casting::Facing => 0,
-            Casting::All => -1,
-        };
-        let casts: Vec<i8> = self
-            .planes
-            .iter()
-            .map(|(normal, offset)| {
-                let above = normal.dot(light_point) - offset * light_weight;
-                if above > edge_on {
-                    1
-                } else if above < -edge_on {
+        self.planes.iter().map(move |(normal, offset)| {
+            let height = normal.dot(light_point) - offset * light_weight;
+            if height.abs() > edge_on { height } else { 0.0 }
+        })
+    }
+
+    /// How the triangles that face the light cast, and how those do that are turned away, with their outline.
+    fn silhouette(&self, light: LightPlace, [facing, turned_away]: [i8; 2]) -> Silhouette {
+        let casts = self
+            .light_heights(light)
+            .map(|height| {
+                if height > 0.0 {
+                    facing
+                } else if height < 0.0 {
                     turned_away
                 } else {
                     0
                 }
             })
             .collect();
-
-        self.outline(light, casts)
+        self.outline(casts)
     }
 
-    fn outline(&self, light: LightPlace, casts: Vec<i8>) -> Silhouette {
+    fn outline(&self, casts: Vec<i8>) -> Silhouette {
         let mut edges = Vec::new();
         let mut push = |[a, b]: [u32; 2], multiplicity: i32| {
             let edge = if multiplicity > 0 { [a, b] } else { [b, a] };
@@ -220,11 +260,7 @@ impl Caster {
             };
             push(edge.ends, edge.triangles.iter().map(net).sum());
         }
-        Silhouette {
-            light,
-            casts,
-            edges,
-        }
+        Silhouette { casts, edges }
     }
 
     /// Triangles of the volume's sides, counter-clockwise seen from outside it.
@@ -256,33 +292,42 @@ impl Caster {
         indices
     }
 
+    /// Triangles that face the light.
+    pub fn facing(&self, light: LightPlace) -> impl Iterator<Item = usize> {
+        let heights = self.light_heights(light).enumerate();
+        heights
+            .filter(|(_, height)| *height > 0.0)
+            .map(|(triangle, _)| triangle)
+    }
+
     /// Triangles turned away from the light, so that they lie in their own shadow, of whose `corner_normals` some face
     /// it: smooth shading lights them up to the line where the normals turn away.
-    pub fn terminator(&self, silhouette: &Silhouette, corner_normals: &[[Vec3; 3]]) -> Vec<usize> {
-        let (light_point, light_weight) = silhouette.light.homogeneous();
+    pub fn terminator(
+        &self,
+        light: LightPlace,
+        corner_normals: &[[Vec3; 3]],
+    ) -> impl Iterator<Item = usize> {
+        let (light_point, light_weight) = light.homogeneous();
         let (light_point, light_weight) = (light_point.as_vec3(), light_weight as f32);
-        let faces_light = |vertex: u32, normal: Vec3| {
+        let faces_light = move |vertex: u32, normal: Vec3| {
             let place = self.positions[vertex as usize];
             normal.dot(light_point - place * light_weight) > 0.0
         };
-        let smooth = |triangle: &usize| {
-            let corners = self.triangles[*triangle]
-                .iter()
-                .zip(&corner_normals[*triangle]);
-            corners
-                .into_iter()
-                .any(|(&vertex, &normal)| faces_light(vertex, normal))
-        };
-        (0..self.triangles.len())
-            .filter(|&triangle| silhouette.casts[triangle] < 1)
-            .filter(smooth)
-            .collect()
+        let heights = self.light_heights(light).enumerate();
+        heights
+            .filter(|(_, height)| *height <= 0.0)
+            .map(|(triangle, _)| triangle)
+            .filter(move |&triangle| {
+                let mut corners = self.triangles[triangle]
+                    .iter()
+                    .zip(&corner_normals[triangle]);
+                corners.any(|(&vertex, &normal)| faces_light(vertex, normal))
+            })
     }
 }
 
 impl Silhouette {
-    /// The triangles that cast.
-    pub fn casting_triangles(&self) -> impl Iterator<Item = usize> {
+    fn casting_triangles(&self) -> impl Iterator<Item = usize> {
         let casts = self.casts.iter().enumerate();
         casts
             .filter(|(_, cast)| **cast != 0)
@@ -292,12 +337,20 @@ impl Silhouette {
 
 /// How many volumes can lie one in another, so that a narrow counter never wraps.
 impl Caster {
-    /// The silhouette, cut into as many parts as it takes that no point lies in more than `most` (at least 1) volumes
-    /// of one part, each with a bound of that number. A point is in the shadow if it lies in any part's volume.
-    pub fn parts(&self, silhouette: Silhouette, most: u32) -> Vec<(Silhouette, u32)> {
-        let bound = self.most_layers(&silhouette, most);
-        if bound <= most {
-            return vec![(silhouette, bound)];
+    fn shallow(
+        &self,
+        light: LightPlace,
+        silhouette: Silhouette,
+        most: u32,
+        counted_apart: bool,
+    ) -> Vec<Part> {
+        let layers = self.most_layers(light, &silhouette, most);
+        if layers <= most {
+            return vec![Part {
+                silhouette,
+                layers,
+                counted_apart,
+            }];
         }
         let casting = silhouette.casting_triangles().count();
         let mut first = silhouette.casts.clone();
@@ -312,7 +365,7 @@ impl Caster {
         }
         [first, second]
             .into_iter()
-            .flat_map(|casts| self.parts(self.outline(silhouette.light, casts), most))
+            .flat_map(|casts| self.shallow(light, self.outline(casts), most, counted_apart))
             .collect()
     }
 
@@ -322,12 +375,12 @@ impl Caster {
     /// On the sphere of directions about the light that number changes at silhouette edges alone, and a great circle
     /// crosses them as often inwards as outwards: no direction can have more than half the edges that a great circle
     /// through it and a pole meets, besides what the pole has.
-    fn most_layers(&self, silhouette: &Silhouette, enough: u32) -> u32 {
+    fn most_layers(&self, light: LightPlace, silhouette: &Silhouette, enough: u32) -> u32 {
         let casting = silhouette.casting_triangles().count() as u32;
         let at_pole;
         let mut spans: Vec<[f64; 2]> = Vec::new();
         let place = |index: u32| self.positions[index as usize].as_dvec3();
-        match (silhouette.light, &self.bounds) {
+        match (light, &self.bounds) {
             (LightPlace::Point(light), Some(bounds)) => {
                 let away = light - light.clamp(bounds.low, bounds.high);
                 let pole = away.try_normalize().unwrap_or(SOME_DIRECTION);
@@ -467,6 +520,10 @@ fn planes(positions: &[Vec3], triangles: &[[u32; 3]], edges: &[PairedEdge]) -> V
 mod tests {
     use super::*;
 
+    const FACING: [i8; 2] = [1, 0];
+    const ALL: [i8; 2] = [1, -1];
+    const SURPLUS: [i8; 2] = [-1, -1];
+
     fn cube() -> Caster {
         let positions = (0..8)
             .map(|corner| {
@@ -495,8 +552,8 @@ mod tests {
     }
 
     /// The caps and sides for a light.
-    fn volume(caster: &Caster, light: LightPlace, casting: Casting) -> Vec<u32> {
-        let silhouette = caster.silhouette(light, casting);
+    fn volume(caster: &Caster, light: LightPlace, casts: [i8; 2]) -> Vec<u32> {
+        let silhouette = caster.silhouette(light, casts);
         let mut indices = caster.cap_indices(&silhouette);
         indices.extend(caster.side_indices(&silhouette));
         indices
@@ -545,7 +602,7 @@ mod tests {
         assert!(closed.is_closed() && !open.is_closed());
         for caster in [&closed, &open] {
             for light in lights() {
-                for casting in [Casting::Facing, Casting::All] {
+                for casting in [FACING, ALL, SURPLUS] {
                     let distant = matches!(light, LightPlace::Along(_));
                     let indices = volume(caster, light, casting);
                     let open_edges = boundary(&indices, &caster.volume_vertices(), distant);
@@ -559,14 +616,14 @@ mod tests {
     fn a_cube_lit_from_above_has_the_outline_of_its_top() {
         let light = LightPlace::Along(DVec3::new(0.0, 0.0, -1.0));
         // Two triangles for each cap and each of four sides.
-        assert_eq!(volume(&cube(), light, Casting::Facing).len() / 3, 12);
+        assert_eq!(volume(&cube(), light, FACING).len() / 3, 12);
     }
 
     #[test]
     fn the_winding_number_counts_the_triangles_towards_the_light() {
         // A ray from a point, away from everything, crosses the volumes outward once for each that it lies in.
         let caster = cube();
-        let crossings = |light: DVec3, casting: Casting, origin: DVec3| -> i32 {
+        let crossings = |light: DVec3, casting: [i8; 2], origin: DVec3| -> i32 {
             let indices = volume(&caster, LightPlace::Point(light), casting);
             let vertices = caster.volume_vertices();
             let place = |index: u32| {
@@ -604,18 +661,17 @@ mod tests {
             DVec3::new(-3.0, 0.5, -1.0),
         );
         for (point, facing, all) in [(below, 1, 2), (over, 0, 0), (beside, 0, 0)] {
-            assert_eq!(crossings(above, Casting::Facing, point), facing, "{point}");
-            assert_eq!(crossings(above, Casting::All, point), all, "{point}");
+            assert_eq!(crossings(above, FACING, point), facing, "{point}");
+            assert_eq!(crossings(above, ALL, point), all, "{point}");
+            let surplus = all - 2 * facing;
+            assert_eq!(crossings(above, SURPLUS, point), surplus, "{point}");
         }
         // From within, each way out meets one triangle.
         let within = DVec3::new(0.4, 0.3, 0.5);
         for point in [below, over, beside] {
-            assert_eq!(crossings(within, Casting::All, point), 1, "{point}");
+            assert_eq!(crossings(within, ALL, point), 1, "{point}");
         }
-        assert_eq!(
-            crossings(within, Casting::All, DVec3::new(0.2, 0.7, 0.3)),
-            0
-        );
+        assert_eq!(crossings(within, ALL, DVec3::new(0.2, 0.7, 0.3)), 0);
     }
 
     #[test]
@@ -653,7 +709,7 @@ mod tests {
         for count in [1, 7, 40] {
             let caster = nested(count);
             for light in lights() {
-                for (casting, each) in [(Casting::Facing, 1), (Casting::All, 2)] {
+                for (casting, each) in [(FACING, 1), (ALL, 2)] {
                     let silhouette = caster.silhouette(light, casting);
                     // The innermost cube lies behind all the others.
                     let (origin, way) = match light {
@@ -665,7 +721,7 @@ mod tests {
                         }
                     };
                     let layers = caster.casting_towards(&silhouette, origin, way);
-                    let bound = caster.most_layers(&silhouette, 0);
+                    let bound = caster.most_layers(light, &silhouette, 0);
                     let from_within = light == lights()[1];
                     if !from_within {
                         assert_eq!(layers as usize, each * count, "{light:?}");
@@ -684,20 +740,33 @@ mod tests {
     fn deep_nests_are_cut_into_parts_that_cast_the_same_triangles() {
         let caster = nested(40);
         for light in lights() {
-            let whole = caster.silhouette(light, Casting::All);
-            let parts = caster.parts(whole.clone(), 15);
+            let whole = caster.silhouette(light, ALL);
+            let parts = caster.shallow(light, whole.clone(), 15, false);
             assert!(parts.len() >= 2, "{light:?}");
             let mut casts = vec![0; whole.casts.len()];
-            for (part, layers) in &parts {
-                assert!(*layers <= 15);
-                for (sum, cast) in casts.iter_mut().zip(&part.casts) {
+            for part in &parts {
+                assert!(part.layers <= 15 && !part.counted_apart);
+                for (sum, cast) in casts.iter_mut().zip(&part.silhouette.casts) {
                     *sum += cast;
                 }
             }
             assert_eq!(casts, whole.casts);
         }
-        let shallow = cube().silhouette(lights()[0], Casting::All);
-        assert_eq!(cube().parts(shallow, 15).len(), 1);
+        let parts = cube().parts(lights()[0], Casting::All, 15);
+        assert!(parts.len() == 1 && !parts[0].counted_apart);
+    }
+
+    #[test]
+    fn a_nearly_closed_mesh_is_counted_by_what_faces_the_light_and_the_surplus() {
+        let closed = nested(40);
+        let open = Caster::new(closed.positions.clone(), closed.triangles[1..].to_vec());
+        let light = lights()[0];
+        let parts = open.parts(light, Casting::All, 63);
+        let sides = |part: &Part| part.silhouette.edges.len();
+        assert!(parts.len() == 2 && parts[0].counted_apart && !parts[1].counted_apart);
+        assert_eq!(sides(&parts[1]), 3);
+        let all = open.silhouette(light, ALL).edges.len();
+        assert!(sides(&parts[0]) < all / 2 + 3);
     }
 
     #[test]
@@ -725,7 +794,7 @@ mod tests {
         let triangles = vec![[0, 1, 2], [0, 4, 3], [4, 2, 3], [0, 2, 4]];
         let caster = Caster::new(positions, triangles);
         let light = LightPlace::Point(DVec3::new(0.3, 0.2, 2.0));
-        let silhouette = caster.silhouette(light, Casting::All);
+        let silhouette = caster.silhouette(light, ALL);
         assert_eq!(silhouette.casts, [1; 4]);
         assert_eq!(silhouette.edges.len(), 4);
     }
@@ -734,7 +803,6 @@ mod tests {
     fn the_terminator_is_where_smooth_normals_still_face_the_light() {
         let caster = cube();
         let light = LightPlace::Point(DVec3::new(0.5, 0.5, 9.0));
-        let silhouette = caster.silhouette(light, Casting::Facing);
         // As on a ball about the cube: the sides' upper corners face the light, the bottom's do not.
         let normals: Vec<[Vec3; 3]> = caster
             .triangles
@@ -746,7 +814,7 @@ mod tests {
                 caster.triangles[*triangle].map(|index| caster.positions[index as usize].z);
             corners.iter().sum::<f32>() % 3.0 != 0.0
         };
-        let terminator = caster.terminator(&silhouette, &normals);
+        let terminator: Vec<usize> = caster.terminator(light, &normals).collect();
         assert_eq!(terminator, (0..12).filter(is_side).collect::<Vec<_>>());
     }
 }

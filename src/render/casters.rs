@@ -8,7 +8,7 @@ use crate::geometry::bounds::HalfSpace;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::counting::{self, Counting};
 use crate::geometry::reach::PixelRect;
-use crate::geometry::shadow_volume::{Caster, Casting};
+use crate::geometry::shadow_volume::{Caster, Casting, LightPlace};
 use crate::light::Light;
 use crate::scene;
 
@@ -99,7 +99,6 @@ impl Casters {
         intrinsics: &Intrinsics,
         touched: &Touched,
     ) {
-        let (device, queue) = (&gpu.device, &gpu.queue);
         let Some(camera_from_world) = camera_from_anchor.first().copied().flatten() else {
             return;
         };
@@ -140,7 +139,7 @@ impl Casters {
                     .end
                     .map(|end| end.in_space(&placed.anchor_from_world.inverse()));
                 self.lights.write(
-                    queue,
+                    &gpu.queue,
                     index * count + number,
                     &CastingLight::new(light, end),
                 );
@@ -158,12 +157,11 @@ impl Casters {
                     _ => Counting::DepthFail,
                 };
                 let made_for = (light, caster.caster.casting(light, placed.eye));
-                let changed =
-                    shadow
-                        .volume
-                        .update(device, queue, &caster.caster, made_for, shadow.counting);
+                let changed = shadow
+                    .volume
+                    .update(gpu, &caster.caster, made_for, shadow.counting);
                 if let (true, Some(surface)) = (changed, &caster.surface) {
-                    shadow.list_lit(gpu, &caster.caster, surface);
+                    shadow.list_lit(gpu, &caster.caster, light, surface);
                 }
             }
         }
@@ -225,21 +223,21 @@ impl Casters {
 impl Shadow {
     /// Lists what the light may reach of the caster's own surface. Where all triangles cast, all may be lit, for the
     /// camera may see either side of them.
-    fn list_lit(&mut self, gpu: &Gpu, caster: &Caster, surface: &SurfacePart) {
-        let mut terminator: Vec<u32> = Vec::new();
-        let mut facing: Vec<u32> = Vec::new();
-        for silhouette in self.volume.silhouettes() {
-            if let Some(normals) = &surface.smooth_normals {
-                let triangles = caster.terminator(silhouette, normals).into_iter();
-                terminator.extend(triangles.flat_map(|triangle| surface.triangles[triangle]));
-            }
-            if self.volume.casting() == Casting::Facing {
-                let triangles = silhouette.casting_triangles();
-                facing.extend(triangles.flat_map(|triangle| surface.triangles[triangle]));
-            }
+    fn list_lit(&mut self, gpu: &Gpu, caster: &Caster, light: LightPlace, surface: &SurfacePart) {
+        if self.volume.casting() == Casting::Facing {
+            let facing = caster.facing(light);
+            let facing: Vec<u32> = facing
+                .flat_map(|triangle| surface.triangles[triangle])
+                .collect();
+            self.facing.write(&gpu.device, &gpu.queue, &facing);
         }
-        self.terminator.write(&gpu.device, &gpu.queue, &terminator);
-        self.facing.write(&gpu.device, &gpu.queue, &facing);
+        if let Some(normals) = &surface.smooth_normals {
+            let terminator = caster.terminator(light, normals);
+            let terminator: Vec<u32> = terminator
+                .flat_map(|triangle| surface.triangles[triangle])
+                .collect();
+            self.terminator.write(&gpu.device, &gpu.queue, &terminator);
+        }
     }
 }
 

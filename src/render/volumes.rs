@@ -9,6 +9,7 @@ use crate::geometry::reach::PixelRect;
 use crate::geometry::shadow_volume::{Caster, Casting, LightPlace, Silhouette};
 
 use super::anchor_geometry::Role;
+use super::gpu::Gpu;
 use super::shader;
 use super::stencil::{self, COUNT, MOST_LAYERS, REAL_HIDES};
 
@@ -32,6 +33,29 @@ pub(super) struct Volumes {
 struct Counters {
     depth_pass: wgpu::RenderPipeline,
     depth_fail: wgpu::RenderPipeline,
+}
+
+impl Counters {
+    fn draw(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        groups: [&wgpu::BindGroup; 2],
+        counted: &Counted<'_>,
+        part: &DrawnPart,
+    ) {
+        let (pipeline, count) = match counted.counting {
+            Counting::DepthPass => (&self.depth_pass, part.side_index_count),
+            Counting::DepthFail => (&self.depth_fail, part.indices.count),
+        };
+        pass.set_pipeline(pipeline);
+        pass.set_stencil_reference(0);
+        set_scissor(pass, counted.scissor);
+        for (index, (group, offset)) in groups.iter().zip(counted.offsets).enumerate() {
+            pass.set_bind_group(index as u32, *group, &[offset]);
+        }
+        pass.set_vertex_buffer(0, counted.vertices.slice(..));
+        part.indices.draw(pass, count);
+    }
 }
 
 /// One volume of a batch, as it is to be drawn.
@@ -185,34 +209,26 @@ impl Volumes {
             Among::All => &self.among_all,
             Among::LitByReal => &self.among_lit,
         };
+        let counted: Vec<Counted<'_>> = counted.collect();
         let mut layers = 0;
         let mut any = false;
-        for Counted {
-            volume,
-            counting,
-            scissor,
-            offsets,
-            vertices,
-        } in counted
-        {
-            for part in &volume.parts {
-                if layers + part.layers > MOST_LAYERS {
-                    self.keep(pass, role, within);
-                    layers = 0;
+        // What is counted apart comes first, so that the rest is left as a number.
+        for apart in [true, false] {
+            for counted in &counted {
+                let parts = counted.volume.parts.iter();
+                for part in parts.filter(|part| part.counted_apart == apart) {
+                    if layers + part.layers > MOST_LAYERS {
+                        self.keep(pass, role, within);
+                        layers = 0;
+                    }
+                    layers += part.layers;
+                    any = true;
+                    counters.draw(pass, groups, counted, part);
                 }
-                layers += part.layers;
-                any = true;
-                pass.set_pipeline(match counting {
-                    Counting::DepthPass => &counters.depth_pass,
-                    Counting::DepthFail => &counters.depth_fail,
-                });
-                pass.set_stencil_reference(0);
-                set_scissor(pass, scissor);
-                for (index, (group, offset)) in groups.iter().zip(offsets).enumerate() {
-                    pass.set_bind_group(index as u32, *group, &[offset]);
-                }
-                pass.set_vertex_buffer(0, vertices.slice(..));
-                part.draw(pass, counting);
+            }
+            if apart && layers > 0 {
+                self.keep(pass, role, within);
+                layers = 0;
             }
         }
         set_scissor(pass, within);
@@ -241,13 +257,14 @@ pub(super) fn set_scissor(pass: &mut wgpu::RenderPass<'_>, rect: PixelRect) {
 #[derive(Default)]
 pub(super) struct Volume {
     made_for: Option<(LightPlace, Casting)>,
-    parts: Vec<Part>,
+    parts: Vec<DrawnPart>,
 }
 
 /// Volumes that never lie more than [`MOST_LAYERS`] deep one in another.
-struct Part {
+struct DrawnPart {
     silhouette: Silhouette,
     layers: u32,
+    counted_apart: bool,
     /// Triangles of the sides, then those of the caps where they are needed.
     indices: IndexBuffer,
     side_index_count: u32,
@@ -255,26 +272,26 @@ struct Part {
 }
 
 impl Volume {
-    /// Makes anew what has changed. Returns whether the silhouette has.
+    /// Makes anew what has changed. Returns whether what casts has.
     pub fn update(
         &mut self,
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
+        gpu: &Gpu,
         caster: &Caster,
         made_for: (LightPlace, Casting),
         counting: Counting,
     ) -> bool {
         let changed = self.made_for != Some(made_for);
         if changed {
-            let silhouette = caster.silhouette(made_for.0, made_for.1);
+            let (light, casting) = made_for;
             let mut buffers: Vec<IndexBuffer> =
                 self.parts.drain(..).map(|part| part.indices).collect();
             self.parts = caster
-                .parts(silhouette, MOST_LAYERS)
+                .parts(light, casting, MOST_LAYERS)
                 .into_iter()
-                .map(|(silhouette, layers)| Part {
-                    silhouette,
-                    layers,
+                .map(|part| DrawnPart {
+                    silhouette: part.silhouette,
+                    layers: part.layers,
+                    counted_apart: part.counted_apart,
                     indices: buffers.pop().unwrap_or_default(),
                     side_index_count: 0,
                     has_caps: false,
@@ -291,7 +308,7 @@ impl Volume {
                     indices.extend(caster.cap_indices(&part.silhouette));
                 }
                 part.has_caps = needs_caps;
-                part.indices.write(device, queue, &indices);
+                part.indices.write(&gpu.device, &gpu.queue, &indices);
             }
         }
         changed
@@ -300,21 +317,6 @@ impl Volume {
     /// Which triangles cast.
     pub fn casting(&self) -> Casting {
         self.made_for.map_or(Casting::All, |(_, casting)| casting)
-    }
-
-    /// What casts, part by part.
-    pub fn silhouettes(&self) -> impl Iterator<Item = &Silhouette> {
-        self.parts.iter().map(|part| &part.silhouette)
-    }
-}
-
-impl Part {
-    fn draw(&self, pass: &mut wgpu::RenderPass<'_>, counting: Counting) {
-        let count = match counting {
-            Counting::DepthPass => self.side_index_count,
-            Counting::DepthFail => self.indices.count,
-        };
-        self.indices.draw(pass, count);
     }
 }
 
