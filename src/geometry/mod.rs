@@ -7,9 +7,12 @@
 //! `a_from_b` maps b to a.
 
 pub mod camera;
+pub mod levels;
 pub mod mesh;
 pub mod normals;
+pub mod outline_scale;
 pub mod pose;
 pub mod ray_caster;
 pub mod reach;
 pub mod shadow_volume;
+pub mod surface_distance;

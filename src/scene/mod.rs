@@ -169,6 +169,9 @@ pub struct ShadowSettings {
     pub technique: Technique,
     /// Samples per pixel: 1 or 4.
     pub samples: u32,
+    /// By less than this many pixels a coarser version of a thing may move its silhouette, as the camera and the lights
+    /// see it; 0: things are never made coarser.
+    pub max_silhouette_error_px: f64,
     /// What a frame may take, milliseconds; `None`: no limit is asked for.
     pub frame_budget_ms: Option<f64>,
 }
@@ -178,6 +181,7 @@ impl Default for ShadowSettings {
         Self {
             technique: Technique::Auto,
             samples: 4,
+            max_silhouette_error_px: 0.5,
             frame_budget_ms: None,
         }
     }

@@ -5,6 +5,7 @@ use super::reader::{Numbers, Table, Value};
 use super::{
     ArucoRefinement, CameraSettings, DetectorKind, ShadowSettings, Technique, TrackingSettings,
 };
+use crate::geometry::outline_scale::LARGEST_MOVE_PX;
 
 pub fn camera(root: &Table) -> Result<CameraSettings, SceneError> {
     let what = "a scene needs [camera] with a source";
@@ -105,7 +106,13 @@ pub fn shadows(root: &Table) -> Result<ShadowSettings, SceneError> {
         ));
     }
     let default = ShadowSettings::default();
-    let Some(shadows) = root.table("shadows", &["technique", "samples", "frame_budget_ms"])? else {
+    const KEYS: [&str; 4] = [
+        "technique",
+        "samples",
+        "max_silhouette_error_px",
+        "frame_budget_ms",
+    ];
+    let Some(shadows) = root.table("shadows", &KEYS)? else {
         return Ok(default);
     };
     let technique = |value: Value| match value.text()? {
@@ -130,6 +137,11 @@ pub fn shadows(root: &Table) -> Result<ShadowSettings, SceneError> {
             .map(samples)
             .transpose()?
             .unwrap_or(default.samples),
+        max_silhouette_error_px: shadows.number_or(
+            "max_silhouette_error_px",
+            default.max_silhouette_error_px,
+            &Numbers::between(0.0, LARGEST_MOVE_PX, "px"),
+        )?,
         frame_budget_ms: shadows
             .optional("frame_budget_ms")
             .map(budget)

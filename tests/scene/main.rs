@@ -133,6 +133,7 @@ fn a_small_scene_has_the_defaults() {
         ShadowSettings {
             technique: Technique::Auto,
             samples: 4,
+            max_silhouette_error_px: 0.5,
             frame_budget_ms: None
         }
     );
@@ -202,6 +203,7 @@ radiance = 0.5
 [shadows]
 technique = \"volumes\"
 samples = 1
+max_silhouette_error_px = 0
 frame_budget_ms = 16
 ";
     let scene = load_in(&project, text).unwrap();
@@ -289,6 +291,7 @@ frame_budget_ms = 16
         ShadowSettings {
             technique: Technique::Volumes,
             samples: 1,
+            max_silhouette_error_px: 0.0,
             frame_budget_ms: Some(16.0)
         }
     );
