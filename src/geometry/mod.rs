@@ -9,9 +9,12 @@
 pub mod bounds;
 pub mod camera;
 pub mod counting;
+pub mod levels;
 pub mod mesh;
 pub mod normals;
+pub mod outline_scale;
 pub mod pose;
 pub mod ray_caster;
 pub mod reach;
 pub mod shadow_volume;
+pub mod surface_distance;

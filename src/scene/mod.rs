@@ -180,6 +180,9 @@ pub struct ShadowSettings {
     pub samples: u32,
     /// How volumes are counted.
     pub counting: Counting,
+    /// By less than this many pixels a coarser version of a thing may move its silhouette, as the camera and the lights
+    /// see it; 0: things are never made coarser.
+    pub max_silhouette_error_px: f64,
     /// What a frame may take, milliseconds; `None`: no limit is asked for.
     pub frame_budget_ms: Option<f64>,
 }
@@ -190,6 +193,7 @@ impl Default for ShadowSettings {
             technique: Technique::Auto,
             samples: 4,
             counting: Counting::Auto,
+            max_silhouette_error_px: 0.5,
             frame_budget_ms: None,
         }
     }

@@ -6,6 +6,7 @@ use super::{
     ArucoRefinement, CameraSettings, Counting, DetectorKind, ShadowSettings, Technique,
     TrackingSettings,
 };
+use crate::geometry::outline_scale::LARGEST_MOVE_PX;
 
 pub fn camera(root: &Table) -> Result<CameraSettings, SceneError> {
     let what = "a scene needs [camera] with a source";
@@ -110,11 +111,14 @@ pub fn shadows(root: &Table) -> Result<ShadowSettings, SceneError> {
         ));
     }
     let default = ShadowSettings::default();
-    let Some(shadows) = root.table(
-        "shadows",
-        &["technique", "samples", "counting", "frame_budget_ms"],
-    )?
-    else {
+    const KEYS: [&str; 5] = [
+        "technique",
+        "samples",
+        "counting",
+        "max_silhouette_error_px",
+        "frame_budget_ms",
+    ];
+    let Some(shadows) = root.table("shadows", &KEYS)? else {
         return Ok(default);
     };
     let technique = |value: Value| match value.text()? {
@@ -145,6 +149,11 @@ pub fn shadows(root: &Table) -> Result<ShadowSettings, SceneError> {
             .map(counting)
             .transpose()?
             .unwrap_or(default.counting),
+        max_silhouette_error_px: shadows.number_or(
+            "max_silhouette_error_px",
+            default.max_silhouette_error_px,
+            &Numbers::between(0.0, LARGEST_MOVE_PX, "px"),
+        )?,
         frame_budget_ms: shadows
             .optional("frame_budget_ms")
             .map(budget)

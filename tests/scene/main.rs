@@ -135,6 +135,7 @@ fn a_small_scene_has_the_defaults() {
             technique: Technique::Auto,
             samples: 4,
             counting: Counting::Auto,
+            max_silhouette_error_px: 0.5,
             frame_budget_ms: None
         }
     );
@@ -205,6 +206,7 @@ radiance = 0.5
 technique = \"volumes\"
 samples = 1
 counting = \"depth-fail\"
+max_silhouette_error_px = 0
 frame_budget_ms = 16
 ";
     let scene = load_in(&project, text).unwrap();
@@ -293,6 +295,7 @@ frame_budget_ms = 16
             technique: Technique::Volumes,
             samples: 1,
             counting: Counting::DepthFail,
+            max_silhouette_error_px: 0.0,
             frame_budget_ms: Some(16.0)
         }
     );
