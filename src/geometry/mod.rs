@@ -7,9 +7,13 @@
 //! `a_from_b` maps b to a.
 
 pub mod camera;
+mod mend;
 pub mod mesh;
 pub mod normals;
+mod orient;
 pub mod pose;
 pub mod ray_caster;
 pub mod reach;
 pub mod shadow_volume;
+mod soup;
+pub mod winding;
