@@ -657,12 +657,69 @@ mod tests {
         assert_eq!(mended.faces.len(), 13);
     }
 
+    /// A square of side `size` at a corner, of two triangles that share their diagonal.
+    fn square(low: Vec3, size: f32) -> [Vec3; 4] {
+        [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
+            .map(|(x, y)| low + size * Vec3::new(x, y, 0.0))
+    }
+
+    fn square_faces(count: u32) -> Vec<Face> {
+        (0..count)
+            .flat_map(|number| {
+                [[0, 1, 2], [0, 2, 3]].map(|corners| corners.map(|c| 4 * number + c))
+            })
+            .map(face)
+            .collect()
+    }
+
+    #[test]
+    fn small_parts_of_a_large_mesh_stay_apart() {
+        // Their gap is a tenth of their size, and within what the large triangle would allow.
+        let low = [Vec3::ZERO, Vec3::new(1.1e-4, 0.0, 0.0)];
+        let mut positions = low.map(|low| square(low, 1e-4)).concat();
+        let mut faces = square_faces(2);
+        faces.push(face([8, 9, 10]));
+        positions.extend([Vec3::X, Vec3::Y, Vec3::Z].map(|axis| axis));
+        let mended = mend(&positions, faces);
+        assert_eq!((mended.odd_edges, mended.merged_vertices), (11, 0));
+    }
+
+    #[test]
+    fn a_ribbon_narrower_than_the_tolerance_stays() {
+        let positions = square(Vec3::ZERO, 1.0).map(|point| point * Vec3::new(1.0, 5e-6, 1.0));
+        let mended = mend(&positions, square_faces(1));
+        assert_eq!((mended.faces.len(), mended.merged_vertices), (2, 0));
+    }
+
+    #[test]
+    fn tiles_meet_in_their_own_layer() {
+        // Two layers a tenth of the tolerance apart, of tiles that miss each other by a rounding; the upper layer is
+        // whole, or has one tile alone.
+        for (tiles, odd_edges, merged_vertices) in [(4, 12, 4), (3, 10, 2)] {
+            let low = [
+                Vec3::Z * 2e-6,
+                Vec3::ZERO,
+                Vec3::X,
+                Vec3::new(1.0, 0.0, 2e-6),
+            ];
+            let positions = low[..tiles].iter().flat_map(|&low| square(low, 1.0));
+            let positions = jittered(&positions.collect::<Vec<Vec3>>(), 2e-7);
+            let mended = mend(&positions, square_faces(tiles as u32));
+            let found = (mended.odd_edges, mended.merged_vertices);
+            assert_eq!(found, (odd_edges, merged_vertices));
+            let upper = |face: &Face| {
+                face.vertices
+                    .map(|vertex| positions[vertex as usize].z > 1e-6)
+            };
+            let mixed = |face: &&Face| ![[true; 3], [false; 3]].contains(&upper(face));
+            assert_eq!(mended.faces.iter().find(mixed), None);
+        }
+    }
+
     #[test]
     fn the_sides_of_a_thin_open_sheet_stay_apart() {
         // Two squares of side 1, 1e-6 apart, back to back, without a rim.
-        let square = [(0, 0), (1, 0), (1, 1), (0, 1)];
-        let side = |z: f32| square.map(|(x, y)| Vec3::new(x as f32, y as f32, z));
-        let positions = [side(0.0), side(1e-6)].concat();
+        let positions = [0.0, 1e-6].map(|z| square(Vec3::Z * z, 1.0)).concat();
         let faces = [[4, 5, 6], [4, 6, 7], [0, 2, 1], [0, 3, 2]].map(face);
         let mended = mend(&positions, faces.to_vec());
         assert_eq!((mended.merged_vertices, mended.duplicates), (0, 0));
@@ -773,6 +830,19 @@ mod tests {
         assert_eq!(restore_backs(&positions, &mut mended.faces), 2);
         let uses = edge_uses(mended.faces.iter().map(|face| face.vertices));
         assert_eq!(super::super::soup::unbalanced_edges(&uses), 0);
+        // A square from each side in the middle of a row: its rim would close as many edges as it opened.
+        let row: Vec<Vec3> = (0..8)
+            .map(|index| Vec3::new((index / 2) as f32, (index % 2) as f32, 0.0))
+            .collect();
+        let mut faces: Vec<Face> = [0, 2, 4]
+            .into_iter()
+            .flat_map(|low| [[low, low + 2, low + 3], [low, low + 3, low + 1]])
+            .map(face)
+            .collect();
+        faces.extend([[5, 4, 2], [3, 5, 2]].map(face));
+        let mut mended = mend(&row, faces);
+        assert_eq!(mended.duplicates, 2);
+        assert_eq!(restore_backs(&row, &mut mended.faces), 0);
         // A tetrahedron with one face twice needs one of them.
         let mut faces: Vec<Face> = [[0, 2, 1], [0, 1, 5], [0, 5, 2], [1, 2, 5], [1, 0, 2]]
             .map(face)

@@ -369,16 +369,20 @@ mod tests {
         let positions: Vec<Vec3> = (0..12)
             .map(|index| Vec3::new((index % 2) as f32, (index / 2) as f32, 0.0))
             .collect();
-        let mut strip: Vec<[u32; 3]> = (0..5)
+        let strip: Vec<[u32; 3]> = (0..5)
             .flat_map(|row| {
                 let first = 2 * row;
                 [[first, first + 1, first + 3], [first, first + 3, first + 2]]
             })
             .collect();
         assert!(turned(&positions, &strip).is_empty());
-        strip[0].swap(1, 2);
-        strip[7].swap(1, 2);
-        assert_eq!(turned(&positions, &strip), [0, 7]);
+        for wrong in [[0, 7], [5, 7]] {
+            let mut damaged = strip.clone();
+            for index in wrong {
+                damaged[index].swap(1, 2);
+            }
+            assert_eq!(turned(&positions, &damaged), wrong);
+        }
     }
 
     #[test]
