@@ -194,6 +194,25 @@ fn check_points_at_a_typo() {
 }
 
 #[test]
+fn a_light_in_a_thing_is_warned_of_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = lamp_scene_with(folder.path(), &project_file("recordings/lamp"));
+    let lit_from_the_house = text(scene.clone().into()).replace(
+        "position_m = [-0.26, 0.24, 0.46]",
+        "position_m = [-0.055, 0.035, 0.03]",
+    );
+    std::fs::write(&scene, lit_from_the_house).unwrap();
+    let said = replay(
+        folder.path(),
+        &[&scene, "--frames", "0,2", "--poses", "poses.csv"],
+    );
+    let warning =
+        "warning: light 0 is inside \"house\": everything outside of it is in its shadow\n";
+    assert_eq!(said.matches(warning).count(), 1, "{said}");
+    assert_eq!(said.matches("warning").count(), 1, "{said}");
+}
+
+#[test]
 fn layers_are_the_contract_s() {
     let folder = tempfile::tempdir().unwrap();
     let layers = ["--layers", "role,shadow,gain,depth"];

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use glam::DVec3;
 
+use crate::geometry::mesh::MeshReport;
 use crate::light::Light;
 use crate::scene::{Anchor, DetectorKind, Object, Scene, Technique};
 
@@ -80,7 +81,37 @@ pub fn summary(scene: &Scene) -> String {
             budget.unwrap_or_default()
         ),
     );
+    for warning in warnings(scene) {
+        line(&mut text, "warning", &warning);
+    }
     text
+}
+
+/// What is well defined but hardly meant: lights inside closed casters of the world's anchor (where others are is not
+/// known before there are pictures).
+pub fn warnings(scene: &Scene) -> Vec<String> {
+    let casters = scene.phantoms.iter().chain(&scene.virtuals);
+    let closed: Vec<&Object> = casters
+        .filter(|object| object.casts && object.mesh_report.closed && object.anchor == 0)
+        .collect();
+    let mut warnings = Vec::new();
+    for (number, light) in scene.lights.iter().enumerate() {
+        let Light::Point { position_m, .. } = light else {
+            continue;
+        };
+        for object in &closed {
+            let object_from_world = object.anchor_from_object.inverse();
+            let light_in_object = object_from_world.transform_point3(*position_m);
+            // Below zero where the placement mirrors the mesh.
+            if object.mesh.winding_number(light_in_object).abs() > 0.5 {
+                warnings.push(format!(
+                    "light {number} is inside \"{}\": everything outside of it is in its shadow",
+                    object.name
+                ));
+            }
+        }
+    }
+    warnings
 }
 
 fn line(text: &mut String, label: &str, value: &str) {
@@ -89,32 +120,41 @@ fn line(text: &mut String, label: &str, value: &str) {
     text.push('\n');
 }
 
-/// Rows of cells in aligned columns, the label before the first.
-fn rows(text: &mut String, label: &str, rows: Vec<Vec<String>>) {
+/// A row of a table, and what there is to say about it.
+#[derive(Default)]
+struct Row {
+    cells: Vec<String>,
+    /// Empty, or what stands on a line of its own below the row.
+    note: String,
+}
+
+/// Rows of cells in aligned columns, the label before the first; notes stand under the second column.
+fn rows(text: &mut String, label: &str, rows: Vec<Row>) {
     if rows.is_empty() {
         return line(text, label, "none");
     }
-    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let width = |column: usize| {
-        rows.iter()
-            .filter_map(|row| row.get(column))
-            .map(|cell| cell.chars().count())
-            .max()
-    };
+    let columns = rows.iter().map(|row| row.cells.len()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..columns)
-        .map(|column| width(column).unwrap_or(0))
+        .map(|column| {
+            let cells = rows.iter().filter_map(|row| row.cells.get(column));
+            cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+        })
         .collect();
     for (number, row) in rows.iter().enumerate() {
         let mut cells = String::new();
-        for (cell, &width) in row.iter().zip(&widths) {
+        for (cell, &width) in row.cells.iter().zip(&widths) {
             // Writing to a text cannot fail.
             let _ = write!(cells, "{cell:<width$}  ");
         }
         line(text, if number == 0 { label } else { "" }, &cells);
+        if !row.note.is_empty() {
+            let indent = widths.first().map_or(0, |width| width + 2);
+            line(text, "", &format!("{:indent$}{}", "", row.note));
+        }
     }
 }
 
-fn anchor_row((number, anchor): (usize, &Anchor)) -> Vec<String> {
+fn anchor_row((number, anchor): (usize, &Anchor)) -> Row {
     let markers = &anchor.markers;
     let family = markers
         .first()
@@ -126,7 +166,7 @@ fn anchor_row((number, anchor): (usize, &Anchor)) -> Vec<String> {
         .collect();
     sizes_mm.sort();
     sizes_mm.dedup();
-    vec![
+    let cells = vec![
         anchor.name.clone(),
         format!(
             "{} marker{}",
@@ -141,48 +181,108 @@ fn anchor_row((number, anchor): (usize, &Anchor)) -> Vec<String> {
         } else {
             String::new()
         },
-    ]
+    ];
+    Row {
+        cells,
+        ..Row::default()
+    }
 }
 
-fn object_row(object: &Object, anchors: &[Anchor]) -> Vec<String> {
-    let report = &object.mesh_report;
-    let mut notes = Vec::new();
-    if report.merged_vertices > 0 {
-        notes.push(format!("{} vertices merged", report.merged_vertices));
-    }
-    if report.dropped_triangles > 0 {
-        notes.push(format!(
-            "{} triangles without area dropped",
-            report.dropped_triangles
-        ));
-    }
+fn object_row(object: &Object, anchors: &[Anchor]) -> Row {
+    let anchor = anchors
+        .get(object.anchor)
+        .map_or("nothing", |anchor| &anchor.name);
+    let mut notes = mesh_notes(&object.mesh_report);
     if object.anchor_from_object.matrix3.determinant() < 0.0 {
         notes.push("mirrored".to_owned());
     }
-    vec![
-        object.name.clone(),
-        format!(
-            "on {}",
-            anchors
-                .get(object.anchor)
-                .map_or("nothing", |anchor| &anchor.name)
-        ),
-        format!("{} triangles", object.mesh.triangles.len()),
-        if report.closed {
-            "closed".to_owned()
-        } else {
-            format!("{} open edges", report.open_edges)
-        },
-        if object.casts {
-            "casts".to_owned()
-        } else {
-            "casts no shadow".to_owned()
-        },
-        notes.join(", "),
-    ]
+    let casts = if object.casts {
+        "casts"
+    } else {
+        "casts no shadow"
+    };
+    Row {
+        cells: vec![
+            object.name.clone(),
+            format!("on {anchor}"),
+            mesh_cell(object),
+            casts.to_owned(),
+        ],
+        note: notes.join(", "),
+    }
 }
 
-fn light_row((number, light): (usize, &Light)) -> Vec<String> {
+/// Size and topology of a mesh, and how it casts.
+fn mesh_cell(object: &Object) -> String {
+    let report = &object.mesh_report;
+    let (topology, method) = if report.closed {
+        ("closed".to_owned(), "silhouettes of one orientation")
+    } else {
+        (
+            counted(report.open_edges, "open edge"),
+            "signed edge multiplicity",
+        )
+    };
+    let size = counted(object.mesh.triangles.len(), "triangle");
+    if object.casts {
+        format!("{size}, {topology}: {method}")
+    } else {
+        format!("{size}, {topology}")
+    }
+}
+
+/// What was found in a mesh and done to it.
+fn mesh_notes(report: &MeshReport) -> Vec<String> {
+    let turned = counted(report.turned_triangles, "triangle");
+    let counts = [
+        (report.components, 1, format!("{} parts", report.components)),
+        (
+            report.crowded_edges,
+            0,
+            counted(report.crowded_edges, "edge") + " of more than two triangles",
+        ),
+        (
+            report.merged_vertices,
+            0,
+            format!("merged {}", counted(report.merged_vertices, "vertex")),
+        ),
+        (
+            report.dropped_without_area,
+            0,
+            format!("dropped {} without area", report.dropped_without_area),
+        ),
+        (
+            report.dropped_duplicates,
+            0,
+            format!(
+                "dropped {}",
+                counted(report.dropped_duplicates, "duplicate")
+            ),
+        ),
+        (
+            report.splits,
+            0,
+            counted(report.splits, "cut") + " at vertices on edges",
+        ),
+        (report.turned_triangles, 0, format!("turned {turned}")),
+    ];
+    counts
+        .into_iter()
+        .filter(|(count, usual, _)| count > usual)
+        .map(|(_, _, note)| note)
+        .collect()
+}
+
+/// `1 edge`, `2 edges`.
+fn counted(count: usize, noun: &str) -> String {
+    let nouns = match noun {
+        "vertex" => "vertices".to_owned(),
+        _ => format!("{noun}s"),
+    };
+    format!("{count} {}", if count == 1 { noun } else { &nouns })
+}
+
+fn light_row((number, light): (usize, &Light)) -> Row {
     let (kind, place, power) = match light {
         Light::Point {
             position_m,
@@ -201,7 +301,10 @@ fn light_row((number, light): (usize, &Light)) -> Vec<String> {
             format!("irradiance {}", vector(*irradiance)),
         ),
     };
-    vec![number.to_string(), kind.to_owned(), place, power]
+    Row {
+        cells: vec![number.to_string(), kind.to_owned(), place, power],
+        ..Row::default()
+    }
 }
 
 fn vector(vector: DVec3) -> String {

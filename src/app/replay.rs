@@ -16,6 +16,7 @@ use crate::render::{Gpu, Layers, Renderer, Shown};
 use crate::scene::{DetectorKind, Scene, Technique};
 use crate::tracking::{AnchorPose, Tracker};
 
+use super::check;
 use super::contact_sheet::ContactSheet;
 use super::layer_files::{Layer, write_layers};
 use super::output::FrameSink;
@@ -78,6 +79,9 @@ pub struct Report {
 pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
     let watch = Stopwatch::start();
     let scene = Scene::load(&request.scene)?;
+    for warning in check::warnings(&scene) {
+        eprintln!("warning: {warning}");
+    }
     let source = FrameSource::open(&scene.camera.source)?;
     let intrinsics = calibration(&scene, &source)?;
     if !request.layers.is_empty() {

@@ -4,7 +4,11 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 
+use super::mend::{Mended, has_three_vertices, mend, restore_backs};
 use super::normals::{face_normal, made_normals};
+use super::orient::turned_triangles;
+use super::soup::{EdgeUse, Face, Sets, Side, by_edge, edge_uses, unbalanced_edges};
+use super::winding::winding_number;
 
 /// An indexed triangle mesh in object space, metres.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -33,22 +37,35 @@ pub struct RawTriangle {
 /// What [`Mesh::weld`] found and did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MeshReport {
-    /// Vertices that fell together with another at the same place.
+    /// Vertices that fell together with another, at the same place or within rounding of it.
     pub merged_vertices: usize,
-    /// Triangles without area that were left out.
-    pub dropped_triangles: usize,
+    /// Triangles that were left out for having no area.
+    pub dropped_without_area: usize,
+    /// Triangles that were left out because another has the same vertices, the same way round or the other.
+    pub dropped_duplicates: usize,
+    /// Cuts through triangles at vertices that lie on their edges.
+    pub splits: usize,
+    /// Triangles that were turned over, to agree with their neighbours or to face outwards.
+    pub turned_triangles: usize,
     /// Edges that are not passed as often one way as the other.
     pub open_edges: usize,
+    /// Edges at which more than two triangles meet.
+    pub crowded_edges: usize,
+    /// Parts that have no edge in common.
+    pub components: usize,
     /// The mesh bounds a volume: it has triangles and no open edge.
     pub closed: bool,
 }
 
 impl Mesh {
-    /// Builds a mesh from raw triangles: merges vertices at exactly the same place, leaves out triangles without area,
-    /// and makes the missing normals by averaging over the faces within `crease_rad` (0: flat).
+    /// Builds a mesh from raw triangles. Vertices at exactly the same place are merged, triangles without area and
+    /// duplicates left out. If that leaves edges with an odd number of triangles, vertices within a hundred-thousandth
+    /// of the mesh's size are merged too, and triangles cut at vertices that lie on their edges, where it closes such
+    /// edges. Then triangles are wound like their neighbours and closed parts outwards, and the missing normals made by
+    /// averaging over the faces within `crease_rad` (0: flat).
     ///
-    /// A needle, whose corners differ but lie on a line, is left out only if that opens no edge: in a closed mesh it
-    /// may be all that joins its neighbours, and a closed shadow volume needs the join.
+    /// Triangles that are there in both orientations keep both only where one alone would leave more edges open: a
+    /// sheet of two sides is closed. A triangle without area stays if it is all that joins its neighbours.
     ///
     /// # Panics
     /// If a triangle names a vertex that `raw_positions` does not have.
@@ -57,39 +74,61 @@ impl Mesh {
         raw: &[RawTriangle],
         crease_rad: f64,
     ) -> (Self, MeshReport) {
-        let mut welded = Welder::new(raw_positions.len());
-        let mut corners: Vec<([u32; 3], &RawTriangle)> = Vec::with_capacity(raw.len());
-        for triangle in raw {
-            let indices = triangle
-                .vertices
-                .map(|vertex| welded.index(raw_positions, vertex));
-            corners.push((indices, triangle));
-        }
-        let merged_vertices = welded.used - welded.positions.len();
-        let positions = welded.positions;
+        let mut welder = Welder::new(raw_positions.len());
+        let faces: Vec<Face> = raw
+            .iter()
+            .map(|triangle| Face {
+                vertices: triangle
+                    .vertices
+                    .map(|vertex| welder.index(raw_positions, vertex)),
+                front: Side {
+                    normals: triangle.normals,
+                    material: triangle.material,
+                },
+                back: None,
+            })
+            .filter(|face| has_three_vertices(face.vertices))
+            .collect();
+        let exactly_merged = welder.used - welder.positions.len();
+        let positions = welder.positions;
+        let Mended {
+            mut faces,
+            merged_vertices,
+            duplicates,
+            splits,
+            ..
+        } = mend(&positions, faces);
+        let turned_triangles = orient(&positions, &mut faces);
+        let restored = restore_backs(&positions, &mut faces);
 
-        corners.retain(|([a, b, c], _)| a != b && b != c && c != a);
-        let with_needles = open_edge_count(corners.iter().map(|(indices, _)| *indices));
-        let has_area = |indices: &[u32; 3]| face_normal(&positions, *indices) != DVec3::ZERO;
-        let without_needles = open_edge_count(
-            corners
-                .iter()
-                .map(|(indices, _)| *indices)
-                .filter(|indices| has_area(indices)),
-        );
-        if without_needles <= with_needles {
-            corners.retain(|(indices, _)| has_area(indices));
-        }
+        let mesh = Self::from_faces(positions, &faces, crease_rad);
+        let dropped_duplicates = duplicates - restored;
+        let uses = edge_uses(mesh.triangles.iter().copied());
+        let open_edges = unbalanced_edges(&uses);
+        let report = MeshReport {
+            merged_vertices: exactly_merged + merged_vertices,
+            dropped_without_area: raw.len() + splits - dropped_duplicates - mesh.triangles.len(),
+            dropped_duplicates,
+            splits,
+            turned_triangles,
+            open_edges,
+            crowded_edges: by_edge(&uses).filter(|around| around.len() > 2).count(),
+            components: component_count(&uses, mesh.triangles.len()),
+            closed: open_edges == 0 && !mesh.triangles.is_empty(),
+        };
+        (mesh, report)
+    }
 
-        let triangles: Vec<[u32; 3]> = corners.iter().map(|(indices, _)| *indices).collect();
+    fn from_faces(positions: Vec<Vec3>, faces: &[Face], crease_rad: f64) -> Self {
+        let triangles: Vec<[u32; 3]> = faces.iter().map(|face| face.vertices).collect();
         let made = made_normals(&positions, &triangles, crease_rad);
-        let corner_normals = corners
+        let corner_normals = faces
             .iter()
             .zip(made)
-            .map(|((_, raw), made)| {
+            .map(|(face, made)| {
                 std::array::from_fn(|corner| {
-                    let given =
-                        raw.normals[corner].map(|normal| normal.as_dvec3().normalize_or_zero());
+                    let given = face.front.normals[corner]
+                        .map(|normal| normal.as_dvec3().normalize_or_zero());
                     match given {
                         Some(normal) if normal != DVec3::ZERO => normal.as_vec3(),
                         _ => made[corner],
@@ -97,31 +136,23 @@ impl Mesh {
                 })
             })
             .collect();
-        let triangle_materials = corners.iter().map(|(_, raw)| raw.material).collect();
-        let dropped_triangles = raw.len() - triangles.len();
-        let mesh = Self {
+        Self {
             positions,
             triangles,
             corner_normals,
-            triangle_materials,
+            triangle_materials: faces.iter().map(|face| face.front.material).collect(),
         }
-        .without_unused_positions();
-        let open_edges = mesh.open_edge_count();
-        let closed = open_edges == 0 && !mesh.triangles.is_empty();
-        (
-            mesh,
-            MeshReport {
-                merged_vertices,
-                dropped_triangles,
-                open_edges,
-                closed,
-            },
-        )
+        .without_unused_positions()
+    }
+
+    /// How often the mesh winds around a point of its space: 1 in a closed mesh, 0 outside (see [`winding_number`]).
+    pub fn winding_number(&self, point: DVec3) -> f64 {
+        winding_number(&self.positions, self.triangles.iter().copied(), point)
     }
 
     /// Edges that are not passed as often one way as the other; 0 for a mesh that bounds a volume.
     pub fn open_edge_count(&self) -> usize {
-        open_edge_count(self.triangles.iter().copied())
+        unbalanced_edges(&edge_uses(self.triangles.iter().copied()))
     }
 
     /// Whether each edge is passed as often one way as the other: the mesh is closed and its triangles agree on
@@ -205,15 +236,34 @@ impl Welder {
     }
 }
 
-fn open_edge_count(triangles: impl Iterator<Item = [u32; 3]>) -> usize {
-    let mut balance: HashMap<(u32, u32), i64> = HashMap::new();
-    for [a, b, c] in triangles {
-        for (from, to) in [(a, b), (b, c), (c, a)] {
-            *balance.entry((from.min(to), from.max(to))).or_default() +=
-                if from < to { 1 } else { -1 };
+/// Turns faces over where [`turned_triangles`] says so, and tells how many. Where the file has a face both ways round,
+/// turning is a choice between the two and does not count.
+fn orient(positions: &[Vec3], faces: &mut [Face]) -> usize {
+    let triangles: Vec<[u32; 3]> = faces.iter().map(|face| face.vertices).collect();
+    let turned = turned_triangles(positions, &triangles);
+    let mut count = 0;
+    for (face, _) in faces.iter_mut().zip(turned).filter(|(_, turned)| *turned) {
+        match face.back {
+            Some(back) => (face.front, face.back) = (back, Some(face.front)),
+            None => count += 1,
+        }
+        *face = face.turned();
+        face.turn_inverted_normals(face_normal(positions, face.vertices));
+    }
+    count
+}
+
+/// Parts that have no edge in common.
+fn component_count(uses: &[EdgeUse], triangles: usize) -> usize {
+    let mut parts = Sets::new(triangles);
+    for around in by_edge(uses) {
+        for other in &around[1..] {
+            parts.join(around[0].triangle, other.triangle);
         }
     }
-    balance.values().filter(|&&passes| passes != 0).count()
+    (0..triangles as u32)
+        .filter(|&triangle| parts.least(triangle) == triangle)
+        .count()
 }
 
 #[cfg(test)]
@@ -254,9 +304,9 @@ mod tests {
             report,
             MeshReport {
                 merged_vertices: 8,
-                dropped_triangles: 0,
-                open_edges: 0,
-                closed: true
+                components: 1,
+                closed: true,
+                ..MeshReport::default()
             }
         );
         assert_eq!(mesh.positions.len(), 4);
@@ -268,54 +318,53 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_or_turned_triangle_opens_three_edges() {
+    fn a_missing_triangle_opens_three_edges_and_a_turned_one_is_turned_back() {
         let (positions, mut triangles) = loose_tetrahedron();
         triangles[3].vertices.swap(0, 1);
         let (mesh, report) = Mesh::weld(&positions, &triangles, 0.0);
-        assert_eq!(
-            (
-                report.open_edges,
-                report.closed,
-                mesh.closed_and_consistent()
-            ),
-            (3, false, false)
-        );
+        assert!(report.closed && mesh.closed_and_consistent());
+        assert_eq!(report.turned_triangles, 1);
         triangles.pop();
-        assert_eq!(Mesh::weld(&positions, &triangles, 0.0).1.open_edges, 3);
+        let report = Mesh::weld(&positions, &triangles, 0.0).1;
+        assert_eq!((report.open_edges, report.closed), (3, false));
         assert!(!Mesh::default().closed_and_consistent());
     }
 
     #[test]
-    fn triangles_without_area_go_unless_they_join_their_neighbours() {
+    fn triangles_without_area_go() {
         let (mut positions, mut triangles) = loose_tetrahedron();
         triangles.push(raw([0, 0, 1]));
         let (mesh, report) = Mesh::weld(&positions, &triangles, 0.0);
         assert_eq!(
             (
                 mesh.triangles.len(),
-                report.dropped_triangles,
+                report.dropped_without_area,
                 report.closed
             ),
             (4, 1, true)
         );
 
-        // The edge from (1,0,0) to (0,1,0) of the last face gets a vertex in its middle, and a needle fills the gap.
+        // The edge from (1,0,0) to (0,1,0) of the last face gets a vertex in its middle, and a needle fills the gap:
+        // the face on the other side is cut there instead.
         positions.push(Vec3::new(0.5, 0.5, 0.0));
-        triangles[3] = raw([1, 12, 11]);
-        triangles[4] = raw([12, 2, 11]);
         let [x, y, z] = [9, 10, 11];
         triangles[3].vertices = [x, 12, z];
-        triangles[4].vertices = [12, y, z];
+        triangles[4] = raw([12, y, z]);
         triangles.push(raw([x, y, 12]));
         let (mesh, report) = Mesh::weld(&positions, &triangles, 0.0);
         assert_eq!(
-            (
-                mesh.triangles.len(),
-                report.dropped_triangles,
-                report.closed
-            ),
-            (6, 0, true)
+            report,
+            MeshReport {
+                merged_vertices: 8,
+                dropped_without_area: 1,
+                splits: 1,
+                components: 1,
+                closed: true,
+                ..MeshReport::default()
+            }
         );
+        assert_eq!(mesh.triangles.len(), 6);
+        assert!((mesh.signed_volume_m3() - 1.0 / 6.0).abs() < 1e-12);
 
         // By itself it joins nothing.
         let line = [Vec3::ZERO, Vec3::X, Vec3::X * 2.0];
@@ -324,11 +373,82 @@ mod tests {
             (
                 mesh.positions.len(),
                 mesh.triangles.len(),
-                report.dropped_triangles
+                report.dropped_without_area
             ),
             (0, 0, 1)
         );
         assert!(!report.closed);
+    }
+
+    #[test]
+    fn normals_turn_with_their_triangle_unless_they_were_right() {
+        let (positions, mut triangles) = loose_tetrahedron();
+        for triangle in &mut triangles {
+            let [a, b, c] = triangle.vertices.map(|vertex| positions[vertex as usize]);
+            triangle.normals = [Some((b - a).cross(c - a)); 3];
+        }
+        let outward = Mesh::weld(&positions, &triangles, 0.0).0;
+        // All inside out, and of two triangles the normals too.
+        for triangle in &mut triangles {
+            triangle.vertices.swap(0, 1);
+        }
+        for triangle in &mut triangles[..2] {
+            triangle.normals = triangle.normals.map(|normal| normal.map(|normal| -normal));
+        }
+        let (mesh, report) = Mesh::weld(&positions, &triangles, 0.0);
+        assert_eq!((report.turned_triangles, report.closed), (4, true));
+        assert_eq!(mesh.corner_normals, outward.corner_normals);
+        assert!((mesh.signed_volume_m3() - 1.0 / 6.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn of_a_face_that_is_there_both_ways_round_a_closed_mesh_keeps_the_outer_one() {
+        let (positions, mut triangles) = loose_tetrahedron();
+        let mut outer = triangles[3];
+        outer.normals = [Some(Vec3::ONE); 3];
+        outer.material = 1;
+        triangles[3].vertices.swap(0, 1);
+        triangles.push(outer);
+        triangles.push(triangles[0]);
+        let (mesh, report) = Mesh::weld(&positions, &triangles, 0.0);
+        assert_eq!(
+            report,
+            MeshReport {
+                merged_vertices: 8,
+                dropped_duplicates: 2,
+                components: 1,
+                closed: true,
+                ..MeshReport::default()
+            }
+        );
+        assert_eq!(mesh.triangle_materials, [0, 0, 0, 1]);
+        assert_eq!(mesh.corner_normals[3], [Vec3::ONE.normalize(); 3]);
+    }
+
+    #[test]
+    fn a_sheet_of_two_sides_is_closed_and_has_a_normal_on_each() {
+        let positions = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::new(1.0, 1.0, 0.0)];
+        let sides = [[0, 1, 2], [1, 3, 2], [2, 1, 0], [2, 3, 1]].map(raw);
+        let (mesh, report) = Mesh::weld(&positions, &sides, 0.0);
+        assert_eq!((report.open_edges, report.closed), (0, true));
+        assert_eq!((report.dropped_duplicates, report.crowded_edges), (0, 1));
+        let up = mesh
+            .corner_normals
+            .iter()
+            .filter(|normals| **normals == [Vec3::Z; 3]);
+        let down = mesh
+            .corner_normals
+            .iter()
+            .filter(|normals| **normals == [-Vec3::Z; 3]);
+        assert_eq!((up.count(), down.count()), (2, 2));
+    }
+
+    #[test]
+    fn it_winds_once_around_its_inside() {
+        let (positions, triangles) = loose_tetrahedron();
+        let mesh = Mesh::weld(&positions, &triangles, 0.0).0;
+        assert!((mesh.winding_number(DVec3::splat(0.1)) - 1.0).abs() < 1e-12);
+        assert!(mesh.winding_number(DVec3::splat(0.4)).abs() < 1e-12);
     }
 
     #[test]
@@ -345,5 +465,72 @@ mod tests {
             mesh.corner_normals[0],
             [Vec3::new(0.0, 0.6, 0.8), Vec3::Z, Vec3::Z]
         );
+    }
+
+    /// Marsaglia's xorshift: the same soups in each run.
+    struct Random(u64);
+
+    impl Random {
+        fn below(&mut self, end: u32) -> u32 {
+            self.0 ^= self.0 << 13;
+            self.0 ^= self.0 >> 7;
+            self.0 ^= self.0 << 17;
+            (self.0 % u64::from(end)) as u32
+        }
+
+        fn point(&mut self) -> DVec3 {
+            DVec3::from_array([(); 3].map(|()| {
+                let share = f64::from(self.below(1 << 30)) / f64::from(1 << 30);
+                3.0 * share - 0.5
+            }))
+        }
+    }
+
+    fn passes_through(positions: &[Vec3], corners: [u32; 3], from: DVec3, to: DVec3) -> bool {
+        let [a, b, c] = corners.map(|index| positions[index as usize].as_dvec3());
+        let side = |a: DVec3, b: DVec3, c: DVec3, d: DVec3| (b - a).cross(c - a).dot(d - a);
+        let around = [(a, b), (b, c), (c, a)].map(|(p, q)| side(from, to, p, q));
+        let one_way = around.iter().all(|&s| s > 0.0) || around.iter().all(|&s| s < 0.0);
+        one_way && side(a, b, c, from) * side(a, b, c, to) < 0.0
+    }
+
+    #[test]
+    fn mending_never_changes_what_lies_between_two_points() {
+        // On a grid of 27 points all goes wrong at once: needles, duplicates, sheets of two sides, fins, vertices on
+        // edges.
+        let positions: Vec<Vec3> = (0..27)
+            .map(|index| {
+                Vec3::new(
+                    (index % 3) as f32,
+                    (index / 3 % 3) as f32,
+                    (index / 9) as f32,
+                )
+            })
+            .collect();
+        let mut random = Random(3);
+        let (mut splits, mut duplicates, mut turned, mut hidden) = (0, 0, 0, 0);
+        for soup in 0..400 {
+            let triangles: Vec<RawTriangle> = (0..1 + random.below(60))
+                .map(|_| raw([random.below(27), random.below(27), random.below(27)]))
+                .collect();
+            let (mesh, report) = Mesh::weld(&positions, &triangles, 0.5);
+            splits += report.splits;
+            duplicates += report.dropped_duplicates;
+            turned += report.turned_triangles;
+            assert_eq!(report.open_edges, mesh.open_edge_count());
+            for _ in 0..40 {
+                let (from, to) = (random.point(), random.point());
+                let before = triangles
+                    .iter()
+                    .any(|triangle| passes_through(&positions, triangle.vertices, from, to));
+                let after = mesh
+                    .triangles
+                    .iter()
+                    .any(|&corners| passes_through(&mesh.positions, corners, from, to));
+                assert_eq!(before, after, "soup {soup}: {from} to {to}");
+                hidden += usize::from(before);
+            }
+        }
+        assert!(splits > 100 && duplicates > 10 && turned > 1000 && hidden > 2000);
     }
 }

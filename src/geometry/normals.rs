@@ -1,9 +1,15 @@
 //! Normals made where a mesh has none.
 
+use std::collections::HashMap;
+
 use glam::{DVec3, Vec3};
 
 /// Cosine's slack, so that faces at just the crease angle count as within it whatever the rounding.
 const CREASE_SLACK: f64 = 1e-6;
+/// Faces around a vertex that are compared one by one; more are first taken together where they face alike.
+const MOST_FACES_APART: usize = 256;
+/// Steps per unit of the normals that are taken together, less than four degrees apart.
+const ALIKE_STEPS: f64 = 32.0;
 /// A triangle whose height is below this part of its longest side has no area that single precision can tell.
 const NEEDLE: f64 = 1e-7;
 
@@ -37,6 +43,11 @@ pub fn made_normals(positions: &[Vec3], triangles: &[[u32; 3]], crease_rad: f64)
                 .push((normal, corner_angle_rad(positions, corners, corner)));
         }
     }
+    for around in &mut weighted_at {
+        if around.len() > MOST_FACES_APART {
+            *around = taken_together(around);
+        }
+    }
     let least_cosine = crease_rad.cos() - CREASE_SLACK;
     triangles
         .iter()
@@ -65,6 +76,27 @@ pub fn made_normals(positions: &[Vec3], triangles: &[[u32; 3]], crease_rad: f64)
                     .as_vec3()
             })
         })
+        .collect()
+}
+
+/// Weighted normals with those that are nearly alike added up, so that a vertex with very many faces takes no time that
+/// grows with their square.
+fn taken_together(weighted: &[(DVec3, f64)]) -> Vec<(DVec3, f64)> {
+    let mut sums: HashMap<[i32; 3], DVec3> = HashMap::new();
+    let mut order = Vec::new();
+    for &(normal, weight) in weighted {
+        let key = (normal * ALIKE_STEPS)
+            .round()
+            .to_array()
+            .map(|step| step as i32);
+        *sums.entry(key).or_insert_with(|| {
+            order.push(key);
+            DVec3::ZERO
+        }) += normal * weight;
+    }
+    order
+        .into_iter()
+        .map(|key| (sums[&key].normalize_or_zero(), sums[&key].length()))
         .collect()
 }
 
@@ -181,6 +213,27 @@ mod tests {
                     "{normal}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn a_fan_of_very_many_faces_has_its_cone_s_axis_at_its_tip() {
+        let rim = 20_000_u32;
+        let positions: Vec<Vec3> = (0..rim)
+            .map(|step| {
+                let azimuth_rad = std::f64::consts::TAU * f64::from(step) / f64::from(rim);
+                DVec3::new(azimuth_rad.cos(), azimuth_rad.sin(), -0.2).as_vec3()
+            })
+            .chain([Vec3::ZERO])
+            .collect();
+        let triangles: Vec<[u32; 3]> = (0..rim).map(|step| [rim, step, (step + 1) % rim]).collect();
+        for (normals, corners) in made_normals(&positions, &triangles, 1.0)
+            .iter()
+            .zip(&triangles)
+        {
+            assert!(normals[0].angle_between(Vec3::Z) < 1e-3, "{}", normals[0]);
+            let flat = face_normal(&positions, *corners).as_vec3();
+            assert!(normals[1].angle_between(flat) < 1e-3);
         }
     }
 

@@ -282,9 +282,9 @@ mod tests {
             loaded.report,
             MeshReport {
                 merged_vertices: 16,
-                dropped_triangles: 0,
-                open_edges: 0,
-                closed: true
+                components: 1,
+                closed: true,
+                ..MeshReport::default()
             }
         );
         assert!((loaded.mesh.signed_volume_m3() - 1.0).abs() < 1e-12);
@@ -306,7 +306,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.obj");
         let mtl = folder.path().join("a.mtl");
-        let text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl matt\nf 1 2 3\nusemtl shiny\nf 1 3 2\nusemtl none\nf 1 2 3\n";
+        let text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl matt\nf 1 2 3\nusemtl shiny\nf 1 4 2\nusemtl none\nf 1 3 4\n";
         let plain = Material {
             albedo: DVec3::splat(0.5),
             roughness: None,

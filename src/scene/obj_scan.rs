@@ -1,6 +1,7 @@
 //! Checks an OBJ or MTL file line by line before tobj reads it: tobj tells no lines, takes NaN for a coordinate, makes
 //! triangles of polylines, lends a corner without a normal that of another, and panics at a short colour.
 
+use std::collections::HashMap;
 use std::ops::Range;
 
 /// A coordinate beyond this is a mistake of units, metres.
@@ -25,15 +26,19 @@ pub struct ScannedObj {
 /// Checks an OBJ file's records.
 pub fn scan_obj(text: &str) -> Result<ScannedObj, ScanError> {
     let mut scanned = ScannedObj::default();
-    let (mut positions, mut normals) = (0_usize, 0_usize);
+    let mut places: Vec<Place> = Vec::new();
+    let mut normals = 0_usize;
+    let mut polygons = Polygons::default();
     for line in text.lines() {
         let record = Record { text, line };
         let mut words = line.split_whitespace();
         match words.next().map(|word| word.trim_start_matches('\u{feff}')) {
             Some("v") => {
                 let words: Vec<&str> = words.collect();
-                scanned.text += &vertex(&record, &words)?;
-                positions += 1;
+                let [x, y, z] = vertex(&record, &words)?;
+                scanned.text += &format!("v {x} {y} {z}");
+                // Adding 0 makes 0 of -0, which is the same place.
+                places.push([x, y, z].map(|coordinate_m| (coordinate_m + 0.0).to_bits()));
             }
             Some("vn") => {
                 let words: Vec<&str> = words.collect();
@@ -50,20 +55,27 @@ pub fn scan_obj(text: &str) -> Result<ScannedObj, ScanError> {
                 normals += 1;
             }
             Some("f") => {
-                let has_normal = words
-                    .map(|corner| record.corner(corner, positions, normals))
-                    .collect::<Result<Vec<bool>, ScanError>>()?;
-                if has_normal.len() < 3 {
+                let mut corners = words
+                    .map(|corner| record.corner(corner, places.len(), normals))
+                    .collect::<Result<Vec<Corner>, ScanError>>()?;
+                if corners.len() < 3 {
                     return Err(record.error(
                         line.trim(),
-                        format!("{} corners; a face has 3 or more", has_normal.len()),
+                        format!("{} corners; a face has 3 or more", corners.len()),
                     ));
                 }
+                polygons.start_alike(&mut corners, &places);
+                let has_normal: Vec<bool> =
+                    corners.iter().map(|corner| corner.has_normal).collect();
                 let fan = has_normal[1..]
                     .windows(2)
                     .map(|pair| [has_normal[0], pair[0], pair[1]]);
                 scanned.corner_has_normal.extend(fan);
-                scanned.text += line;
+                scanned.text.push('f');
+                for corner in &corners {
+                    scanned.text.push(' ');
+                    scanned.text += corner.written;
+                }
             }
             Some("usemtl") if line.trim().split_once(' ').is_none() => {
                 return Err(record.error(line.trim(), "names no material"));
@@ -109,6 +121,41 @@ pub fn scan_mtl(text: &str) -> Result<(), ScanError> {
     Ok(())
 }
 
+/// A face's corner.
+struct Corner<'a> {
+    written: &'a str,
+    /// Index of its vertex, from 0.
+    vertex: usize,
+    has_normal: bool,
+}
+
+/// A vertex's coordinates, bit by bit.
+type Place = [u32; 3];
+
+/// Polygons by the places of their vertices. A fan starts at the first vertex, so the same polygon twice, or once from
+/// each side, could be cut along different diagonals; here copies start where the first one does.
+#[derive(Default)]
+struct Polygons {
+    start_of: HashMap<Vec<Place>, Place>,
+}
+
+impl Polygons {
+    fn start_alike(&mut self, corners: &mut [Corner], places: &[Place]) {
+        // A triangle has no diagonal.
+        if corners.len() == 3 {
+            return;
+        }
+        let mut key: Vec<Place> = corners.iter().map(|corner| places[corner.vertex]).collect();
+        let first = key[0];
+        key.sort_unstable();
+        let start = *self.start_of.entry(key).or_insert(first);
+        let offset = corners
+            .iter()
+            .position(|corner| places[corner.vertex] == start);
+        corners.rotate_left(offset.unwrap_or(0));
+    }
+}
+
 /// A line and the text that it is a part of.
 struct Record<'a> {
     text: &'a str,
@@ -139,11 +186,16 @@ impl Record<'_> {
         }
     }
 
-    /// Whether a face's corner `v`, `v/vt`, `v//vn` or `v/vt/vn` has a normal.
-    fn corner(&self, corner: &str, positions: usize, normals: usize) -> Result<bool, ScanError> {
+    /// A face's corner: `v`, `v/vt`, `v//vn` or `v/vt/vn`.
+    fn corner<'b>(
+        &self,
+        corner: &'b str,
+        vertices: usize,
+        normals: usize,
+    ) -> Result<Corner<'b>, ScanError> {
         let mut parts = corner.split('/');
         let vertex = parts.next().unwrap_or_default();
-        self.index(corner, vertex, positions, "vertex", "vertices")?;
+        let vertex = self.index(corner, vertex, vertices, "vertex", "vertices")?;
         if let Some(texture) = parts.next().filter(|texture| !texture.is_empty()) {
             texture
                 .parse::<i64>()
@@ -153,13 +205,17 @@ impl Record<'_> {
         if parts.next().is_some() {
             return Err(self.error(corner, format!("{corner} is not a face's corner")));
         }
-        normal.map_or(Ok(false), |normal| {
-            self.index(corner, normal, normals, "normal", "normals")
-                .map(|()| true)
+        if let Some(normal) = normal {
+            self.index(corner, normal, normals, "normal", "normals")?;
+        }
+        Ok(Corner {
+            written: corner,
+            vertex,
+            has_normal: normal.is_some(),
         })
     }
 
-    /// Indices count from 1, negative ones back from the newest.
+    /// An index from 0. Written ones count from 1, negative ones back from the newest.
     fn index(
         &self,
         corner: &str,
@@ -167,7 +223,7 @@ impl Record<'_> {
         known: usize,
         one: &str,
         many: &str,
-    ) -> Result<(), ScanError> {
+    ) -> Result<usize, ScanError> {
         let index: i64 = written
             .parse()
             .map_err(|_| self.error(corner, format!("{corner} is not a face's corner")))?;
@@ -176,12 +232,17 @@ impl Record<'_> {
                 format!("{one} {index} does not exist; {known} {many} are known by this line");
             return Err(self.error(corner, message));
         }
-        Ok(())
+        let from_start = index.unsigned_abs() as usize;
+        Ok(if index > 0 {
+            from_start - 1
+        } else {
+            known - from_start
+        })
     }
 }
 
-/// The record of a vertex's position alone, checked; its weight is divided out.
-fn vertex(record: &Record, words: &[&str]) -> Result<String, ScanError> {
+/// A vertex's position, checked; its weight is divided out.
+fn vertex(record: &Record, words: &[&str]) -> Result<[f32; 3], ScanError> {
     let numbers = words
         .iter()
         .map(|word| record.number(word))
@@ -195,9 +256,9 @@ fn vertex(record: &Record, words: &[&str]) -> Result<String, ScanError> {
             return Err(record.error(record.line.trim(), message));
         }
     };
-    let mut text = String::from("v");
-    for (word, number) in words.iter().zip(&numbers).take(3) {
-        let coordinate_m = number / weight;
+    let mut position_m = [0.0; 3];
+    for ((coordinate_m, word), number) in position_m.iter_mut().zip(words).zip(&numbers) {
+        *coordinate_m = number / weight;
         // A weight of 0 gives infinity or NaN.
         if coordinate_m.is_nan() || coordinate_m.abs() > FARTHEST_M {
             let message = format!(
@@ -205,9 +266,8 @@ fn vertex(record: &Record, words: &[&str]) -> Result<String, ScanError> {
             );
             return Err(record.error(word, message));
         }
-        text += &format!(" {coordinate_m}");
     }
-    Ok(text)
+    Ok(position_m)
 }
 
 #[cfg(test)]
@@ -237,6 +297,30 @@ mod tests {
         assert_eq!(
             scanned.corner_has_normal,
             [[true, true, false], [true, false, false]]
+        );
+    }
+
+    #[test]
+    fn copies_of_a_polygon_are_cut_along_the_same_diagonals() {
+        let quad = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 -0\n";
+        let loose = "v 1 1 0\nv 0 1 0\nv 0 0 0\nv 1 0 0\n";
+        let text = format!("{quad}{loose}f 2 3 4 1\nf 4 3 2 1\nf 1 2 3 4\nf 5 6 7 8\nf 5 7 6\n");
+        let faces: Vec<String> = scan_obj(&text)
+            .unwrap()
+            .text
+            .lines()
+            .filter(|line| line.starts_with('f'))
+            .map(str::to_owned)
+            .collect();
+        assert_eq!(
+            faces,
+            [
+                "f 2 3 4 1",
+                "f 2 1 4 3",
+                "f 2 3 4 1",
+                "f 8 5 6 7",
+                "f 5 7 6"
+            ]
         );
     }
 

@@ -5,6 +5,7 @@
     reason = "a test may stop where its own files fail"
 )]
 
+mod meshes;
 mod mistakes;
 mod mutations;
 
