@@ -50,13 +50,10 @@ pub fn levels(mesh: &Mesh) -> Vec<Level> {
     chain(mesh, FEWEST)
 }
 
-/// The coarsest level that may stand for the mesh where a metre of it (in its own space) is at most `px_per_m` pixels
-/// long, in the picture or in the edge of its shadow; `None`: the mesh itself.
-pub fn choose(levels: &[Level], px_per_m: f64, max_silhouette_error_px: f64) -> Option<&Level> {
-    levels.iter().rev().find(|level| {
-        level.max_error_m * px_per_m < max_silhouette_error_px
-            && level.mean_error_m * px_per_m < max_silhouette_error_px * MEAN_TO_MAX
-    })
+/// Whether a level may stand for its mesh where outlines, in the picture or of its shadow, are off by `max_px` at most
+/// and by `mean_px` on the average.
+pub fn is_close_enough(max_px: f64, mean_px: f64, max_silhouette_error_px: f64) -> bool {
+    max_px < max_silhouette_error_px && mean_px < max_silhouette_error_px * MEAN_TO_MAX
 }
 
 fn chain(mesh: &Mesh, fewest: usize) -> Vec<Level> {
@@ -712,14 +709,13 @@ mod tests {
             (0.002, 0.0003),
             (0.008, 0.0004),
             (0.02, 0.004),
-        ]
-        .map(|(max_error_m, mean_error_m)| Level {
-            mesh: Mesh::default(),
-            max_error_m,
-            mean_error_m,
-        });
-        let chosen =
-            |px_per_m, max_px| choose(&levels, px_per_m, max_px).map(|level| level.max_error_m);
+        ];
+        let chosen = |px_per_m: f64, limit_px| {
+            let fits = |&&(max_m, mean_m): &&(f64, f64)| {
+                is_close_enough(max_m * px_per_m, mean_m * px_per_m, limit_px)
+            };
+            levels.iter().rev().find(fits).map(|(max_m, _)| *max_m)
+        };
         assert_eq!(chosen(10.0, 0.5), Some(0.02));
         assert_eq!(chosen(60.0, 0.5), Some(0.008));
         // The largest error would allow the next coarser one, the mean does not.

@@ -1,5 +1,5 @@
 //! How far outlines and shadow edges move in the picture, in pixels for a metre that a surface is off: bounds that are
-//! never too small, for [`choose`](super::levels::choose).
+//! never too small, for [`is_close_enough`](super::levels::is_close_enough).
 //!
 //! A surface and its coarser version both lie in the box of the former, which is convex; so a bound on the derivative
 //! of the projection over the part of a box that the camera sees bounds each movement there.
@@ -12,6 +12,9 @@ use super::shadow_volume::LightPlace;
 
 /// The bounds hold for movements up to this many pixels: so far beyond the picture's edge they are taken.
 pub const LARGEST_MOVE_PX: f64 = 100.0;
+
+/// Where light grazes a receiver at less than this cosine, its shadow's edge is fainter by as much as it is longer.
+const LEAST_COSINE: f64 = 0.2;
 
 /// What the camera sees.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,7 +54,8 @@ pub fn outline_px_per_m(bounds: &Bounds, view: &View) -> f64 {
 
 /// How many pixels the edge of a shadow moves at most for a metre that the caster's surface, within `caster`, is off.
 /// The shadow falls on `receivers`, triangles counter-clockwise seen from outside; all in world space. Infinite where
-/// the light may lie within the caster.
+/// the light may lie within the caster. On receivers that the light grazes (at a cosine below 0.2) edges may move
+/// farther, but are as much fainter.
 pub fn shadow_px_per_m(
     caster: &Bounds,
     light: LightPlace,
@@ -101,7 +105,7 @@ fn cast(caster: &Bounds, light: LightPlace, receiver: &[DVec3; 3]) -> Option<Cas
             let images = images.map(|(corner, way)| corner + direction * way);
             Some(Cast {
                 region: overlap(&triangle, &Bounds::around(images)?)?,
-                lengthening: 1.0 / cosine,
+                lengthening: 1.0 / cosine.max(LEAST_COSINE),
             })
         }
         LightPlace::Point(light) => {
@@ -134,7 +138,7 @@ fn cast(caster: &Bounds, light: LightPlace, receiver: &[DVec3; 3]) -> Option<Cas
             let cosine = depth_m / farthest_m(&region, light);
             Some(Cast {
                 region,
-                lengthening: enlargement / cosine,
+                lengthening: enlargement / cosine.max(LEAST_COSINE),
             })
         }
     }

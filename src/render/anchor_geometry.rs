@@ -1,15 +1,19 @@
-//! The scene's meshes on the GPU. Objects stand still on their anchor, so their vertices are kept in the anchor's
-//! space: one matrix per anchor draws all that it carries.
+//! The scene's meshes on the GPU, each with its levels of detail. Objects stand still on their anchor, so their vertices
+//! are kept in the anchor's space: one matrix per anchor draws all that it carries.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use wgpu::util::DeviceExt as _;
 
 use crate::geometry::bounds::Bounds;
+use crate::geometry::levels::levels;
+use crate::geometry::mesh::Mesh;
+use crate::geometry::outline_scale::largest_stretch;
 use crate::geometry::shadow_volume::Caster;
 use crate::light::bounce::Reflector;
 use crate::scene::{Object, Scene};
@@ -55,175 +59,147 @@ pub(super) struct SurfaceBatch {
     /// For each corner the irradiance that no light gives it.
     pub indirect: wgpu::Buffer,
     pub indices: wgpu::Buffer,
-    pub index_count: u32,
 }
 
-/// One thing that takes light away, in its anchor's space.
-pub(super) struct AnchoredCaster {
+/// One thing, in its anchor's space.
+pub(super) struct Thing {
     pub role: Role,
     pub anchor: usize,
+    /// Around the mesh itself; its coarser levels lie within.
+    pub bounds: Bounds,
+    /// The mesh itself, then ever coarser ones.
+    pub levels: Vec<ThingLevel>,
+    pub casts: bool,
+    /// Triangles that stand for it where others' shadows fall on it.
+    pub receivers: Vec<[DVec3; 3]>,
+}
+
+/// A thing in one level of detail.
+pub(super) struct ThingLevel {
+    /// Its triangles among the batch's indices.
+    pub range: Range<u32>,
+    /// How far outlines are off at most and on the average, metres in the anchor's space.
+    pub max_error_m: f64,
+    pub mean_error_m: f64,
+    pub caster: Option<LevelCaster>,
+}
+
+/// What takes light away.
+pub(super) struct LevelCaster {
     pub caster: Caster,
     /// See [`Caster::volume_vertices`].
     pub vertices: wgpu::Buffer,
-    /// Where a virtual thing's surface is in its batch.
-    pub surface: Option<SurfacePart>,
-}
-
-/// The surface of one thing as part of its batch.
-pub(super) struct SurfacePart {
     /// Each triangle's corners in the batch.
-    pub triangles: Vec<[u32; 3]>,
-    /// Its place among the batch's indices.
-    pub range: Range<u32>,
-    /// Unit normals of each triangle's corners, in the anchor's space, if they light more than the triangles that face
-    /// the light.
+    pub surface_triangles: Vec<[u32; 3]>,
+    /// Unit normals of each triangle's corners, in the anchor's space, if they are smooth.
     pub smooth_normals: Option<Vec<[Vec3; 3]>>,
 }
 
-/// The box around one thing, in its anchor's space.
-pub(super) struct Extent {
-    pub role: Role,
-    pub anchor: usize,
-    pub bounds: Bounds,
-    /// Which caster it is, if it casts.
-    pub caster: Option<usize>,
+/// Corners of the world's virtual batch (place and unit normal) and the triangles that join them.
+pub(super) type VirtualCorners = (Vec<(Vec3, Vec3)>, Vec<[u32; 3]>);
+
+/// Everything that stands on anchors.
+pub(super) struct AnchorGeometry {
+    pub batches: Vec<SurfaceBatch>,
+    /// The real ones first.
+    pub things: Vec<Thing>,
+    pub world_virtuals: VirtualCorners,
 }
 
-/// The extents of all things.
-pub(super) fn extents(scene: &Scene) -> Vec<Extent> {
-    let mut casters = 0..;
-    objects(scene)
-        .filter_map(|(role, object)| {
-            let caster = object.casts.then(|| casters.next()).flatten();
-            let points = positions_in_anchor(object)
-                .into_iter()
-                .map(|point| point.as_dvec3());
-            Some(Extent {
-                role,
-                anchor: object.anchor,
-                bounds: Bounds::around(points)?,
-                caster,
-            })
-        })
-        .collect()
+impl AnchorGeometry {
+    pub fn new(device: &wgpu::Device, scene: &Scene) -> Self {
+        let ambient = (PI * scene.ambient_radiance).as_vec3();
+        let mut geometry = Self {
+            batches: Vec::new(),
+            things: Vec::new(),
+            world_virtuals: Default::default(),
+        };
+        for (role, objects) in [
+            (Role::Real, &scene.phantoms),
+            (Role::Virtual, &scene.virtuals),
+        ] {
+            for anchor in 0..scene.anchors.len() {
+                let mut shared = SharedCorners::default();
+                for object in objects.iter().filter(|object| object.anchor == anchor) {
+                    let coarsest_px = scene.shadows.max_silhouette_error_px;
+                    let thing = thing(device, role, object, coarsest_px > 0.0, &mut shared);
+                    geometry.things.extend(thing);
+                }
+                if shared.triangles.is_empty() {
+                    continue;
+                }
+                geometry
+                    .batches
+                    .push(shared.batch(device, role, anchor, ambient));
+                if (role, anchor) == (Role::Virtual, 0) {
+                    let places = shared.corners.iter();
+                    let places = places.map(|corner| (corner.position, corner.normal));
+                    geometry.world_virtuals = (places.collect(), shared.triangles);
+                }
+            }
+        }
+        geometry
+    }
 }
 
-/// Surfaces, the real ones first.
-pub(super) fn surface_batches(device: &wgpu::Device, scene: &Scene) -> Vec<SurfaceBatch> {
-    let ambient = (PI * scene.ambient_radiance).as_vec3();
-    let buffer = |label, contents: &[u8], usage| {
-        device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some(label),
-            contents,
-            usage,
-        })
+/// Puts an object's levels among its batch's corners; `None` without triangles.
+fn thing(
+    device: &wgpu::Device,
+    role: Role,
+    object: &Object,
+    with_levels: bool,
+    shared: &mut SharedCorners,
+) -> Option<Thing> {
+    let stretch = largest_stretch(&object.anchor_from_object);
+    let coarser = match with_levels {
+        true => levels(&object.mesh),
+        false => Vec::new(),
     };
-    let mut batches = Vec::new();
-    for role in [Role::Real, Role::Virtual] {
-        for anchor in 0..scene.anchors.len() {
-            let mut shared = SharedCorners::default();
-            for object in batch(scene, role, anchor) {
-                shared.add(object);
-            }
-            let SharedCorners {
-                corners, triangles, ..
-            } = shared;
-            if triangles.is_empty() {
-                continue;
-            }
-            batches.push(SurfaceBatch {
-                role,
-                anchor,
-                index_count: 3 * triangles.len() as u32,
-                corners: buffer(
-                    "surface corners",
-                    bytemuck::cast_slice(&corners),
-                    wgpu::BufferUsages::VERTEX,
-                ),
-                indirect: buffer(
-                    "indirect light",
-                    bytemuck::cast_slice(&vec![ambient; corners.len()]),
-                    wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
-                ),
-                indices: buffer(
-                    "surface triangles",
-                    bytemuck::cast_slice(&triangles),
-                    wgpu::BufferUsages::INDEX,
-                ),
-            });
-        }
-    }
-    batches
-}
-
-/// Casters, the real ones first.
-pub(super) fn casters(device: &wgpu::Device, scene: &Scene) -> Vec<AnchoredCaster> {
-    let mut surfaces = virtual_surfaces(scene);
-    objects(scene)
-        .filter(|(_, object)| object.casts)
-        .map(|(role, object)| {
-            let caster = Caster::new(positions_in_anchor(object), object.mesh.triangles.clone());
-            AnchoredCaster {
-                role,
-                anchor: object.anchor,
-                vertices: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                    label: Some("shadow volume"),
-                    contents: bytemuck::cast_slice(&caster.volume_vertices()),
-                    usage: wgpu::BufferUsages::VERTEX,
-                }),
-                caster,
-                surface: match role {
-                    Role::Real => None,
-                    Role::Virtual => surfaces.remove(object.name.as_str()),
-                },
+    let itself = (Cow::Borrowed(&object.mesh), 0.0, 0.0);
+    let coarser = coarser.into_iter().map(|level| {
+        let [max_error_m, mean_error_m] = [level.max_error_m, level.mean_error_m];
+        (Cow::Owned(level.mesh), max_error_m, mean_error_m)
+    });
+    let mut receivers = Vec::new();
+    let levels = std::iter::once(itself)
+        .chain(coarser)
+        .map(|(mesh, max_error_m, mean_error_m)| {
+            let positions = positions_in_anchor(object, &mesh);
+            let corner = |index: u32| positions[index as usize].as_dvec3();
+            receivers = mesh.triangles.iter().map(|t| t.map(corner)).collect();
+            let first = shared.triangles.len();
+            let corners = corners(object, &mesh);
+            shared.add(&corners);
+            let of_casting = || {
+                let caster = Caster::new(positions, mesh.triangles.clone());
+                LevelCaster {
+                    vertices: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                        label: Some("shadow volume"),
+                        contents: bytemuck::cast_slice(&caster.volume_vertices()),
+                        usage: wgpu::BufferUsages::VERTEX,
+                    }),
+                    caster,
+                    surface_triangles: shared.triangles[first..].to_vec(),
+                    smooth_normals: smooth_normals(&corners),
+                }
+            };
+            ThingLevel {
+                caster: object.casts.then(of_casting),
+                range: 3 * first as u32..3 * shared.triangles.len() as u32,
+                max_error_m: max_error_m * stretch,
+                mean_error_m: mean_error_m * stretch,
             }
         })
-        .collect()
-}
-
-/// All things, the real ones first.
-fn objects(scene: &Scene) -> impl Iterator<Item = (Role, &Object)> {
-    let real = scene.phantoms.iter().map(|object| (Role::Real, object));
-    let seeming = scene.virtuals.iter().map(|object| (Role::Virtual, object));
-    real.chain(seeming)
-}
-
-/// The things of one batch, in their order in it.
-fn batch(scene: &Scene, role: Role, anchor: usize) -> impl Iterator<Item = &Object> {
-    objects(scene)
-        .filter(move |(found, object)| *found == role && object.anchor == anchor)
-        .map(|(_, object)| object)
-}
-
-/// Anchor and place in their batches of the virtual things that hide no light.
-pub(super) fn virtuals_without_shadow(scene: &Scene) -> Vec<(usize, Range<u32>)> {
-    let mut surfaces = virtual_surfaces(scene);
-    let virtuals = scene.virtuals.iter().filter(|object| !object.casts);
-    virtuals
-        .filter_map(|object| Some((object.anchor, surfaces.remove(object.name.as_str())?.range)))
-        .collect()
-}
-
-/// The surfaces of virtual things, by name.
-fn virtual_surfaces(scene: &Scene) -> HashMap<&str, SurfacePart> {
-    let mut surfaces = HashMap::new();
-    for anchor in 0..scene.anchors.len() {
-        let mut shared = SharedCorners::default();
-        for object in batch(scene, Role::Virtual, anchor) {
-            let first = shared.triangles.len();
-            shared.add(object);
-            let normals: Vec<Vec3> = corners(object).map(|corner| corner.normal).collect();
-            let (corner_normals, _) = normals.as_chunks::<3>();
-            let is_smooth = corner_normals.iter().any(|[a, b, c]| a != b || b != c);
-            let surface = SurfacePart {
-                triangles: shared.triangles[first..].to_vec(),
-                range: 3 * first as u32..3 * shared.triangles.len() as u32,
-                smooth_normals: is_smooth.then(|| corner_normals.to_vec()),
-            };
-            surfaces.insert(object.name.as_str(), surface);
-        }
-    }
-    surfaces
+        .collect();
+    let positions = positions_in_anchor(object, &object.mesh);
+    Some(Thing {
+        role,
+        anchor: object.anchor,
+        bounds: Bounds::around(positions.iter().map(|position| position.as_dvec3()))?,
+        levels,
+        casts: object.casts,
+        receivers,
+    })
 }
 
 /// Corners that triangles share, and the triangles.
@@ -235,8 +211,9 @@ struct SharedCorners {
 }
 
 impl SharedCorners {
-    fn add(&mut self, object: &Object) {
-        let indices: Vec<u32> = corners(object).map(|corner| self.index(corner)).collect();
+    /// Adds triangles, three corners each.
+    fn add(&mut self, corners: &[Corner]) {
+        let indices: Vec<u32> = corners.iter().map(|corner| self.index(*corner)).collect();
         self.triangles.extend(indices.as_chunks::<3>().0);
     }
 
@@ -248,28 +225,62 @@ impl SharedCorners {
         }
         index
     }
+
+    fn batch(
+        &self,
+        device: &wgpu::Device,
+        role: Role,
+        anchor: usize,
+        ambient: Vec3,
+    ) -> SurfaceBatch {
+        let buffer = |label, contents: &[u8], usage| {
+            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(label),
+                contents,
+                usage,
+            })
+        };
+        SurfaceBatch {
+            role,
+            anchor,
+            corners: buffer(
+                "surface corners",
+                bytemuck::cast_slice(&self.corners),
+                wgpu::BufferUsages::VERTEX,
+            ),
+            indirect: buffer(
+                "indirect light",
+                bytemuck::cast_slice(&vec![ambient; self.corners.len()]),
+                wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+            ),
+            indices: buffer(
+                "surface triangles",
+                bytemuck::cast_slice(&self.triangles),
+                wgpu::BufferUsages::INDEX,
+            ),
+        }
+    }
 }
 
-fn positions_in_anchor(object: &Object) -> Vec<Vec3> {
+fn positions_in_anchor(object: &Object, mesh: &Mesh) -> Vec<Vec3> {
     let place = |position: &Vec3| {
         object
             .anchor_from_object
             .transform_point3(position.as_dvec3())
             .as_vec3()
     };
-    object.mesh.positions.iter().map(place).collect()
+    mesh.positions.iter().map(place).collect()
 }
 
 /// Three corners for each triangle.
-fn corners(object: &Object) -> impl Iterator<Item = Corner> {
-    let positions = positions_in_anchor(object);
+fn corners(object: &Object, mesh: &Mesh) -> Vec<Corner> {
+    let positions = positions_in_anchor(object, mesh);
     let normal_matrix = object.anchor_from_object.matrix3.inverse().transpose();
-    let mesh = &object.mesh;
     mesh.triangles
         .iter()
         .zip(&mesh.corner_normals)
         .zip(&mesh.triangle_materials)
-        .flat_map(move |((triangle, normals), &material)| {
+        .flat_map(|((triangle, normals), &material)| {
             let material = object.materials[material as usize];
             [0, 1, 2].map(|corner| Corner {
                 position: positions[triangle[corner] as usize],
@@ -280,12 +291,26 @@ fn corners(object: &Object) -> impl Iterator<Item = Corner> {
                 roughness: material.roughness.unwrap_or(0.0) as f32,
             })
         })
+        .collect()
+}
+
+/// The normals of triangles' corners unless each triangle has but one.
+fn smooth_normals(corners: &[Corner]) -> Option<Vec<[Vec3; 3]>> {
+    let (triangles, _) = corners.as_chunks::<3>();
+    let normals = || {
+        triangles
+            .iter()
+            .map(|corners| corners.map(|corner| corner.normal))
+    };
+    normals()
+        .any(|[a, b, c]| a != b || b != c)
+        .then(|| normals().collect())
 }
 
 /// The triangles of an object as what light meets there, in its anchor's space.
 pub(super) fn reflectors(object: &Object) -> impl Iterator<Item = Reflector> {
-    let positions = positions_in_anchor(object);
     let mesh = &object.mesh;
+    let positions = positions_in_anchor(object, mesh);
     mesh.triangles
         .iter()
         .zip(&mesh.triangle_materials)
@@ -293,17 +318,4 @@ pub(super) fn reflectors(object: &Object) -> impl Iterator<Item = Reflector> {
             corners: triangle.map(|index| positions[index as usize]),
             albedo: object.materials[material as usize].albedo,
         })
-}
-
-/// The virtual things of one anchor as their batch has them: place and normal of each shared corner, and the triangles.
-pub(super) fn virtual_corners(scene: &Scene, anchor: usize) -> (Vec<(Vec3, Vec3)>, Vec<[u32; 3]>) {
-    let mut shared = SharedCorners::default();
-    for object in batch(scene, Role::Virtual, anchor) {
-        shared.add(object);
-    }
-    let places = shared.corners.iter();
-    let places = places
-        .map(|corner| (corner.position, corner.normal))
-        .collect();
-    (places, shared.triangles)
 }

@@ -8,32 +8,34 @@ use crate::geometry::bounds::HalfSpace;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::counting::{self, Counting};
 use crate::geometry::reach::PixelRect;
-use crate::geometry::shadow_volume::{Caster, Casting, LightPlace};
+use crate::geometry::shadow_volume::{Casting, LightPlace};
 use crate::light::Light;
 use crate::scene;
 
-use super::anchor_geometry::{AnchoredCaster, Role, SurfacePart};
+use super::anchor_geometry::{LevelCaster, Role, Thing};
 use super::gpu::Gpu;
 use super::touched::{Touched, light_place};
 use super::uniforms::{CastingLight, NEAR_M, UniformRow};
-use super::volumes::{Counted, IndexBuffer, Volume};
+use super::volumes::{Counted, IndexBuffer, MadeFor, Volume};
 
-/// The casters of a scene and their shadows.
+/// The shadows of a scene's things.
 pub(super) struct Casters {
-    casters: Vec<AnchoredCaster>,
-    /// For each light those of each caster.
+    /// For each light those of each thing; what does not cast has an empty one.
     shadows: Vec<Vec<Shadow>>,
-    /// For each light, that light as each caster meets it.
+    /// For each light, that light as each thing meets it.
     lights: UniformRow,
     light_group: wgpu::BindGroup,
     counting: scene::Counting,
 }
 
 /// What one caster does to one light.
+#[derive(Default)]
 struct Shadow {
     volume: Volume,
-    counting: Counting,
-    scissor: PixelRect,
+    /// Of the thing that casts it.
+    level: usize,
+    counting: Option<Counting>,
+    scissor: Option<PixelRect>,
     /// Corners of its batch: a virtual caster's triangles that face the light, and those that lie in its own shadow and
     /// that smooth shading lights all the same.
     facing: IndexBuffer,
@@ -42,7 +44,6 @@ struct Shadow {
 
 /// The part of a virtual caster's surface that a light may reach.
 pub(super) struct Lit<'a> {
-    pub anchor: usize,
     pub facing: Facing<'a>,
     pub terminator: &'a IndexBuffer,
 }
@@ -58,24 +59,16 @@ impl Casters {
     /// `light_layout` has one uniform with a dynamic offset.
     pub fn new(
         device: &wgpu::Device,
-        casters: Vec<AnchoredCaster>,
+        thing_count: usize,
         light_count: usize,
         light_layout: &wgpu::BindGroupLayout,
         counting: scene::Counting,
     ) -> Self {
         let lights =
-            UniformRow::new::<CastingLight>(device, "casting lights", light_count * casters.len());
-        let shadow = |_: &AnchoredCaster| Shadow {
-            volume: Volume::default(),
-            counting: Counting::DepthFail,
-            scissor: PixelRect::whole([0; 2]),
-            facing: IndexBuffer::default(),
-            terminator: IndexBuffer::default(),
-        };
+            UniformRow::new::<CastingLight>(device, "casting lights", light_count * thing_count);
+        let of_light = |_| (0..thing_count).map(|_| Shadow::default()).collect();
         Self {
-            shadows: (0..light_count)
-                .map(|_| casters.iter().map(shadow).collect())
-                .collect(),
+            shadows: (0..light_count).map(of_light).collect(),
             light_group: device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("casting light"),
                 layout: light_layout,
@@ -84,16 +77,17 @@ impl Casters {
                     resource: lights.binding(),
                 }],
             }),
-            casters,
             lights,
             counting,
         }
     }
 
-    /// Makes the volumes that `touched` asks for, where light or caster has moved, and chooses how they are counted.
+    /// Makes the volumes that `touched` asks for, where light or caster has moved or another of its `levels` is to be
+    /// drawn, and chooses how they are counted.
     pub fn update(
         &mut self,
         gpu: &Gpu,
+        (things, levels): (&[Thing], &[usize]),
         lights: &[Light],
         camera_from_anchor: &[Option<DAffine3>],
         intrinsics: &Intrinsics,
@@ -122,27 +116,27 @@ impl Casters {
                 })
             })
             .collect();
-        let count = self.casters.len();
         for (index, (light, shadows)) in lights.iter().zip(&mut self.shadows).enumerate() {
-            for (number, (caster, shadow)) in self.casters.iter().zip(shadows).enumerate() {
+            for (number, (thing, shadow)) in things.iter().zip(shadows).enumerate() {
                 let reach = &touched.shadows[index][number];
-                shadow.scissor = reach.pixels;
-                let (Some(bounds), Some(placed), false) = (
-                    caster.caster.bounds(),
-                    &placed[caster.anchor],
+                shadow.scissor = None;
+                let level = levels[number];
+                let (Some(caster), Some(placed), false) = (
+                    &thing.levels[level].caster,
+                    &placed[thing.anchor],
                     reach.pixels.is_empty(),
                 ) else {
                     continue;
                 };
+                shadow.scissor = Some(reach.pixels);
+                shadow.level = level;
                 let light = light_place(light, &placed.anchor_from_world);
                 let end = reach
                     .end
                     .map(|end| end.in_space(&placed.anchor_from_world.inverse()));
-                self.lights.write(
-                    &gpu.queue,
-                    index * count + number,
-                    &CastingLight::new(light, end),
-                );
+                let slot = index * things.len() + number;
+                self.lights
+                    .write(&gpu.queue, slot, &CastingLight::new(light, end));
                 // Beyond its end a volume is open: no ray may come from there.
                 let sees_past_end = |end: HalfSpace| {
                     placed
@@ -150,18 +144,22 @@ impl Casters {
                         .iter()
                         .any(|corner| end.depth_of(*corner) <= 0.0)
                 };
-                shadow.counting = match self.counting {
+                let counting = match self.counting {
                     scene::Counting::Auto if !end.is_some_and(sees_past_end) => {
-                        counting::counting(bounds, light, &placed.near)
+                        counting::counting(&thing.bounds, light, &placed.near)
                     }
                     _ => Counting::DepthFail,
                 };
-                let made_for = (light, caster.caster.casting(light, placed.eye));
-                let changed = shadow
-                    .volume
-                    .update(gpu, &caster.caster, made_for, shadow.counting);
-                if let (true, Some(surface)) = (changed, &caster.surface) {
-                    shadow.list_lit(gpu, &caster.caster, light, surface);
+                shadow.counting = Some(counting);
+                let made_for = MadeFor {
+                    level,
+                    light,
+                    casting: caster.caster.casting(light, placed.eye),
+                };
+                let volume = &mut shadow.volume;
+                let changed = volume.update(gpu, &caster.caster, made_for, counting);
+                if changed && thing.role == Role::Virtual {
+                    shadow.list_lit(gpu, caster, light);
                 }
             }
         }
@@ -170,71 +168,59 @@ impl Casters {
     /// The volumes of a role and light, for [`super::volumes::Volumes::count`].
     pub fn counted<'a>(
         &'a self,
+        things: &'a [Thing],
         role: Role,
         light: usize,
         views: &'a UniformRow,
     ) -> impl Iterator<Item = Counted<'a>> {
-        let count = self.casters.len();
-        self.present(role, light)
-            .map(move |(number, caster, shadow)| Counted {
-                volume: &shadow.volume,
-                counting: shadow.counting,
-                scissor: shadow.scissor,
-                offsets: [
-                    views.offset(caster.anchor),
-                    self.lights.offset(light * count + number),
-                ],
-                vertices: &caster.vertices,
+        let shadows = things.iter().zip(&self.shadows[light]).enumerate();
+        shadows
+            .filter(move |(_, (thing, _))| thing.role == role)
+            .filter_map(move |(number, (thing, shadow))| {
+                let slot = light * things.len() + number;
+                Some(Counted {
+                    volume: &shadow.volume,
+                    counting: shadow.counting?,
+                    scissor: shadow.scissor?,
+                    offsets: [views.offset(thing.anchor), self.lights.offset(slot)],
+                    vertices: &thing.levels[shadow.level].caster.as_ref()?.vertices,
+                })
             })
     }
 
-    /// The surfaces of virtual casters that the light may reach.
-    pub fn lit(&self, light: usize) -> impl Iterator<Item = Lit<'_>> {
-        self.present(Role::Virtual, light)
-            .filter_map(|(_, caster, shadow)| {
-                Some(Lit {
-                    anchor: caster.anchor,
-                    facing: match shadow.volume.casting() {
-                        Casting::Facing => Facing::Listed(&shadow.facing),
-                        Casting::All => Facing::Whole(caster.surface.as_ref()?.range.clone()),
-                    },
-                    terminator: &shadow.terminator,
-                })
-            })
+    /// The part of a virtual thing's surface that the light may reach; `None` where it casts nothing that is seen.
+    pub fn lit<'a>(&'a self, thing: &Thing, number: usize, light: usize) -> Option<Lit<'a>> {
+        let shadow = &self.shadows[light][number];
+        shadow.scissor?;
+        Some(Lit {
+            facing: match shadow.volume.casting() {
+                Casting::Facing => Facing::Listed(&shadow.facing),
+                Casting::All => Facing::Whole(thing.levels[shadow.level].range.clone()),
+            },
+            terminator: &shadow.terminator,
+        })
     }
 
     /// The light in the anchors of casters.
     pub fn light_group(&self) -> &wgpu::BindGroup {
         &self.light_group
     }
-
-    fn present(
-        &self,
-        role: Role,
-        light: usize,
-    ) -> impl Iterator<Item = (usize, &AnchoredCaster, &Shadow)> {
-        let casters = self.casters.iter().zip(&self.shadows[light]).enumerate();
-        casters
-            .filter(move |(_, (caster, shadow))| caster.role == role && !shadow.scissor.is_empty())
-            .map(|(number, (caster, shadow))| (number, caster, shadow))
-    }
 }
 
 impl Shadow {
     /// Lists what the light may reach of the caster's own surface. Where all triangles cast, all may be lit, for the
     /// camera may see either side of them.
-    fn list_lit(&mut self, gpu: &Gpu, caster: &Caster, light: LightPlace, surface: &SurfacePart) {
+    fn list_lit(&mut self, gpu: &Gpu, caster: &LevelCaster, light: LightPlace) {
+        let triangles = &caster.surface_triangles;
         if self.volume.casting() == Casting::Facing {
-            let facing = caster.facing(light);
-            let facing: Vec<u32> = facing
-                .flat_map(|triangle| surface.triangles[triangle])
-                .collect();
+            let facing = caster.caster.facing(light);
+            let facing: Vec<u32> = facing.flat_map(|triangle| triangles[triangle]).collect();
             self.facing.write(&gpu.device, &gpu.queue, &facing);
         }
-        if let Some(normals) = &surface.smooth_normals {
-            let terminator = caster.terminator(light, normals);
+        if let Some(normals) = &caster.smooth_normals {
+            let terminator = caster.caster.terminator(light, normals);
             let terminator: Vec<u32> = terminator
-                .flat_map(|triangle| surface.triangles[triangle])
+                .flat_map(|triangle| triangles[triangle])
                 .collect();
             self.terminator.write(&gpu.device, &gpu.queue, &terminator);
         }

@@ -10,7 +10,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use crate::light::bounce::{Gathering, Mover, Surroundings};
 use crate::scene::Scene;
 
-use super::anchor_geometry::{reflectors, virtual_corners};
+use super::anchor_geometry::{VirtualCorners, reflectors};
 
 /// Rays for a scene in which nothing moves: gathered once, in a second or so.
 const STANDING_BUDGET: usize = 1_000_000;
@@ -33,8 +33,7 @@ pub(super) struct Indirect {
 
 impl Indirect {
     /// Sends the rays; `None` where nothing virtual stands in the world.
-    pub fn new(scene: &Scene) -> Option<Self> {
-        let (corners, triangles) = virtual_corners(scene, 0);
+    pub fn new(scene: &Scene, (corners, triangles): &VirtualCorners) -> Option<Self> {
         if corners.is_empty() {
             return None;
         }
@@ -49,7 +48,7 @@ impl Indirect {
             .collect();
         let surroundings =
             Surroundings::new(on_anchor(0), scene.lights.clone(), scene.ambient_radiance);
-        let (points, point_of_corner) = points(&corners, &triangles);
+        let (points, point_of_corner) = points(corners, triangles);
         let budget = if movers.is_empty() {
             STANDING_BUDGET
         } else {

@@ -8,6 +8,7 @@ mod anchor_geometry;
 mod background;
 mod casters;
 mod composite;
+mod detail;
 mod direct;
 mod gpu;
 mod gpu_clock;

@@ -1,7 +1,5 @@
 //! What stands where in a frame: the scene's surfaces, casters and lights on the GPU, and how passes draw them.
 
-use std::ops::Range;
-
 use glam::DAffine3;
 
 use crate::geometry::camera::Intrinsics;
@@ -9,8 +7,9 @@ use crate::geometry::reach::PixelRect;
 use crate::light::Light;
 use crate::scene::Scene;
 
-use super::anchor_geometry::{self, Extent, Role, SurfaceBatch};
+use super::anchor_geometry::{AnchorGeometry, Role, SurfaceBatch, Thing};
 use super::casters::{Casters, Facing};
+use super::detail::chosen_levels;
 use super::gpu::Gpu;
 use super::indirect::Indirect;
 use super::touched::{Touched, everywhere, touched_by_virtual};
@@ -21,11 +20,12 @@ use super::volumes::{Among, Volumes};
 pub(super) struct Stage {
     intrinsics: Intrinsics,
     lights: Vec<Light>,
-    surfaces: Vec<SurfaceBatch>,
+    batches: Vec<SurfaceBatch>,
+    things: Vec<Thing>,
+    /// For each thing the level that is drawn.
+    levels: Vec<usize>,
+    max_silhouette_error_px: f64,
     casters: Casters,
-    /// Anchor and indices of virtual things that hide no light.
-    without_shadow: Vec<(usize, Range<u32>)>,
-    extents: Vec<Extent>,
     indirect: Option<Indirect>,
     views: UniformRow,
     light_sources: UniformRow,
@@ -57,18 +57,24 @@ impl Stage {
         };
         let views = UniformRow::new::<View>(device, "views", scene.anchors.len());
         let light_sources = UniformRow::new::<LightSource>(device, "lights", scene.lights.len());
+        let AnchorGeometry {
+            batches,
+            things,
+            world_virtuals,
+        } = AnchorGeometry::new(device, scene);
         Self {
-            surfaces: anchor_geometry::surface_batches(device, scene),
             casters: Casters::new(
                 device,
-                anchor_geometry::casters(device, scene),
+                things.len(),
                 scene.lights.len(),
                 &layouts[1],
                 scene.shadows.counting,
             ),
-            without_shadow: anchor_geometry::virtuals_without_shadow(scene),
-            extents: anchor_geometry::extents(scene),
-            indirect: Indirect::new(scene),
+            indirect: Indirect::new(scene, &world_virtuals),
+            max_silhouette_error_px: scene.shadows.max_silhouette_error_px,
+            levels: vec![0; things.len()],
+            batches,
+            things,
             view_group: group(&layouts[0], &views),
             light_group: group(&layouts[1], &light_sources),
             camera_from_anchor: vec![None; scene.anchors.len()],
@@ -99,7 +105,7 @@ impl Stage {
             return;
         };
         let world_virtuals = self
-            .surfaces
+            .batches
             .iter()
             .find(|batch| batch.role == Role::Virtual && batch.anchor == 0);
         if let (Some(indirect), Some(batch)) = (&mut self.indirect, world_virtuals) {
@@ -114,12 +120,19 @@ impl Stage {
             let light = LightSource::new(light, &camera_from_world);
             self.light_sources.write(queue, index, &light);
         }
+        self.levels = chosen_levels(
+            &self.things,
+            &self.lights,
+            camera_from_anchor,
+            &self.intrinsics,
+            self.max_silhouette_error_px,
+        );
     }
 
     /// Makes the shadow volumes that matter to the picture. Returns what virtual things touch in it, if anything.
     pub fn cast_on_touched(&mut self, gpu: &Gpu) -> Option<Touched> {
         let touched = touched_by_virtual(
-            &self.extents,
+            &self.things,
             &self.lights,
             &self.camera_from_anchor,
             &self.intrinsics,
@@ -131,7 +144,7 @@ impl Stage {
     /// Makes all shadow volumes, wherever they are.
     pub fn cast_everywhere(&mut self, gpu: &Gpu) {
         let everywhere = everywhere(
-            &self.extents,
+            &self.things,
             &self.lights,
             &self.camera_from_anchor,
             &self.intrinsics,
@@ -143,6 +156,7 @@ impl Stage {
     fn cast(&mut self, gpu: &Gpu, touched: &Touched) {
         self.casters.update(
             gpu,
+            (&self.things, &self.levels),
             &self.lights,
             &self.camera_from_anchor,
             &self.intrinsics,
@@ -163,8 +177,10 @@ impl Stage {
         pass.set_bind_group(1, &self.light_group, &[self.light_sources.offset(light)]);
         for batch in self.placed(role) {
             self.set_batch(pass, batch);
-            pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
-            pass.draw_indexed(0..batch.index_count, 0, 0..1);
+            for (number, thing) in self.of_batch(batch) {
+                let level = &thing.levels[self.levels[number]];
+                pass.draw_indexed(level.range.clone(), 0, 0..1);
+            }
         }
     }
 
@@ -181,30 +197,23 @@ impl Stage {
         pass.set_stencil_reference(0);
         pass.set_bind_group(1, &self.light_group, &[self.light_sources.offset(light)]);
         for batch in self.placed(Role::Virtual) {
-            self.set_batch(pass, batch);
-            let of_batch = |anchor: usize| anchor == batch.anchor;
-            let lit = || self.casters.lit(light).filter(|lit| of_batch(lit.anchor));
-            let without_shadow = self.without_shadow.iter();
-            let without_shadow = without_shadow.filter(|(anchor, _)| of_batch(*anchor));
-            pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
-            for (_, range) in without_shadow {
-                pass.draw_indexed(range.clone(), 0, 0..1);
-            }
-            for lit in lit() {
-                if let Facing::Whole(range) = lit.facing {
-                    pass.draw_indexed(range, 0, 0..1);
+            for (number, thing) in self.of_batch(batch) {
+                self.set_batch(pass, batch);
+                let whole = &thing.levels[self.levels[number]].range;
+                let Some(lit) = self.casters.lit(thing, number, light) else {
+                    if !thing.casts {
+                        pass.draw_indexed(whole.clone(), 0, 0..1);
+                    }
+                    continue;
+                };
+                match lit.facing {
+                    Facing::Whole(range) => pass.draw_indexed(range, 0, 0..1),
+                    Facing::Listed(indices) => indices.draw(pass, indices.count),
                 }
-            }
-            for lit in lit() {
-                if let Facing::Listed(indices) = lit.facing {
-                    indices.draw(pass, indices.count);
-                }
-            }
-            pass.set_stencil_reference(1);
-            for lit in lit() {
+                pass.set_stencil_reference(1);
                 lit.terminator.draw(pass, lit.terminator.count);
+                pass.set_stencil_reference(0);
             }
-            pass.set_stencil_reference(0);
         }
     }
 
@@ -219,20 +228,28 @@ impl Stage {
         within: PixelRect,
     ) -> bool {
         let groups = [&self.view_group, self.casters.light_group()];
-        let counted = self.casters.counted(role, light, &self.views);
+        let counted = self.casters.counted(&self.things, role, light, &self.views);
         volumes.count(pass, among, role, groups, within, counted)
     }
 
     /// The batches of a role whose anchor has a pose, in a world that has one.
     fn placed(&self, role: Role) -> impl Iterator<Item = &SurfaceBatch> {
         let has_pose = |anchor: usize| self.camera_from_anchor[anchor].is_some();
-        let batches = self.surfaces.iter();
+        let batches = self.batches.iter();
         batches.filter(move |b| b.role == role && has_pose(0) && has_pose(b.anchor))
+    }
+
+    /// The things of a batch, with their numbers.
+    fn of_batch(&self, batch: &SurfaceBatch) -> impl Iterator<Item = (usize, &Thing)> {
+        let kind = (batch.role, batch.anchor);
+        let things = self.things.iter().enumerate();
+        things.filter(move |(_, thing)| (thing.role, thing.anchor) == kind)
     }
 
     fn set_batch(&self, pass: &mut wgpu::RenderPass<'_>, batch: &SurfaceBatch) {
         pass.set_bind_group(0, &self.view_group, &[self.views.offset(batch.anchor)]);
         pass.set_vertex_buffer(0, batch.corners.slice(..));
         pass.set_vertex_buffer(1, batch.indirect.slice(..));
+        pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
     }
 }

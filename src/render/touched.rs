@@ -8,11 +8,16 @@ use crate::geometry::reach::{self, PixelRect};
 use crate::geometry::shadow_volume::LightPlace;
 use crate::light::Light;
 
-use super::anchor_geometry::{Extent, Role};
+use super::anchor_geometry::{Role, Thing};
 
 const NOWHERE: PixelRect = PixelRect {
     low: [0; 2],
     high: [0; 2],
+};
+
+const UNSEEN: ShadowReach = ShadowReach {
+    pixels: NOWHERE,
+    end: None,
 };
 
 /// Where the things of a frame can change its picture.
@@ -20,7 +25,7 @@ const NOWHERE: PixelRect = PixelRect {
 pub(super) struct Touched {
     /// All of it.
     pub pixels: PixelRect,
-    /// For each light and each caster.
+    /// For each light and each thing; empty for those that cast none.
     pub shadows: Vec<Vec<ShadowReach>>,
 }
 
@@ -35,51 +40,45 @@ pub(super) struct ShadowReach {
 
 /// What virtual things and their shadows can change; `None` if nothing.
 pub(super) fn touched_by_virtual(
-    extents: &[Extent],
+    things: &[Thing],
     lights: &[Light],
     camera_from_anchor: &[Option<DAffine3>],
     intrinsics: &Intrinsics,
 ) -> Option<Touched> {
     let camera_from_world = (*camera_from_anchor.first()?)?;
     let world_from_camera = camera_from_world.inverse();
-    let corners_in_world = |extent: &Extent| {
-        let world_from_anchor = world_from_camera * camera_from_anchor[extent.anchor]?;
+    let corners_in_world = |thing: &Thing| {
+        let world_from_anchor = world_from_camera * camera_from_anchor[thing.anchor]?;
         Some(
-            extent
+            thing
                 .bounds
                 .corners()
                 .map(|corner| world_from_anchor.transform_point3(corner)),
         )
     };
-    let placed: Vec<(&Extent, [DVec3; 8])> = extents
+    let placed: Vec<(usize, &Thing, [DVec3; 8])> = things
         .iter()
-        .filter_map(|extent| Some((extent, corners_in_world(extent)?)))
+        .enumerate()
+        .filter_map(|(index, thing)| Some((index, thing, corners_in_world(thing)?)))
         .collect();
-    let receivers = Bounds::around(placed.iter().flat_map(|(_, corners)| *corners))?;
+    let receivers = Bounds::around(placed.iter().flat_map(|(_, _, corners)| *corners))?;
 
-    let unseen = ShadowReach {
-        pixels: NOWHERE,
-        end: None,
-    };
-    let casters = extents.iter().filter_map(|extent| extent.caster).count();
-    let mut shadows = vec![vec![unseen; casters]; lights.len()];
+    let mut shadows = vec![vec![UNSEEN; things.len()]; lights.len()];
     let mut pixels = NOWHERE;
-    for (extent, corners) in &placed {
-        if extent.role == Role::Virtual {
+    for (index, thing, corners) in &placed {
+        if thing.role == Role::Virtual {
             pixels = pixels.union(reach::covered(corners, &camera_from_world, intrinsics));
         }
-        let Some(caster) = extent.caster else {
-            continue;
-        };
-        for (light, shadows) in lights.iter().zip(&mut shadows) {
+        for (light, shadows) in lights.iter().zip(&mut shadows).filter(|_| thing.casts) {
             let light = light_place(light, &DAffine3::IDENTITY);
-            shadows[caster] = ShadowReach {
+            let shadow = ShadowReach {
                 pixels: reach::shadowed(corners, light, &receivers, &camera_from_world, intrinsics),
                 end: reach::shadow_end(corners, light, &receivers),
             };
-            if extent.role == Role::Virtual {
-                pixels = pixels.union(shadows[caster].pixels);
+            if thing.role == Role::Virtual {
+                pixels = pixels.union(shadow.pixels);
             }
+            shadows[*index] = shadow;
         }
     }
     for shadow in shadows.iter_mut().flatten() {
@@ -90,23 +89,19 @@ pub(super) fn touched_by_virtual(
 
 /// The whole picture, as far as things have poses.
 pub(super) fn everywhere(
-    extents: &[Extent],
+    things: &[Thing],
     lights: &[Light],
     camera_from_anchor: &[Option<DAffine3>],
     intrinsics: &Intrinsics,
 ) -> Touched {
     let pixels = PixelRect::whole(intrinsics.size_px);
     let world = camera_from_anchor.first().copied().flatten();
-    let placed = |extent: &Extent| world.is_some() && camera_from_anchor[extent.anchor].is_some();
-    let of_caster = |extent: &Extent| ShadowReach {
-        pixels: match placed(extent) {
-            true => pixels,
-            false => NOWHERE,
-        },
-        end: None,
+    let placed = |thing: &Thing| world.is_some() && camera_from_anchor[thing.anchor].is_some();
+    let of_thing = |thing: &Thing| match placed(thing) && thing.casts {
+        true => ShadowReach { pixels, end: None },
+        false => UNSEEN,
     };
-    let casters = extents.iter().filter(|extent| extent.caster.is_some());
-    let shadows = vec![casters.map(of_caster).collect(); lights.len()];
+    let shadows = vec![things.iter().map(of_thing).collect(); lights.len()];
     Touched { pixels, shadows }
 }
 

@@ -256,8 +256,18 @@ pub(super) fn set_scissor(pass: &mut wgpu::RenderPass<'_>, rect: PixelRect) {
 /// The shadow volume of one caster and one light, kept while the two stand still to each other.
 #[derive(Default)]
 pub(super) struct Volume {
-    made_for: Option<(LightPlace, Casting)>,
+    made_for: Option<MadeFor>,
     parts: Vec<DrawnPart>,
+}
+
+/// What a volume depends on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct MadeFor {
+    /// The caster's level of detail.
+    pub level: usize,
+    /// In the caster's space.
+    pub light: LightPlace,
+    pub casting: Casting,
 }
 
 /// Volumes that never lie more than [`MOST_LAYERS`] deep one in another.
@@ -277,12 +287,12 @@ impl Volume {
         &mut self,
         gpu: &Gpu,
         caster: &Caster,
-        made_for: (LightPlace, Casting),
+        made_for: MadeFor,
         counting: Counting,
     ) -> bool {
         let changed = self.made_for != Some(made_for);
         if changed {
-            let (light, casting) = made_for;
+            let MadeFor { light, casting, .. } = made_for;
             let mut buffers: Vec<IndexBuffer> =
                 self.parts.drain(..).map(|part| part.indices).collect();
             self.parts = caster
@@ -316,7 +326,8 @@ impl Volume {
 
     /// Which triangles cast.
     pub fn casting(&self) -> Casting {
-        self.made_for.map_or(Casting::All, |(_, casting)| casting)
+        self.made_for
+            .map_or(Casting::All, |made_for| made_for.casting)
     }
 }
 
