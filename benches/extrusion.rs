@@ -193,6 +193,9 @@ impl Moment {
     }
 }
 
+/// What the stencil can count to.
+const MOST_LAYERS: u32 = 255;
+
 const SHADER: &str = "
 struct Place {
     clip_from_space: mat4x4f,
@@ -554,10 +557,12 @@ impl OnCpu {
     /// When the volume was made, and when it was handed over.
     fn make(&mut self, lab: &Lab, moment: &Moment, counting: Counting) -> (Instant, Instant) {
         let light = LightPlace::Point(moment.light_in_caster);
-        let silhouette = self.caster.silhouette(light, Casting::Facing);
-        let mut indices = self.caster.side_indices(&silhouette);
-        if counting == Counting::DepthFail {
-            indices.extend(self.caster.cap_indices(&silhouette));
+        let mut indices = Vec::new();
+        for part in self.caster.parts(light, Casting::Facing, MOST_LAYERS) {
+            indices.extend(self.caster.side_indices(&part.silhouette));
+            if counting == Counting::DepthFail {
+                indices.extend(self.caster.cap_indices(&part.silhouette));
+            }
         }
         let made = Instant::now();
         lab.queue
