@@ -1,8 +1,8 @@
-# Both targets set up what they need first (scripts/setup) and use the release profile, so dependencies compile once.
+# Every target first sets up what it needs (scripts/setup) and uses the release profile, so dependencies compile once.
 # Mesa's layer that asks the desktop for its favourite card complains on machines without a desktop; gnomon chooses itself.
 export NODEVICE_SELECT = 1
 
-.PHONY: demo test setup
+.PHONY: demo test bench bench-volumes setup
 
 demo: setup
 	cargo build --release
@@ -19,6 +19,17 @@ test: setup
 	cargo clippy --release --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps
 	cargo test --release
+
+# How the cost of shadow volumes grows, and whether silhouettes belong on the CPU: figures in out/.
+bench: setup
+	mkdir -p out
+	cargo bench --bench volumes -- --csv $(CURDIR)/out/volumes.csv
+	cargo bench --bench volumes -- --sweep --csv $(CURDIR)/out/volumes_sweep.csv
+	cargo bench --bench extrusion -- --csv $(CURDIR)/out/extrusion.csv
+
+# Beside what a user would run instead, where ../shared/peers has it.
+bench-volumes: setup
+	tools/bench_volumes.sh
 
 setup:
 	@scripts/setup
