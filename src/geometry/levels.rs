@@ -11,7 +11,7 @@ use glam::{DVec3, Vec3};
 use meshopt::{SimplifyOptions, VertexDataAdapter, simplify_with_attributes_and_locks};
 
 use super::bounds::Bounds;
-use super::mesh::{Mesh, RawTriangle};
+use super::mesh::Mesh;
 use super::normals::face_normal;
 use super::surface_distance::Surface;
 
@@ -202,29 +202,29 @@ impl<'a> Simplifier<'a> {
 
     /// The mesh of these triangles, with the source's normals and materials; `None` if a triangle mixes materials.
     fn mesh(&self, indices: &[u32]) -> Option<Mesh> {
-        let raw: Option<Vec<RawTriangle>> = indices
-            .as_chunks()
-            .0
-            .iter()
-            .map(|vertices| self.triangle(vertices))
-            .collect();
-        Some(Mesh::weld(&self.source.positions, &raw?, 0.0).0)
-    }
-
-    fn triangle(&self, vertices: &[u32; 3]) -> Option<RawTriangle> {
-        let positions = vertices.map(|vertex| self.vertex_positions[vertex as usize]);
-        let [material, second, third] =
-            vertices.map(|vertex| self.vertex_materials[vertex as usize]);
-        let face = face_normal(&self.source.positions, positions);
-        let normals = vertices.map(|vertex| match self.flat {
-            Some(side) => (face * side).as_vec3(),
-            None => self.corner_normal(vertex, face),
-        });
-        (material == second && material == third).then(|| RawTriangle {
-            vertices: positions,
-            normals: normals.map(Some),
-            material,
-        })
+        // The source is mended already, and wound as its placement wants it.
+        let (triangles, _) = indices.as_chunks::<3>();
+        let mut mesh = Mesh {
+            positions: self.source.positions.clone(),
+            ..Mesh::default()
+        };
+        for &vertices in triangles {
+            let corners = vertices.map(|vertex| self.vertex_positions[vertex as usize]);
+            let [material, second, third] =
+                vertices.map(|vertex| self.vertex_materials[vertex as usize]);
+            if material != second || material != third {
+                return None;
+            }
+            let face = face_normal(&self.source.positions, corners);
+            mesh.triangles.push(corners);
+            mesh.triangle_materials.push(material);
+            mesh.corner_normals
+                .push(vertices.map(|vertex| match self.flat {
+                    Some(side) => (face * side).as_vec3(),
+                    None => self.corner_normal(vertex, face),
+                }));
+        }
+        Some(mesh.without_unused_positions())
     }
 
     /// Of the normals that the source has at a vertex, the one of the corner whose face is turned most like `face`: so
@@ -245,6 +245,7 @@ impl<'a> Simplifier<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::mesh::RawTriangle;
     use std::f32::consts::{PI, TAU};
 
     fn raw(vertices: [u32; 3], material: u32) -> RawTriangle {

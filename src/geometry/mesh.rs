@@ -181,7 +181,7 @@ impl Mesh {
         self
     }
 
-    fn without_unused_positions(mut self) -> Self {
+    pub(super) fn without_unused_positions(mut self) -> Self {
         let mut new_index = vec![u32::MAX; self.positions.len()];
         let mut kept = Vec::with_capacity(self.positions.len());
         for index in self.triangles.iter_mut().flatten() {

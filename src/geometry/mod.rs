@@ -19,6 +19,7 @@ pub mod pose;
 pub mod ray_caster;
 pub mod reach;
 pub mod shadow_volume;
+pub mod solid;
 mod soup;
 pub mod surface_distance;
 pub mod winding;

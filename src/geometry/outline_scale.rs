@@ -14,7 +14,7 @@ use super::shadow_volume::LightPlace;
 pub const LARGEST_MOVE_PX: f64 = 100.0;
 
 /// Where light grazes a receiver at less than this cosine, its shadow's edge is fainter by as much as it is longer.
-const LEAST_COSINE: f64 = 0.2;
+const LEAST_COSINE: f64 = 0.5;
 
 /// What the camera sees.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,7 +54,7 @@ pub fn outline_px_per_m(bounds: &Bounds, view: &View) -> f64 {
 
 /// How many pixels the edge of a shadow moves at most for a metre that the caster's surface, within `caster`, is off.
 /// The shadow falls on `receivers`, triangles counter-clockwise seen from outside; all in world space. Infinite where
-/// the light may lie within the caster. On receivers that the light grazes (at a cosine below 0.2) edges may move
+/// the light may lie within the caster. On receivers that the light grazes (at a cosine below 0.5) edges may move
 /// farther, but are as much fainter.
 pub fn shadow_px_per_m(
     caster: &Bounds,
@@ -299,16 +299,22 @@ mod tests {
         (place.z >= view.near_m && in_picture).then_some(pixel)
     }
 
-    /// The largest movement over its bound, from pairs of points and where they are cast to.
+    /// Grazing light moves edges farther; they are fainter by as much as the cosine falls below its floor.
+    fn strength_at(cosine: f64) -> f64 {
+        (cosine / LEAST_COSINE).min(1.0)
+    }
+
+    /// The largest movement over its bound, from pairs of points, where they are cast to and how strongly that shows.
     fn largest_share(
         pairs: impl Iterator<Item = [DVec3; 2]>,
         px_per_m: f64,
         view: &View,
         cast: impl Fn(DVec3) -> Option<DVec3>,
+        strength: impl Fn(DVec3) -> f64,
     ) -> f64 {
         let share = |[one, two]: [DVec3; 2]| {
             let [one_px, two_px] = [pixel(view, cast(one)?)?, pixel(view, cast(two)?)?];
-            Some((two_px - one_px).length() / ((two - one).length() * px_per_m))
+            Some(strength(one) * (two_px - one_px).length() / ((two - one).length() * px_per_m))
         };
         pairs.filter_map(share).fold(0.0, f64::max)
     }
@@ -324,7 +330,7 @@ mod tests {
                 },
             ] {
                 let px_per_m = outline_px_per_m(&bounds, &view());
-                let share = largest_share(pairs(bounds, apart_m), px_per_m, &view(), Some);
+                let share = largest_share(pairs(bounds, apart_m), px_per_m, &view(), Some, |_| 1.0);
                 assert!(share <= 1.0 && share > 0.7, "{apart_m} {bounds:?}: {share}");
             }
         }
@@ -348,17 +354,20 @@ mod tests {
         ];
         for (light, tight) in lights {
             let px_per_m = shadow_px_per_m(&thing(), light, table(), &view());
+            let ray_to = |point: DVec3| match light {
+                LightPlace::Point(light) => point - light,
+                LightPlace::Along(direction) => direction,
+            };
+            let strength = |point: DVec3| strength_at(-ray_to(point).normalize().z);
             let cast = |point: DVec3| {
-                let ray = match light {
-                    LightPlace::Point(light) => point - light,
-                    LightPlace::Along(direction) => direction,
-                };
+                let ray = ray_to(point);
                 let shadow = point - ray * (point.z / ray.z);
                 let on_table = shadow.x.abs() <= 0.6 && (-0.5..=0.7).contains(&shadow.y);
                 (ray.z < 0.0 && on_table).then_some(shadow)
             };
             for apart_m in [1e-5, 0.002] {
-                let share = largest_share(pairs(thing(), apart_m), px_per_m, &view(), cast);
+                let share =
+                    largest_share(pairs(thing(), apart_m), px_per_m, &view(), cast, strength);
                 assert!(
                     share <= 1.0 && share > tight,
                     "{light:?} {apart_m}: {share}"
@@ -379,12 +388,14 @@ mod tests {
         let lamp = DVec3::new(0.1, -0.3, 0.2);
         let light = LightPlace::Point(lamp);
         let px_per_m = shadow_px_per_m(&thing(), light, wall, &view());
+        let strength =
+            |point: DVec3| strength_at(normal.normalize().dot((point - lamp).normalize()).abs());
         let cast = |point: DVec3| {
             let ray = point - lamp;
             let shadow = point + ray * (normal.dot(corner(0.0, 0.0) - point) / normal.dot(ray));
             (shadow.x.abs() <= 0.5 && (0.0..=0.6).contains(&shadow.z)).then_some(shadow)
         };
-        let share = largest_share(pairs(thing(), 1e-4), px_per_m, &view(), cast);
+        let share = largest_share(pairs(thing(), 1e-4), px_per_m, &view(), cast, strength);
         assert!(share <= 1.0 && share > 0.2, "{share}");
     }
 

@@ -15,6 +15,7 @@ use crate::geometry::levels::levels;
 use crate::geometry::mesh::Mesh;
 use crate::geometry::outline_scale::largest_stretch;
 use crate::geometry::shadow_volume::Caster;
+use crate::geometry::solid::is_solid;
 use crate::light::bounce::Reflector;
 use crate::scene::{Object, Scene};
 
@@ -81,6 +82,8 @@ pub(super) struct ThingLevel {
     /// How far outlines are off at most and on the average, metres in the anchor's space.
     pub max_error_m: f64,
     pub mean_error_m: f64,
+    /// Whether it bounds a solid, so that only its outside is seen from outside.
+    pub is_solid: bool,
     pub caster: Option<LevelCaster>,
 }
 
@@ -184,6 +187,7 @@ fn thing(
                 }
             };
             ThingLevel {
+                is_solid: is_solid(&mesh),
                 caster: object.casts.then(of_casting),
                 range: 3 * first as u32..3 * shared.triangles.len() as u32,
                 max_error_m: max_error_m * stretch,

@@ -151,7 +151,7 @@ impl Background {
                     store: wgpu::StoreOp::Store,
                 },
             })],
-            timestamp_writes: clock.map(|clock| clock.pass(Stretch::Background, true, true)),
+            timestamp_writes: clock.and_then(|clock| clock.pass(Stretch::Background, true, true)),
             ..Default::default()
         });
         pass.set_pipeline(&self.pipeline);

@@ -5,19 +5,19 @@
 use super::background::PICTURE_FORMAT;
 use super::shader;
 use super::stencil::{SHADOW, VIRTUAL_SHADOW};
-use super::surfaces::Use;
+use super::surfaces::{Sided, Use};
 use super::volumes::Volumes;
 
 /// Pipelines and depth buffer of the pass.
 pub(super) struct Direct {
     /// Depth of real surfaces.
-    pub depth_of_real: wgpu::RenderPipeline,
+    pub depth_of_real: Sided,
     /// Depth and all light of virtual surfaces, as if nothing hid it.
-    pub light_on_virtual: wgpu::RenderPipeline,
+    pub light_on_virtual: Sided,
     /// Real surfaces where virtual things hide the light.
-    pub hidden_on_real: wgpu::RenderPipeline,
+    pub hidden_on_real: Sided,
     /// The ambient light alone on virtual surfaces that lie in more volumes than the stencil's reference says.
-    pub shadow_on_virtual: wgpu::RenderPipeline,
+    pub shadow_on_virtual: Sided,
     pub volumes: Volumes,
     pub depth_stencil: wgpu::TextureView,
 }
@@ -44,7 +44,7 @@ impl Direct {
                     write_mask: written,
                 })],
             };
-            usage.pipeline(device, layout, &module, depth_format, 1)
+            usage.pipelines(device, layout, &module, depth_format, 1)
         };
         let (always, less) = (wgpu::CompareFunction::Always, wgpu::CompareFunction::Less);
         let (all, none) = (wgpu::ColorWrites::ALL, wgpu::ColorWrites::empty());

@@ -56,19 +56,19 @@ impl GpuClock {
         }
     }
 
-    /// For a pass that is the first of a stretch, the last, or both.
+    /// For a pass of a stretch; `None` if it is neither its first nor its last.
     pub fn pass(
         &self,
         stretch: Stretch,
         first: bool,
         last: bool,
-    ) -> wgpu::RenderPassTimestampWrites<'_> {
+    ) -> Option<wgpu::RenderPassTimestampWrites<'_>> {
         let begin = 2 * stretch as u32;
-        wgpu::RenderPassTimestampWrites {
+        (first || last).then(|| wgpu::RenderPassTimestampWrites {
             query_set: &self.queries,
             beginning_of_pass_write_index: first.then_some(begin),
             end_of_pass_write_index: last.then_some(begin + 1),
-        }
+        })
     }
 
     pub fn resolve(&mut self, encoder: &mut wgpu::CommandEncoder, drawn: &[Stretch]) {

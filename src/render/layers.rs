@@ -6,6 +6,7 @@ use super::gpu::{Gpu, RenderError};
 use super::readback::Readback;
 use super::shader;
 use super::stencil::SHADOW;
+use super::surfaces::Sided;
 use super::volumes::Volumes;
 
 const ROLE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
@@ -27,8 +28,8 @@ pub struct Layers {
 
 /// Pipelines and textures of the layers.
 pub(super) struct LayerPasses {
-    real: wgpu::RenderPipeline,
-    seeming: wgpu::RenderPipeline,
+    real: Sided,
+    seeming: Sided,
     volumes: Volumes,
     mark_real: wgpu::RenderPipeline,
     mark_virtual: wgpu::RenderPipeline,
@@ -42,8 +43,7 @@ pub(super) struct LayerPasses {
 }
 
 /// Draws all surfaces of a role into the pass by a pipeline.
-pub(super) type DrawSurfaces<'a> =
-    &'a dyn Fn(&mut wgpu::RenderPass<'_>, &wgpu::RenderPipeline, Role);
+pub(super) type DrawSurfaces<'a> = &'a dyn Fn(&mut wgpu::RenderPass<'_>, &Sided, Role);
 /// Counts all volumes of a role's casters for one light.
 pub(super) type CountVolumes<'a> = &'a dyn Fn(&mut wgpu::RenderPass<'_>, &Volumes, Role);
 
@@ -149,8 +149,8 @@ impl LayerPasses {
             })
         };
         Self {
-            real: surface("real"),
-            seeming: surface("virtual_thing"),
+            real: Sided::both(surface("real")),
+            seeming: Sided::both(surface("virtual_thing")),
             volumes: Volumes::new(device, layout, gpu.depth_format, 1, &[BITS_FORMAT]),
             mark_real: mark("in_real_shadow"),
             mark_virtual: mark("in_virtual_shadow"),

@@ -258,11 +258,11 @@ impl Renderer {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("direct"),
             color_attachments: &[Some(loaded(&picture, wgpu::LoadOp::Load))],
-            depth_stencil_attachment: Some(depth_stencil(&direct.depth_stencil, true)),
+            depth_stencil_attachment: Some(depth_stencil(&direct.depth_stencil, true, true)),
             timestamp_writes: self
                 .clock
                 .as_ref()
-                .map(|clock| clock.pass(Stretch::Light, true, true)),
+                .and_then(|clock| clock.pass(Stretch::Light, true, true)),
             ..Default::default()
         });
         set_scissor(&mut pass, touched);
@@ -294,7 +294,7 @@ impl Renderer {
         let (surfaces, volumes) = (&accumulation.surfaces, &accumulation.volumes);
         let passes = stage.light_count().max(1);
         for light in 0..passes {
-            let first = light == 0;
+            let (first, last) = (light == 0, light + 1 == passes);
             let load = match first {
                 true => wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
                 false => wgpu::LoadOp::Load,
@@ -305,11 +305,15 @@ impl Renderer {
                     Some(loaded(&accumulation.reaching, load)),
                     Some(loaded(&accumulation.change, load)),
                 ],
-                depth_stencil_attachment: Some(depth_stencil(&accumulation.depth_stencil, first)),
+                depth_stencil_attachment: Some(depth_stencil(
+                    &accumulation.depth_stencil,
+                    first,
+                    last,
+                )),
                 timestamp_writes: self
                     .clock
                     .as_ref()
-                    .map(|clock| clock.pass(Stretch::Light, first, light + 1 == passes)),
+                    .and_then(|clock| clock.pass(Stretch::Light, first, last)),
                 ..Default::default()
             });
             set_scissor(&mut pass, touched);
@@ -356,7 +360,7 @@ impl Renderer {
             timestamp_writes: self
                 .clock
                 .as_ref()
-                .map(|clock| clock.pass(Stretch::Composite, true, true)),
+                .and_then(|clock| clock.pass(Stretch::Composite, true, true)),
             ..Default::default()
         });
         set_scissor(&mut pass, touched);
@@ -434,7 +438,13 @@ fn loaded(
 fn depth_stencil(
     view: &wgpu::TextureView,
     first: bool,
+    last: bool,
 ) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    // Both or neither: to keep one alone costs a clear of the other.
+    let store = match last {
+        true => wgpu::StoreOp::Discard,
+        false => wgpu::StoreOp::Store,
+    };
     wgpu::RenderPassDepthStencilAttachment {
         view,
         depth_ops: Some(wgpu::Operations {
@@ -442,11 +452,11 @@ fn depth_stencil(
                 true => wgpu::LoadOp::Clear(0.0),
                 false => wgpu::LoadOp::Load,
             },
-            store: wgpu::StoreOp::Store,
+            store,
         }),
         stencil_ops: Some(wgpu::Operations {
             load: wgpu::LoadOp::Clear(0),
-            store: wgpu::StoreOp::Discard,
+            store,
         }),
     }
 }

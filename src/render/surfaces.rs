@@ -11,16 +11,40 @@ pub(super) const LIGHT_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16
 /// Pipelines of the pass where several samples or lights are added up.
 pub(super) struct Surfaces {
     /// Depth and ambient light of real surfaces.
-    pub ambient_on_real: wgpu::RenderPipeline,
+    pub ambient_on_real: Sided,
     /// Depth and ambient light of virtual surfaces.
-    pub ambient_on_virtual: wgpu::RenderPipeline,
+    pub ambient_on_virtual: Sided,
     /// A light as it reaches real surfaces in the video.
-    pub light_reaching_real: wgpu::RenderPipeline,
+    pub light_reaching_real: Sided,
     /// A light where virtual things hide it from real surfaces.
-    pub light_hidden_from_real: wgpu::RenderPipeline,
+    pub light_hidden_from_real: Sided,
     /// A light on virtual surfaces past all casters; the stencil's reference is 0, or 1 for surfaces that lie in no
     /// shadow but their own.
-    pub light_on_virtual: wgpu::RenderPipeline,
+    pub light_on_virtual: Sided,
+}
+
+/// A pipeline for both sides of triangles, and one for outsides alone.
+pub(super) struct Sided {
+    both: wgpu::RenderPipeline,
+    outside: wgpu::RenderPipeline,
+}
+
+impl Sided {
+    /// The same, whichever sides can be seen.
+    pub fn both(pipeline: wgpu::RenderPipeline) -> Self {
+        Self {
+            outside: pipeline.clone(),
+            both: pipeline,
+        }
+    }
+
+    /// The pipeline for a surface whose insides can be seen, or cannot.
+    pub fn pipeline(&self, shows_inside: bool) -> &wgpu::RenderPipeline {
+        match shows_inside {
+            true => &self.both,
+            false => &self.outside,
+        }
+    }
 }
 
 /// What a pipeline does besides its shader.
@@ -35,57 +59,66 @@ pub(super) struct Use<'a> {
 }
 
 impl Use<'_> {
-    /// The pipeline that draws surface batches so.
-    pub fn pipeline(
+    /// The pipelines that draw surface batches so.
+    pub fn pipelines(
         &self,
         device: &wgpu::Device,
         layout: &wgpu::PipelineLayout,
         module: &wgpu::ShaderModule,
         depth_format: wgpu::TextureFormat,
         samples: u32,
-    ) -> wgpu::RenderPipeline {
+    ) -> Sided {
         let face = wgpu::StencilFaceState {
             compare: self.stencil,
             ..Default::default()
         };
-        device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some(self.fragment),
-            layout: Some(layout),
-            vertex: wgpu::VertexState {
-                module,
-                entry_point: Some(self.vertex),
-                compilation_options: Default::default(),
-                buffers: &[Some(CORNER_LAYOUT), Some(INDIRECT_LAYOUT)],
-            },
-            primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: Some(wgpu::DepthStencilState {
-                format: depth_format,
-                depth_write_enabled: Some(self.writes_depth),
-                depth_compare: Some(match self.writes_depth {
-                    true => wgpu::CompareFunction::Greater,
-                    false => wgpu::CompareFunction::Equal,
-                }),
-                stencil: wgpu::StencilState {
-                    front: face,
-                    back: face,
-                    read_mask: self.stencil_bits,
-                    write_mask: 0,
+        let build = |cull_mode| {
+            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(self.fragment),
+                layout: Some(layout),
+                vertex: wgpu::VertexState {
+                    module,
+                    entry_point: Some(self.vertex),
+                    compilation_options: Default::default(),
+                    buffers: &[Some(CORNER_LAYOUT), Some(INDIRECT_LAYOUT)],
                 },
-                bias: wgpu::DepthBiasState::default(),
-            }),
-            multisample: wgpu::MultisampleState {
-                count: samples,
-                ..Default::default()
-            },
-            fragment: Some(wgpu::FragmentState {
-                module,
-                entry_point: Some(self.fragment),
-                compilation_options: Default::default(),
-                targets: self.targets,
-            }),
-            multiview_mask: None,
-            cache: None,
-        })
+                primitive: wgpu::PrimitiveState {
+                    cull_mode,
+                    ..Default::default()
+                },
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: depth_format,
+                    depth_write_enabled: Some(self.writes_depth),
+                    depth_compare: Some(match self.writes_depth {
+                        true => wgpu::CompareFunction::Greater,
+                        false => wgpu::CompareFunction::Equal,
+                    }),
+                    stencil: wgpu::StencilState {
+                        front: face,
+                        back: face,
+                        read_mask: self.stencil_bits,
+                        write_mask: 0,
+                    },
+                    bias: wgpu::DepthBiasState::default(),
+                }),
+                multisample: wgpu::MultisampleState {
+                    count: samples,
+                    ..Default::default()
+                },
+                fragment: Some(wgpu::FragmentState {
+                    module,
+                    entry_point: Some(self.fragment),
+                    compilation_options: Default::default(),
+                    targets: self.targets,
+                }),
+                multiview_mask: None,
+                cache: None,
+            })
+        };
+        Sided {
+            both: build(None),
+            outside: build(Some(wgpu::Face::Back)),
+        }
     }
 }
 
@@ -129,7 +162,7 @@ impl Surfaces {
                 stencil_bits,
                 targets: &targets.map(target),
             };
-            usage.pipeline(device, layout, &module, depth_format, samples)
+            usage.pipelines(device, layout, &module, depth_format, samples)
         };
         let (always, equal, other) = (
             wgpu::CompareFunction::Always,
