@@ -3,8 +3,9 @@
 
 mod common;
 
-use common::{flat_mesh, gpu, object, scene};
-use glam::{DAffine3, DMat3, DVec2, DVec3, Vec3};
+use common::ray_cast::pixels;
+use common::{flat_mesh, gpu, grey_frame, lamp, look_at, object, scene, sun};
+use glam::{DAffine3, DVec2, DVec3, Vec3};
 use gnomon::capture::Frame;
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::geometry::mesh::Mesh;
@@ -23,21 +24,6 @@ const PERFECT_LENS: Intrinsics = Intrinsics {
     center_px: DVec2::new(237.1, 182.9),
     distortion: [0.0; 5],
 };
-
-/// OpenCV's camera at `eye` that looks at `target`, the world's z up.
-fn look_at(eye: DVec3, target: DVec3) -> DAffine3 {
-    let forward = (target - eye).normalize();
-    let right = forward.cross(DVec3::Z).normalize();
-    let world_from_camera = DAffine3::from_mat3_translation(
-        DMat3::from_cols(right, forward.cross(right), forward),
-        eye,
-    );
-    world_from_camera.inverse()
-}
-
-fn grey_video(size_px: [u32; 2]) -> Vec<u8> {
-    vec![128; (4 * size_px[0] * size_px[1]) as usize]
-}
 
 /// Every pixel another colour than its neighbours.
 fn noise(size_px: [u32; 2]) -> Vec<u8> {
@@ -182,20 +168,6 @@ fn table() -> Object {
     }
 }
 
-fn sun(direction: [f64; 3], irradiance: [f64; 3]) -> Light {
-    Light::Directional {
-        direction: DVec3::from_array(direction).normalize(),
-        irradiance: DVec3::from_array(irradiance),
-    }
-}
-
-fn lamp(position_m: [f64; 3], intensity: [f64; 3]) -> Light {
-    Light::Point {
-        position_m: DVec3::from_array(position_m),
-        intensity: DVec3::from_array(intensity),
-    }
-}
-
 /// IEC 61966-2-1, in levels.
 fn srgb_levels(linear: f64) -> f64 {
     let shown = linear.clamp(0.0, 1.0);
@@ -214,13 +186,6 @@ fn linear_of_level(level: u8) -> f64 {
     } else {
         ((encoded + 0.055) / 1.055).powf(2.4)
     }
-}
-
-fn pixels(size_px: [u32; 2]) -> impl Iterator<Item = (usize, DVec2)> {
-    (0..size_px[0] * size_px[1]).map(move |index| {
-        let (x, y) = (index % size_px[0], index / size_px[0]);
-        (index as usize, DVec2::new(f64::from(x), f64::from(y)))
-    })
 }
 
 /// Eye and direction of a pixel's ray, in the world.
@@ -299,7 +264,7 @@ fn hold_sphere(name: &str, roughness: Option<f64>, lights: &[Light]) {
         &sphere_scene(material, lights.to_vec()),
         PERFECT_LENS,
         sphere_camera(),
-        grey_video(SIZE_PX),
+        grey_frame(SIZE_PX).rgba,
     );
     let points = sphere_points(lights);
     let mut worst = 0.0_f64;
@@ -363,7 +328,7 @@ fn lights_add_up_in_linear_light() {
             &sphere_scene(material, lights.to_vec()),
             PERFECT_LENS,
             sphere_camera(),
-            grey_video(SIZE_PX),
+            grey_frame(SIZE_PX).rgba,
         )
         .0
     };
@@ -401,7 +366,7 @@ fn point_light_falls_off_with_the_square_of_distance() {
             &scene(vec![], vec![plate], vec![light], 0.0),
             PERFECT_LENS,
             camera,
-            grey_video(SIZE_PX),
+            grey_frame(SIZE_PX).rgba,
         );
         for (index, pixel) in pixels(SIZE_PX) {
             let distance_m = table_point(&camera, pixel).length();
@@ -481,7 +446,7 @@ fn hold_gains(name: &str, real: &[Crate], seeming: &[Crate], light: Light) -> [u
         &scene(phantoms, virtuals, vec![light], AMBIENT),
         PERFECT_LENS,
         camera,
-        grey_video(SIZE_PX),
+        grey_frame(SIZE_PX).rgba,
     );
     let clear = all_real(&layers, SIZE_PX);
     let (mut darkened, mut both, mut worst) = (0, 0, 0.0_f64);
@@ -561,55 +526,6 @@ fn two_virtual_casters_darken_once() {
         darkened > 500 && overlap > 500,
         "{darkened} darkened, {overlap} under both"
     );
-}
-
-/// The average over a pixel's area, on both sides of the straight edges of a box's shadow.
-#[test]
-fn shadow_edges_are_area_averages() {
-    let light = sun([0.6, 0.3, -1.0], [1.2, 0.9, 0.6]);
-    let scene = scene(
-        vec![table()],
-        vec![CASTER.object("box")],
-        vec![light],
-        AMBIENT,
-    );
-    let dark = closed_form_gain(&light, DVec3::ZERO).x;
-    let (mut found, mut exact, mut squares, mut count) = (0.0, 0.0, 0.0, 0);
-    // From all sides, so that no edge lies along the rows alone.
-    for side in 0..6 {
-        let turn = DVec2::from_angle(0.3 + f64::from(side)) * 0.55;
-        let camera = look_at(turn.extend(0.6), DVec3::new(0.08, 0.05, 0.0));
-        let (_, layers) = render(&scene, PERFECT_LENS, camera, grey_video(SIZE_PX));
-        let clear = all_real(&layers, SIZE_PX);
-        for (index, pixel) in pixels(SIZE_PX).filter(|&(index, _)| clear[index]) {
-            const STEPS: u32 = 16;
-            let hides = |offset: DVec2| CASTER.hides(table_point(&camera, pixel + offset), &light);
-            let corners = [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)];
-            let dark_corners = corners.iter().filter(|&&(x, y)| hides(DVec2::new(x, y)));
-            if matches!(dark_corners.count(), 0 | 4) {
-                continue;
-            }
-            let hidden = (0..STEPS * STEPS)
-                .filter(|step| {
-                    let place = DVec2::new(f64::from(step % STEPS), f64::from(step / STEPS));
-                    hides((place + 0.5) / f64::from(STEPS) - 0.5)
-                })
-                .count();
-            let covered = hidden as f64 / f64::from(STEPS * STEPS);
-            let darkened = (1.0 - f64::from(layers.gain[index][0])) / (1.0 - dark);
-            found += darkened;
-            exact += covered;
-            squares += (darkened - covered).powi(2);
-            count += 1;
-        }
-    }
-    let (found, exact) = (found / f64::from(count), exact / f64::from(count));
-    let rms = (squares / f64::from(count)).sqrt();
-    eprintln!("{count} edge pixels: covered {found:.4}, exact {exact:.4}, rms {rms:.4}");
-    assert!(count > 1000, "{count} edge pixels");
-    assert!((found - exact).abs() < 0.015, "{found} for {exact}");
-    // One sample alone would be off by 0.3.
-    assert!(rms < 0.13, "{rms}");
 }
 
 #[test]

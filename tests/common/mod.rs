@@ -1,18 +1,25 @@
 //! What several tests need: scenes from the stability rows, a device, and masks held against exact ones.
 #![allow(dead_code)] // Each test binary uses its own part.
 
+pub mod judge;
+pub mod random;
 pub mod ray_cast;
+pub mod shapes;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use glam::{DAffine3, DMat3, DMat4, DVec2, DVec3, Vec3};
+use gnomon::capture::Frame;
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::geometry::mesh::{Mesh, MeshReport};
 use gnomon::light::{Light, Material};
-use gnomon::render::Gpu;
+use gnomon::render::{Gpu, Layers, Renderer, Shown};
 use gnomon::scene::{Anchor, Object, Scene, ShadowSettings, Technique};
 use serde_json::Value;
+
+use ray_cast::{REAL, Triangle, VIRTUAL, View, World};
+use shapes::Soup;
 
 /// One device for all tests of a binary.
 pub fn gpu() -> Arc<Gpu> {
@@ -116,11 +123,190 @@ pub fn scene(
     }
 }
 
+/// A thing of a stage, as its file has it.
+#[derive(Debug, Clone)]
+pub struct Thing {
+    pub shape: Shape,
+    /// Rotation and translation.
+    pub anchor_from_thing: DAffine3,
+    /// As the scene file gives it, before the rotation.
+    pub scale: DVec3,
+    pub casts: bool,
+}
+
+/// Where a thing's triangles come from.
+#[derive(Debug, Clone)]
+pub enum Shape {
+    File(PathBuf),
+    Made(Soup),
+}
+
+impl Thing {
+    pub fn new(shape: Shape) -> Self {
+        Self {
+            shape,
+            anchor_from_thing: DAffine3::IDENTITY,
+            scale: DVec3::ONE,
+            casts: true,
+        }
+    }
+
+    pub fn made(soup: Soup) -> Self {
+        Self::new(Shape::Made(soup))
+    }
+
+    /// A mesh of `tests/stability`.
+    pub fn file(name: &str) -> Self {
+        Self::new(Shape::File(project_file("tests/stability").join(name)))
+    }
+
+    pub fn at(self, place_m: [f64; 3]) -> Self {
+        self.placed(DAffine3::from_translation(DVec3::from_array(place_m)))
+    }
+
+    pub fn placed(self, anchor_from_thing: DAffine3) -> Self {
+        Self {
+            anchor_from_thing,
+            ..self
+        }
+    }
+
+    pub fn scaled(self, scale: DVec3) -> Self {
+        Self { scale, ..self }
+    }
+
+    pub fn without_shadow(self) -> Self {
+        Self {
+            casts: false,
+            ..self
+        }
+    }
+
+    /// Its raw triangles in the world; the renderer's vertices are single precision on their anchor, and the oracle
+    /// judges its visibility, not its rounding.
+    fn triangles(&self, role: u8, world_from_anchor: &DAffine3) -> Vec<Triangle> {
+        let scaled = DAffine3::from_scale(self.scale);
+        let anchor_from_object = self.anchor_from_thing * scaled;
+        let place = |position: Vec3| {
+            let on_anchor = anchor_from_object.transform_point3(position.as_dvec3());
+            world_from_anchor.transform_point3(on_anchor.as_vec3().as_dvec3())
+        };
+        let read;
+        let (positions, triangles) = match &self.shape {
+            Shape::Made(soup) => (&soup.positions, &soup.triangles),
+            Shape::File(path) => {
+                read = read_obj(path);
+                (&read.positions, &read.triangles)
+            }
+        };
+        let corners = |t: &[u32; 3]| t.map(|index| place(positions[index as usize]));
+        triangles
+            .iter()
+            .map(|triangle| Triangle {
+                role,
+                casts: self.casts,
+                corners: corners(triangle),
+            })
+            .collect()
+    }
+}
+
+/// A scene read as users get theirs, with the same triangles as the files have them for the oracle.
+pub struct Stage {
+    pub scene: Scene,
+    pub world: World,
+    /// Where the second anchor lies, which carries the virtual things; `None` where the world does.
+    pub world_from_card: Option<DAffine3>,
+}
+
+impl Stage {
+    /// Writes meshes and scene file, and reads them back.
+    pub fn new(
+        phantoms: &[Thing],
+        virtuals: &[Thing],
+        world_from_card: Option<DAffine3>,
+        lights: Vec<Light>,
+        ambient_radiance: DVec3,
+    ) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut toml = String::from(
+            "[camera]\nsource = \"webcam:0\"\n[[board]]\nname = \"table\"\n\
+             markers = [{ id = 0, size_m = 0.045, center_m = [0, 0] }]\n\
+             [[marker]]\nname = \"card\"\nid = 1\nsize_m = 0.045\n",
+        );
+        let mut triangles = Vec::new();
+        let virtual_anchor = if world_from_card.is_some() {
+            "card"
+        } else {
+            "table"
+        };
+        for (kind, role, anchor, things) in [
+            ("phantom", REAL, "table", phantoms),
+            ("virtual", VIRTUAL, virtual_anchor, virtuals),
+        ] {
+            let world_from_anchor = match role {
+                VIRTUAL => world_from_card.unwrap_or(DAffine3::IDENTITY),
+                _ => DAffine3::IDENTITY,
+            };
+            for (index, thing) in things.iter().enumerate() {
+                triangles.extend(thing.triangles(role, &world_from_anchor));
+                let path = match &thing.shape {
+                    Shape::File(path) => path.clone(),
+                    Shape::Made(soup) => {
+                        let path = folder.path().join(format!("{kind}{index}.obj"));
+                        std::fs::write(&path, soup.to_obj()).expect("a mesh");
+                        path
+                    }
+                };
+                let (path, casts) = (path.display(), thing.casts);
+                let [x, y, z] = thing.scale.to_array();
+                toml += &format!(
+                    "[[{kind}]]\nname = \"{kind} {index}\"\nmesh = \"{path}\"\non = \"{anchor}\"\n\
+                     scale = [{x:?}, {y:?}, {z:?}]\ncasts = {casts}\n"
+                );
+            }
+        }
+        let path = folder.path().join("scene.toml");
+        std::fs::write(&path, toml).expect("a scene file");
+        let mut scene = Scene::load(&path).unwrap_or_else(|error| panic!("{error}"));
+        let read = scene.phantoms.iter_mut().zip(phantoms);
+        for (object, thing) in read.chain(scene.virtuals.iter_mut().zip(virtuals)) {
+            object.anchor_from_object = thing.anchor_from_thing * object.anchor_from_object;
+        }
+        scene.lights = lights;
+        scene.ambient_radiance = ambient_radiance;
+        Self {
+            scene,
+            world: World::new(triangles),
+            world_from_card,
+        }
+    }
+
+    pub fn renderer(&self, intrinsics: Intrinsics) -> Renderer {
+        let mut renderer = Renderer::new(gpu(), &self.scene, intrinsics).expect("a renderer");
+        let frame = grey_frame(intrinsics.size_px);
+        renderer.upload(&frame).expect("an uploaded frame");
+        renderer
+    }
+
+    /// For each anchor.
+    pub fn poses(&self, camera_from_world: DAffine3) -> [Option<DAffine3>; 2] {
+        let card = self.world_from_card.map(|card| camera_from_world * card);
+        [Some(camera_from_world), card]
+    }
+
+    /// The composite and its layers.
+    pub fn shoot(&self, renderer: &mut Renderer, camera_from_world: DAffine3) -> (Vec<u8>, Layers) {
+        renderer.draw(&self.poses(camera_from_world), Shown::Composite);
+        let picture = renderer.read_picture().expect("a picture");
+        (picture, renderer.layers().expect("layers"))
+    }
+}
+
 /// A row of `tests/stability`: a scene, its camera, and the exact mask.
 pub struct StabilityRow {
-    pub scene: Scene,
-    pub intrinsics: Intrinsics,
-    pub camera_from_world: DAffine3,
+    pub stage: Stage,
+    pub view: View,
     /// As the README there defines it: id + 4 · bits.
     pub exact: Vec<u8>,
 }
@@ -140,19 +326,13 @@ pub fn stability_row(folder: &Path, name: &str) -> StabilityRow {
         center_px: DVec2::new(k(0, 2), k(1, 2)) - 0.5,
         distortion: [0.0; 5],
     };
-    let objects = |key: &str| {
+    let things = |key: &str| -> Vec<Thing> {
         let list = row[key].as_array().expect("objects");
         list.iter()
-            .enumerate()
-            .map(|(index, o)| {
+            .map(|o| {
                 let obj = folder.join(o["obj"].as_str().expect("obj"));
                 let pose = o.get("transform").map_or(DAffine3::IDENTITY, affine);
-                object(
-                    &format!("{key} {index}"),
-                    read_obj(&obj),
-                    vector(&o["albedo"]),
-                    pose,
-                )
+                Thing::new(Shape::File(obj)).placed(pose)
             })
             .collect()
     };
@@ -169,9 +349,17 @@ pub fn stability_row(folder: &Path, name: &str) -> StabilityRow {
         .expect("the exact mask")
         .to_luma8();
     StabilityRow {
-        scene: scene(objects("phantoms"), objects("virtuals"), lights, 0.05),
-        intrinsics,
-        camera_from_world: affine(&row["camera"]["world_to_camera"]),
+        stage: Stage::new(
+            &things("phantoms"),
+            &things("virtuals"),
+            None,
+            lights,
+            DVec3::splat(0.05),
+        ),
+        view: View {
+            intrinsics,
+            camera_from_world: affine(&row["camera"]["world_to_camera"]),
+        },
         exact: exact.into_raw(),
     }
 }
@@ -190,4 +378,43 @@ fn vector(value: &Value) -> DVec3 {
     DVec3::from_array(std::array::from_fn(|index| {
         value[index].as_f64().expect("a vector")
     }))
+}
+
+/// OpenCV's camera at `eye` that looks at `target`, the world's z up.
+pub fn look_at(eye: DVec3, target: DVec3) -> DAffine3 {
+    look_with_up(eye, target, DVec3::Z)
+}
+
+/// The same with any direction up.
+pub fn look_with_up(eye: DVec3, target: DVec3, up: DVec3) -> DAffine3 {
+    let forward = (target - eye).normalize();
+    let right = forward.cross(up).normalize();
+    let world_from_camera = DAffine3::from_mat3_translation(
+        DMat3::from_cols(right, forward.cross(right), forward),
+        eye,
+    );
+    world_from_camera.inverse()
+}
+
+pub fn grey_frame(size_px: [u32; 2]) -> Frame {
+    Frame {
+        index: 0,
+        time_secs: 0.0,
+        size_px,
+        rgba: vec![128; (4 * size_px[0] * size_px[1]) as usize],
+    }
+}
+
+pub fn sun(direction: [f64; 3], irradiance: [f64; 3]) -> Light {
+    Light::Directional {
+        direction: DVec3::from_array(direction).normalize(),
+        irradiance: DVec3::from_array(irradiance),
+    }
+}
+
+pub fn lamp(position_m: [f64; 3], intensity: [f64; 3]) -> Light {
+    Light::Point {
+        position_m: DVec3::from_array(position_m),
+        intensity: DVec3::from_array(intensity),
+    }
 }

@@ -1,155 +1,409 @@
-//! The oracle of visibility: rays in double precision against every triangle, without any offset.
+//! The oracle of visibility: rays in double precision against the raw triangles, without any offset.
 
 use glam::{DAffine3, DVec2, DVec3};
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::light::Light;
-use gnomon::scene::{Object, Scene};
 
 pub const REAL_HIDES: u8 = 1;
 pub const VIRTUAL_HIDES: u8 = 2;
 pub const FACES_AWAY: u8 = 4;
+/// The light passes along the surface: what hides it there is a matter of the last bits of single precision.
+pub const GRAZES: u8 = 8;
 
-/// What a ray through a pixel's centre sees.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Seen {
-    /// 0 none, 100 real, 200 virtual.
+pub const NONE: u8 = 0;
+pub const REAL: u8 = 100;
+pub const VIRTUAL: u8 = 200;
+
+/// The renderer draws nothing nearer, metres.
+const NEAREST_M: f64 = 1e-3;
+/// What lies within this of a surface is that surface, of which a mesh may have copies, metres.
+const COINCIDENT_M: f64 = 1e-9;
+/// Sine of the angle between light and surface below which the light grazes. Single precision puts a volume's side
+/// off by some 2e-7 of its distance; on a surface at this angle that is 2e-4 of the distance, a tenth of a pixel of
+/// the cameras here.
+const GRAZING: f64 = 1e-3;
+
+/// Corners are snapped to 1/256 px, so an edge may pass a place on the other side that it is nearer to than this.
+const SNAPPING_PX: f64 = 1.0 / 256.0;
+
+/// Where four samples lie about a pixel's centre (the standard places of Vulkan and Direct3D).
+pub const SAMPLES_PX: [[f64; 2]; 4] = [
+    [-0.125, -0.375],
+    [0.375, -0.125],
+    [-0.375, 0.125],
+    [0.125, 0.375],
+];
+
+/// A triangle in the world.
+#[derive(Debug, Clone, Copy)]
+pub struct Triangle {
     pub role: u8,
-    /// For the scene's first light.
-    pub bits: u8,
+    pub casts: bool,
+    pub corners: [DVec3; 3],
 }
 
-struct Triangles {
-    role: u8,
-    casts: bool,
-    low: DVec3,
-    high: DVec3,
-    corners: Vec<[DVec3; 3]>,
+/// What a ray meets first.
+#[derive(Debug, Clone, Copy)]
+pub struct Surface {
+    pub role: u8,
+    pub triangle: usize,
+    pub point: DVec3,
+    /// Of the triangle, towards where the ray came from.
+    pub normal: DVec3,
 }
 
-/// Casts a ray through the centre of every pixel, and from what it hits to the scene's first light.
-///
-/// `lift_m` moves the start of the second ray off the surface along its normal: 0 is the truth; other renderers lift
-/// by some 0.1 mm against self-shadowing.
-pub fn cast(
-    scene: &Scene,
-    intrinsics: &Intrinsics,
-    camera_from_world: &DAffine3,
-    lift_m: f64,
-) -> Vec<Seen> {
-    let world_from_camera = camera_from_world.inverse();
-    let eye = world_from_camera.translation;
-    let real = scene.phantoms.iter().map(|object| triangles(object, 100));
-    let objects: Vec<Triangles> = real
-        .chain(scene.virtuals.iter().map(|object| triangles(object, 200)))
-        .collect();
-    let [width, height] = intrinsics.size_px;
-    let mut seen = Vec::with_capacity((width * height) as usize);
-    for y in 0..height {
-        for x in 0..width {
-            let plane = intrinsics.plane_from_pixel(DVec2::new(f64::from(x), f64::from(y)));
-            let direction = world_from_camera.transform_vector3(plane.extend(1.0));
-            seen.push(follow(&objects, &scene.lights[0], eye, direction, lift_m));
+/// A camera in the world.
+#[derive(Debug, Clone, Copy)]
+pub struct View {
+    pub intrinsics: Intrinsics,
+    pub camera_from_world: DAffine3,
+}
+
+/// What is seen at each pixel's centre, rows from the top.
+pub struct Exact {
+    pub size_px: [u32; 2],
+    pub surfaces: Vec<Option<Surface>>,
+    /// For each light and pixel.
+    pub bits: Vec<Vec<u8>>,
+}
+
+/// Triangles ready to be hit.
+pub struct World {
+    pub triangles: Vec<Triangle>,
+    visible: Hierarchy,
+    real_casters: Hierarchy,
+    virtual_casters: Hierarchy,
+}
+
+impl World {
+    pub fn new(triangles: Vec<Triangle>) -> Self {
+        let where_ = |takes: &dyn Fn(&Triangle) -> bool| {
+            let indices = (0..triangles.len()).filter(|&index| takes(&triangles[index]));
+            Hierarchy::new(&triangles, indices.collect())
+        };
+        Self {
+            visible: where_(&|_| true),
+            real_casters: where_(&|t| t.casts && t.role == REAL),
+            virtual_casters: where_(&|t| t.casts && t.role == VIRTUAL),
+            triangles,
         }
     }
-    seen
-}
 
-fn triangles(object: &Object, role: u8) -> Triangles {
-    let place = |index: u32| {
-        // The renderer's vertices are single precision; the oracle judges its visibility, not its rounding.
-        let position = object.mesh.positions[index as usize].as_dvec3();
-        object
-            .anchor_from_object
-            .transform_point3(position)
-            .as_vec3()
-            .as_dvec3()
-    };
-    let corners: Vec<[DVec3; 3]> = object.mesh.triangles.iter().map(|t| t.map(place)).collect();
-    let all = || corners.iter().flatten().copied();
-    Triangles {
-        role,
-        casts: object.casts,
-        low: all().fold(DVec3::MAX, DVec3::min),
-        high: all().fold(DVec3::MIN, DVec3::max),
-        corners,
+    /// What a pixel (or a place within one) sees.
+    pub fn look(&self, view: &View, pixel: DVec2) -> Option<Surface> {
+        let world_from_camera = view.camera_from_world.inverse();
+        let eye = world_from_camera.translation;
+        let plane = view.intrinsics.plane_from_pixel(pixel);
+        let direction = world_from_camera.transform_vector3(plane.extend(1.0));
+        let ray = Ray {
+            origin: eye,
+            direction,
+            near: NEAREST_M,
+            reach: f64::INFINITY,
+        };
+        let (triangle, distance) = self.visible.first_hit(&self.triangles, &ray)?;
+        let [a, b, c] = self.triangles[triangle].corners;
+        let normal = (b - a).cross(c - a).normalize();
+        Some(Surface {
+            role: self.triangles[triangle].role,
+            triangle,
+            point: eye + direction * distance,
+            normal: if normal.dot(direction) > 0.0 {
+                -normal
+            } else {
+                normal
+            },
+        })
+    }
+
+    /// Who takes a light from a surface. `lift_m` moves the start of the ray off it along its normal: 0 is the truth;
+    /// other renderers lift by some 0.1 mm against self-shadowing.
+    pub fn bits(&self, surface: &Surface, light: &Light, lift_m: f64) -> u8 {
+        let start = surface.point + surface.normal * lift_m;
+        let (to_light, reach) = match *light {
+            Light::Point { position_m, .. } => (position_m - surface.point, 1.0),
+            Light::Directional { direction, .. } => (-direction, f64::INFINITY),
+        };
+        let sine = surface.normal.dot(to_light.normalize());
+        let ray = Ray {
+            origin: start,
+            direction: to_light,
+            near: COINCIDENT_M / to_light.length(),
+            reach,
+        };
+        let hides = |casters: &Hierarchy| casters.is_hit(&self.triangles, &ray, surface.triangle);
+        let bit = |holds: bool, bit: u8| if holds { bit } else { 0 };
+        bit(sine < 0.0, FACES_AWAY)
+            | bit(sine.abs() < GRAZING, GRAZES)
+            | bit(hides(&self.real_casters), REAL_HIDES)
+            | bit(hides(&self.virtual_casters), VIRTUAL_HIDES)
+    }
+
+    /// A ray through each pixel's centre, and from what it meets one to each light.
+    pub fn cast(&self, lights: &[Light], view: &View, lift_m: f64) -> Exact {
+        let surfaces: Vec<Option<Surface>> = pixels(view.intrinsics.size_px)
+            .map(|(_, pixel)| self.look(view, pixel))
+            .collect();
+        let bits_of = |light: &Light| {
+            let bits = |seen: &Option<Surface>| seen.map_or(0, |s| self.bits(&s, light, lift_m));
+            surfaces.iter().map(bits).collect()
+        };
+        Exact {
+            size_px: view.intrinsics.size_px,
+            bits: lights.iter().map(bits_of).collect(),
+            surfaces,
+        }
+    }
+
+    /// Whether a triangle's edge, or the shadow of one, passes a place so closely that snapping may put it on the other
+    /// side: triangles, shadows and gaps thinner than that are there for no ray, and may yet be drawn.
+    pub fn is_on_edge(&self, view: &View, place: DVec2, light: &Light) -> bool {
+        let seen = self.look(view, place);
+        let pixel_of = |point: DVec3| {
+            let in_camera = view.camera_from_world.transform_point3(point);
+            let plane = in_camera.truncate() / in_camera.z;
+            (in_camera.z > NEAREST_M).then(|| view.intrinsics.pixel_from_plane(plane))
+        };
+        // Where the shadow of a point falls on the plane of what is seen.
+        let shadow_of = |point: DVec3| {
+            let Surface {
+                point: on, normal, ..
+            } = seen?;
+            let (from, way) = match *light {
+                Light::Point { position_m, .. } => (position_m, point - position_m),
+                Light::Directional { direction, .. } => (point, direction),
+            };
+            let share = normal.dot(on - from) / normal.dot(way);
+            (share > 0.0).then(|| from + way * share)
+        };
+        let is_near = |ends: [Option<DVec2>; 2]| {
+            let [Some(a), Some(b)] = ends else {
+                return false;
+            };
+            let along = ((place - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+            (a + (b - a) * along).distance(place) < SNAPPING_PX
+        };
+        self.triangles.iter().any(|triangle| {
+            let [a, b, c] = triangle.corners;
+            [[a, b], [b, c], [c, a]].into_iter().any(|ends| {
+                is_near(ends.map(pixel_of))
+                    || triangle.casts && is_near(ends.map(|end| shadow_of(end).and_then(pixel_of)))
+            })
+        })
+    }
+
+    /// Places from which an edge within 1.5 px of a pixel's centre shows, however thin it is where it passes close by.
+    pub fn places_around(pixel: DVec2) -> impl Iterator<Item = DVec2> {
+        (0..10).flat_map(move |ring| {
+            let radius_px = 1.5 * 0.5_f64.powi(ring);
+            (0..32).map(move |step| {
+                let turn = f64::from(step) + 0.37 * f64::from(ring);
+                pixel + DVec2::from_angle(turn * std::f64::consts::TAU / 32.0) * radius_px
+            })
+        })
     }
 }
 
-fn follow(objects: &[Triangles], light: &Light, eye: DVec3, direction: DVec3, lift_m: f64) -> Seen {
-    let mut nearest: Option<(f64, u8, usize, usize)> = None;
-    for (object_index, object) in objects.iter().enumerate() {
-        for (triangle, distance) in object.hits(eye, direction) {
-            if distance > 0.0 && nearest.is_none_or(|(best, ..)| distance < best) {
-                nearest = Some((distance, object.role, object_index, triangle));
+/// A pixel's centre, and the places of its samples.
+pub fn sample_places(pixel: DVec2) -> impl Iterator<Item = DVec2> {
+    let samples = SAMPLES_PX.map(|[x, y]| pixel + DVec2::new(x, y));
+    std::iter::once(pixel).chain(samples)
+}
+
+/// Index and centre of each pixel.
+pub fn pixels(size_px: [u32; 2]) -> impl Iterator<Item = (usize, DVec2)> {
+    (0..size_px[0] * size_px[1]).map(move |index| {
+        let (x, y) = (index % size_px[0], index / size_px[0]);
+        (index as usize, DVec2::new(f64::from(x), f64::from(y)))
+    })
+}
+
+impl Exact {
+    pub fn role(&self, index: usize) -> u8 {
+        self.surfaces[index].map_or(NONE, |surface| surface.role)
+    }
+}
+
+/// Whether a pixel and the eight around it are all alike.
+pub fn is_uniform(size_px: [u32; 2], index: usize, same: impl Fn(usize, usize) -> bool) -> bool {
+    let [width, height] = size_px.map(|size| size as usize);
+    let (x, y) = (index % width, index / width);
+    let columns = x.saturating_sub(1)..(x + 2).min(width);
+    (y.saturating_sub(1)..(y + 2).min(height))
+        .flat_map(|row| columns.clone().map(move |column| row * width + column))
+        .all(|other| same(index, other))
+}
+
+/// A line from `origin + near · direction` to `origin + reach · direction`.
+pub struct Ray {
+    pub origin: DVec3,
+    pub direction: DVec3,
+    pub near: f64,
+    pub reach: f64,
+}
+
+impl Triangle {
+    /// Distance in units of the ray's direction (Möller & Trumbore 1997).
+    pub fn hit(&self, ray: &Ray) -> Option<f64> {
+        let [a, b, c] = self.corners;
+        let (first, second) = (b - a, c - a);
+        let across = ray.direction.cross(second);
+        let determinant = first.dot(across);
+        let from_corner = ray.origin - a;
+        let u = from_corner.dot(across) / determinant;
+        let aside = from_corner.cross(first);
+        let v = ray.direction.dot(aside) / determinant;
+        let distance = second.dot(aside) / determinant;
+        // A triangle without area gives no number, and no comparison with that holds.
+        let inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
+        (inside && distance > ray.near && distance < ray.reach).then_some(distance)
+    }
+}
+
+/// Boxes around triangles, halved at the median of the longest side.
+struct Hierarchy {
+    /// Indices of triangles, in the order of the leaves.
+    order: Vec<usize>,
+    nodes: Vec<Node>,
+}
+
+struct Node {
+    low: DVec3,
+    high: DVec3,
+    content: Content,
+}
+
+enum Content {
+    /// A range of `order`.
+    Leaf(usize, usize),
+    /// The other child follows its parent.
+    SecondChild(usize),
+}
+
+const LEAF: usize = 4;
+
+impl Hierarchy {
+    fn new(triangles: &[Triangle], order: Vec<usize>) -> Self {
+        let mut made = Self {
+            order,
+            nodes: Vec::new(),
+        };
+        if !made.order.is_empty() {
+            made.add(triangles, 0, made.order.len());
+        }
+        made
+    }
+
+    fn add(&mut self, triangles: &[Triangle], start: usize, end: usize) {
+        let corners = |index: &usize| triangles[*index].corners;
+        let around = self.order[start..end].iter().flat_map(corners);
+        let (low, high) = around.fold((DVec3::MAX, DVec3::MIN), |(low, high), corner| {
+            (low.min(corner), high.max(corner))
+        });
+        // A flat box has no thickness to lose to rounding.
+        let slack = 1e-9 + 1e-12 * low.abs().max(high.abs()).max_element();
+        let node = self.nodes.len();
+        self.nodes.push(Node {
+            low: low - slack,
+            high: high + slack,
+            content: Content::Leaf(start, end),
+        });
+        if end - start <= LEAF {
+            return;
+        }
+        let axis = (high - low).max_position();
+        let place = |index: &usize| corners(index).iter().map(|c| c[axis]).sum::<f64>();
+        let middle = (end - start) / 2;
+        self.order[start..end].select_nth_unstable_by(middle, |a, b| place(a).total_cmp(&place(b)));
+        self.add(triangles, start, start + middle);
+        self.nodes[node].content = Content::SecondChild(self.nodes.len());
+        self.add(triangles, start + middle, end);
+    }
+
+    /// Calls `found` with triangle and distance of each hit until it answers with the reach that is left, 0 to end.
+    fn visit(
+        &self,
+        triangles: &[Triangle],
+        ray: &Ray,
+        mut found: impl FnMut(usize, f64) -> Option<f64>,
+    ) {
+        let mut reach = ray.reach;
+        let inverse = ray.direction.recip();
+        let mut open: Vec<usize> = (!self.nodes.is_empty()).then_some(0).into_iter().collect();
+        while let Some(index) = open.pop() {
+            let node = &self.nodes[index];
+            let (mut enters, mut leaves) = (ray.near, reach);
+            for axis in 0..3 {
+                let near = (node.low[axis] - ray.origin[axis]) * inverse[axis];
+                let far = (node.high[axis] - ray.origin[axis]) * inverse[axis];
+                // No number (0 · ∞) bounds nothing: max and min pass over it.
+                enters = enters.max(near.min(far));
+                leaves = leaves.min(near.max(far));
+            }
+            if enters > leaves + 1e-9 * leaves.abs() {
+                continue;
+            }
+            match node.content {
+                Content::SecondChild(second) => open.extend([second, index + 1]),
+                Content::Leaf(start, end) => {
+                    for &triangle in &self.order[start..end] {
+                        let shortened = triangles[triangle]
+                            .hit(&Ray { reach, ..*ray })
+                            .and_then(|distance| found(triangle, distance));
+                        match shortened {
+                            Some(0.0) => return,
+                            Some(left) => reach = left,
+                            None => {}
+                        }
+                    }
+                }
             }
         }
     }
-    let Some((distance, role, seen_object, seen_triangle)) = nearest else {
-        return Seen::default();
-    };
-    let point = eye + direction * distance;
-    let [a, b, c] = objects[seen_object].corners[seen_triangle];
-    let normal = (b - a).cross(c - a).normalize();
-    let normal = if normal.dot(direction) > 0.0 {
-        -normal
-    } else {
-        normal
-    };
-    let (to_light, reach) = match *light {
-        Light::Point { position_m, .. } => (position_m - point, 1.0),
-        Light::Directional { direction, .. } => (-direction, f64::INFINITY),
-    };
-    let mut bits = if normal.dot(to_light) < 0.0 {
-        FACES_AWAY
-    } else {
-        0
-    };
-    let start = point + normal * lift_m;
-    for (object_index, object) in objects
-        .iter()
-        .enumerate()
-        .filter(|(_, object)| object.casts)
-    {
-        let hidden = object.hits(start, to_light).any(|(triangle, distance)| {
-            let own = object_index == seen_object && triangle == seen_triangle;
-            !own && distance > 0.0 && distance < reach
+
+    fn first_hit(&self, triangles: &[Triangle], ray: &Ray) -> Option<(usize, f64)> {
+        let mut first = None;
+        self.visit(triangles, ray, |triangle, distance| {
+            first = Some((triangle, distance));
+            Some(distance)
         });
-        if hidden {
-            bits |= if object.role == 100 {
-                REAL_HIDES
-            } else {
-                VIRTUAL_HIDES
-            };
-        }
+        first
     }
-    Seen { role, bits }
+
+    fn is_hit(&self, triangles: &[Triangle], ray: &Ray, own: usize) -> bool {
+        let mut hit = false;
+        self.visit(triangles, ray, |triangle, _| {
+            (triangle != own).then(|| {
+                hit = true;
+                0.0
+            })
+        });
+        hit
+    }
 }
 
-impl Triangles {
-    /// Index and distance, in units of `direction`, of every triangle that the line hits (Möller & Trumbore 1997).
-    fn hits(&self, origin: DVec3, direction: DVec3) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let (near, far) = (
-            (self.low - origin) / direction,
-            (self.high - origin) / direction,
+impl World {
+    /// The same as [`World::look`] and [`World::bits`] find, by every triangle in turn.
+    pub fn check_against_brute_force(&self, ray: &Ray) {
+        let nearest = |casters: &dyn Fn(&Triangle) -> bool| {
+            let hits = self
+                .triangles
+                .iter()
+                .enumerate()
+                .filter(|(_, triangle)| casters(triangle))
+                .filter_map(|(index, triangle)| Some((index, triangle.hit(ray)?)));
+            hits.min_by(|a, b| a.1.total_cmp(&b.1))
+        };
+        let distance = |hit: Option<(usize, f64)>| hit.map(|(_, distance)| distance);
+        assert_eq!(
+            distance(self.visible.first_hit(&self.triangles, ray)),
+            distance(nearest(&|_| true))
         );
-        let enters = near.min(far).max_element();
-        let leaves = near.max(far).min_element();
-        // A flat box has no thickness to lose to rounding.
-        let passes = enters.is_nan() || leaves.is_nan() || enters <= leaves + 1e-6;
-        let corners = if passes { self.corners.as_slice() } else { &[] };
-        corners
-            .iter()
-            .enumerate()
-            .filter_map(move |(index, &[a, b, c])| {
-                let (first, second) = (b - a, c - a);
-                let across = direction.cross(second);
-                let determinant = first.dot(across);
-                let from_corner = origin - a;
-                let u = from_corner.dot(across) / determinant;
-                let aside = from_corner.cross(first);
-                let v = direction.dot(aside) / determinant;
-                (u >= 0.0 && v >= 0.0 && u + v <= 1.0)
-                    .then(|| (index, second.dot(aside) / determinant))
-            })
+        for (role, casters) in [(REAL, &self.real_casters), (VIRTUAL, &self.virtual_casters)] {
+            assert_eq!(
+                casters.is_hit(&self.triangles, ray, usize::MAX),
+                nearest(&|triangle| triangle.casts && triangle.role == role).is_some()
+            );
+        }
     }
 }

@@ -1,0 +1,63 @@
+//! Depth-pass is taken where it gives what depth-fail gives: the same bits of picture and layers from everywhere.
+
+mod common;
+
+use common::random::{Random, random_camera, random_stage};
+use common::{Stage, look_at, project_file, stability_row};
+use glam::{DAffine3, DVec2, DVec3};
+use gnomon::geometry::camera::Intrinsics;
+use gnomon::scene::Counting;
+
+/// Holds what both ways draw against each other, camera by camera.
+fn hold(name: &str, stage: &mut Stage, intrinsics: Intrinsics, cameras: &[DAffine3]) {
+    let mut shoot = |counting: Counting| -> Vec<_> {
+        stage.scene.shadows.counting = counting;
+        let mut renderer = stage.renderer(intrinsics);
+        let shot = |camera: &DAffine3| stage.shoot(&mut renderer, *camera);
+        cameras.iter().map(shot).collect()
+    };
+    let (chosen, depth_fail) = (shoot(Counting::Auto), shoot(Counting::DepthFail));
+    for (camera, (ours, theirs)) in chosen.iter().zip(&depth_fail).enumerate() {
+        let differing = |of: usize, a: &[u8], b: &[u8]| {
+            let pairs = a.chunks(of).zip(b.chunks(of));
+            pairs.filter(|(one, other)| one != other).count()
+        };
+        let picture = differing(4, &ours.0, &theirs.0);
+        assert_eq!(picture, 0, "{name}, camera {camera}: pixels of the picture");
+        let lights = ours.1.shadow.iter().zip(&theirs.1.shadow);
+        for (light, (one, other)) in lights.enumerate() {
+            let bits = differing(1, one, other);
+            assert_eq!(bits, 0, "{name}, camera {camera}: bits of light {light}");
+        }
+        assert!(ours.1 == theirs.1, "{name}, camera {camera}: layers");
+    }
+}
+
+#[test]
+fn random_scenes_look_the_same_counted_either_way() {
+    for seed in 0..80 {
+        let mut random = Random::new(1000 + seed);
+        let (mut stage, places, intrinsics) = random_stage(&mut random, seed % 2 == 0);
+        let lights = stage.scene.lights.clone();
+        let cameras: Vec<DAffine3> = (0..6)
+            .map(|_| random_camera(&mut random, &places, &lights))
+            .collect();
+        hold(&format!("seed {seed}"), &mut stage, intrinsics, &cameras);
+    }
+}
+
+/// From all around, through the volume's sides and out again.
+#[test]
+fn a_flight_through_a_shadow_looks_the_same_counted_either_way() {
+    let row = stability_row(&project_file("tests/stability"), "base");
+    let mut stage = row.stage;
+    let cameras: Vec<DAffine3> = (0..24)
+        .map(|step| {
+            let turn = DVec2::from_angle(0.3 * f64::from(step));
+            let radius_m = 0.08 + 0.02 * f64::from(step);
+            let eye = DVec3::new(0.12, -0.05, 0.03) + (turn * radius_m).extend(0.0);
+            look_at(eye, DVec3::new(0.06, -0.02, 0.03))
+        })
+        .collect();
+    hold("base", &mut stage, row.view.intrinsics, &cameras);
+}
