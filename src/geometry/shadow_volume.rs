@@ -274,22 +274,26 @@ impl Caster {
         indices
     }
 
-    /// Triangles of the volume's near and far caps, counter-clockwise seen from outside it.
+    /// Triangles of the volume's caps: first the near ones that cast as they are wound, and all far ones,
+    /// counter-clockwise seen from outside the volume; then the near ones that cast turned over, clockwise.
     ///
-    /// The near cap is made of the mesh's own triangles with their own vertex order, so that it covers the same
+    /// The near caps are the mesh's own triangles with their own vertex order, for only so they surely cover the same
     /// pixels at the same depths as the mesh does.
-    pub fn cap_indices(&self, silhouette: &Silhouette) -> Vec<u32> {
+    pub fn cap_indices(&self, silhouette: &Silhouette) -> [Vec<u32>; 2] {
         let far = self.positions.len() as u32;
-        let mut indices = Vec::with_capacity(6 * self.triangles.len());
+        let mut outward = Vec::with_capacity(6 * self.triangles.len());
+        let mut turned = Vec::new();
         for (&[a, b, c], &cast) in self.triangles.iter().zip(&silhouette.casts) {
-            let (b, c) = match cast {
-                0 => continue,
-                1 => (b, c),
-                _ => (c, b),
-            };
-            indices.extend([a, b, c, far + a, far + c, far + b]);
+            match cast {
+                0 => {}
+                1 => outward.extend([a, b, c, far + a, far + c, far + b]),
+                _ => {
+                    turned.extend([a, b, c]);
+                    outward.extend([far + a, far + b, far + c]);
+                }
+            }
         }
-        indices
+        [outward, turned]
     }
 
     /// Triangles that face the light.
@@ -554,7 +558,8 @@ mod tests {
     /// The caps and sides for a light.
     fn volume(caster: &Caster, light: LightPlace, casts: [i8; 2]) -> Vec<u32> {
         let silhouette = caster.silhouette(light, casts);
-        let mut indices = caster.cap_indices(&silhouette);
+        let [mut indices, turned] = caster.cap_indices(&silhouette);
+        indices.extend(turned.chunks(3).flat_map(|t| [t[0], t[2], t[1]]));
         indices.extend(caster.side_indices(&silhouette));
         indices
     }

@@ -38,6 +38,7 @@ impl Direct {
                 writes_depth: stencil == wgpu::CompareFunction::Always,
                 stencil,
                 stencil_bits,
+                marks: (wgpu::StencilOperation::Keep, 0),
                 targets: &[Some(wgpu::ColorTargetState {
                     format: PICTURE_FORMAT,
                     blend: None,

@@ -211,10 +211,10 @@ impl Stage {
                 };
                 match lit.facing {
                     Facing::Whole(range) => pass.draw_indexed(range, 0, 0..1),
-                    Facing::Listed(indices) => indices.draw(pass, indices.count),
+                    Facing::Listed(indices) => indices.draw(pass, 0..indices.count),
                 }
                 pass.set_stencil_reference(1);
-                lit.terminator.draw(pass, lit.terminator.count);
+                lit.terminator.draw(pass, 0..lit.terminator.count);
                 pass.set_stencil_reference(0);
             }
         }

@@ -3,9 +3,11 @@
 use super::anchor_geometry::Role;
 
 /// How many volumes of the present batch the surface lies in.
-pub(super) const COUNT: u32 = 0x3f;
+pub(super) const COUNT: u32 = 0x1f;
 /// The largest number that the count can hold: a batch never has more volumes one in another.
 pub(super) const MOST_LAYERS: u32 = COUNT;
+/// The light is added already: of two surfaces in the same place one gets it.
+pub(super) const ADDED: u32 = 0x20;
 /// Whatever the counts say: a virtual thing of an earlier batch hides the light.
 const VIRTUAL_HIDES: u32 = 0x40;
 /// A real thing hides the light; virtual things can then hide no more of it, and are not counted.

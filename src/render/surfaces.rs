@@ -3,7 +3,7 @@
 
 use super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT};
 use super::shader;
-use super::stencil::{REAL_HIDES, SHADOW, VIRTUAL_SHADOW};
+use super::stencil::{ADDED, REAL_HIDES, SHADOW, VIRTUAL_SHADOW};
 
 /// Format of `reaching` and `change`.
 pub(super) const LIGHT_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
@@ -55,6 +55,8 @@ pub(super) struct Use<'a> {
     pub writes_depth: bool,
     pub stencil: wgpu::CompareFunction,
     pub stencil_bits: u32,
+    /// What a drawn sample does to these bits of the stencil.
+    pub marks: (wgpu::StencilOperation, u32),
     pub targets: &'a [Option<wgpu::ColorTargetState>],
 }
 
@@ -70,6 +72,7 @@ impl Use<'_> {
     ) -> Sided {
         let face = wgpu::StencilFaceState {
             compare: self.stencil,
+            pass_op: self.marks.0,
             ..Default::default()
         };
         let build = |cull_mode| {
@@ -97,7 +100,7 @@ impl Use<'_> {
                         front: face,
                         back: face,
                         read_mask: self.stencil_bits,
-                        write_mask: 0,
+                        write_mask: self.marks.1,
                     },
                     bias: wgpu::DepthBiasState::default(),
                 }),
@@ -139,7 +142,7 @@ impl Surfaces {
             dst_factor: wgpu::BlendFactor::One,
             operation: wgpu::BlendOperation::Add,
         };
-        let build = |fragment: &str, stencil, stencil_bits, targets: [bool; 2]| {
+        let build = |fragment: &str, stencil, stencil_bits, marks, targets: [bool; 2]| {
             let writes_depth = stencil == wgpu::CompareFunction::Always;
             let target = |written: bool| {
                 Some(wgpu::ColorTargetState {
@@ -160,6 +163,7 @@ impl Surfaces {
                 writes_depth,
                 stencil,
                 stencil_bits,
+                marks,
                 targets: &targets.map(target),
             };
             usage.pipelines(device, layout, &module, depth_format, samples)
@@ -169,12 +173,18 @@ impl Surfaces {
             wgpu::CompareFunction::Equal,
             wgpu::CompareFunction::NotEqual,
         );
+        // Coplanar surfaces land on the same depth, and each sample is to get a light once.
+        let nothing = (wgpu::StencilOperation::Keep, 0);
+        let added = (wgpu::StencilOperation::Invert, ADDED);
+        let taken = (wgpu::StencilOperation::Zero, VIRTUAL_SHADOW);
+        let reaching = REAL_HIDES | ADDED;
+        let (ambient, light) = (["ambient_on_real", "ambient_on_virtual"], "light_on_real");
         Self {
-            ambient_on_real: build("ambient_on_real", always, 0, [true, true]),
-            ambient_on_virtual: build("ambient_on_virtual", always, 0, [true, true]),
-            light_reaching_real: build("light_on_real", equal, REAL_HIDES, [true, false]),
-            light_hidden_from_real: build("light_on_real", other, VIRTUAL_SHADOW, [false, true]),
-            light_on_virtual: build("light_on_virtual", equal, SHADOW, [false, true]),
+            ambient_on_real: build(ambient[0], always, 0, nothing, [true, true]),
+            ambient_on_virtual: build(ambient[1], always, 0, nothing, [true, true]),
+            light_reaching_real: build(light, equal, reaching, added, [true, false]),
+            light_hidden_from_real: build(light, other, VIRTUAL_SHADOW, taken, [false, true]),
+            light_on_virtual: build("light_on_virtual", equal, SHADOW, nothing, [false, true]),
         }
     }
 }

@@ -2,6 +2,8 @@
 //! & Kilgard 2002; the passes are those of Haller, Drab & Hartmann 2003, section 3.2).
 //! Reads depth. Writes the stencil (stencil.rs).
 
+use std::ops::Range;
+
 use glam::Vec4;
 
 use crate::geometry::counting::Counting;
@@ -33,6 +35,8 @@ pub(super) struct Volumes {
 struct Counters {
     depth_pass: wgpu::RenderPipeline,
     depth_fail: wgpu::RenderPipeline,
+    /// For triangles that are wound the other way round.
+    depth_fail_turned: wgpu::RenderPipeline,
 }
 
 impl Counters {
@@ -43,18 +47,25 @@ impl Counters {
         counted: &Counted<'_>,
         part: &DrawnPart,
     ) {
-        let (pipeline, count) = match counted.counting {
-            Counting::DepthPass => (&self.depth_pass, part.side_index_count),
-            Counting::DepthFail => (&self.depth_fail, part.indices.count),
-        };
-        pass.set_pipeline(pipeline);
         pass.set_stencil_reference(0);
         set_scissor(pass, counted.scissor);
         for (index, (group, offset)) in groups.iter().zip(counted.offsets).enumerate() {
             pass.set_bind_group(index as u32, *group, &[offset]);
         }
         pass.set_vertex_buffer(0, counted.vertices.slice(..));
-        part.indices.draw(pass, count);
+        let [sides, outward, turned] = part.ends;
+        match counted.counting {
+            Counting::DepthPass => {
+                pass.set_pipeline(&self.depth_pass);
+                part.indices.draw(pass, 0..sides);
+            }
+            Counting::DepthFail => {
+                pass.set_pipeline(&self.depth_fail);
+                part.indices.draw(pass, 0..outward);
+                pass.set_pipeline(&self.depth_fail_turned);
+                part.indices.draw(pass, outward..turned);
+            }
+        }
     }
 }
 
@@ -129,7 +140,7 @@ impl Volumes {
             step_mode: wgpu::VertexStepMode::Vertex,
             attributes: &wgpu::vertex_attr_array![0 => Float32x4],
         });
-        let counter = |among: Among, counting: Counting| {
+        let counter = |among: Among, counting: Counting, turned: bool| {
             // Counts what lies in front or what does not: entering and leaving change sides.
             let face = |in_front, otherwise| wgpu::StencilFaceState {
                 compare: match among {
@@ -146,8 +157,11 @@ impl Volumes {
                     Counting::DepthFail => otherwise,
                 },
             };
-            let more = wgpu::StencilOperation::IncrementWrap;
-            let less = wgpu::StencilOperation::DecrementWrap;
+            let mut more = wgpu::StencilOperation::IncrementWrap;
+            let mut less = wgpu::StencilOperation::DecrementWrap;
+            if turned {
+                std::mem::swap(&mut more, &mut less);
+            }
             build(
                 layout,
                 "place",
@@ -164,8 +178,9 @@ impl Volumes {
             )
         };
         let counters = |among| Counters {
-            depth_pass: counter(among, Counting::DepthPass),
-            depth_fail: counter(among, Counting::DepthFail),
+            depth_pass: counter(among, Counting::DepthPass, false),
+            depth_fail: counter(among, Counting::DepthFail, false),
+            depth_fail_turned: counter(among, Counting::DepthFail, true),
         };
         let no_bindings = shader::no_bindings(device);
         let keep = |role| {
@@ -275,9 +290,10 @@ struct DrawnPart {
     silhouette: Silhouette,
     layers: u32,
     counted_apart: bool,
-    /// Triangles of the sides, then those of the caps where they are needed.
+    /// Triangles of the sides, then those of the caps where they are needed, the turned ones last.
     indices: IndexBuffer,
-    side_index_count: u32,
+    /// Where in the indices the sides end, the caps, and the turned caps.
+    ends: [u32; 3],
     has_caps: bool,
 }
 
@@ -303,7 +319,7 @@ impl Volume {
                     layers: part.layers,
                     counted_apart: part.counted_apart,
                     indices: buffers.pop().unwrap_or_default(),
-                    side_index_count: 0,
+                    ends: [0; 3],
                     has_caps: false,
                 })
                 .collect();
@@ -313,9 +329,13 @@ impl Volume {
         for part in &mut self.parts {
             if changed || (needs_caps && !part.has_caps) {
                 let mut indices = caster.side_indices(&part.silhouette);
-                part.side_index_count = indices.len() as u32;
+                part.ends = [indices.len() as u32; 3];
                 if needs_caps {
-                    indices.extend(caster.cap_indices(&part.silhouette));
+                    let [outward, turned] = caster.cap_indices(&part.silhouette);
+                    indices.extend(outward);
+                    part.ends[1] = indices.len() as u32;
+                    indices.extend(turned);
+                    part.ends[2] = indices.len() as u32;
                 }
                 part.has_caps = needs_caps;
                 part.indices.write(&gpu.device, &gpu.queue, &indices);
@@ -363,11 +383,11 @@ impl IndexBuffer {
         }
     }
 
-    /// Draws the first `count` indices with whatever pipeline, view and vertices are set.
-    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, count: u32) {
-        if let (Some(buffer), 1..) = (&self.buffer, count) {
+    /// Draws some of the indices with whatever pipeline, view and vertices are set.
+    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, range: Range<u32>) {
+        if let (Some(buffer), false) = (&self.buffer, range.is_empty()) {
             pass.set_index_buffer(buffer.slice(..), wgpu::IndexFormat::Uint32);
-            pass.draw_indexed(0..count, 0, 0..1);
+            pass.draw_indexed(range, 0, 0..1);
         }
     }
 }
