@@ -19,6 +19,8 @@ use crate::geometry::solid::is_solid;
 use crate::light::bounce::Reflector;
 use crate::scene::{Object, Scene};
 
+use super::uniforms::NEAR_M;
+
 /// What kind of thing a surface belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Role {
@@ -73,6 +75,19 @@ pub(super) struct Thing {
     pub casts: bool,
     /// Triangles that stand for it where others' shadows fall on it.
     pub receivers: Vec<[DVec3; 3]>,
+}
+
+impl Thing {
+    /// Whether an eye in the anchor's space may see the inside of this level.
+    pub fn shows_inside(&self, level: usize, eye: DVec3) -> bool {
+        // The near plane may cut what the eye is just out of.
+        let reach = DVec3::splat(2.0 * f64::from(NEAR_M));
+        let around = Bounds {
+            low: self.bounds.low - reach,
+            high: self.bounds.high + reach,
+        };
+        !self.levels[level].is_solid || around.contains(eye)
+    }
 }
 
 /// A thing in one level of detail.

@@ -35,6 +35,7 @@ struct Shadow {
     /// Of the thing that casts it.
     level: usize,
     counting: Option<Counting>,
+    shows_inside: bool,
     scissor: Option<PixelRect>,
     /// Corners of its batch: a virtual caster's triangles that face the light, and those that lie in its own shadow and
     /// that smooth shading lights all the same.
@@ -151,6 +152,7 @@ impl Casters {
                     _ => Counting::DepthFail,
                 };
                 shadow.counting = Some(counting);
+                shadow.shows_inside = thing.shows_inside(level, placed.eye);
                 let made_for = MadeFor {
                     level,
                     light,
@@ -181,6 +183,7 @@ impl Casters {
                 Some(Counted {
                     volume: &shadow.volume,
                     counting: shadow.counting?,
+                    shows_inside: shadow.shows_inside,
                     scissor: shadow.scissor?,
                     offsets: [views.offset(thing.anchor), self.lights.offset(slot)],
                     vertices: &thing.levels[shadow.level].caster.as_ref()?.vertices,

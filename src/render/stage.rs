@@ -1,21 +1,20 @@
 //! What stands where in a frame: the scene's surfaces, casters and lights on the GPU, and how passes draw them.
 
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 
-use crate::geometry::bounds::Bounds;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
 use crate::light::Light;
 use crate::scene::Scene;
 
-use super::anchor_geometry::{AnchorGeometry, Role, SurfaceBatch, Thing, ThingLevel};
+use super::anchor_geometry::{AnchorGeometry, Role, SurfaceBatch, Thing};
 use super::casters::{Casters, Facing};
 use super::detail::chosen_levels;
 use super::gpu::Gpu;
 use super::indirect::Indirect;
 use super::surfaces::Sided;
 use super::touched::{Touched, everywhere, touched_by_virtual};
-use super::uniforms::{LightSource, NEAR_M, UniformRow, View, uniform_entry};
+use super::uniforms::{LightSource, UniformRow, View, uniform_entry};
 use super::volumes::{Among, Volumes};
 
 /// The scene as the present frame has it.
@@ -180,7 +179,7 @@ impl Stage {
             self.set_batch(pass, batch);
             for (number, thing) in self.of_batch(batch) {
                 let level = &thing.levels[self.levels[number]];
-                pass.set_pipeline(pipelines.pipeline(self.shows_inside(thing, level)));
+                pass.set_pipeline(pipelines.pipeline(self.shows_inside(number, thing)));
                 pass.draw_indexed(level.range.clone(), 0, 0..1);
             }
         }
@@ -202,7 +201,7 @@ impl Stage {
                 self.set_batch(pass, batch);
                 let level = &thing.levels[self.levels[number]];
                 let whole = &level.range;
-                pass.set_pipeline(pipelines.pipeline(self.shows_inside(thing, level)));
+                pass.set_pipeline(pipelines.pipeline(self.shows_inside(number, thing)));
                 let Some(lit) = self.casters.lit(thing, number, light) else {
                     if !thing.casts {
                         pass.draw_indexed(whole.clone(), 0, 0..1);
@@ -242,18 +241,14 @@ impl Stage {
         batches.filter(move |b| b.role == role && has_pose(0) && has_pose(b.anchor))
     }
 
-    /// Whether the camera may see a triangle's inside.
-    fn shows_inside(&self, thing: &Thing, level: &ThingLevel) -> bool {
-        let camera_from_anchor = self.camera_from_anchor[thing.anchor];
-        let outside = |camera_from_anchor: DAffine3| {
-            let eye = camera_from_anchor.inverse().translation;
-            // The near plane may cut what the eye is just out of.
-            let reach = DVec3::splat(2.0 * f64::from(NEAR_M));
-            let Bounds { low, high } = thing.bounds;
-            let (low, high) = (low - reach, high + reach);
-            !Bounds { low, high }.contains(eye)
-        };
-        !(level.is_solid && camera_from_anchor.is_some_and(outside))
+    /// Whether the camera may see the inside of a thing of a batch that has a pose.
+    fn shows_inside(&self, number: usize, thing: &Thing) -> bool {
+        self.camera_from_anchor[thing.anchor].is_none_or(|camera_from_anchor| {
+            thing.shows_inside(
+                self.levels[number],
+                camera_from_anchor.inverse().translation,
+            )
+        })
     }
 
     /// The things of a batch, with their numbers.

@@ -33,10 +33,22 @@ pub(super) struct Volumes {
 }
 
 struct Counters {
+    /// Sides in front of the surface.
     depth_pass: wgpu::RenderPipeline,
+    /// Sides behind it.
     depth_fail: wgpu::RenderPipeline,
-    /// For triangles that are wound the other way round.
-    depth_fail_turned: wgpu::RenderPipeline,
+    /// Caps behind it: as they are wound, and turned over.
+    caps: [Caps; 2],
+}
+
+struct Caps {
+    /// Where the camera may see either side of them.
+    seen: wgpu::RenderPipeline,
+    /// Where the caster is a solid that the camera sees from outside: the caps that face it,
+    facing: wgpu::RenderPipeline,
+    /// and those that do not. They lie behind what is seen, whatever rounding makes of their depth along the rim, where
+    /// the surface draws its outside alone.
+    averted: wgpu::RenderPipeline,
 }
 
 impl Counters {
@@ -61,9 +73,19 @@ impl Counters {
             }
             Counting::DepthFail => {
                 pass.set_pipeline(&self.depth_fail);
-                part.indices.draw(pass, 0..outward);
-                pass.set_pipeline(&self.depth_fail_turned);
-                part.indices.draw(pass, outward..turned);
+                part.indices.draw(pass, 0..sides);
+                let ranges = [sides..outward, outward..turned];
+                for (caps, range) in self.caps.iter().zip(ranges) {
+                    if counted.shows_inside {
+                        pass.set_pipeline(&caps.seen);
+                        part.indices.draw(pass, range);
+                    } else {
+                        pass.set_pipeline(&caps.facing);
+                        part.indices.draw(pass, range.clone());
+                        pass.set_pipeline(&caps.averted);
+                        part.indices.draw(pass, range);
+                    }
+                }
             }
         }
     }
@@ -73,6 +95,8 @@ impl Counters {
 pub(super) struct Counted<'a> {
     pub volume: &'a Volume,
     pub counting: Counting,
+    /// Whether the camera may see the caster's inside.
+    pub shows_inside: bool,
     /// Pixels outside which it cannot matter.
     pub scissor: PixelRect,
     /// Dynamic offsets of its anchor's view and of the light in its anchor.
@@ -103,7 +127,7 @@ impl Volumes {
                 })
             })
             .collect();
-        let build = |layout, entry_point, buffers: &[_], depth_compare, stencil| {
+        let build = |layout, entry_point, buffers: &[_], depth_compare, cull_mode, stencil| {
             device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some("shadow volumes"),
                 layout: Some(layout),
@@ -113,7 +137,10 @@ impl Volumes {
                     compilation_options: Default::default(),
                     buffers,
                 },
-                primitive: wgpu::PrimitiveState::default(),
+                primitive: wgpu::PrimitiveState {
+                    cull_mode,
+                    ..Default::default()
+                },
                 depth_stencil: Some(wgpu::DepthStencilState {
                     format: depth_format,
                     depth_write_enabled: Some(false),
@@ -140,7 +167,10 @@ impl Volumes {
             step_mode: wgpu::VertexStepMode::Vertex,
             attributes: &wgpu::vertex_attr_array![0 => Float32x4],
         });
-        let counter = |among: Among, counting: Counting, turned: bool| {
+        // Strict: a lit surface lies at the very depth of its own cap, which then counts as not in front. No bias is
+        // needed, and none is right.
+        let in_front = wgpu::CompareFunction::Greater;
+        let counter = |among: Among, counting, turned: bool, compare, cull_mode| {
             // Counts what lies in front or what does not: entering and leaving change sides.
             let face = |in_front, otherwise| wgpu::StencilFaceState {
                 compare: match among {
@@ -166,9 +196,8 @@ impl Volumes {
                 layout,
                 "place",
                 std::slice::from_ref(&corners),
-                // Strict: a lit surface lies at the very depth of its own cap, which then counts as not in front. No
-                // bias is needed, and none is right.
-                wgpu::CompareFunction::Greater,
+                compare,
+                cull_mode,
                 wgpu::StencilState {
                     front: face(more, less),
                     back: face(less, more),
@@ -177,10 +206,20 @@ impl Volumes {
                 },
             )
         };
-        let counters = |among| Counters {
-            depth_pass: counter(among, Counting::DepthPass, false),
-            depth_fail: counter(among, Counting::DepthFail, false),
-            depth_fail_turned: counter(among, Counting::DepthFail, true),
+        let counters = |among| {
+            let caps = |turned, compare, cull_mode| {
+                counter(among, Counting::DepthFail, turned, compare, cull_mode)
+            };
+            let (back, front) = (Some(wgpu::Face::Back), Some(wgpu::Face::Front));
+            Counters {
+                depth_pass: counter(among, Counting::DepthPass, false, in_front, None),
+                depth_fail: counter(among, Counting::DepthFail, false, in_front, None),
+                caps: [false, true].map(|turned| Caps {
+                    seen: caps(turned, in_front, None),
+                    facing: caps(turned, in_front, back),
+                    averted: caps(turned, wgpu::CompareFunction::Never, front),
+                }),
+            }
         };
         let no_bindings = shader::no_bindings(device);
         let keep = |role| {
@@ -194,6 +233,7 @@ impl Volumes {
                 "whole_picture",
                 &[],
                 wgpu::CompareFunction::Always,
+                None,
                 wgpu::StencilState {
                     front: counted,
                     back: counted,
