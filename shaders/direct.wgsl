@@ -19,12 +19,11 @@ fn depth_alone() {}
 @fragment
 fn hidden_on_real(surface: Surface, @builtin(front_facing) outside: bool) -> @location(0) vec4f {
     let taken = irradiance(surface, outside);
-    // A surface that loses nothing keeps its picture bit for bit.
-    if all(taken <= vec3f(0.0)) {
-        discard;
-    }
+    let recorded = undistorted(vec2i(surface.clip.xy));
     let gain = surface.indirect / max(surface.indirect + taken, vec3f(1e-6));
-    return vec4f(srgb_from_linear(linear_from_srgb(undistorted(vec2i(surface.clip.xy))) * gain), 1.0);
+    // A surface that loses nothing keeps its picture bit for bit. (To discard it would make the stencil wait for it.)
+    let loses = any(taken > vec3f(0.0));
+    return vec4f(select(recorded, srgb_from_linear(linear_from_srgb(recorded) * gain), loses), 1.0);
 }
 
 struct AmbientSurface {

@@ -4,6 +4,9 @@
 @group(0) @binding(0) var<uniform> view: View;
 @group(1) @binding(0) var<uniform> light: LightSource;
 
+// Set when the shader is built: whether any material has a glossy layer.
+override GLOSSY: bool = true;
+
 struct Corner {
     @location(0) position: vec3f,
     @location(1) normal: vec3f,
@@ -56,7 +59,7 @@ fn radiance(surface: Surface, outside: bool) -> vec3f {
 fn reflectance(albedo: vec3f, roughness: f32, normal: vec3f, to_light: vec3f, to_camera: vec3f) -> vec3f {
     let diffuse = albedo / PI;
     let cos_light = dot(normal, to_light);
-    if roughness <= 0.0 || cos_light <= 0.0 {
+    if !GLOSSY || roughness <= 0.0 || cos_light <= 0.0 {
         return diffuse;
     }
     let cos_camera = max(dot(normal, to_camera), 1e-3);

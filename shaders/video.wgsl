@@ -5,18 +5,20 @@ struct Lens {
     center_px: vec2f,
     // k1 k2 p1 p2 of OpenCV, then k3.
     distortion: vec4f,
-    k3: f32,
-    // 0 where the lens is perfect: the picture then passes untouched.
-    distorts: u32,
     size_px: vec2u,
+    k3: f32,
+    padding: u32,
 }
+
+// Set when the shader is built; a perfect lens lets the picture pass untouched.
+override DISTORTS: bool = true;
 
 @group(2) @binding(0) var<uniform> lens: Lens;
 @group(2) @binding(1) var video: texture_2d<f32>;
 
 // The recorded picture where an ideal lens would have seen this pixel, still sRGB-encoded.
 fn undistorted(pixel: vec2i) -> vec3f {
-    if lens.distorts == 0u {
+    if !DISTORTS {
         return textureLoad(video, pixel, 0).rgb;
     }
     let ideal = (vec2f(pixel) - lens.center_px) / lens.focal_px;

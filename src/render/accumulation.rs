@@ -1,6 +1,6 @@
 //! Where several lights or samples are added up before the composite: targets and pipelines.
 
-use super::background::extent;
+use super::background::{Background, extent};
 use super::composite::Composite;
 use super::gpu::Gpu;
 use super::surfaces::{LIGHT_FORMAT, Surfaces};
@@ -21,16 +21,16 @@ impl Accumulation {
     pub fn new(
         gpu: &Gpu,
         layout: &wgpu::PipelineLayout,
-        video_layout: &wgpu::BindGroupLayout,
-        size_px: [u32; 2],
+        background: &Background,
         samples: u32,
+        glossy: bool,
     ) -> Self {
         let device = &gpu.device;
         let target = |label, format, usage| {
             device
                 .create_texture(&wgpu::TextureDescriptor {
                     label: Some(label),
-                    size: extent(size_px),
+                    size: extent(background.size_px),
                     mip_level_count: 1,
                     sample_count: samples,
                     dimension: wgpu::TextureDimension::D2,
@@ -44,7 +44,7 @@ impl Accumulation {
         let reaching = target("reaching", LIGHT_FORMAT, read);
         let change = target("change", LIGHT_FORMAT, read);
         Self {
-            surfaces: Surfaces::new(device, layout, gpu.depth_format, samples),
+            surfaces: Surfaces::new(device, layout, gpu.depth_format, samples, glossy),
             volumes: Volumes::new(
                 device,
                 layout,
@@ -52,7 +52,7 @@ impl Accumulation {
                 samples,
                 &[LIGHT_FORMAT, LIGHT_FORMAT],
             ),
-            composite: Composite::new(device, samples, video_layout, [&reaching, &change]),
+            composite: Composite::new(device, samples, background, [&reaching, &change]),
             depth_stencil: target(
                 "depth and stencil",
                 gpu.depth_format,

@@ -15,8 +15,9 @@ pub(super) const PICTURE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba
 /// The recorded picture and the lens through which it was seen.
 pub(super) struct Background {
     recorded: wgpu::Texture,
-    size_px: [u32; 2],
-    distorts: bool,
+    pub size_px: [u32; 2],
+    /// Whether the lens does.
+    pub distorts: bool,
     pipeline: wgpu::RenderPipeline,
     /// Layout of [`Background::group`].
     pub layout: wgpu::BindGroupLayout,
@@ -39,6 +40,7 @@ impl Background {
                 | wgpu::TextureUsages::COPY_SRC,
             view_formats: &[],
         });
+        let distorts = intrinsics.distortion != [0.0; 5];
         let lens = UniformRow::new::<Lens>(device, "lens", 1);
         lens.write(&gpu.queue, 0, &Lens::new(intrinsics));
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
@@ -90,11 +92,11 @@ impl Background {
                 &module,
                 "background",
                 PICTURE_FORMAT,
-                &[],
+                &[("DISTORTS", f64::from(distorts))],
             ),
             recorded,
             size_px: intrinsics.size_px,
-            distorts: intrinsics.distortion != [0.0; 5],
+            distorts,
             layout,
             group,
         }

@@ -1,7 +1,7 @@
 //! The composite of video and virtual light where several samples or lights are added up (see composite.wgsl).
 //! Reads the recorded picture, `reaching` and `change`. Writes the picture that is shown, or the `gain` layer.
 
-use super::background::PICTURE_FORMAT;
+use super::background::{Background, PICTURE_FORMAT};
 use super::shader;
 
 /// Format of the gain layer.
@@ -19,7 +19,7 @@ impl Composite {
     pub fn new(
         device: &wgpu::Device,
         samples: u32,
-        video_layout: &wgpu::BindGroupLayout,
+        background: &Background,
         [reaching, change]: [&wgpu::TextureView; 2],
     ) -> Self {
         let text = include_str!("../../shaders/composite.wgsl");
@@ -54,10 +54,13 @@ impl Composite {
         });
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("composite"),
-            bind_group_layouts: &[Some(&layout), None, Some(video_layout)],
+            bind_group_layouts: &[Some(&layout), None, Some(&background.layout)],
             immediate_size: 0,
         });
-        let constants = [("SAMPLES", f64::from(samples))];
+        let constants = [
+            ("SAMPLES", f64::from(samples)),
+            ("DISTORTS", f64::from(background.distorts)),
+        ];
         let build = |entry_point, format| {
             shader::whole_picture(
                 device,

@@ -23,11 +23,13 @@ pub(super) struct Direct {
 }
 
 impl Direct {
-    /// `layout` is that of geometry with the video in group 2.
+    /// `layout` is that of geometry with the video in group 2. Last come whether any material is glossy and the lens
+    /// distorts: what a scene does not have costs nothing.
     pub fn new(
         device: &wgpu::Device,
         layout: &wgpu::PipelineLayout,
         depth_stencil: &wgpu::Texture,
+        [glossy, distorts]: [bool; 2],
     ) -> Self {
         let depth_format = depth_stencil.format();
         let module = shader::module(device, "direct", include_str!("../../shaders/direct.wgsl"));
@@ -44,6 +46,10 @@ impl Direct {
                     blend: None,
                     write_mask: written,
                 })],
+                constants: &[
+                    ("GLOSSY", f64::from(glossy)),
+                    ("DISTORTS", f64::from(distorts)),
+                ],
             };
             usage.pipelines(device, layout, &module, depth_format, 1)
         };

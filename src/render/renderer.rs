@@ -36,6 +36,8 @@ pub struct Renderer {
     gpu: Arc<Gpu>,
     size_px: [u32; 2],
     samples: u32,
+    /// Whether any material is.
+    glossy: bool,
     stage: Stage,
     background: Background,
     geometry_layout: wgpu::PipelineLayout,
@@ -94,6 +96,10 @@ impl Renderer {
         let [view, light] = &stage.layouts;
         let geometry_layout = layout("geometry", &[Some(view), Some(light)]);
         let samples = scene.shadows.samples;
+        let glossy = scene.virtuals.iter().any(|object| {
+            let mut materials = object.materials.iter();
+            materials.any(|material| material.roughness.is_some())
+        });
         let is_direct = samples == 1 && scene.lights.len() == 1;
         Ok(Self {
             direct: is_direct.then(|| {
@@ -106,11 +112,15 @@ impl Renderer {
                     gpu.depth_format,
                     wgpu::TextureUsages::empty(),
                 );
-                Direct::new(device, &layout, &depth_stencil)
+                Direct::new(
+                    device,
+                    &layout,
+                    &depth_stencil,
+                    [glossy, background.distorts],
+                )
             }),
-            accumulation: (!is_direct).then(|| {
-                Accumulation::new(&gpu, &geometry_layout, &background.layout, size_px, samples)
-            }),
+            accumulation: (!is_direct)
+                .then(|| Accumulation::new(&gpu, &geometry_layout, &background, samples, glossy)),
             picture: texture(
                 "picture",
                 PICTURE_FORMAT,
@@ -125,6 +135,7 @@ impl Renderer {
             touched: None,
             size_px,
             samples,
+            glossy,
             stage,
             background,
             geometry_layout,
@@ -374,13 +385,12 @@ impl Renderer {
     fn read_gain(&mut self, touched: PixelRect) -> Result<Vec<[f32; 3]>, RenderError> {
         let gpu = Arc::clone(&self.gpu);
         let accumulation = self.accumulation.take().unwrap_or_else(|| {
-            let video = &self.background.layout;
             Accumulation::new(
                 &gpu,
                 &self.geometry_layout,
-                video,
-                self.size_px,
+                &self.background,
                 self.samples,
+                self.glossy,
             )
         });
         let mut encoder = gpu.device.create_command_encoder(&Default::default());

@@ -58,6 +58,8 @@ pub(super) struct Use<'a> {
     /// What a drawn sample does to these bits of the stencil.
     pub marks: (wgpu::StencilOperation, u32),
     pub targets: &'a [Option<wgpu::ColorTargetState>],
+    /// Of the fragment shader.
+    pub constants: &'a [(&'a str, f64)],
 }
 
 impl Use<'_> {
@@ -111,7 +113,10 @@ impl Use<'_> {
                 fragment: Some(wgpu::FragmentState {
                     module,
                     entry_point: Some(self.fragment),
-                    compilation_options: Default::default(),
+                    compilation_options: wgpu::PipelineCompilationOptions {
+                        constants: self.constants,
+                        ..Default::default()
+                    },
                     targets: self.targets,
                 }),
                 multiview_mask: None,
@@ -131,6 +136,7 @@ impl Surfaces {
         layout: &wgpu::PipelineLayout,
         depth_format: wgpu::TextureFormat,
         samples: u32,
+        glossy: bool,
     ) -> Self {
         let module = shader::module(
             device,
@@ -165,6 +171,7 @@ impl Surfaces {
                 stencil_bits,
                 marks,
                 targets: &targets.map(target),
+                constants: &[("GLOSSY", f64::from(glossy))],
             };
             usage.pipelines(device, layout, &module, depth_format, samples)
         };

@@ -92,9 +92,9 @@ pub(super) struct Lens {
     pub focal_px: [f32; 2],
     pub center_px: [f32; 2],
     pub distortion: [f32; 4],
-    pub k3: f32,
-    pub distorts: u32,
     pub size_px: [u32; 2],
+    pub k3: f32,
+    pub padding: u32,
 }
 
 impl Lens {
@@ -104,9 +104,9 @@ impl Lens {
             focal_px: intrinsics.focal_px.as_vec2().to_array(),
             center_px: intrinsics.center_px.as_vec2().to_array(),
             distortion: [k1, k2, p1, p2],
-            k3,
-            distorts: u32::from(intrinsics.distortion != [0.0; 5]),
             size_px: intrinsics.size_px,
+            k3,
+            padding: 0,
         }
     }
 }
@@ -218,7 +218,7 @@ mod tests {
         assert_twins!(&volumes, CastingLight, place_in_anchor, end_in_anchor);
         let video = include_str!("../../shaders/video.wgsl");
         assert_twins!(
-            video, Lens, focal_px, center_px, distortion, k3, distorts, size_px
+            video, Lens, focal_px, center_px, distortion, size_px, k3, padding
         );
     }
 }
