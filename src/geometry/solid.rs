@@ -117,8 +117,9 @@ fn meet(indices: [[u32; 3]; 2], corners: [&[DVec3; 3]; 2]) -> bool {
 
 /// Whether a segment meets a triangle; true in doubt.
 fn crosses(from: DVec3, to: DVec3, [a, b, c]: &[DVec3; 3]) -> bool {
-    /// Rounding of single precision, as a part of the lengths involved.
-    const DOUBT: f64 = 1e-6;
+    /// Rounding, as a part of the lengths involved. What single precision makes of a mesh's places does not count: a
+    /// part that it turns inside out is too small for a pixel.
+    const DOUBT: f64 = 1e-12;
     let normal = (*b - *a).cross(*c - *a);
     let (above, below) = (normal.dot(from - *a), normal.dot(to - *a));
     let doubt = DOUBT * normal.length() * ((from - *a).length() + (to - *a).length());
