@@ -6,12 +6,12 @@
 //! *signed multiplicity* keep a side. The sum is closed whichever triangles cast, and counts at each point how many of
 //! them lie between it and the light.
 
-use std::collections::HashMap;
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3, Vec4};
 
 use super::bounds::Bounds;
+use super::soup::{by_edge, edge_uses, unbalanced_edges};
 
 /// Where a light is, in the mesh's own space.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -102,37 +102,31 @@ const KEEPING_IN_EDGES: usize = 100;
 impl Caster {
     /// Prepares a mesh whose equal positions share one index. Any soup of triangles will do.
     pub fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Self {
-        let mut around: HashMap<[u32; 2], Vec<(u32, bool)>> =
-            HashMap::with_capacity(3 * triangles.len() / 2);
-        let mut order = Vec::with_capacity(3 * triangles.len() / 2);
-        for (triangle, &[a, b, c]) in triangles.iter().enumerate() {
-            for (from, to) in [(a, b), (b, c), (c, a)] {
-                let ends = [from.min(to), from.max(to)];
-                let known = around.entry(ends).or_insert_with(|| {
-                    order.push(ends);
-                    Vec::with_capacity(2)
-                });
-                known.push((triangle as u32, from < to));
-            }
-        }
-        let mut paired_edges = Vec::with_capacity(order.len());
+        let uses = edge_uses(triangles.iter().copied());
+        let closed = !triangles.is_empty() && unbalanced_edges(&uses) == 0;
+        let mut paired_edges = Vec::with_capacity(uses.len() / 2);
         let mut odd_edges = Vec::new();
-        let mut closed = !triangles.is_empty();
-        for ends in order {
-            let triangles = around.remove(&ends).unwrap_or_default();
-            match triangles[..] {
-                [(forward, true), (backward, false)] | [(backward, false), (forward, true)] => {
+        for around in by_edge(&uses) {
+            let ends = around[0].ends();
+            match around {
+                [one, other] if one.forward != other.forward => {
+                    let (forward, backward) = match one.forward {
+                        true => (one.triangle, other.triangle),
+                        false => (other.triangle, one.triangle),
+                    };
                     paired_edges.push(PairedEdge {
                         ends,
                         forward,
                         backward,
                     });
                 }
-                _ => {
-                    let forward = triangles.iter().filter(|(_, forward)| *forward).count();
-                    closed &= 2 * forward == triangles.len();
-                    odd_edges.push(OddEdge { ends, triangles });
-                }
+                _ => odd_edges.push(OddEdge {
+                    ends,
+                    triangles: around
+                        .iter()
+                        .map(|used| (used.triangle, used.forward))
+                        .collect(),
+                }),
             }
         }
         let planes = planes(&positions, &triangles, &paired_edges);
@@ -547,6 +541,7 @@ fn planes(positions: &[Vec3], triangles: &[[u32; 3]], edges: &[PairedEdge]) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::HashMap;
 
     const FACING: [i8; 2] = [1, 0];
     const ALL: [i8; 2] = [1, -1];

@@ -8,9 +8,12 @@ use crate::geometry::levels::is_close_enough;
 use crate::geometry::outline_scale::{View, outline_px_per_m, shadow_px_per_m};
 use crate::light::Light;
 
-use super::anchor_geometry::{Thing, ThingLevel};
+use super::anchor_geometry::{Role, Thing, ThingLevel};
 use super::touched::light_place;
 use super::uniforms::NEAR_M;
+
+/// So far may the line move at which a real thing turns away from a light.
+const LARGEST_REAL_FACET_PX: f64 = 1.0;
 
 /// For each thing the index of its level, for the camera and all lights.
 pub(super) fn chosen_levels(
@@ -46,7 +49,8 @@ pub(super) fn chosen_levels(
             let Some(bounds) = Bounds::around(thing.bounds.corners().map(place)) else {
                 return 0;
             };
-            let mut px_per_m = outline_px_per_m(&bounds, &view);
+            let outline_px_per_m = outline_px_per_m(&bounds, &view);
+            let mut px_per_m = outline_px_per_m;
             for &light in lights.iter().filter(|_| thing.casts) {
                 // Its shadow on itself moves no farther than its outline, as the light sees it.
                 let others = things
@@ -64,7 +68,10 @@ pub(super) fn chosen_levels(
             let close_enough = |level: &ThingLevel| {
                 let (max_px, mean_px) =
                     (level.max_error_m * px_per_m, level.mean_error_m * px_per_m);
-                is_close_enough(max_px, mean_px, max_silhouette_error_px)
+                // The video shows a real thing's own shading, and where that ends its own shadow has to.
+                let facets_show = thing.role == Role::Real
+                    && level.largest_facet_m * outline_px_per_m > LARGEST_REAL_FACET_PX;
+                is_close_enough(max_px, mean_px, max_silhouette_error_px) && !facets_show
             };
             thing.levels.iter().rposition(close_enough).unwrap_or(0)
         })
