@@ -220,16 +220,12 @@ fn virtual_shadow_on_a_real_one() {
 #[test]
 fn open_mesh_of_a_public_collection() {
     let folder = project_file("../shared/stability");
-    let folder = [folder, "/work/shared/stability".into()]
-        .into_iter()
-        .find(|folder| folder.join("teapot.json").is_file());
-    match folder {
-        Some(folder) => {
-            let (layers, exact) = hold_row(&folder, "teapot");
-            hold_mask("teapot", &layers, &exact);
-        }
-        None => eprintln!("skipped: ../shared/stability/teapot.json is not here"),
+    if !folder.join("teapot.json").is_file() {
+        eprintln!("skipped: ../shared/stability/teapot.json is not here");
+        return;
     }
+    let (layers, exact) = hold_row(&folder, "teapot");
+    hold_mask("teapot", &layers, &exact);
 }
 
 // What that folder has no scene for.
