@@ -57,6 +57,7 @@ pub struct Caster {
     /// All other edges.
     odd_edges: Vec<OddEdge>,
     bounds: Option<Bounds>,
+    /// Whether each edge is passed as often one way as the other, so that a way that enters the mesh leaves it again.
     closed: bool,
 }
 
@@ -139,11 +140,6 @@ impl Caster {
             odd_edges,
             closed,
         }
-    }
-
-    /// Whether each edge is passed as often one way as the other, so that a way that enters the mesh leaves it again.
-    pub fn is_closed(&self) -> bool {
-        self.closed
     }
 
     /// The box around it, metres; `None` without triangles.
@@ -623,7 +619,7 @@ mod tests {
         let mut triangles = closed.triangles[..9].to_vec();
         triangles.extend([[0, 1, 7], [7, 1, 3]]);
         let open = Caster::new(closed.positions.clone(), triangles);
-        assert!(closed.is_closed() && !open.is_closed());
+        assert!(closed.closed && !open.closed);
         for caster in [&closed, &open] {
             for light in lights() {
                 for casting in [FACING, ALL, SURPLUS] {
