@@ -20,12 +20,14 @@ test: setup
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps
 	cargo test --release
 
-# How the cost of shadow volumes grows, and whether silhouettes belong on the CPU: figures in out/.
+# How the cost of shadow volumes grows, whether silhouettes belong on the CPU, and what phantoms that are off do: figures
+# in out/.
 bench: setup
 	mkdir -p out
 	cargo bench --bench volumes -- --csv $(CURDIR)/out/volumes.csv
 	cargo bench --bench volumes -- --sweep --csv $(CURDIR)/out/volumes_sweep.csv
 	cargo bench --bench extrusion -- --csv $(CURDIR)/out/extrusion.csv
+	cargo bench --bench displacement -- --csv $(CURDIR)/out/displacement.csv
 
 # Beside what a user would run instead, where ../shared/peers has it.
 bench-volumes: setup

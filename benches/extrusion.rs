@@ -561,7 +561,9 @@ impl OnCpu {
         for part in self.caster.parts(light, Casting::Facing, MOST_LAYERS) {
             indices.extend(self.caster.side_indices(&part.silhouette));
             if counting == Counting::DepthFail {
-                indices.extend(self.caster.cap_indices(&part.silhouette));
+                let [outward, turned] = self.caster.cap_indices(&part.silhouette);
+                indices.extend(outward);
+                indices.extend(turned.chunks(3).flat_map(|t| [t[0], t[2], t[1]]));
             }
         }
         let made = Instant::now();

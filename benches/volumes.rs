@@ -72,7 +72,7 @@ fn main() -> Result<()> {
     };
     let mut csv = Csv::new(
         options.csv,
-        "what,value,triangles,lights,casters,width,height,samples,median_ms,p10_ms,p90_ms",
+        "what,value,triangles,lights,casters,width,height,samples,median_ms,p10_ms,p90_ms,wrong_pct",
     );
     println!(
         "{:24} {:>9} {:>9} {:>7} {:>7} {:>8} {:>8} {:>9} {:>12}",
@@ -114,6 +114,7 @@ fn main() -> Result<()> {
             &total.median_ms,
             &total.p10_ms,
             &total.p90_ms,
+            &wrong_pct(&gpu, &stage)?,
         ]);
     }
     csv.finish()
@@ -188,6 +189,7 @@ fn four_scenes(only: Option<&str>, samples: u32) -> Result<Vec<Case>> {
 /// The torus of 2,500 triangles over the table, one thing varied at a time.
 fn sweep(samples: u32) -> Vec<Case> {
     const TRIANGLES: usize = 2_500;
+    const DETAILED_TRIANGLES: usize = 40_000;
     let one = |triangles| vec![(torus(triangles, 1.0), TORUS_CENTER_M)];
     let case = |what, value: String, stage| Case { what, value, stage };
     let mut cases = Vec::new();
@@ -227,11 +229,51 @@ fn sweep(samples: u32) -> Vec<Case> {
         let stage = Stage::new(one(TRIANGLES), &[LIGHT_M], size_px, samples);
         cases.push(case("pixels", (size_px[0] * size_px[1]).to_string(), stage));
     }
+    // The same with all triangles and with ever less detail: what it saves, and what of the shadow it moves.
+    for error_px in [0.0, 0.25, 0.5, 1.0, 2.0, 4.0] {
+        let mut stage = Stage::new(one(DETAILED_TRIANGLES), &[LIGHT_M], SIZE_PX, samples);
+        stage.scene.shadows.max_silhouette_error_px = error_px;
+        cases.push(case("silhouette_error_px", error_px.to_string(), stage));
+    }
     for samples in [1, 4] {
         let stage = Stage::new(one(TRIANGLES), &[LIGHT_M], SIZE_PX, samples);
         cases.push(case("samples", samples.to_string(), stage));
     }
     cases
+}
+
+/// Real pixels, in percent, whose shadow is another than with all triangles; the mean of some poses.
+fn wrong_pct(gpu: &Arc<Gpu>, stage: &Stage) -> Result<f64> {
+    const POSES: usize = 8;
+    if stage.scene.shadows.max_silhouette_error_px == 0.0 {
+        return Ok(0.0);
+    }
+    const REAL: u8 = 100;
+    let masks = |max_silhouette_error_px| -> Result<Vec<(u8, u8)>> {
+        let mut scene = stage.scene.clone();
+        scene.shadows.max_silhouette_error_px = max_silhouette_error_px;
+        let mut renderer = Renderer::new(Arc::clone(gpu), &scene, stage.intrinsics)?;
+        let mut masks = Vec::new();
+        for pose in 0..POSES {
+            renderer.draw(&stage.poses(15 * pose), Shown::Composite);
+            let layers = renderer.layers()?;
+            let roles = layers.role.into_iter().cycle();
+            masks.extend(roles.zip(layers.shadow.concat()));
+        }
+        Ok(masks)
+    };
+    let (ours, exact) = (
+        masks(stage.scene.shadows.max_silhouette_error_px)?,
+        masks(0.0)?,
+    );
+    let pairs = ours.iter().zip(&exact);
+    let real = pairs.filter(|((role, _), (exactly, _))| *role == REAL && *exactly == REAL);
+    let (mut wrong, mut all) = (0, 0);
+    for ((_, one), (_, other)) in real {
+        wrong += usize::from(one != other);
+        all += 1;
+    }
+    Ok(100.0 * wrong as f64 / all.max(1) as f64)
 }
 
 /// A frame from the call to the last pixel, and its parts; what the GPU's own timestamps tell, where it has them.

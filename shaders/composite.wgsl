@@ -18,29 +18,30 @@ struct Change {
 }
 
 fn change(pixel: vec2i) -> Change {
-    var gain = vec3f(0.0);
     var added = vec3f(0.0);
-    var kept = 0.0;
-    var touched = false;
+    var light = vec3f(0.0);
+    var taken = vec3f(0.0);
+    var modelled = 0.0;
+    var seeming = 0.0;
     for (var sample = 0; sample < SAMPLES; sample++) {
         let change = textureLoad(changes, pixel, sample);
-        if change.a > 0.5 {
-            added += change.rgb;
-            touched = true;
-            continue;
-        }
-        kept += 1.0;
-        // A surface that loses nothing keeps its picture bit for bit.
-        if all(change.rgb <= vec3f(0.0)) {
-            gain += 1.0;
-            continue;
-        }
-        let light = textureLoad(reaching, pixel, sample).rgb;
-        gain += max(light - change.rgb, vec3f(0.0)) / max(light, vec3f(1e-6));
-        touched = true;
+        let is_virtual = change.a > 0.5;
+        let reaches = textureLoad(reaching, pixel, sample);
+        let is_real = !is_virtual && reaches.a > 0.5;
+        added += select(vec3f(0.0), change.rgb, is_virtual);
+        seeming += select(0.0, 1.0, is_virtual);
+        light += select(vec3f(0.0), reaches.rgb, is_real);
+        taken += select(vec3f(0.0), change.rgb, is_real);
+        modelled += select(0.0, 1.0, is_real);
     }
+    // The video's pixel is what all its light made of it: of that, and not sample by sample, a part is taken. Where a
+    // virtual shadow meets a real one, the samples in the real one have less to lose, and made less of the pixel.
+    let gain = select(vec3f(1.0), max(light - taken, vec3f(0.0)) / max(light, vec3f(1e-6)), taken > vec3f(0.0));
+    let kept = f32(SAMPLES) - seeming;
     let weight = 1.0 / f32(SAMPLES);
-    return Change(gain * weight, added * weight, kept * weight, touched);
+    // A surface that loses nothing keeps its picture bit for bit.
+    let touched = seeming > 0.0 || any(taken > vec3f(0.0));
+    return Change((gain * modelled + kept - modelled) * weight, added * weight, kept * weight, touched);
 }
 
 @fragment

@@ -32,8 +32,8 @@ struct AmbientSurface {
 }
 
 @vertex
-fn place_in_ambient_light(@location(0) position: vec3f, @location(2) albedo: vec3f, @location(4) indirect: vec3f) -> AmbientSurface {
-    return AmbientSurface(clip_from_point(view, vec4f(position, 1.0)), albedo / PI * indirect);
+fn place_in_ambient_light(@location(0) position: vec3f, @location(2) material: vec4f, @location(3) indirect: vec3f) -> AmbientSurface {
+    return AmbientSurface(clip_from_point(view, vec4f(position, 1.0)), material.rgb / PI * indirect);
 }
 
 @fragment
@@ -43,6 +43,6 @@ fn ambient_on_virtual(surface: AmbientSurface) -> @location(0) vec4f {
 
 @fragment
 fn light_on_virtual(surface: Surface, @builtin(front_facing) outside: bool) -> @location(0) vec4f {
-    let ambient = surface.albedo / PI * surface.indirect;
+    let ambient = surface.material.rgb / PI * surface.indirect;
     return vec4f(srgb_from_linear(ambient + radiance(surface, outside)), 1.0);
 }

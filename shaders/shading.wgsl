@@ -10,9 +10,9 @@ override GLOSSY: bool = true;
 struct Corner {
     @location(0) position: vec3f,
     @location(1) normal: vec3f,
-    @location(2) albedo: vec3f,
-    @location(3) roughness: f32,
-    @location(4) indirect: vec3f,
+    // Albedo, and the roughness of a glossy layer or 0.
+    @location(2) material: vec4f,
+    @location(3) indirect: vec3f,
 }
 
 struct Surface {
@@ -20,10 +20,9 @@ struct Surface {
     // Centroid: at the edge of a triangle the pixel's centre may lie outside it.
     @location(0) @interpolate(perspective, centroid) point_in_camera: vec3f,
     @location(1) @interpolate(perspective, centroid) normal_in_camera: vec3f,
-    @location(2) @interpolate(flat) albedo: vec3f,
-    @location(3) @interpolate(flat) roughness: f32,
+    @location(2) @interpolate(flat) material: vec4f,
     // Irradiance from the surroundings, lights aside (light::bounce).
-    @location(4) @interpolate(perspective, centroid) indirect: vec3f,
+    @location(3) @interpolate(perspective, centroid) indirect: vec3f,
 }
 
 @vertex
@@ -33,8 +32,7 @@ fn place(corner: Corner) -> Surface {
         clip_from_point(view, point),
         (view.camera_from_anchor * point).xyz,
         (view.camera_from_anchor * vec4f(corner.normal, 0.0)).xyz,
-        corner.albedo,
-        corner.roughness,
+        corner.material,
         corner.indirect,
     );
 }
@@ -50,7 +48,7 @@ fn radiance(surface: Surface, outside: bool) -> vec3f {
     let arriving = incidence(light, surface.point_in_camera);
     let normal = normalize(surface.normal_in_camera) * select(-1.0, 1.0, outside);
     let to_camera = normalize(-surface.point_in_camera);
-    let reflected = reflectance(surface.albedo, surface.roughness, normal, arriving.direction, to_camera);
+    let reflected = reflectance(surface.material.rgb, surface.material.a, normal, arriving.direction, to_camera);
     return arriving.irradiance * max(dot(normal, arriving.direction), 0.0) * reflected;
 }
 

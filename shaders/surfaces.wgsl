@@ -16,7 +16,7 @@ fn ambient_on_real(surface: Surface) -> Light {
 
 @fragment
 fn ambient_on_virtual(surface: Surface) -> Light {
-    return Light(vec4f(0.0), vec4f(surface.albedo / PI * surface.indirect, 1.0));
+    return Light(vec4f(0.0), vec4f(surface.material.rgb / PI * surface.indirect, 1.0));
 }
 
 // Once where the light reaches the surface in the video, and once where virtual things then hide it.

@@ -1,11 +1,13 @@
-//! Depth-pass is taken where it gives what depth-fail gives: the same bits of picture and layers from everywhere.
+//! Ways to one picture: depth-pass is taken where it gives what depth-fail gives, bit for bit, and one light and one sample
+//! are shaded straight into the picture as they would be by way of sums.
 
 mod common;
 
 use common::random::{Random, random_camera, random_stage};
-use common::{Stage, look_at, project_file, stability_row};
+use common::{Stage, look_at, project_file, stability_row, sun};
 use glam::{DAffine3, DVec2, DVec3};
 use gnomon::geometry::camera::Intrinsics;
+use gnomon::light::Light;
 use gnomon::scene::Counting;
 
 /// Holds what both ways draw against each other, camera by camera.
@@ -60,4 +62,29 @@ fn a_flight_through_a_shadow_looks_the_same_counted_either_way() {
         })
         .collect();
     hold("base", &mut stage, row.view.intrinsics, &cameras);
+}
+
+/// A second light that gives nothing makes the renderer add up.
+#[test]
+fn one_light_and_one_sample_need_no_sums() {
+    for seed in 0..12 {
+        let mut random = Random::new(500 + seed);
+        let (mut stage, places, intrinsics) = random_stage(&mut random, seed % 2 == 0);
+        let light = stage.scene.lights[0];
+        let camera = random_camera(&mut random, &places, &[light]);
+        let mut shoot = |lights: Vec<Light>| {
+            stage.scene.shadows.samples = 1;
+            stage.scene.lights = lights;
+            let mut renderer = stage.renderer(intrinsics);
+            stage.shoot(&mut renderer, camera)
+        };
+        let (direct, layers) = shoot(vec![light]);
+        let (summed, with_dark) = shoot(vec![light, sun([0.3, 0.2, -1.0], [0.0; 3])]);
+        assert!(layers.gain == with_dark.gain && layers.role == with_dark.role);
+        // Half precision holds a linear value to 2⁻¹¹ of it, less than a level anywhere.
+        let pairs = direct.chunks(4).zip(summed.chunks(4));
+        let colors = pairs.flat_map(|(one, other)| one[..3].iter().zip(&other[..3]));
+        let worst = colors.map(|(one, other)| one.abs_diff(*other)).max();
+        assert!(worst <= Some(1), "seed {seed}: {worst:?} levels apart");
+    }
 }

@@ -802,7 +802,7 @@ fn mesh_that_no_one_welds_or_winds_as_the_real_table() {
         .unwelded(&mut random, 0.0)
         .flipped(|index| index % 2 == 0);
     let ring = Thing::made(fine_torus()).at(PLACE);
-    for light in [desk_lamp(), lamp([-0.3, 0.1, 0.06], [0.3; 3])] {
+    for light in [desk_lamp(), lamp([-0.3, 0.1, 0.2], [0.3; 3])] {
         let stage = stage_with(
             &[Thing::made(sheet.clone()), crate_()],
             std::slice::from_ref(&ring),

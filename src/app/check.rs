@@ -4,7 +4,9 @@ use std::fmt::Write;
 
 use glam::DVec3;
 
+use crate::geometry::levels::{Level, levels};
 use crate::geometry::mesh::MeshReport;
+use crate::geometry::outline_scale::largest_stretch;
 use crate::light::Light;
 use crate::scene::{Anchor, DetectorKind, Object, Scene, Technique};
 
@@ -34,13 +36,14 @@ pub fn summary(scene: &Scene) -> String {
         "tracked",
         scene.anchors.iter().enumerate().map(anchor_row).collect(),
     );
+    let with_levels = scene.shadows.max_silhouette_error_px > 0.0;
     rows(
         &mut text,
         "phantoms",
         scene
             .phantoms
             .iter()
-            .map(|object| object_row(object, &scene.anchors))
+            .map(|object| object_row(object, &scene.anchors, with_levels))
             .collect(),
     );
     rows(
@@ -49,7 +52,7 @@ pub fn summary(scene: &Scene) -> String {
         scene
             .virtuals
             .iter()
-            .map(|object| object_row(object, &scene.anchors))
+            .map(|object| object_row(object, &scene.anchors, with_levels))
             .collect(),
     );
     rows(
@@ -81,6 +84,11 @@ pub fn summary(scene: &Scene) -> String {
             budget.unwrap_or_default()
         ),
     );
+    let detail = match scene.shadows.max_silhouette_error_px {
+        0.0 => "all triangles at any distance".to_owned(),
+        error_px => format!("silhouettes within {} px", short(error_px)),
+    };
+    line(&mut text, "detail", &detail);
     for warning in warnings(scene) {
         line(&mut text, "warning", &warning);
     }
@@ -188,11 +196,14 @@ fn anchor_row((number, anchor): (usize, &Anchor)) -> Row {
     }
 }
 
-fn object_row(object: &Object, anchors: &[Anchor]) -> Row {
+fn object_row(object: &Object, anchors: &[Anchor], with_levels: bool) -> Row {
     let anchor = anchors
         .get(object.anchor)
         .map_or("nothing", |anchor| &anchor.name);
     let mut notes = mesh_notes(&object.mesh_report);
+    if with_levels {
+        notes.extend(levels_note(object));
+    }
     if object.anchor_from_object.matrix3.determinant() < 0.0 {
         notes.push("mirrored".to_owned());
     }
@@ -229,6 +240,26 @@ fn mesh_cell(object: &Object) -> String {
     } else {
         format!("{size}, {topology}")
     }
+}
+
+/// The coarser versions that may stand for an object where no pixel tells, and how far they are measured to be off.
+fn levels_note(object: &Object) -> Option<String> {
+    /// The finest say enough.
+    const SHOWN: usize = 4;
+    let stretch = largest_stretch(&object.anchor_from_object);
+    let levels = levels(&object.mesh);
+    let level = |level: &Level| {
+        let [most, mean] =
+            [level.max_error_m, level.mean_error_m].map(|error_m| error_m * stretch * 1000.0);
+        let triangles = level.mesh.triangles.len();
+        format!("{triangles} at {most:.3}/{mean:.3}")
+    };
+    let mut shown: Vec<String> = levels.iter().take(SHOWN).map(level).collect();
+    if levels.len() > SHOWN {
+        shown.push(format!("{} more", levels.len() - SHOWN));
+    }
+    let list = shown.join(", ");
+    (!levels.is_empty()).then(|| format!("from afar at largest/mean error in mm: {list}"))
 }
 
 /// What was found in a mesh and done to it.

@@ -13,6 +13,7 @@ use meshopt::{SimplifyOptions, VertexDataAdapter, simplify_with_attributes_and_l
 use super::bounds::Bounds;
 use super::mesh::Mesh;
 use super::normals::face_normal;
+use super::soup::{by_edge, edge_uses};
 use super::surface_distance::Surface;
 
 /// A coarser version of a mesh. Its vertices are some of the mesh's.
@@ -25,6 +26,9 @@ pub struct Level {
     pub max_error_m: f64,
     /// How far outlines are off on the average over their length and over all directions of view, metres.
     pub mean_error_m: f64,
+    /// Longest edge of the triangles that bend smoothly into a neighbour, metres: so far may the line move at which they
+    /// turn away from a light.
+    pub largest_facet_m: f64,
 }
 
 /// Below so many triangles a mesh has no levels: there is nothing to save.
@@ -89,11 +93,33 @@ fn chain(mesh: &Mesh, fewest: usize) -> Vec<Level> {
             return levels;
         }
         levels.push(Level {
+            largest_facet_m: largest_facet_m(&coarse),
             mesh: coarse,
             max_error_m: distance.max_m,
             mean_error_m: distance.outline_mean_m,
         });
     }
+}
+
+fn largest_facet_m(mesh: &Mesh) -> f64 {
+    /// Cosines of the angles between neighbours' normals: from flat to a crease, 0.3° to 30°.
+    const BENDS: std::ops::Range<f64> = 0.866..0.999_986;
+    let normal = |triangle: u32| face_normal(&mesh.positions, mesh.triangles[triangle as usize]);
+    let longest_edge_m = |triangle: u32| {
+        let corner = |index: u32| mesh.positions[index as usize].as_dvec3();
+        let [a, b, c] = mesh.triangles[triangle as usize].map(corner);
+        a.distance(b).max(b.distance(c)).max(c.distance(a))
+    };
+    let uses = edge_uses(mesh.triangles.iter().copied());
+    by_edge(&uses)
+        .filter_map(|around| match around {
+            [one, other] => Some([one.triangle, other.triangle]),
+            _ => None,
+        })
+        .filter(|[one, other]| BENDS.contains(&normal(*one).dot(normal(*other))))
+        .flatten()
+        .map(longest_edge_m)
+        .fold(0.0, f64::max)
 }
 
 /// A mesh as the simplifier takes it. A vertex is a position with a material, so that materials keep their borders;
@@ -701,6 +727,17 @@ mod tests {
             levels(&sphere(7, |_| 1.0)).is_empty(),
             "too small to be worth it"
         );
+    }
+
+    #[test]
+    fn facets_are_measured_where_a_surface_bends_and_nowhere_else() {
+        let around = 36;
+        for level in levels(&torus(around, 16)) {
+            let facet_m = level.largest_facet_m;
+            assert!(facet_m > 0.0 && facet_m < 4.0, "{facet_m}");
+        }
+        let flat = chain(&cut_box(8), 12);
+        assert!(flat.iter().all(|level| level.largest_facet_m == 0.0));
     }
 
     #[test]

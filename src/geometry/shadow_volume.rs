@@ -6,12 +6,12 @@
 //! *signed multiplicity* keep a side. The sum is closed whichever triangles cast, and counts at each point how many of
 //! them lie between it and the light.
 
-use std::collections::HashMap;
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3, Vec4};
 
 use super::bounds::Bounds;
+use super::soup::{by_edge, edge_uses, unbalanced_edges};
 
 /// Where a light is, in the mesh's own space.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -102,37 +102,31 @@ const KEEPING_IN_EDGES: usize = 100;
 impl Caster {
     /// Prepares a mesh whose equal positions share one index. Any soup of triangles will do.
     pub fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Self {
-        let mut around: HashMap<[u32; 2], Vec<(u32, bool)>> =
-            HashMap::with_capacity(3 * triangles.len() / 2);
-        let mut order = Vec::with_capacity(3 * triangles.len() / 2);
-        for (triangle, &[a, b, c]) in triangles.iter().enumerate() {
-            for (from, to) in [(a, b), (b, c), (c, a)] {
-                let ends = [from.min(to), from.max(to)];
-                let known = around.entry(ends).or_insert_with(|| {
-                    order.push(ends);
-                    Vec::with_capacity(2)
-                });
-                known.push((triangle as u32, from < to));
-            }
-        }
-        let mut paired_edges = Vec::with_capacity(order.len());
+        let uses = edge_uses(triangles.iter().copied());
+        let closed = !triangles.is_empty() && unbalanced_edges(&uses) == 0;
+        let mut paired_edges = Vec::with_capacity(uses.len() / 2);
         let mut odd_edges = Vec::new();
-        let mut closed = !triangles.is_empty();
-        for ends in order {
-            let triangles = around.remove(&ends).unwrap_or_default();
-            match triangles[..] {
-                [(forward, true), (backward, false)] | [(backward, false), (forward, true)] => {
+        for around in by_edge(&uses) {
+            let ends = around[0].ends();
+            match around {
+                [one, other] if one.forward != other.forward => {
+                    let (forward, backward) = match one.forward {
+                        true => (one.triangle, other.triangle),
+                        false => (other.triangle, one.triangle),
+                    };
                     paired_edges.push(PairedEdge {
                         ends,
                         forward,
                         backward,
                     });
                 }
-                _ => {
-                    let forward = triangles.iter().filter(|(_, forward)| *forward).count();
-                    closed &= 2 * forward == triangles.len();
-                    odd_edges.push(OddEdge { ends, triangles });
-                }
+                _ => odd_edges.push(OddEdge {
+                    ends,
+                    triangles: around
+                        .iter()
+                        .map(|used| (used.triangle, used.forward))
+                        .collect(),
+                }),
             }
         }
         let planes = planes(&positions, &triangles, &paired_edges);
@@ -296,38 +290,62 @@ impl Caster {
         [outward, turned]
     }
 
-    /// Triangles that face the light.
-    pub fn facing(&self, light: LightPlace) -> impl Iterator<Item = usize> {
-        let heights = self.light_heights(light).enumerate();
-        heights
-            .filter(|(_, height)| *height > 0.0)
-            .map(|(triangle, _)| triangle)
-    }
-
-    /// Triangles turned away from the light, so that they lie in their own shadow, of whose `corner_normals` some face
-    /// it: smooth shading lights them up to the line where the normals turn away.
-    pub fn terminator(
+    /// Sorts the triangles by what the light can give to the side of them that an eye sees: at `eye`, or anywhere outside
+    /// of a closed mesh. Smooth shading goes by `corner_normals`, where there are any.
+    pub fn lit_triangles(
         &self,
         light: LightPlace,
-        corner_normals: &[[Vec3; 3]],
-    ) -> impl Iterator<Item = usize> {
+        eye: Option<DVec3>,
+        corner_normals: Option<&[[Vec3; 3]]>,
+    ) -> LitTriangles {
         let (light_point, light_weight) = light.homogeneous();
         let (light_point, light_weight) = (light_point.as_vec3(), light_weight as f32);
-        let faces_light = move |vertex: u32, normal: Vec3| {
-            let place = self.positions[vertex as usize];
-            normal.dot(light_point - place * light_weight) > 0.0
-        };
-        let heights = self.light_heights(light).enumerate();
-        heights
-            .filter(|(_, height)| *height <= 0.0)
-            .map(|(triangle, _)| triangle)
-            .filter(move |&triangle| {
-                let mut corners = self.triangles[triangle]
-                    .iter()
-                    .zip(&corner_normals[triangle]);
-                corners.any(|(&vertex, &normal)| faces_light(vertex, normal))
+        let smoothly_lit = |triangle: usize, side: f32| {
+            let normals = corner_normals.map(|normals| normals[triangle]);
+            let corners = normals.iter().flatten().zip(self.triangles[triangle]);
+            corners.into_iter().any(|(normal, vertex)| {
+                let place = self.positions[vertex as usize];
+                side * normal.dot(light_point - place * light_weight) > 0.0
             })
+        };
+        // What is seen from inside mostly lies behind the rest: drawn after it, it need not be shaded.
+        let mut sorted = LitTriangles::default();
+        let mut from_inside = LitTriangles::default();
+        for (triangle, height) in self.light_heights(light).enumerate() {
+            let (normal, offset) = self.planes[triangle];
+            let side = match eye {
+                Some(eye) if normal.dot(eye) < offset => -1.0,
+                _ => 1.0,
+            };
+            let sorted = match side > 0.0 {
+                true => &mut sorted,
+                false => &mut from_inside,
+            };
+            if side * height > 0.0 {
+                sorted.facing.push(triangle);
+            } else if smoothly_lit(triangle, side as f32) {
+                sorted.terminator.push(triangle);
+            } else {
+                sorted.averted.push(triangle);
+            }
+        }
+        sorted.facing.extend(from_inside.facing);
+        sorted.terminator.extend(from_inside.terminator);
+        sorted.averted.extend(from_inside.averted);
+        sorted
     }
+}
+
+/// The triangles of a mesh, by what a light can give to their visible side.
+#[derive(Debug, Clone, Default)]
+pub struct LitTriangles {
+    /// They face it: lit where nothing hides it.
+    pub facing: Vec<usize>,
+    /// They are turned away, so that they lie in their own shadow, but some of their corners' normals face it: smooth
+    /// shading lights them up to the line where the normals turn away.
+    pub terminator: Vec<usize>,
+    /// All others: never lit.
+    pub averted: Vec<usize>,
 }
 
 impl Silhouette {
@@ -523,6 +541,7 @@ fn planes(positions: &[Vec3], triangles: &[[u32; 3]], edges: &[PairedEdge]) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::HashMap;
 
     const FACING: [i8; 2] = [1, 0];
     const ALL: [i8; 2] = [1, -1];
@@ -819,7 +838,16 @@ mod tests {
                 caster.triangles[*triangle].map(|index| caster.positions[index as usize].z);
             corners.iter().sum::<f32>() % 3.0 != 0.0
         };
-        let terminator: Vec<usize> = caster.terminator(light, &normals).collect();
-        assert_eq!(terminator, (0..12).filter(is_side).collect::<Vec<_>>());
+        let sorted = caster.lit_triangles(light, None, Some(&normals));
+        assert_eq!(
+            sorted.terminator,
+            (0..12).filter(is_side).collect::<Vec<_>>()
+        );
+        assert_eq!((sorted.facing.len(), sorted.averted.len()), (2, 2));
+        // An eye below sees the bottom from outside, and from inside the top, which the light sees from the other side, and
+        // the walls, which it sees from the same.
+        let below = Some(DVec3::new(0.5, 0.5, -3.0));
+        let sorted = caster.lit_triangles(light, below, None);
+        assert_eq!((sorted.facing.len(), sorted.averted.len()), (8, 4));
     }
 }

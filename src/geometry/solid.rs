@@ -4,6 +4,7 @@
 use glam::DVec3;
 
 use super::mesh::Mesh;
+use super::soup::Sets;
 
 /// Whether each part of a mesh bounds a solid; parts may cut or hold one another. In doubt it does not.
 pub fn is_solid(mesh: &Mesh) -> bool {
@@ -24,35 +25,21 @@ pub fn is_solid(mesh: &Mesh) -> bool {
     part_of.iter().all(|&part| volumes_m3[part] > 0.0) && !cuts_itself(mesh, &corners, &part_of)
 }
 
-/// For each triangle a number that all triangles joined to it by edges share.
+/// For each triangle the number of the first of those that it is joined to.
 fn parts(mesh: &Mesh) -> Vec<usize> {
     // Triangles that share a vertex without an edge are rare, and to take them for one part is to doubt more.
-    let mut root: Vec<usize> = (0..mesh.positions.len()).collect();
-    fn find(root: &mut [usize], mut vertex: usize) -> usize {
-        while root[vertex] != vertex {
-            root[vertex] = root[root[vertex]];
-            vertex = root[vertex];
-        }
-        vertex
+    let mut joined = Sets::new(mesh.positions.len());
+    for &[a, b, c] in &mesh.triangles {
+        joined.join(a, b);
+        joined.join(a, c);
     }
-    for [a, b, c] in &mesh.triangles {
-        for other in [b, c] {
-            let (one, other) = (
-                find(&mut root, *a as usize),
-                find(&mut root, *other as usize),
-            );
-            root[one] = other;
-        }
-    }
-    let mut number_of = vec![usize::MAX; root.len()];
+    let mut number_of = vec![usize::MAX; mesh.positions.len()];
     let triangles = mesh.triangles.iter().enumerate();
     triangles
         .map(|(triangle, [a, _, _])| {
-            let part = find(&mut root, *a as usize);
-            if number_of[part] == usize::MAX {
-                number_of[part] = triangle;
-            }
-            number_of[part]
+            let number = &mut number_of[joined.least(*a) as usize];
+            *number = (*number).min(triangle);
+            *number
         })
         .collect()
 }

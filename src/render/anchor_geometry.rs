@@ -43,14 +43,14 @@ struct Corner {
 pub(super) const CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
     array_stride: size_of::<Corner>() as u64,
     step_mode: wgpu::VertexStepMode::Vertex,
-    attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x3, 3 => Float32],
+    attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x4],
 };
 
 /// Vertex layout of [`SurfaceBatch::indirect`].
 pub(super) const INDIRECT_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
     array_stride: size_of::<Vec3>() as u64,
     step_mode: wgpu::VertexStepMode::Vertex,
-    attributes: &wgpu::vertex_attr_array![4 => Float32x3],
+    attributes: &wgpu::vertex_attr_array![3 => Float32x3],
 };
 
 /// All surfaces of one role on one anchor.
@@ -97,6 +97,8 @@ pub(super) struct ThingLevel {
     /// How far outlines are off at most and on the average, metres in the anchor's space.
     pub max_error_m: f64,
     pub mean_error_m: f64,
+    /// Of the triangles that bend smoothly into one another, metres in the anchor's space; 0 for the mesh itself.
+    pub largest_facet_m: f64,
     /// Whether it bounds a solid, so that only its outside is seen from outside.
     pub is_solid: bool,
     pub caster: Option<LevelCaster>,
@@ -173,15 +175,17 @@ fn thing(
         true => levels(&object.mesh),
         false => Vec::new(),
     };
-    let itself = (Cow::Borrowed(&object.mesh), 0.0, 0.0);
+    let itself = (Cow::Borrowed(&object.mesh), [0.0; 3]);
     let coarser = coarser.into_iter().map(|level| {
-        let [max_error_m, mean_error_m] = [level.max_error_m, level.mean_error_m];
-        (Cow::Owned(level.mesh), max_error_m, mean_error_m)
+        let lengths_m = [level.max_error_m, level.mean_error_m, level.largest_facet_m];
+        (Cow::Owned(level.mesh), lengths_m)
     });
     let mut receivers = Vec::new();
     let levels = std::iter::once(itself)
         .chain(coarser)
-        .map(|(mesh, max_error_m, mean_error_m)| {
+        .map(|(mesh, lengths_m)| {
+            let [max_error_m, mean_error_m, largest_facet_m] =
+                lengths_m.map(|length_m| length_m * stretch);
             let positions = positions_in_anchor(object, &mesh);
             let corner = |index: u32| positions[index as usize].as_dvec3();
             receivers = mesh.triangles.iter().map(|t| t.map(corner)).collect();
@@ -205,8 +209,9 @@ fn thing(
                 is_solid: is_solid(&mesh),
                 caster: object.casts.then(of_casting),
                 range: 3 * first as u32..3 * shared.triangles.len() as u32,
-                max_error_m: max_error_m * stretch,
-                mean_error_m: mean_error_m * stretch,
+                max_error_m,
+                mean_error_m,
+                largest_facet_m,
             }
         })
         .collect();

@@ -1,7 +1,5 @@
 //! What takes light away: the volumes of each caster and light, and how each is counted in the present frame.
 
-use std::ops::Range;
-
 use glam::{DAffine3, DVec3};
 
 use crate::geometry::bounds::HalfSpace;
@@ -37,23 +35,19 @@ struct Shadow {
     counting: Option<Counting>,
     shows_inside: bool,
     scissor: Option<PixelRect>,
-    /// Corners of its batch: a virtual caster's triangles that face the light, and those that lie in its own shadow and
-    /// that smooth shading lights all the same.
-    facing: IndexBuffer,
-    terminator: IndexBuffer,
+    /// A virtual caster's own surface, and what it is sorted for.
+    lit: Lit,
+    lit_for: Option<(usize, LightPlace, Option<DVec3>)>,
 }
 
-/// The part of a virtual caster's surface that a light may reach.
-pub(super) struct Lit<'a> {
-    pub facing: Facing<'a>,
-    pub terminator: &'a IndexBuffer,
-}
-
-/// Triangles that a light may reach if nothing hides it.
-pub(super) enum Facing<'a> {
-    /// A part of the batch's own indices.
-    Whole(Range<u32>),
-    Listed(&'a IndexBuffer),
+/// A virtual caster's surface by what a light can give it ([`LitTriangles`]), as corners of its batch.
+///
+/// [`LitTriangles`]: crate::geometry::shadow_volume::LitTriangles
+#[derive(Default)]
+pub(super) struct Lit {
+    pub facing: IndexBuffer,
+    pub terminator: IndexBuffer,
+    pub averted: IndexBuffer,
 }
 
 impl Casters {
@@ -158,10 +152,13 @@ impl Casters {
                     light,
                     casting: caster.caster.casting(light, placed.eye),
                 };
-                let volume = &mut shadow.volume;
-                let changed = volume.update(gpu, &caster.caster, made_for, counting);
-                if changed && thing.role == Role::Virtual {
-                    shadow.list_lit(gpu, caster, light);
+                shadow
+                    .volume
+                    .update(gpu, &caster.caster, made_for, counting);
+                if thing.role == Role::Virtual {
+                    // From outside, all that is seen of a closed mesh is seen from its outer side.
+                    let eye = (made_for.casting == Casting::All).then_some(placed.eye);
+                    shadow.sort_lit(gpu, caster, (level, light, eye));
                 }
             }
         }
@@ -191,17 +188,10 @@ impl Casters {
             })
     }
 
-    /// The part of a virtual thing's surface that the light may reach; `None` where it casts nothing that is seen.
-    pub fn lit<'a>(&'a self, thing: &Thing, number: usize, light: usize) -> Option<Lit<'a>> {
-        let shadow = &self.shadows[light][number];
-        shadow.scissor?;
-        Some(Lit {
-            facing: match shadow.volume.casting() {
-                Casting::Facing => Facing::Listed(&shadow.facing),
-                Casting::All => Facing::Whole(thing.levels[shadow.level].range.clone()),
-            },
-            terminator: &shadow.terminator,
-        })
+    /// The surface of a virtual thing; `None` where it casts nothing that is seen.
+    pub fn lit(&self, number: usize, light: usize) -> Option<&Lit> {
+        let shadow = self.shadows.get(light)?.get(number)?;
+        shadow.scissor.map(|_| &shadow.lit)
     }
 
     /// The light in the anchors of casters.
@@ -211,22 +201,30 @@ impl Casters {
 }
 
 impl Shadow {
-    /// Lists what the light may reach of the caster's own surface. Where all triangles cast, all may be lit, for the
-    /// camera may see either side of them.
-    fn list_lit(&mut self, gpu: &Gpu, caster: &LevelCaster, light: LightPlace) {
-        let triangles = &caster.surface_triangles;
-        if self.volume.casting() == Casting::Facing {
-            let facing = caster.caster.facing(light);
-            let facing: Vec<u32> = facing.flat_map(|triangle| triangles[triangle]).collect();
-            self.facing.write(&gpu.device, &gpu.queue, &facing);
+    /// Sorts the caster's surface anew if what it depends on has changed: level, light and, if it matters, the eye.
+    fn sort_lit(
+        &mut self,
+        gpu: &Gpu,
+        caster: &LevelCaster,
+        lit_for: (usize, LightPlace, Option<DVec3>),
+    ) {
+        if self.lit_for == Some(lit_for) {
+            return;
         }
-        if let Some(normals) = &caster.smooth_normals {
-            let terminator = caster.caster.terminator(light, normals);
-            let terminator: Vec<u32> = terminator
-                .flat_map(|triangle| triangles[triangle])
-                .collect();
-            self.terminator.write(&gpu.device, &gpu.queue, &terminator);
+        let (_, light, eye) = lit_for;
+        let normals = caster.smooth_normals.as_deref();
+        let sorted = caster.caster.lit_triangles(light, eye, normals);
+        for (buffer, triangles) in [
+            (&mut self.lit.facing, sorted.facing),
+            (&mut self.lit.terminator, sorted.terminator),
+            (&mut self.lit.averted, sorted.averted),
+        ] {
+            let corners = triangles
+                .into_iter()
+                .flat_map(|triangle| caster.surface_triangles[triangle]);
+            buffer.write(&gpu.device, &gpu.queue, &corners.collect::<Vec<u32>>());
         }
+        self.lit_for = Some(lit_for);
     }
 }
 

@@ -6,11 +6,15 @@ use crate::geometry::bounds::Bounds;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::levels::is_close_enough;
 use crate::geometry::outline_scale::{View, outline_px_per_m, shadow_px_per_m};
+use crate::geometry::shadow_volume::LightPlace;
 use crate::light::Light;
 
-use super::anchor_geometry::{Thing, ThingLevel};
+use super::anchor_geometry::{Role, Thing, ThingLevel};
 use super::touched::light_place;
 use super::uniforms::NEAR_M;
+
+/// So far may the line move at which a real thing turns away from a light.
+const LARGEST_REAL_FACET_PX: f64 = 1.0;
 
 /// For each thing the index of its level, for the camera and all lights.
 pub(super) fn chosen_levels(
@@ -29,44 +33,118 @@ pub(super) fn chosen_levels(
         near_m: f64::from(NEAR_M),
     };
     let world_from_camera = camera_from_world.inverse();
-    let world_from = |thing: &Thing| Some(world_from_camera * camera_from_anchor[thing.anchor]?);
-    let lights: Vec<_> = lights
+    let placed: Vec<Option<Placed>> = things
+        .iter()
+        .map(|thing| {
+            let world_from_thing = world_from_camera * camera_from_anchor[thing.anchor]?;
+            let place = |point: DVec3| world_from_thing.transform_point3(point);
+            Some(Placed {
+                bounds: Bounds::around(thing.bounds.corners().map(place))?,
+                world_from_thing,
+            })
+        })
+        .collect();
+    let lights: Vec<LightPlace> = lights
         .iter()
         .map(|light| light_place(light, &DAffine3::IDENTITY))
         .collect();
     things
         .iter()
+        .zip(&placed)
         .enumerate()
-        .map(|(index, thing)| {
-            let Some(world_from_thing) = world_from(thing).filter(|_| thing.levels.len() > 1)
-            else {
+        .map(|(index, (thing, placed_thing))| {
+            let Some(Placed { bounds, .. }) = placed_thing else {
                 return 0;
             };
-            let place = |point: DVec3| world_from_thing.transform_point3(point);
-            let Some(bounds) = Bounds::around(thing.bounds.corners().map(place)) else {
+            if thing.levels.len() == 1 {
                 return 0;
-            };
-            let mut px_per_m = outline_px_per_m(&bounds, &view);
+            }
+            let outline_px_per_m = outline_px_per_m(bounds, &view);
+            let mut px_per_m = outline_px_per_m;
             for &light in lights.iter().filter(|_| thing.casts) {
                 // Its shadow on itself moves no farther than its outline, as the light sees it.
-                let others = things
-                    .iter()
-                    .enumerate()
-                    .filter(|(other, _)| *other != index);
-                for (world_from_other, other) in
-                    others.filter_map(|(_, other)| Some((world_from(other)?, other)))
-                {
-                    let place = |point: DVec3| world_from_other.transform_point3(point);
+                let others = things.iter().zip(&placed).enumerate();
+                for (_, (other, placed)) in others.filter(|(other, _)| *other != index) {
+                    let Some(placed) = placed
+                        .as_ref()
+                        .filter(|placed| may_shade(light, bounds, &placed.bounds))
+                    else {
+                        continue;
+                    };
+                    let place = |point: DVec3| placed.world_from_thing.transform_point3(point);
                     let receivers = other.receivers.iter().map(|corners| corners.map(place));
-                    px_per_m = px_per_m.max(shadow_px_per_m(&bounds, light, receivers, &view));
+                    px_per_m = px_per_m.max(shadow_px_per_m(bounds, light, receivers, &view));
                 }
             }
             let close_enough = |level: &ThingLevel| {
                 let (max_px, mean_px) =
                     (level.max_error_m * px_per_m, level.mean_error_m * px_per_m);
-                is_close_enough(max_px, mean_px, max_silhouette_error_px)
+                // The video shows a real thing's own shading, and where that ends its own shadow has to.
+                let facets_show = thing.role == Role::Real
+                    && level.largest_facet_m * outline_px_per_m > LARGEST_REAL_FACET_PX;
+                is_close_enough(max_px, mean_px, max_silhouette_error_px) && !facets_show
             };
             thing.levels.iter().rposition(close_enough).unwrap_or(0)
         })
         .collect()
+}
+
+/// Where a thing is in this frame, in world space.
+struct Placed {
+    bounds: Bounds,
+    world_from_thing: DAffine3,
+}
+
+/// Whether a shadow can fall from one box on another, told by the balls around them; true in doubt.
+fn may_shade(light: LightPlace, caster: &Bounds, receiver: &Bounds) -> bool {
+    let ball = |bounds: &Bounds| {
+        let radius = 0.5 * (bounds.high - bounds.low).length();
+        (0.5 * (bounds.low + bounds.high), radius)
+    };
+    let ((one, one_radius), (other, other_radius)) = (ball(caster), ball(receiver));
+    match light {
+        LightPlace::Along(direction) => {
+            let way = other - one;
+            let along = way.dot(direction);
+            let aside = (way - direction * along).length();
+            aside <= one_radius + other_radius && along >= -(one_radius + other_radius)
+        }
+        LightPlace::Point(light) => {
+            let (one, other) = (one - light, other - light);
+            let farther = other.length() + other_radius >= one.length() - one_radius;
+            let half_angle = |way: DVec3, radius: f64| (radius / way.length()).min(1.0).asin();
+            let apart = one.angle_between(other);
+            let angles = half_angle(one, one_radius) + half_angle(other, other_radius);
+            farther && (apart.is_nan() || angles.is_nan() || apart <= angles)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_may_shade_what_lies_behind_it_and_not_what_lies_beside_or_before() {
+        let around = |center: DVec3| Bounds {
+            low: center - 0.05,
+            high: center + 0.05,
+        };
+        let caster = around(DVec3::new(0.0, 0.0, 0.2));
+        let lamp = LightPlace::Point(DVec3::new(0.0, 0.0, 0.5));
+        let sun = LightPlace::Along(DVec3::NEG_Z);
+        for light in [lamp, sun] {
+            assert!(may_shade(light, &caster, &around(DVec3::ZERO)), "{light:?}");
+            assert!(!may_shade(light, &caster, &around(DVec3::X)), "{light:?}");
+        }
+        assert!(!may_shade(
+            lamp,
+            &caster,
+            &around(DVec3::new(0.0, 0.0, 0.45))
+        ));
+        assert!(!may_shade(sun, &caster, &around(DVec3::new(0.0, 0.0, 0.6))));
+        // A lamp within a thing lights and shades all ways.
+        let within = LightPlace::Point(DVec3::new(0.0, 0.0, 0.2));
+        assert!(may_shade(within, &caster, &around(DVec3::X)));
+    }
 }

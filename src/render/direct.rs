@@ -14,6 +14,8 @@ pub(super) struct Direct {
     pub depth_of_real: Sided,
     /// Depth and all light of virtual surfaces, as if nothing hid it.
     pub light_on_virtual: Sided,
+    /// Depth and the ambient light alone.
+    pub ambient_on_virtual: Sided,
     /// Real surfaces where virtual things hide the light.
     pub hidden_on_real: Sided,
     /// The ambient light alone on virtual surfaces that lie in more volumes than the stencil's reference says.
@@ -58,6 +60,13 @@ impl Direct {
         Self {
             depth_of_real: build("place_alone", "depth_alone", always, 0, none),
             light_on_virtual: build("place", "light_on_virtual", always, 0, all),
+            ambient_on_virtual: build(
+                "place_in_ambient_light",
+                "ambient_on_virtual",
+                always,
+                0,
+                all,
+            ),
             hidden_on_real: build("place", "hidden_on_real", less, VIRTUAL_SHADOW, all),
             shadow_on_virtual: build(
                 "place_in_ambient_light",

@@ -280,7 +280,8 @@ impl Renderer {
         pass.set_bind_group(2, &self.background.group, &[]);
         let stage = &self.stage;
         stage.draw_surfaces(&mut pass, &direct.depth_of_real, Role::Real, 0);
-        stage.draw_surfaces(&mut pass, &direct.light_on_virtual, Role::Virtual, 0);
+        let shading = [&direct.light_on_virtual, &direct.ambient_on_virtual];
+        stage.draw_virtuals(&mut pass, shading, 0);
 
         let volumes = &direct.volumes;
         if stage.count_volumes(&mut pass, volumes, Among::All, Role::Real, 0, touched) {

@@ -1,5 +1,7 @@
 //! What stands where in a frame: the scene's surfaces, casters and lights on the GPU, and how passes draw them.
 
+use std::ops::Range;
+
 use glam::DAffine3;
 
 use crate::geometry::camera::Intrinsics;
@@ -8,7 +10,7 @@ use crate::light::Light;
 use crate::scene::Scene;
 
 use super::anchor_geometry::{AnchorGeometry, Role, SurfaceBatch, Thing};
-use super::casters::{Casters, Facing};
+use super::casters::Casters;
 use super::detail::chosen_levels;
 use super::gpu::Gpu;
 use super::indirect::Indirect;
@@ -173,48 +175,65 @@ impl Stage {
         role: Role,
         light: usize,
     ) {
-        pass.set_stencil_reference(0);
-        pass.set_bind_group(1, &self.light_group, &[self.light_sources.offset(light)]);
+        self.set_light(pass, light);
         for batch in self.placed(role) {
             self.set_batch(pass, batch);
             for (number, thing) in self.of_batch(batch) {
-                let level = &thing.levels[self.levels[number]];
                 pass.set_pipeline(pipelines.pipeline(self.shows_inside(number, thing)));
-                pass.draw_indexed(level.range.clone(), 0, 0..1);
+                pass.draw_indexed(self.whole(number, thing), 0, 0..1);
             }
         }
     }
 
-    /// Draws the virtual surfaces that a light may reach: with the stencil's reference 0, and once more with 1 those that
-    /// lie in one volume, which is then their own, and that smooth shading lights all the same. Otherwise the facets
-    /// would draw a jagged line where the light ends.
+    /// Draws virtual surfaces for the first time: by `lit` what the light may reach, by `unlit` all else.
+    pub fn draw_virtuals(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        [lit, unlit]: [&Sided; 2],
+        light: usize,
+    ) {
+        self.set_light(pass, light);
+        for batch in self.placed(Role::Virtual) {
+            for (number, thing) in self.of_batch(batch) {
+                self.set_batch(pass, batch);
+                let shows_inside = self.shows_inside(number, thing);
+                pass.set_pipeline(lit.pipeline(shows_inside));
+                let Some(surface) = self.casters.lit(number, light) else {
+                    pass.draw_indexed(self.whole(number, thing), 0, 0..1);
+                    continue;
+                };
+                surface.facing.draw_all(pass);
+                surface.terminator.draw_all(pass);
+                pass.set_pipeline(unlit.pipeline(shows_inside));
+                surface.averted.draw_all(pass);
+            }
+        }
+    }
+
+    /// Draws the virtual surfaces that a light may reach: with the stencil's reference 0, and with 1 those that lie in one
+    /// volume, which is then their own, and that smooth shading lights all the same. Otherwise the facets would draw a
+    /// jagged line where the light ends.
     pub fn draw_virtuals_facing(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         pipelines: &Sided,
         light: usize,
     ) {
-        pass.set_stencil_reference(0);
-        pass.set_bind_group(1, &self.light_group, &[self.light_sources.offset(light)]);
+        self.set_light(pass, light);
         for batch in self.placed(Role::Virtual) {
             for (number, thing) in self.of_batch(batch) {
                 self.set_batch(pass, batch);
-                let level = &thing.levels[self.levels[number]];
-                let whole = &level.range;
                 pass.set_pipeline(pipelines.pipeline(self.shows_inside(number, thing)));
-                let Some(lit) = self.casters.lit(thing, number, light) else {
-                    if !thing.casts {
-                        pass.draw_indexed(whole.clone(), 0, 0..1);
+                match self.casters.lit(number, light) {
+                    Some(surface) => {
+                        surface.facing.draw_all(pass);
+                        pass.set_stencil_reference(1);
+                        surface.terminator.draw_all(pass);
+                        pass.set_stencil_reference(0);
                     }
-                    continue;
-                };
-                match lit.facing {
-                    Facing::Whole(range) => pass.draw_indexed(range, 0, 0..1),
-                    Facing::Listed(indices) => indices.draw(pass, 0..indices.count),
+                    None if thing.casts => {}
+                    None => pass.draw_indexed(self.whole(number, thing), 0, 0..1),
                 }
-                pass.set_stencil_reference(1);
-                lit.terminator.draw(pass, 0..lit.terminator.count);
-                pass.set_stencil_reference(0);
             }
         }
     }
@@ -256,6 +275,16 @@ impl Stage {
         let kind = (batch.role, batch.anchor);
         let things = self.things.iter().enumerate();
         things.filter(move |(_, thing)| (thing.role, thing.anchor) == kind)
+    }
+
+    /// A thing's triangles, in its level, among its batch's indices.
+    fn whole(&self, number: usize, thing: &Thing) -> Range<u32> {
+        thing.levels[self.levels[number]].range.clone()
+    }
+
+    fn set_light(&self, pass: &mut wgpu::RenderPass<'_>, light: usize) {
+        pass.set_stencil_reference(0);
+        pass.set_bind_group(1, &self.light_group, &[self.light_sources.offset(light)]);
     }
 
     fn set_batch(&self, pass: &mut wgpu::RenderPass<'_>, batch: &SurfaceBatch) {

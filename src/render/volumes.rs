@@ -338,14 +338,8 @@ struct DrawnPart {
 }
 
 impl Volume {
-    /// Makes anew what has changed. Returns whether what casts has.
-    pub fn update(
-        &mut self,
-        gpu: &Gpu,
-        caster: &Caster,
-        made_for: MadeFor,
-        counting: Counting,
-    ) -> bool {
+    /// Makes anew what has changed.
+    pub fn update(&mut self, gpu: &Gpu, caster: &Caster, made_for: MadeFor, counting: Counting) {
         let changed = self.made_for != Some(made_for);
         if changed {
             let MadeFor { light, casting, .. } = made_for;
@@ -381,13 +375,6 @@ impl Volume {
                 part.indices.write(&gpu.device, &gpu.queue, &indices);
             }
         }
-        changed
-    }
-
-    /// Which triangles cast.
-    pub fn casting(&self) -> Casting {
-        self.made_for
-            .map_or(Casting::All, |made_for| made_for.casting)
     }
 }
 
@@ -395,10 +382,15 @@ impl Volume {
 #[derive(Default)]
 pub(super) struct IndexBuffer {
     buffer: Option<wgpu::Buffer>,
-    pub count: u32,
+    count: u32,
 }
 
 impl IndexBuffer {
+    /// Draws all indices with whatever pipeline, view and vertices are set.
+    pub fn draw_all(&self, pass: &mut wgpu::RenderPass<'_>) {
+        self.draw(pass, 0..self.count);
+    }
+
     pub fn write(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, indices: &[u32]) {
         let contents: &[u8] = bytemuck::cast_slice(indices);
         let size = contents.len() as u64;
