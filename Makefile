@@ -28,6 +28,7 @@ bench: setup
 	cargo bench --bench volumes -- --sweep --csv $(CURDIR)/out/volumes_sweep.csv
 	cargo bench --bench extrusion -- --csv $(CURDIR)/out/extrusion.csv
 	cargo bench --bench displacement -- --csv $(CURDIR)/out/displacement.csv
+	cargo bench --bench displaced_lamp -- --csv $(CURDIR)/out/displaced_lamp.csv
 
 # Beside what a user would run instead, where ../shared/peers has it.
 bench-volumes: setup
