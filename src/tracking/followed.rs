@@ -68,11 +68,6 @@ impl Followed {
         }
     }
 
-    /// When the anchor was seen last, if that is not long ago.
-    pub(super) fn last_seen_secs(&self) -> Option<f64> {
-        self.last.as_ref().map(|last| last.time_secs)
-    }
-
     /// By what part of its size each marker is larger than the scene says, once that is known.
     pub(super) fn size_error(&self) -> Option<f64> {
         self.condition.known_size_error()

@@ -13,7 +13,7 @@ use crate::geometry::camera::Intrinsics;
 use crate::scene::{Anchor, Search, TrackingSettings};
 
 /// The whole picture is searched again after this, even when nothing is missing, seconds.
-const SEARCH_AGAIN_SECS: f64 = 1.0;
+const SEARCH_AGAIN_SECS: f64 = 2.0;
 /// An anchor that has been missing for longer than this is looked for less often, seconds,
 const LONG_GONE_SECS: f64 = 3.0;
 /// in one of so many frames.
