@@ -81,6 +81,7 @@ impl Default for PosesText {
 fn status_name(status: Status) -> &'static str {
     match status {
         Status::Tracked => "tracked",
+        Status::Predicted => "predicted",
         Status::Ambiguous => "ambiguous",
         Status::Lost => "lost",
     }
@@ -175,12 +176,14 @@ impl GivenPoses {
             poses[anchor] = AnchorPose {
                 status: match status.map(|column| fields[column]) {
                     Some("ambiguous") => Status::Ambiguous,
+                    Some("predicted") => Status::Predicted,
                     _ => Status::Tracked,
                 },
                 markers: markers
                     .and_then(|column| fields[column].parse().ok())
                     .unwrap_or(0),
                 camera_from_anchor: Some(camera_from_anchor),
+                visibility: 1.0,
                 ..lost()
             };
         }

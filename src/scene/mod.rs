@@ -92,6 +92,19 @@ pub struct TrackingSettings {
     pub min_margin: f64,
     /// libapriltag: threads of the search.
     pub threads: u32,
+    /// Where markers are looked for.
+    pub search: Search,
+    /// Poses from all pixels around the markers' edges, not from a detector's corners alone.
+    pub pose_from_pixels: bool,
+}
+
+/// Where markers are looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Search {
+    /// Where they must be by now; in the whole picture now and then, and whenever an anchor is missing.
+    Near,
+    /// In the whole picture of every frame.
+    Full,
 }
 
 impl Default for TrackingSettings {
@@ -105,6 +118,8 @@ impl Default for TrackingSettings {
             corrected_bits: 1,
             min_margin: 20.0,
             threads: 1,
+            search: Search::Near,
+            pose_from_pixels: true,
         }
     }
 }

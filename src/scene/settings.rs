@@ -4,7 +4,7 @@ use super::error::SceneError;
 use super::reader::{Numbers, Table, Value};
 use super::{
     ArucoRefinement, CameraSettings, Counting, DetectorKind, ShadowSettings, Technique,
-    TrackingSettings,
+    Search, TrackingSettings,
 };
 use crate::geometry::outline_scale::LARGEST_MOVE_PX;
 
@@ -44,7 +44,7 @@ fn source(value: &Value) -> Result<String, SceneError> {
 }
 
 pub fn tracking(root: &Table) -> Result<TrackingSettings, SceneError> {
-    const KEYS: [&str; 8] = [
+    const KEYS: [&str; 10] = [
         "detector",
         "decimation",
         "blur_px",
@@ -53,7 +53,10 @@ pub fn tracking(root: &Table) -> Result<TrackingSettings, SceneError> {
         "corrected_bits",
         "min_margin",
         "threads",
+        "search",
+        "pose_from_pixels",
     ];
+    const SEARCHES: [(&str, Search); 2] = [("near", Search::Near), ("full", Search::Full)];
     const DETECTORS: [(&str, DetectorKind); 2] = [
         ("apriltag", DetectorKind::AprilTag),
         ("aruco", DetectorKind::Aruco),
@@ -74,6 +77,9 @@ pub fn tracking(root: &Table) -> Result<TrackingSettings, SceneError> {
     let refinement = tracking
         .optional("aruco_refinement")
         .map(|value| value.one_of("refinement", &REFINEMENTS));
+    let search = tracking
+        .optional("search")
+        .map(|value| value.one_of("search", &SEARCHES));
     Ok(TrackingSettings {
         detector: detector.transpose()?.unwrap_or(default.detector),
         decimation: tracking.number_or(
@@ -95,6 +101,8 @@ pub fn tracking(root: &Table) -> Result<TrackingSettings, SceneError> {
             &Numbers::between(0.0, 255.0, ""),
         )?,
         threads: tracking.integer_or("threads", default.threads, 1..=64)?,
+        search: search.transpose()?.unwrap_or(default.search),
+        pose_from_pixels: tracking.flag_or("pose_from_pixels", default.pose_from_pixels)?,
     })
 }
 

@@ -4,7 +4,7 @@ use glam::DVec2;
 use opencv::core::{Mat, Point2f, Vector};
 use opencv::prelude::*;
 
-use super::apriltag::printed_cells;
+use super::apriltag;
 use super::conventions::{corners_from_aruco, quarter_turns_between};
 use super::{Detection, TrackingError};
 use crate::scene::{ArucoRefinement, Codes, Family, TrackingSettings};
@@ -82,6 +82,20 @@ impl ArucoDetector {
     }
 }
 
+/// The cells of a marker as printed, rows from the top, true for white; black border included, white rim not. `None`
+/// where the family has no such marker.
+pub(super) fn printed_cells(family: Family, id: u32) -> Result<Option<Vec<bool>>, TrackingError> {
+    if family.is_april_tag() {
+        return Ok(apriltag::printed_cells(family, id));
+    }
+    let Some(number) = dictionary_number(family).filter(|_| id < family.id_count()) else {
+        return Ok(None);
+    };
+    let dictionary = installed::Dictionary::new(number, 0, ArucoRefinement::None)?;
+    let side = family.cells() as usize + 2;
+    Ok(Some(dictionary.cells(id as i32, side)?))
+}
+
 /// The turn of the installed dictionary against the prints; its own pictures are the prints of OpenCV's families.
 fn quarter_turns(
     family: Family,
@@ -92,7 +106,7 @@ fn quarter_turns(
     }
     let side = family.cells_across() as usize;
     let opencv = dictionary.cells(0, side)?;
-    printed_cells(family, 0)
+    apriltag::printed_cells(family, 0)
         .and_then(|print| quarter_turns_between(&print, &opencv, side))
         .ok_or_else(|| {
             TrackingError::Library(format!("OpenCV's {} is not AprilTag's", family.name()))
@@ -287,7 +301,7 @@ mod tests {
             let side = family.cells_across() as usize;
             let turn = quarter_turns(family, &dictionary).unwrap();
             for id in 0..family.id_count() {
-                let print = printed_cells(family, id).unwrap();
+                let print = apriltag::printed_cells(family, id).unwrap();
                 let opencv = dictionary.cells(id as i32, side).unwrap();
                 assert_eq!(
                     quarter_turns_between(&print, &opencv, side),
@@ -295,7 +309,7 @@ mod tests {
                     "{family} {id}"
                 );
             }
-            assert!(printed_cells(family, family.id_count()).is_none());
+            assert!(apriltag::printed_cells(family, family.id_count()).is_none());
         }
     }
 

@@ -1,11 +1,14 @@
 //! Markers in a grey picture, by libapriltag or OpenCV's ArUco behind one small interface.
 
+use std::cmp::Ordering;
+
 use glam::DVec2;
 
 use super::TrackingError;
 use super::apriltag::AprilTagDetector;
 use super::aruco::ArucoDetector;
-use super::refine::{Grey, refined};
+use super::light::Grey;
+use super::refine::refined;
 use crate::scene::{ArucoRefinement, DetectorKind, Family, TrackingSettings};
 
 /// A marker seen in a picture.
@@ -22,6 +25,18 @@ pub struct Detection {
     pub margin: f64,
     /// Bits of the code that were wrong; 0 from OpenCV, which does not tell.
     pub corrected_bits: u32,
+}
+
+impl Detection {
+    /// By family and id; of one id the upper left one comes first.
+    pub(super) fn by_id_and_place(a: &Self, b: &Self) -> Ordering {
+        let key = |detection: &Self| (detection.family, detection.id);
+        let (corner_a, corner_b) = (a.corners_px[0], b.corners_px[0]);
+        key(a)
+            .cmp(&key(b))
+            .then(corner_a.y.total_cmp(&corner_b.y))
+            .then(corner_a.x.total_cmp(&corner_b.x))
+    }
 }
 
 /// No marker is smaller in a picture.
@@ -100,15 +115,8 @@ impl Detector {
                 detection.corners_px = refined(picture, detection.corners_px);
             }
         }
-        // Threads may find them in any order; of one id the upper left one comes first.
-        let key = |detection: &Detection| (detection.family, detection.id);
-        detections.sort_by(|a, b| {
-            let (corner_a, corner_b) = (a.corners_px[0], b.corners_px[0]);
-            key(a)
-                .cmp(&key(b))
-                .then(corner_a.y.total_cmp(&corner_b.y))
-                .then(corner_a.x.total_cmp(&corner_b.x))
-        });
+        // Threads may find them in any order.
+        detections.sort_by(Detection::by_id_and_place);
         Ok(detections)
     }
 }

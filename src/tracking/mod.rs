@@ -9,11 +9,21 @@
 )]
 mod apriltag;
 mod aruco;
+mod condition;
 mod conventions;
 mod detector;
+mod edge_fit;
+mod follow;
+mod followed;
+mod layout;
+mod least_squares;
+mod light;
+mod pixel_pose;
 mod pose;
+mod print;
 mod refine;
 mod tracker;
+mod twin;
 mod undistort;
 
 use glam::DAffine3;
@@ -26,10 +36,29 @@ pub use tracker::Tracker;
 pub enum Status {
     /// One pose explains the picture.
     Tracked,
+    /// The picture does not show the anchor, but those just before it did: it is where its motion took it.
+    Predicted,
     /// A lone marker whose two poses explain the picture about equally well.
     Ambiguous,
     /// No marker of the anchor was seen, or none that can be trusted.
     Lost,
+}
+
+/// Why an anchor is not simply tracked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Why {
+    /// The usual one.
+    #[error("none of its markers is in the picture")]
+    NoMarker,
+    /// Of several markers with one id none is trusted unless the rest of a board decides.
+    #[error("several markers in the picture have its id")]
+    DoubleId,
+    /// A mirrored picture, or markers that do not lie as the scene says.
+    #[error("no pose explains where its markers are")]
+    NoPose,
+    /// A small or frontal marker alone.
+    #[error("two poses explain the picture about equally well")]
+    TwoPoses,
 }
 
 /// What is known of one anchor in one frame.
@@ -37,25 +66,36 @@ pub enum Status {
 pub struct AnchorPose {
     /// How far the pose can be trusted.
     pub status: Status,
+    /// Why it is not simply tracked; `None` when it is.
+    pub why: Option<Why>,
     /// Markers that the pose rests on.
     pub markers: u32,
     /// `None` when lost.
     pub camera_from_anchor: Option<DAffine3>,
+    /// Covariance of the pose where it comes from pixels: of a small turn about the anchor's origin in camera axes
+    /// (radians; it stands left of the rotation), then of a shift (metres).
+    pub covariance: Option<[[f64; 6]; 6]>,
     /// Root mean square distance of the corners from where the pose puts them, pixels; 0 when lost. Above a pixel the
     /// calibration or the markers' sizes are wrong.
     pub reprojection_px: f64,
     /// The other of the two poses that a plane has, where it differs.
     pub alternative: Option<Alternative>,
+    /// How much of what stands on the anchor is to be shown: 1 while it is seen, less as a prediction grows old, 0 when
+    /// lost.
+    pub visibility: f64,
 }
 
 impl AnchorPose {
     /// An anchor that was not found.
     pub const LOST: Self = Self {
         status: Status::Lost,
+        why: None,
         markers: 0,
         camera_from_anchor: None,
+        covariance: None,
         reprojection_px: 0.0,
         alternative: None,
+        visibility: 0.0,
     };
 }
 
@@ -80,6 +120,16 @@ pub enum TrackingError {
         detector: &'static str,
         /// Names of the families that it knows.
         allowed: String,
+    },
+    /// A family has no marker of this number.
+    #[error("{family} has no marker {id}; it has 0 to {}", count - 1)]
+    NoSuchMarker {
+        /// Name of the family.
+        family: &'static str,
+        /// Number of the marker.
+        id: u32,
+        /// How many the family has.
+        count: u32,
     },
     /// A setting is out of its range.
     #[error("{name} = {value} is out of range; allowed: {allowed}")]

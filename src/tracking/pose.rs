@@ -6,6 +6,7 @@
 
 use glam::{DAffine3, DMat2, DMat3, DVec2, DVec3};
 
+use super::least_squares::{accumulate, solve_positive_definite};
 use crate::geometry::camera::Intrinsics;
 
 /// A point of the anchor's plane and where it was seen.
@@ -107,7 +108,7 @@ fn is_seen_from_the_front(camera_from_anchor: &DAffine3, sightings: &[Sighting])
 }
 
 /// The two poses that the homography's derivative at the points' centre allows (IPPE, section 4).
-fn ippe_starts(intrinsics: &Intrinsics, sightings: &[Sighting]) -> Option<[DAffine3; 2]> {
+pub(super) fn ippe_starts(intrinsics: &Intrinsics, sightings: &[Sighting]) -> Option<[DAffine3; 2]> {
     if sightings.len() < 4 {
         return None;
     }
@@ -261,7 +262,7 @@ fn translation_for(
 }
 
 /// Levenberg-Marquardt on the six parameters of the pose; `None` when it does not converge to a pose in front.
-fn refine(intrinsics: &Intrinsics, sightings: &[Sighting], start: DAffine3) -> Option<Solution> {
+pub(super) fn refine(intrinsics: &Intrinsics, sightings: &[Sighting], start: DAffine3) -> Option<Solution> {
     const ROUNDS: usize = 100;
     const STEP_TOLERANCE: f64 = 1e-10;
     let mut pose = start;
@@ -341,52 +342,6 @@ fn linearize(
         }
     }
     (normal, right)
-}
-
-/// Adds one equation `row · x = value` to the normal equations.
-fn accumulate<const N: usize>(
-    normal: &mut [[f64; N]; N],
-    right: &mut [f64; N],
-    row: &[f64; N],
-    value: f64,
-) {
-    for i in 0..N {
-        for j in 0..N {
-            normal[i][j] += row[i] * row[j];
-        }
-        right[i] += row[i] * value;
-    }
-}
-
-/// Solves by Cholesky's decomposition; `None` when the matrix is not positive definite.
-fn solve_positive_definite<const N: usize>(
-    matrix: &[[f64; N]; N],
-    right: &[f64; N],
-) -> Option<[f64; N]> {
-    let mut lower = [[0.0; N]; N];
-    for i in 0..N {
-        for j in 0..=i {
-            let known = (0..j).map(|k| lower[i][k] * lower[j][k]).sum::<f64>();
-            let rest = matrix[i][j] - known;
-            if i != j {
-                lower[i][j] = rest / lower[j][j];
-            } else if rest > matrix[i][i] * 1e-14 {
-                lower[i][i] = rest.sqrt();
-            } else {
-                return None;
-            }
-        }
-    }
-    let mut solution = *right;
-    for i in 0..N {
-        let known = (0..i).map(|k| lower[i][k] * solution[k]).sum::<f64>();
-        solution[i] = (solution[i] - known) / lower[i][i];
-    }
-    for i in (0..N).rev() {
-        let known = (i + 1..N).map(|k| lower[k][i] * solution[k]).sum::<f64>();
-        solution[i] = (solution[i] - known) / lower[i][i];
-    }
-    Some(solution)
 }
 
 #[cfg(test)]

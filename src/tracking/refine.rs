@@ -4,9 +4,9 @@
 //! blurred edge lies inside the black, every marker looks small, and a lone one seems too far away. Here the edges are
 //! found in linear light, each by its gradient along many normals, and the corners are where neighbouring edges meet.
 
-use std::sync::LazyLock;
-
 use glam::DVec2;
+
+use super::light::Grey;
 
 /// How far from where the detector says an edge is looked for, pixels.
 const REACH_PX: f64 = 2.5;
@@ -18,45 +18,6 @@ const LEFT_OUT: f64 = 0.08;
 const MOST_SAMPLES: usize = 64;
 /// A corner that would move farther keeps its place: something else was found.
 const MOST_MOVE_PX: f64 = 3.0;
-
-/// Linear light of each grey level (IEC 61966-2-1).
-static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| {
-    std::array::from_fn(|level| {
-        let encoded = level as f32 / 255.0;
-        if encoded <= 0.04045 {
-            encoded / 12.92
-        } else {
-            ((encoded + 0.055) / 1.055).powf(2.4)
-        }
-    })
-});
-
-/// An 8-bit grey picture, rows from the top without padding.
-#[derive(Clone, Copy)]
-pub(super) struct Grey<'a> {
-    pub levels: &'a [u8],
-    pub size_px: [u32; 2],
-}
-
-impl Grey<'_> {
-    /// Linear light between four pixels' centres; `None` outside the picture.
-    fn light(&self, place: DVec2) -> Option<f64> {
-        let [width, height] = self.size_px.map(|side| side as usize);
-        let corner = place.floor();
-        if corner.x < 0.0 || corner.y < 0.0 {
-            return None;
-        }
-        let (x, y) = (corner.x as usize, corner.y as usize);
-        if x + 1 >= width || y + 1 >= height {
-            return None;
-        }
-        let share = place - corner;
-        let at = |x: usize, y: usize| f64::from(LINEAR[usize::from(self.levels[y * width + x])]);
-        let top = at(x, y) * (1.0 - share.x) + at(x + 1, y) * share.x;
-        let bottom = at(x, y + 1) * (1.0 - share.x) + at(x + 1, y + 1) * share.x;
-        Some(top * (1.0 - share.y) + bottom * share.y)
-    }
-}
 
 /// A line through a point along a unit direction.
 #[derive(Clone, Copy)]

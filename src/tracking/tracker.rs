@@ -1,34 +1,41 @@
 //! From a frame to the poses of all anchors in it.
 
-use glam::{DAffine3, DVec2};
 use opencv::core::Mat;
 use opencv::imgproc;
 
-use super::pose::{self, Sighting, Solutions, pixel_of, rotation_between};
-use super::undistort::undistorted_pixel;
-use super::{Alternative, AnchorPose, Detection, Detector, Status, TrackingError};
+use super::followed::Followed;
+use super::layout::Layout;
+use super::light::Grey;
+use super::pixel_pose::{PixelPose, project};
+use super::{AnchorPose, Detection, Detector, TrackingError, Why};
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
-use crate::scene::{Anchor, Family, Marker, TrackingSettings};
+use crate::scene::{Anchor, Search, TrackingSettings};
 
-/// An earlier pose decides between two poses that explain the picture equally well for this long, seconds.
-const MEMORY_SECS: f64 = 0.5;
-
-/// A board's pose that leaves more than this is looked through for a marker that does not fit, pixels.
-const SUSPICIOUS_RMS_PX: f64 = 1.5;
-
-/// Of several markers with one id the rest of the board picks the one whose corners lie this near, pixels.
-const SAME_MARKER_PX: f64 = 3.0;
+/// The whole picture is searched again after this, even when nothing is missing, seconds.
+const SEARCH_AGAIN_SECS: f64 = 1.0;
+/// An anchor that has been missing for longer than this is looked for less often, seconds,
+const LONG_GONE_SECS: f64 = 3.0;
+/// in one of so many frames.
+const LONG_GONE_FRAMES: u32 = 3;
+/// A search that puts an anchor's corners farther than this from where it was followed to has found another place,
+/// pixels.
+const ELSEWHERE_PX: f64 = 5.0;
 
 /// Finds the anchors of a scene in the frames of one camera. For one thread at a time.
 pub struct Tracker {
     detector: Detector,
-    anchors: Vec<Layout>,
+    anchors: Vec<Followed>,
+    /// Per anchor when it was looked for in vain for the first time, seconds.
+    missing_since_secs: Vec<Option<f64>>,
     intrinsics: Intrinsics,
+    follows: bool,
+    fits_pixels: bool,
     grey: Vec<u8>,
     detections: Vec<Detection>,
-    /// Per anchor the last pose and its time.
-    last: Vec<Option<(f64, DAffine3)>>,
+    /// When the whole picture was searched last, seconds.
+    searched_secs: f64,
+    frames: u32,
 }
 
 impl Tracker {
@@ -42,17 +49,23 @@ impl Tracker {
             .iter()
             .flat_map(|anchor| anchor.markers.iter().map(|marker| marker.family))
             .collect::<Vec<_>>();
+        let followed = anchors.iter().map(|anchor| Ok(Followed::new(Layout::new(anchor)?)));
         Ok(Self {
             detector: Detector::new(settings, &families)?,
-            anchors: anchors.iter().map(Layout::new).collect(),
+            anchors: followed.collect::<Result<_, TrackingError>>()?,
+            missing_since_secs: vec![None; anchors.len()],
             intrinsics,
+            follows: settings.search == Search::Near && settings.pose_from_pixels,
+            fits_pixels: settings.pose_from_pixels,
             grey: Vec::new(),
             detections: Vec::new(),
-            last: vec![None; anchors.len()],
+            searched_secs: f64::NEG_INFINITY,
+            frames: 0,
         })
     }
 
-    /// The poses of all anchors in the order in which they were given. A marker that is not seen is no error.
+    /// The poses of all anchors in the order in which they were given. A marker that is not seen is no error. Frames
+    /// are expected in the order of their times; one from before the last one starts the tracker anew.
     pub fn track(&mut self, frame: &Frame) -> Result<Vec<AnchorPose>, TrackingError> {
         if frame.size_px != self.intrinsics.size_px {
             return Err(TrackingError::FrameSize {
@@ -61,198 +74,119 @@ impl Tracker {
             });
         }
         grey_from_rgba(frame, &mut self.grey)?;
+        let picture = Grey {
+            levels: &self.grey,
+            size_px: frame.size_px,
+        };
+        let now_secs = frame.time_secs;
+        self.frames = self.frames.wrapping_add(1);
+        for anchor in &mut self.anchors {
+            anchor.forget(now_secs);
+        }
+        let mut found: Vec<Option<PixelPose>> = self
+            .anchors
+            .iter_mut()
+            .map(|anchor| {
+                let follows = self.follows.then_some(anchor);
+                follows.and_then(|anchor| anchor.follow(picture, &self.intrinsics, now_secs))
+            })
+            .collect();
+
+        if !self.needs_search(&found, now_secs) {
+            self.detections.clear();
+            let poses = self.anchors.iter_mut().zip(found).map(|(anchor, found)| match found {
+                Some(fitted) => {
+                    add_seen(&mut self.detections, &self.intrinsics, &anchor.layout, &fitted);
+                    anchor.take(picture, &self.intrinsics, fitted, now_secs)
+                }
+                None => anchor.missed(Why::NoMarker, now_secs),
+            });
+            let poses = poses.collect();
+            self.detections.sort_by(Detection::by_id_and_place);
+            return Ok(poses);
+        }
+        self.searched_secs = now_secs;
         self.detections = self.detector.detect(&self.grey, frame.size_px)?;
         let poses = self
             .anchors
-            .iter()
-            .zip(&mut self.last)
-            .map(|(layout, last)| {
-                let before = last
-                    .filter(|(time_secs, _)| (frame.time_secs - time_secs).abs() <= MEMORY_SECS)
-                    .map(|(_, pose)| pose);
-                let pose = layout.locate(&self.intrinsics, &self.detections, before);
-                if let Some(found) = pose.camera_from_anchor {
-                    *last = Some((frame.time_secs, found));
+            .iter_mut()
+            .zip(found.iter_mut())
+            .zip(&mut self.missing_since_secs)
+            .map(|((anchor, found), missing_since_secs)| {
+                let located = anchor.layout.locate(&self.intrinsics, &self.detections);
+                if let Ok(located) = &located {
+                    let start = located.solutions.best.camera_from_anchor;
+                    // A search that finds the anchor elsewhere is right: its codes were read, not taken for granted.
+                    let elsewhere = found.as_ref().is_none_or(|followed| {
+                        let here = &followed.camera_from_anchor;
+                        anchor.layout.distance_px(&self.intrinsics, here, &start) > ELSEWHERE_PX
+                    });
+                    if self.fits_pixels && elsewhere {
+                        *found = anchor.fit(picture, &self.intrinsics, start);
+                    }
                 }
-                pose
+                *missing_since_secs = match (&found, &located) {
+                    (None, Err(_)) => missing_since_secs.or(Some(now_secs)),
+                    _ => None,
+                };
+                match (found.take(), located) {
+                    (Some(fitted), _) => anchor.take(picture, &self.intrinsics, fitted, now_secs),
+                    (None, Ok(located)) => anchor.take_located(&located, now_secs),
+                    (None, Err(why)) => anchor.missed(why, now_secs),
+                }
             })
             .collect();
         Ok(poses)
     }
 
-    /// All markers seen in the last frame, also those of no anchor, sorted by family and id.
+    /// All markers seen in the last frame, sorted by family and id: by the detector also those of no anchor, and between
+    /// its searches those that were followed.
     pub fn detections(&self) -> &[Detection] {
         &self.detections
     }
-}
 
-/// The markers of an anchor with their corners as printed.
-struct Layout {
-    markers: Vec<(Family, u32, [DVec2; 4])>,
-}
-
-/// A marker of an anchor as one frame shows it.
-struct SeenMarker {
-    sightings: [Sighting; 4],
-}
-
-impl Layout {
-    fn new(anchor: &Anchor) -> Self {
-        Self {
-            markers: anchor
-                .markers
-                .iter()
-                .map(|marker| (marker.family, marker.id, printed_corners_m(marker)))
-                .collect(),
-        }
+    /// Per anchor by what part of their size its markers are larger than the scene says, where pictures of several of
+    /// them have told.
+    pub fn size_errors(&self) -> impl Iterator<Item = Option<f64>> {
+        self.anchors.iter().map(Followed::size_error)
     }
 
-    fn locate(
-        &self,
-        intrinsics: &Intrinsics,
-        detections: &[Detection],
-        before: Option<DAffine3>,
-    ) -> AnchorPose {
-        let mut seen = Vec::new();
-        let mut doubled = Vec::new();
-        for &(family, id, corners_m) in &self.markers {
-            let start = detections
-                .partition_point(|detection| (detection.family, detection.id) < (family, id));
-            let mut candidates = detections[start..]
-                .iter()
-                .take_while(|detection| (detection.family, detection.id) == (family, id))
-                .filter_map(|detection| {
-                    SeenMarker::new(intrinsics, corners_m, detection.corners_px)
-                })
-                .collect::<Vec<_>>();
-            match candidates.len() {
-                0 => {}
-                1 => seen.append(&mut candidates),
-                _ => doubled.push(candidates),
-            }
+    /// Whether the whole picture is to be searched.
+    fn needs_search(&self, found: &[Option<PixelPose>], now_secs: f64) -> bool {
+        let since_secs = now_secs - self.searched_secs;
+        if !(0.0..SEARCH_AGAIN_SECS).contains(&since_secs) {
+            return true;
         }
-        let Some(mut solutions) = solve_without_misfits(intrinsics, &mut seen) else {
-            return AnchorPose::LOST;
-        };
-        // The rest of the board decides which of several markers with one id is its own.
-        if !doubled.is_empty() && !solutions.ambiguous {
-            let known = seen.len();
-            let camera_from_anchor = solutions.best.camera_from_anchor;
-            for candidates in doubled {
-                let mut fitting = candidates.into_iter().filter(|marker| {
-                    marker.distance_px(intrinsics, &camera_from_anchor) < SAME_MARKER_PX
-                });
-                if let (Some(marker), None) = (fitting.next(), fitting.next()) {
-                    seen.push(marker);
-                }
-            }
-            if seen.len() > known
-                && let Some(better) = solve_without_misfits(intrinsics, &mut seen)
-            {
-                solutions = better;
-            }
-        }
-        anchor_pose(&solutions, seen.len(), before)
+        found.iter().zip(&self.missing_since_secs).any(|(found, since_secs)| {
+            let long_gone = since_secs.is_some_and(|since_secs| now_secs - since_secs > LONG_GONE_SECS);
+            found.is_none() && (!long_gone || self.frames.is_multiple_of(LONG_GONE_FRAMES))
+        })
     }
 }
 
-impl SeenMarker {
-    /// `None` where the lens distortion has no inverse.
-    fn new(intrinsics: &Intrinsics, corners_m: [DVec2; 4], corners_px: [DVec2; 4]) -> Option<Self> {
-        let mut sightings = [Sighting {
-            point_m: DVec2::ZERO,
-            pixel: DVec2::ZERO,
-        }; 4];
-        for (sighting, (point_m, corner_px)) in sightings
-            .iter_mut()
-            .zip(corners_m.into_iter().zip(corners_px))
-        {
-            let pixel = undistorted_pixel(intrinsics, corner_px)?;
-            *sighting = Sighting { point_m, pixel };
-        }
-        Some(Self { sightings })
-    }
-
-    /// Of the farthest corner from where the pose puts it.
-    fn distance_px(&self, intrinsics: &Intrinsics, camera_from_anchor: &DAffine3) -> f64 {
-        self.sightings
-            .iter()
-            .map(|sighting| {
-                (pixel_of(intrinsics, camera_from_anchor, sighting.point_m) - sighting.pixel)
-                    .length()
-            })
-            .fold(0.0, f64::max)
-    }
-}
-
-/// Solves for all markers at once. When they do not fit together, the one without which the others do is left out
-/// (a wrong id, a corner under a pencil or a shadow's edge), as long as two others agree.
-fn solve_without_misfits(intrinsics: &Intrinsics, seen: &mut Vec<SeenMarker>) -> Option<Solutions> {
-    let solve_for = |markers: &mut dyn Iterator<Item = &SeenMarker>| {
-        let sightings = markers
-            .flat_map(|marker| marker.sightings)
-            .collect::<Vec<_>>();
-        let solutions = pose::solve(intrinsics, &sightings)?;
-        Some((solutions, solutions.best.rms_px(sightings.len())))
-    };
-    loop {
-        let all = solve_for(&mut seen.iter());
-        let rms_px = all.map_or(f64::INFINITY, |(_, rms_px)| rms_px);
-        if seen.len() < 3 || rms_px <= SUSPICIOUS_RMS_PX {
-            return all.map(|(solutions, _)| solutions);
-        }
-        let without = (0..seen.len())
-            .filter_map(|left_out| {
-                let mut others = seen
-                    .iter()
-                    .enumerate()
-                    .filter(|&(k, _)| k != left_out)
-                    .map(|(_, marker)| marker);
-                solve_for(&mut others).map(|(_, rms_px)| (left_out, rms_px))
-            })
-            .min_by(|a, b| a.1.total_cmp(&b.1));
-        match without {
-            // A bad calibration spreads its error over all markers; one misfit stands out.
-            Some((left_out, rest_px)) if rest_px < rms_px / 3.0 => {
-                seen.remove(left_out);
-            }
-            _ => return all.map(|(solutions, _)| solutions),
-        }
-    }
-}
-
-fn anchor_pose(solutions: &Solutions, markers: usize, before: Option<DAffine3>) -> AnchorPose {
-    let (mut chosen, mut other) = (solutions.best, solutions.alternative);
-    if let (true, Some(alternative), Some(before)) = (solutions.ambiguous, other, before)
-        && rotation_between(&alternative.camera_from_anchor, &before)
-            < rotation_between(&chosen.camera_from_anchor, &before)
+/// Adds the markers that a pose was found from, where the pose puts them.
+fn add_seen(
+    detections: &mut Vec<Detection>,
+    intrinsics: &Intrinsics,
+    layout: &Layout,
+    fitted: &PixelPose,
+) {
+    for (((family, id), print), _) in
+        layout.markers().zip(&layout.prints).zip(&fitted.seen).filter(|(_, seen)| **seen)
     {
-        other = Some(chosen);
-        chosen = alternative;
+        let corners = print
+            .corners_m()
+            .map(|corner_m| Some(project(intrinsics, &fitted.camera_from_anchor, corner_m)?.pixel));
+        if let [Some(a), Some(b), Some(c), Some(d)] = corners {
+            detections.push(Detection {
+                family,
+                id,
+                corners_px: [a, b, c, d],
+                margin: 0.0,
+                corrected_bits: 0,
+            });
+        }
     }
-    let corners = 4 * markers;
-    AnchorPose {
-        status: if solutions.ambiguous {
-            Status::Ambiguous
-        } else {
-            Status::Tracked
-        },
-        markers: markers as u32,
-        camera_from_anchor: Some(chosen.camera_from_anchor),
-        reprojection_px: chosen.rms_px(corners),
-        alternative: other.map(|solution| Alternative {
-            camera_from_anchor: solution.camera_from_anchor,
-            reprojection_px: solution.rms_px(corners),
-        }),
-    }
-}
-
-/// Corners of a marker's black square in its anchor's plane: top left, top right, bottom right, bottom left.
-fn printed_corners_m(marker: &Marker) -> [DVec2; 4] {
-    let half_m = marker.size_m / 2.0;
-    let turn = DVec2::from_angle(marker.rotation_rad);
-    [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]
-        .map(|corner| marker.center_m + turn.rotate(DVec2::from(corner) * half_m))
 }
 
 fn grey_from_rgba(frame: &Frame, grey: &mut Vec<u8>) -> Result<(), TrackingError> {

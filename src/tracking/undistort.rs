@@ -32,7 +32,7 @@ pub(super) fn undistorted_pixel(intrinsics: &Intrinsics, distorted_px: DVec2) ->
 }
 
 /// Derivative of [`Intrinsics::distort`].
-fn distortion_jacobian(intrinsics: &Intrinsics, point: DVec2) -> DMat2 {
+pub(super) fn distortion_jacobian(intrinsics: &Intrinsics, point: DVec2) -> DMat2 {
     let [k1, k2, p1, p2, k3] = intrinsics.distortion;
     let (x, y) = (point.x, point.y);
     let r2 = point.length_squared();

@@ -1,0 +1,233 @@
+//! Where an edge of the print lies in the picture, from the light of the pixels around it.
+//!
+//! A pixel's light is `black + contrast · whiteness`: the whiteness is that of the print's cells, blurred by the lens,
+//! the motion and the pixel itself; black and contrast are the edge's own, since a shadow may lie across the marker.
+//! Light, not encoded values, for that is what blurs.
+
+use std::sync::LazyLock;
+
+use glam::{DMat2, DVec2};
+
+use super::least_squares::inverse;
+use super::light::Grey;
+use super::print::{COLUMNS, Edge, ROWS};
+
+/// Half the window across an edge: at most so many pixels,
+const ACROSS_PX: f64 = 3.0;
+/// and so many cells.
+const ACROSS_CELLS: f64 = 1.0;
+/// Half the window along it, pixels; a longer edge tells as much in its middle.
+const ALONG_PX: f64 = 6.0;
+/// An edge with fewer pixels tells nothing.
+const FEWEST_PIXELS: u32 = 8;
+/// Less light between white and black is none.
+const LEAST_CONTRAST: f64 = 0.004;
+/// Variance of a pixel's light that no picture is without: what 8 bits leave out.
+const NOISE_FLOOR: f64 = 1e-6;
+
+/// An edge as the picture shows it.
+pub(super) struct EdgeFit {
+    /// How far across the edge it lies from where it was expected, cells.
+    pub offset_cells: f64,
+    /// Variance of the offset, cells².
+    pub variance_cells: f64,
+    /// Light of white above that of black.
+    pub contrast: f64,
+    /// What the blur's variance is short of, pixels², and how sure that is: the inverse of its own variance.
+    pub blur_error: (f64, f64),
+}
+
+/// Fits one edge. `middle_px` is where its middle is expected, the columns of `pixels_from_cells` are one cell across
+/// and one along it there (distorted pixels); `blur_variance` is the blur's across the edge, pixels².
+/// `None` where the window leaves the picture or the light does not look like the edge.
+pub(super) fn fit_edge(
+    picture: Grey<'_>,
+    edge: &Edge,
+    middle_px: DVec2,
+    pixels_from_cells: DMat2,
+    blur_variance: f64,
+) -> Option<EdgeFit> {
+    let cells_from_pixels = pixels_from_cells.inverse();
+    let (across_cells_per_px, along_cells_per_px) = (
+        cells_from_pixels.row(0).length(),
+        cells_from_pixels.row(1).length(),
+    );
+    let reach = DVec2::new(
+        (ACROSS_PX * across_cells_per_px).min(ACROSS_CELLS),
+        (ALONG_PX * along_cells_per_px).min(0.5),
+    );
+    let extent = DVec2::new(
+        pixels_from_cells.row(0).abs().dot(reach),
+        pixels_from_cells.row(1).abs().dot(reach),
+    );
+    let (low, high) = ((middle_px - extent).ceil(), (middle_px + extent).floor());
+    let [width, height] = picture.size_px.map(f64::from);
+    if !(low.cmpge(DVec2::ZERO).all() && high.x < width && high.y < height) {
+        return None;
+    }
+
+    let deviation_px = blur_variance.sqrt();
+    let across_scale = (1.0 / (across_cells_per_px * deviation_px)) as f32;
+    let along_scale = (1.0 / (along_cells_per_px * deviation_px)) as f32;
+    let steps = Steps::new(edge);
+    let reach = reach.as_vec2();
+    let to_cells = cells_from_pixels.as_mat2();
+    let mut sums = Sums::default();
+    for y in low.y as u32..=high.y as u32 {
+        let row = picture.row(y);
+        let start = DVec2::new(low.x, f64::from(y)) - middle_px;
+        let mut cells = to_cells * start.as_vec2();
+        for light in &row[low.x as usize..=high.x as usize] {
+            if cells.x.abs() <= reach.x && cells.y.abs() <= reach.y {
+                let [white, slope, blurring] = steps.whiteness(cells, across_scale, along_scale);
+                sums.add(
+                    [1.0, white, -slope * across_scale, blurring],
+                    super::light::linear(*light),
+                );
+            }
+            cells += to_cells.x_axis;
+        }
+    }
+    sums.solve(blur_variance)
+}
+
+/// The integral of the unit Gaussian up to a place, and its density there.
+fn gaussian(place: f32) -> (f32, f32) {
+    /// Beyond so many deviations nothing is left.
+    const REACH: f32 = 4.0;
+    const PER_DEVIATION: f32 = 64.0;
+    /// Integral and density at the grid's places; between them the density is the integral's slope.
+    static GRID: LazyLock<Vec<(f32, f32)>> = LazyLock::new(|| {
+        let count = (2.0 * REACH * PER_DEVIATION) as i32 + 1;
+        let density = |place: f64| (-0.5 * place * place).exp() / std::f64::consts::TAU.sqrt();
+        let at = |k: i32| f64::from(k) / f64::from(PER_DEVIATION) - f64::from(REACH);
+        let mut integral = 0.0;
+        (0..count)
+            .map(|k| {
+                let here = (integral as f32, density(at(k)) as f32);
+                let (low, high) = (at(k), at(k + 1));
+                // Simpson's rule.
+                integral += (high - low) / 6.0
+                    * (density(low) + 4.0 * density(0.5 * (low + high)) + density(high));
+                here
+            })
+            .collect()
+    });
+    if place <= -REACH {
+        return (0.0, 0.0);
+    }
+    if place >= REACH {
+        return (1.0, 0.0);
+    }
+    let index = (place + REACH) * PER_DEVIATION;
+    let cell = index as usize;
+    let beyond = (index - cell as f32) / PER_DEVIATION;
+    let (integral, density) = GRID[cell];
+    // To second order, the density's own slope included.
+    (
+        integral + beyond * density * (1.0 - 0.5 * beyond * (place - beyond)),
+        density * (1.0 - beyond * (place - beyond)),
+    )
+}
+
+/// The whiteness around an edge, as steps across it per row.
+struct Steps {
+    first: [f32; ROWS],
+    steps: [[f32; COLUMNS - 1]; ROWS],
+}
+
+impl Steps {
+    fn new(edge: &Edge) -> Self {
+        Self {
+            first: edge.around.map(|row| row[0]),
+            steps: edge
+                .around
+                .map(|row| std::array::from_fn(|k| row[k + 1] - row[k])),
+        }
+    }
+
+    /// Whiteness at a place in cells from the edge's middle, its derivative by the scaled place across, and that by
+    /// the logarithm of the blur; the scales are the inverse of the blur in cells.
+    fn whiteness(&self, cells: glam::Vec2, across_scale: f32, along_scale: f32) -> [f32; 3] {
+        let along = [-0.5, 0.5].map(|line: f32| gaussian((cells.y - line) * along_scale).0);
+        let shares = [1.0 - along[0], along[0] - along[1], along[1]];
+        let lines: [(f32, f32, f32); COLUMNS - 1] = std::array::from_fn(|k| {
+            let scaled = (cells.x - (k as f32 - 1.0)) * across_scale;
+            let (integral, density) = gaussian(scaled);
+            (integral, density, -scaled * density)
+        });
+        let mut sum = [0.0; 3];
+        for ((share, first), steps) in shares.into_iter().zip(self.first).zip(&self.steps) {
+            let mut row = [first, 0.0, 0.0];
+            for (step, line) in steps.iter().zip(lines) {
+                row[0] += step * line.0;
+                row[1] += step * line.1;
+                row[2] += step * line.2;
+            }
+            for (sum, row) in sum.iter_mut().zip(row) {
+                *sum += share * row;
+            }
+        }
+        sum
+    }
+}
+
+/// The normal equations of black, contrast, contrast · offset and contrast · blur.
+#[derive(Default)]
+struct Sums {
+    normal: [[f32; 4]; 4],
+    right: [f32; 4],
+    squares: f32,
+    count: u32,
+}
+
+impl Sums {
+    fn add(&mut self, row: [f32; 4], light: f32) {
+        for i in 0..4 {
+            for j in 0..=i {
+                self.normal[i][j] += row[i] * row[j];
+            }
+            self.right[i] += row[i] * light;
+        }
+        self.squares += light * light;
+        self.count += 1;
+    }
+
+    fn solve(&self, blur_variance: f64) -> Option<EdgeFit> {
+        if self.count < FEWEST_PIXELS {
+            return None;
+        }
+        let entry = |i: usize, j: usize| f64::from(self.normal[i.max(j)][i.min(j)]);
+        let normal: [[f64; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
+        let right: [f64; 3] = std::array::from_fn(|i| f64::from(self.right[i]));
+        let inverse = inverse(&normal)?;
+        let solution: [f64; 3] =
+            std::array::from_fn(|i| (0..3).map(|j| inverse[i][j] * right[j]).sum());
+        let [_, contrast, shift] = solution;
+        let explained: f64 = (0..3).map(|i| solution[i] * right[i]).sum();
+        let unexplained = (f64::from(self.squares) - explained).max(0.0);
+        let noise = unexplained / f64::from(self.count - 3) + NOISE_FLOOR;
+        if contrast < LEAST_CONTRAST {
+            return None;
+        }
+        // What is left of the fourth equation once the other three are solved.
+        let blurring: [f64; 3] = std::array::from_fn(|i| entry(i, 3));
+        let blur_left = f64::from(self.right[3]) - (0..3).map(|i| blurring[i] * solution[i]).sum::<f64>();
+        let blur_information = entry(3, 3)
+            - (0..3)
+                .map(|i| blurring[i] * (0..3).map(|j| inverse[i][j] * blurring[j]).sum::<f64>())
+                .sum::<f64>();
+        // By the logarithm of the deviation, hence twice the variance.
+        let (unit, certainty) = (2.0 * blur_variance, blur_information * contrast * contrast / noise);
+        let blur_error = match blur_information > 1e-9 {
+            true => (unit * blur_left / (blur_information * contrast), certainty / (unit * unit)),
+            false => (0.0, 0.0),
+        };
+        Some(EdgeFit {
+            offset_cells: shift / contrast,
+            variance_cells: inverse[2][2] * noise / (contrast * contrast),
+            contrast,
+            blur_error,
+        })
+    }
+}

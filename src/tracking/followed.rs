@@ -1,0 +1,293 @@
+//! One anchor from frame to frame: predicted, found again, and which of its two poses it has.
+
+use glam::{DAffine3, DQuat, DVec2, DVec3};
+
+use super::condition::Condition;
+use super::follow::{REACHES, find_shift};
+use super::layout::{Layout, Located};
+use super::light::Grey;
+use super::pixel_pose::{PixelPose, fit_pose, project};
+use super::pose::{Sighting, refine, rotation_between};
+use super::twin::{Twin, twin_of};
+use super::undistort::undistorted_pixel;
+use super::{Alternative, AnchorPose, Status, Why};
+use crate::geometry::camera::Intrinsics;
+
+/// What was seen longer ago than this decides nothing any more, seconds.
+const MEMORY_SECS: f64 = 0.5;
+/// A motion is believed to go on over gaps up to this, seconds.
+const LONGEST_STEP_SECS: f64 = 0.15;
+/// A pose is predicted without a picture for this long, and then fades, seconds.
+const PREDICTED_SECS: f64 = 0.1;
+/// An anchor that is not seen is gone after this, seconds.
+const FADED_SECS: f64 = 0.4;
+/// Without a picture a motion dies down within about this time, seconds.
+const COASTING_SECS: f64 = 0.08;
+/// A shift that the edges make up for themselves, pixels.
+const SMALL_SHIFT_PX: f64 = 0.75;
+/// Logarithm of the odds, 100 : 1, from which on a pose is believed to be the right one of the two,
+const BELIEVED: f64 = 4.6;
+/// and below which it is doubted again: between the two it stays what it was.
+const DOUBTED: f64 = 2.3;
+/// The most that earlier frames can say for a pose.
+const MOST_ODDS: f64 = 20.0;
+/// What of the earlier frames' odds counts in the next one; errors of neighbouring frames are not independent.
+const REMEMBERED: f64 = 0.8;
+
+/// An anchor and what is known of it from earlier frames.
+pub(super) struct Followed {
+    pub(super) layout: Layout,
+    condition: Condition,
+    last: Option<Sight>,
+}
+
+/// An anchor as it was seen.
+#[derive(Clone)]
+struct Sight {
+    time_secs: f64,
+    camera_from_anchor: DAffine3,
+    motion: Motion,
+    /// Logarithm of the odds for this pose against its twin, from all frames.
+    odds: f64,
+    believed: bool,
+}
+
+/// In camera axes, per second.
+#[derive(Clone, Copy, Default)]
+struct Motion {
+    turn: DVec3,
+    shift_m: DVec3,
+}
+
+impl Followed {
+    pub(super) fn new(layout: Layout) -> Self {
+        Self {
+            layout,
+            condition: Condition::UNKNOWN,
+            last: None,
+        }
+    }
+
+    /// When the anchor was seen last, if that is not long ago.
+    pub(super) fn last_seen_secs(&self) -> Option<f64> {
+        self.last.as_ref().map(|last| last.time_secs)
+    }
+
+    /// By what part of its size each marker is larger than the scene says, once that is known.
+    pub(super) fn size_error(&self) -> Option<f64> {
+        self.condition.known_size_error()
+    }
+
+    /// Forgets what is too long ago, or lies ahead in a recording that starts again.
+    pub(super) fn forget(&mut self, now_secs: f64) {
+        let recent = |sight: &Sight| {
+            let age_secs = now_secs - sight.time_secs;
+            (0.0..=MEMORY_SECS).contains(&age_secs)
+        };
+        if self.last.as_ref().is_some_and(|sight| !recent(sight)) {
+            self.last = None;
+        }
+    }
+
+    /// The anchor near where its motion puts it, without a detector.
+    pub(super) fn follow(
+        &mut self,
+        picture: Grey<'_>,
+        intrinsics: &Intrinsics,
+        now_secs: f64,
+    ) -> Option<PixelPose> {
+        let predicted = self.last.as_ref()?.predicted(now_secs);
+        let near = REACHES.iter().find_map(|reach| {
+            let shifts: Vec<Option<DVec2>> = self
+                .layout
+                .prints
+                .iter()
+                .map(|print| find_shift(picture, intrinsics, print, &predicted, reach))
+                .collect();
+            shifts.iter().any(Option::is_some).then_some(shifts)
+        })?;
+        let start = self.shifted(intrinsics, predicted, &near)?;
+        fit_pose(picture, intrinsics, &self.layout.prints, start, &mut self.condition)
+    }
+
+    /// The pose that explains by how much each print lies from where `pose` puts it.
+    fn shifted(
+        &self,
+        intrinsics: &Intrinsics,
+        pose: DAffine3,
+        shifts: &[Option<DVec2>],
+    ) -> Option<DAffine3> {
+        let largest_px = shifts.iter().flatten().map(|shift| shift.length()).fold(0.0, f64::max);
+        if largest_px <= SMALL_SHIFT_PX {
+            return Some(pose);
+        }
+        let mut sightings = Vec::new();
+        for (print, shift) in self.layout.prints.iter().zip(shifts) {
+            let Some(shift) = shift else { continue };
+            for point_m in print.corners_m() {
+                let pixel = project(intrinsics, &pose, point_m)?.pixel + *shift;
+                let pixel = undistorted_pixel(intrinsics, pixel)?;
+                sightings.push(Sighting { point_m, pixel });
+            }
+        }
+        Some(refine(intrinsics, &sightings, pose)?.camera_from_anchor)
+    }
+
+    /// The anchor's pose from the pixels around where a detector's corners put it; `None` where the pixels do not bear
+    /// it out.
+    pub(super) fn fit(
+        &mut self,
+        picture: Grey<'_>,
+        intrinsics: &Intrinsics,
+        start: DAffine3,
+    ) -> Option<PixelPose> {
+        fit_pose(picture, intrinsics, &self.layout.prints, start, &mut self.condition)
+    }
+
+    /// Takes a pose of this frame for the anchor's, or its twin, as this frame and the earlier ones say.
+    pub(super) fn take(
+        &mut self,
+        picture: Grey<'_>,
+        intrinsics: &Intrinsics,
+        mut fitted: PixelPose,
+        now_secs: f64,
+    ) -> AnchorPose {
+        let mut twin = twin_of(&fitted, intrinsics, &self.layout.prints);
+        let mut odds = twin.map_or(MOST_ODDS, |twin| twin.odds);
+        let mut believed = false;
+        if let Some(last) = &self.last {
+            // The earlier frames speak for whichever of the two is their pose.
+            let predicted = last.predicted(now_secs);
+            let off = |pose: &DAffine3| rotation_between(pose, &predicted);
+            let is_twins = twin
+                .is_some_and(|twin| off(&twin.camera_from_anchor) < off(&fitted.camera_from_anchor));
+            let sign = if is_twins { -1.0 } else { 1.0 };
+            odds += sign * REMEMBERED * last.odds;
+            believed = last.believed;
+        }
+        let turned = odds < 0.0;
+        if let (true, Some(other)) = (turned, twin)
+            && let Some(better) = self.fit(picture, intrinsics, other.camera_from_anchor)
+        {
+            odds = -odds;
+            twin = Some(Twin {
+                camera_from_anchor: fitted.camera_from_anchor,
+                odds: -other.odds,
+                rms_px: fitted.rms_px,
+            });
+            fitted = better;
+        }
+        let odds = odds.clamp(0.0, MOST_ODDS);
+        let believed = odds > if believed { DOUBTED } else { BELIEVED };
+        let sight = Sight {
+            time_secs: now_secs,
+            camera_from_anchor: fitted.camera_from_anchor,
+            motion: self.motion_to(&fitted.camera_from_anchor, now_secs),
+            odds,
+            believed,
+        };
+        self.last = Some(sight);
+        AnchorPose {
+            status: if believed { Status::Tracked } else { Status::Ambiguous },
+            why: (!believed).then_some(Why::TwoPoses),
+            markers: fitted.seen.iter().filter(|&&seen| seen).count() as u32,
+            camera_from_anchor: Some(fitted.camera_from_anchor),
+            covariance: Some(fitted.covariance),
+            // An edge tells one coordinate of a corner's two.
+            reprojection_px: fitted.rms_px * std::f64::consts::SQRT_2,
+            alternative: twin.map(|twin| Alternative {
+                camera_from_anchor: twin.camera_from_anchor,
+                reprojection_px: twin.rms_px * std::f64::consts::SQRT_2,
+            }),
+            visibility: 1.0,
+        }
+    }
+
+    /// Takes what a detector's corners say, where the pixels have no better pose.
+    pub(super) fn take_located(&mut self, located: &Located, now_secs: f64) -> AnchorPose {
+        let solutions = &located.solutions;
+        let (mut chosen, mut other) = (solutions.best, solutions.alternative);
+        let before = self.last.as_ref().map(|last| last.camera_from_anchor);
+        if let (true, Some(alternative), Some(before)) = (solutions.ambiguous, other, before)
+            && rotation_between(&alternative.camera_from_anchor, &before)
+                < rotation_between(&chosen.camera_from_anchor, &before)
+        {
+            other = Some(chosen);
+            chosen = alternative;
+        }
+        let corners = 4 * located.markers;
+        self.last = Some(Sight {
+            time_secs: now_secs,
+            camera_from_anchor: chosen.camera_from_anchor,
+            motion: self.motion_to(&chosen.camera_from_anchor, now_secs),
+            odds: 0.0,
+            believed: !solutions.ambiguous,
+        });
+        AnchorPose {
+            status: if solutions.ambiguous { Status::Ambiguous } else { Status::Tracked },
+            why: solutions.ambiguous.then_some(Why::TwoPoses),
+            markers: located.markers as u32,
+            camera_from_anchor: Some(chosen.camera_from_anchor),
+            covariance: None,
+            reprojection_px: chosen.rms_px(corners),
+            alternative: other.map(|solution| Alternative {
+                camera_from_anchor: solution.camera_from_anchor,
+                reprojection_px: solution.rms_px(corners),
+            }),
+            visibility: 1.0,
+        }
+    }
+
+    /// The anchor in a frame that does not show it: predicted for a moment, fading, then lost.
+    pub(super) fn missed(&self, why: Why, now_secs: f64) -> AnchorPose {
+        let lost = AnchorPose {
+            why: Some(why),
+            ..AnchorPose::LOST
+        };
+        let Some(last) = &self.last else { return lost };
+        let age_secs = now_secs - last.time_secs;
+        if age_secs >= FADED_SECS {
+            return lost;
+        }
+        AnchorPose {
+            status: Status::Predicted,
+            camera_from_anchor: Some(last.predicted(now_secs)),
+            visibility: ((FADED_SECS - age_secs) / (FADED_SECS - PREDICTED_SECS)).min(1.0),
+            ..lost
+        }
+    }
+
+    fn motion_to(&self, pose: &DAffine3, now_secs: f64) -> Motion {
+        let Some(last) = &self.last else {
+            return Motion::default();
+        };
+        let step_secs = now_secs - last.time_secs;
+        if !(step_secs > 0.0 && step_secs <= LONGEST_STEP_SECS) {
+            return Motion::default();
+        }
+        let turn = pose.matrix3 * last.camera_from_anchor.matrix3.transpose();
+        Motion {
+            turn: DQuat::from_mat3(&turn).normalize().to_scaled_axis() / step_secs,
+            shift_m: (pose.translation - last.camera_from_anchor.translation) / step_secs,
+        }
+    }
+}
+
+impl Sight {
+    /// Where the anchor is by now: the motion goes on from frame to frame, and dies down where none shows it.
+    fn predicted(&self, now_secs: f64) -> DAffine3 {
+        let age_secs = (now_secs - self.time_secs).max(0.0);
+        let moving_secs = if age_secs <= PREDICTED_SECS {
+            age_secs
+        } else {
+            PREDICTED_SECS
+                + COASTING_SECS * (1.0 - (-(age_secs - PREDICTED_SECS) / COASTING_SECS).exp())
+        };
+        let turn = DQuat::from_scaled_axis(self.motion.turn * moving_secs);
+        let rotation = (turn * DQuat::from_mat3(&self.camera_from_anchor.matrix3)).normalize();
+        DAffine3::from_rotation_translation(
+            rotation,
+            self.camera_from_anchor.translation + self.motion.shift_m * moving_secs,
+        )
+    }
+}

@@ -1,0 +1,198 @@
+//! An anchor's markers and where a detector saw them: a first pose, from corners.
+
+use glam::{DAffine3, DVec2};
+
+use super::aruco::printed_cells;
+use super::pixel_pose::project;
+use super::pose::{self, Sighting, Solutions, pixel_of};
+use super::print::Print;
+use super::undistort::undistorted_pixel;
+use super::{Detection, TrackingError, Why};
+use crate::geometry::camera::Intrinsics;
+use crate::scene::{Anchor, Family};
+
+/// A board's pose that leaves more than this is looked through for a marker that does not fit, pixels.
+const SUSPICIOUS_RMS_PX: f64 = 1.5;
+
+/// Of several markers with one id the rest of the board picks the one whose corners lie this near, pixels.
+const SAME_MARKER_PX: f64 = 3.0;
+
+/// The markers of an anchor.
+pub(super) struct Layout {
+    markers: Vec<(Family, u32)>,
+    /// In the same order.
+    pub(super) prints: Vec<Print>,
+}
+
+/// Poses that a detector's corners allow.
+pub(super) struct Located {
+    pub(super) solutions: Solutions,
+    /// Markers that they rest on.
+    pub(super) markers: usize,
+}
+
+/// A marker of an anchor as one frame shows it.
+struct SeenMarker {
+    sightings: [Sighting; 4],
+}
+
+impl Layout {
+    pub(super) fn new(anchor: &Anchor) -> Result<Self, TrackingError> {
+        let prints = anchor.markers.iter().map(|marker| {
+            let cells = printed_cells(marker.family, marker.id)?;
+            let cells = cells.ok_or_else(|| TrackingError::NoSuchMarker {
+                family: marker.family.name(),
+                id: marker.id,
+                count: marker.family.id_count(),
+            })?;
+            Ok(Print::new(marker, cells))
+        });
+        Ok(Self {
+            markers: anchor
+                .markers
+                .iter()
+                .map(|marker| (marker.family, marker.id))
+                .collect(),
+            prints: prints.collect::<Result<_, TrackingError>>()?,
+        })
+    }
+
+    /// Family and id of each print.
+    pub(super) fn markers(&self) -> impl Iterator<Item = (Family, u32)> {
+        self.markers.iter().copied()
+    }
+
+    /// How far the two poses put the same corner from each other at most, pixels; infinite behind the camera.
+    pub(super) fn distance_px(&self, intrinsics: &Intrinsics, a: &DAffine3, b: &DAffine3) -> f64 {
+        let corners = self.prints.iter().flat_map(Print::corners_m);
+        corners
+            .map(|point_m| {
+                let place = |pose| Some(project(intrinsics, pose, point_m)?.pixel);
+                match (place(a), place(b)) {
+                    (Some(a), Some(b)) => a.distance(b),
+                    _ => f64::INFINITY,
+                }
+            })
+            .fold(0.0, f64::max)
+    }
+
+    /// The poses that explain where a detector saw the anchor's markers; `detections` are sorted by family and id.
+    pub(super) fn locate(
+        &self,
+        intrinsics: &Intrinsics,
+        detections: &[Detection],
+    ) -> Result<Located, Why> {
+        let mut seen = Vec::new();
+        let mut doubled = Vec::new();
+        for (marker, print) in self.markers().zip(&self.prints) {
+            let of = |detection: &Detection| (detection.family, detection.id);
+            let start = detections.partition_point(|detection| of(detection) < marker);
+            let mut candidates = detections[start..]
+                .iter()
+                .take_while(|detection| of(detection) == marker)
+                .filter_map(|detection| {
+                    SeenMarker::new(intrinsics, print.corners_m(), detection.corners_px)
+                })
+                .collect::<Vec<_>>();
+            match candidates.len() {
+                0 => {}
+                1 => seen.append(&mut candidates),
+                _ => doubled.push(candidates),
+            }
+        }
+        let Some(mut solutions) = solve_without_misfits(intrinsics, &mut seen) else {
+            return Err(match (seen.is_empty(), doubled.is_empty()) {
+                (true, true) => Why::NoMarker,
+                (true, false) => Why::DoubleId,
+                (false, _) => Why::NoPose,
+            });
+        };
+        // The rest of the board decides which of several markers with one id is its own.
+        if !doubled.is_empty() && !solutions.ambiguous {
+            let known = seen.len();
+            let camera_from_anchor = solutions.best.camera_from_anchor;
+            for candidates in doubled {
+                let mut fitting = candidates.into_iter().filter(|marker| {
+                    marker.distance_px(intrinsics, &camera_from_anchor) < SAME_MARKER_PX
+                });
+                if let (Some(marker), None) = (fitting.next(), fitting.next()) {
+                    seen.push(marker);
+                }
+            }
+            if seen.len() > known
+                && let Some(better) = solve_without_misfits(intrinsics, &mut seen)
+            {
+                solutions = better;
+            }
+        }
+        Ok(Located {
+            solutions,
+            markers: seen.len(),
+        })
+    }
+}
+
+impl SeenMarker {
+    /// `None` where the lens distortion has no inverse.
+    fn new(intrinsics: &Intrinsics, corners_m: [DVec2; 4], corners_px: [DVec2; 4]) -> Option<Self> {
+        let mut sightings = [Sighting {
+            point_m: DVec2::ZERO,
+            pixel: DVec2::ZERO,
+        }; 4];
+        for (sighting, (point_m, corner_px)) in sightings
+            .iter_mut()
+            .zip(corners_m.into_iter().zip(corners_px))
+        {
+            let pixel = undistorted_pixel(intrinsics, corner_px)?;
+            *sighting = Sighting { point_m, pixel };
+        }
+        Some(Self { sightings })
+    }
+
+    /// Of the farthest corner from where the pose puts it.
+    fn distance_px(&self, intrinsics: &Intrinsics, camera_from_anchor: &DAffine3) -> f64 {
+        self.sightings
+            .iter()
+            .map(|sighting| {
+                (pixel_of(intrinsics, camera_from_anchor, sighting.point_m) - sighting.pixel)
+                    .length()
+            })
+            .fold(0.0, f64::max)
+    }
+}
+
+/// Solves for all markers at once. When they do not fit together, the one without which the others do is left out
+/// (a wrong id, a corner under a pencil or a shadow's edge), as long as two others agree.
+fn solve_without_misfits(intrinsics: &Intrinsics, seen: &mut Vec<SeenMarker>) -> Option<Solutions> {
+    let solve_for = |markers: &mut dyn Iterator<Item = &SeenMarker>| {
+        let sightings = markers
+            .flat_map(|marker| marker.sightings)
+            .collect::<Vec<_>>();
+        let solutions = pose::solve(intrinsics, &sightings)?;
+        Some((solutions, solutions.best.rms_px(sightings.len())))
+    };
+    loop {
+        let all = solve_for(&mut seen.iter());
+        let rms_px = all.map_or(f64::INFINITY, |(_, rms_px)| rms_px);
+        if seen.len() < 3 || rms_px <= SUSPICIOUS_RMS_PX {
+            return all.map(|(solutions, _)| solutions);
+        }
+        let without = (0..seen.len())
+            .filter_map(|left_out| {
+                let mut others = seen
+                    .iter()
+                    .enumerate()
+                    .filter(|&(k, _)| k != left_out)
+                    .map(|(_, marker)| marker);
+                solve_for(&mut others).map(|(_, rms_px)| (left_out, rms_px))
+            })
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        match without {
+            // A bad calibration spreads its error over all markers; one misfit stands out.
+            Some((left_out, rest_px)) if rest_px < rms_px / 3.0 => {
+                seen.remove(left_out);
+            }
+            _ => return all.map(|(solutions, _)| solutions),
+        }
+    }
+}

@@ -1,0 +1,325 @@
+//! An anchor's pose from the pixels: all edges of all its prints at once, each by its own light (`edge_fit.rs`).
+//!
+//! A detector's four corners use a marker's outline alone, and each marker for itself. Here every boundary between
+//! black and white cells tells how far across itself it lies from where the pose puts it, with a variance of its own;
+//! Gauss-Newton steps on the six parameters of the one pose take all of them together, robustly, so that a pencil or a
+//! shadow's edge across a marker has no say. (Edges that steer a pose: C. Harris, "Tracking with rigid models", in
+//! Active Vision, 1992; the M-estimator is Tukey's.)
+
+use glam::{DAffine3, DMat2, DMat3, DQuat, DVec2, DVec3};
+
+use super::condition::Condition;
+use super::edge_fit::fit_edge;
+use super::least_squares::{accumulate, inverse, solve_positive_definite};
+use super::light::Grey;
+use super::print::Print;
+use super::undistort::distortion_jacobian;
+use crate::geometry::camera::Intrinsics;
+
+/// Parameters of a step: a turn about the anchor's origin (left of the rotation), a shift, how far all edges lie
+/// toward the black (ink runs, and light that the camera does not encode as it says spills), and by what part of its
+/// size each marker is larger than the scene says (a page printed to fit, a rule read wrongly).
+const PARAMETERS: usize = 8;
+/// Those of them that move the anchor.
+pub(super) const POSE_PARAMETERS: usize = 6;
+const SPILL: usize = 6;
+const SIZE: usize = 7;
+/// Standard deviation of what edges are expected to lie toward the black, pixels.
+const SPILL_PX: f64 = 0.1;
+/// An edge is never known better than this, pixels: paper bends, sheets are not printed to the micrometre.
+const FLOOR_PX: f64 = 0.02;
+/// Tukey's constant, standard deviations.
+const TUKEY: f64 = 4.685;
+/// Once a step moves no edge by more than this (root mean square), the pose is found, pixels.
+const SETTLED_PX: f64 = 0.01;
+/// Weight from which on an edge counts as being where it should be.
+const FITTING: f64 = 0.3;
+/// A marker is seen when so large a part of its edges fits, and so many of them.
+const SEEN_SHARE: f64 = 0.4;
+const SEEN_EDGES: usize = 10;
+
+/// A pose that the pixels agree on.
+pub(super) struct PixelPose {
+    pub(super) camera_from_anchor: DAffine3,
+    /// Of a turn about the anchor's origin (left of the rotation; radians) and a shift (metres).
+    pub(super) covariance: [[f64; POSE_PARAMETERS]; POSE_PARAMETERS],
+    /// Per print, whether it was seen.
+    pub(super) seen: Vec<bool>,
+    /// Root mean square distance, pixels, of the edges that fit from where the pose puts them.
+    pub(super) rms_px: f64,
+    /// By what factor the edges vary more than their pixels' noise says.
+    pub(super) excess: f64,
+    pub(super) edges: Vec<Edge>,
+}
+
+/// An edge of a print as one picture shows it.
+pub(super) struct Edge {
+    print: usize,
+    /// Its middle in the anchor's plane, metres.
+    pub(super) point_m: DVec2,
+    /// Where a point of it was seen, distorted pixels; that the print spills or is of another size is taken out.
+    pub(super) seen_px: DVec2,
+    /// Across it, a unit vector of the picture.
+    pub(super) normal: DVec2,
+    /// From where the pose puts it to where it was seen, along the normal, pixels.
+    offset_px: f64,
+    pub(super) variance: f64,
+    /// Derivative of the offset that a step explains.
+    row: [f64; PARAMETERS],
+    /// As [`EdgeFit::blur_error`](super::edge_fit::EdgeFit::blur_error).
+    pub(super) blur_error: (f64, f64),
+    /// Tukey's, 0 to 1.
+    pub(super) weight: f64,
+}
+
+impl Edge {
+    /// What a step does not explain of the offset, pixels.
+    fn left_px(&self, step: &[f64; PARAMETERS]) -> f64 {
+        let explained: f64 = self.row.iter().zip(step).map(|(row, step)| row * step).sum();
+        self.offset_px - explained
+    }
+}
+
+/// Where a pose puts a point of the anchor's plane, and the derivative by its place in camera space.
+pub(super) struct Projected {
+    /// Distorted pixel.
+    pub(super) pixel: DVec2,
+    /// By x, y and z, pixels per metre.
+    by_place: [DVec2; 3],
+    /// The point from the anchor's origin, in camera axes.
+    turned: DVec3,
+}
+
+impl Projected {
+    /// The derivative of the pixel along a direction of the picture by a turn about the anchor's origin and a shift.
+    pub(super) fn row(&self, direction: DVec2) -> [f64; POSE_PARAMETERS] {
+        let gradient = DVec3::from(self.by_place.map(|column| column.dot(direction)));
+        // gradient · (turn × turned) = turn · (turned × gradient)
+        let by_turn = self.turned.cross(gradient);
+        [
+            by_turn.x, by_turn.y, by_turn.z, gradient.x, gradient.y, gradient.z,
+        ]
+    }
+
+    /// The step in the picture, pixels, for one of the point in camera axes, metres.
+    fn step_px(&self, step_m: DVec3) -> DVec2 {
+        let [x, y, z] = self.by_place;
+        x * step_m.x + y * step_m.y + z * step_m.z
+    }
+}
+
+/// `None` behind the camera.
+pub(super) fn project(
+    intrinsics: &Intrinsics,
+    camera_from_anchor: &DAffine3,
+    point_m: DVec2,
+) -> Option<Projected> {
+    let turned = camera_from_anchor.matrix3 * point_m.extend(0.0);
+    let in_camera = turned + camera_from_anchor.translation;
+    if in_camera.z <= 1e-6 {
+        return None;
+    }
+    let image = in_camera.truncate() / in_camera.z;
+    let lens = distortion_jacobian(intrinsics, image);
+    let scale = DMat2::from_diagonal(intrinsics.focal_px / in_camera.z) * lens;
+    Some(Projected {
+        pixel: intrinsics.pixel_from_plane(intrinsics.distort(image)),
+        by_place: [scale.x_axis, scale.y_axis, -(scale * image)],
+        turned,
+    })
+}
+
+/// A pose after a turn about the anchor's origin (left of the rotation, radians) and a shift (metres).
+pub(super) fn moved(pose: &DAffine3, step: [f64; POSE_PARAMETERS]) -> DAffine3 {
+    let [rx, ry, rz, tx, ty, tz] = step;
+    let turn = DQuat::from_scaled_axis(DVec3::new(rx, ry, rz));
+    let rotation = (turn * DQuat::from_mat3(&pose.matrix3)).normalize();
+    DAffine3::from_mat3_translation(
+        DMat3::from_quat(rotation),
+        pose.translation + DVec3::new(tx, ty, tz),
+    )
+}
+
+/// The pose near `start` that puts the edges of the prints where the picture has them. `None` when too few edges are
+/// where they should be; `condition` is then as it was.
+pub(super) fn fit_pose(
+    picture: Grey<'_>,
+    intrinsics: &Intrinsics,
+    prints: &[Print],
+    start: DAffine3,
+    condition: &mut Condition,
+) -> Option<PixelPose> {
+    const ROUNDS: usize = 5;
+    let mut learned = *condition;
+    let mut pose = start;
+    let mut edges = Vec::new();
+    let mut solution = None;
+    for _ in 0..ROUNDS {
+        edges.clear();
+        for (index, print) in prints.iter().enumerate() {
+            measure(picture, intrinsics, (index, print), &pose, &learned, &mut edges);
+        }
+        let solved = solve(&mut edges, condition)?;
+        pose = moved(&pose, pose_part(&solved.step));
+        learned.correct_blur(&edges);
+        let explained: f64 = edges
+            .iter()
+            .map(|edge| {
+                let by_pose: f64 = (0..POSE_PARAMETERS).map(|k| edge.row[k] * solved.step[k]).sum();
+                edge.weight * by_pose * by_pose
+            })
+            .sum();
+        let used: f64 = edges.iter().map(|edge| edge.weight).sum();
+        solution = Some(solved);
+        if (explained / used).sqrt() < SETTLED_PX {
+            break;
+        }
+    }
+    let solution = solution?;
+    let fitted = fitted(prints, pose, edges, &solution)?;
+    if fitted.seen.iter().filter(|&&seen| seen).count() > 1 {
+        learned.learn_size(solution.step[SIZE], solution.size_certainty / fitted.excess);
+    }
+    *condition = learned;
+    Some(fitted)
+}
+
+fn pose_part(step: &[f64; PARAMETERS]) -> [f64; POSE_PARAMETERS] {
+    std::array::from_fn(|k| step[k])
+}
+
+/// Adds the edges of one print that the picture shows near where the pose puts them.
+fn measure(
+    picture: Grey<'_>,
+    intrinsics: &Intrinsics,
+    (index, print): (usize, &Print),
+    pose: &DAffine3,
+    condition: &Condition,
+    edges: &mut Vec<Edge>,
+) {
+    for edge in &print.edges {
+        let Some(projected) = project(intrinsics, pose, edge.point_m) else {
+            continue;
+        };
+        let in_picture = |step_m: DVec2| projected.step_px(pose.matrix3 * step_m.extend(0.0));
+        let pixels_from_cells = DMat2::from_cols(in_picture(edge.across_m), in_picture(edge.along_m));
+        // The gradient of the place across.
+        let gradient = pixels_from_cells.inverse().row(0);
+        let length = gradient.length();
+        if !(length.is_finite() && length > 0.0) {
+            continue;
+        }
+        let normal = gradient / length;
+        let blur_variance = condition.blur_variance_along(normal);
+        let fit = fit_edge(picture, edge, projected.pixel, pixels_from_cells, blur_variance);
+        let Some(fit) = fit else { continue };
+        let offset_px = fit.offset_cells / length;
+        let [rx, ry, rz, tx, ty, tz] = projected.row(normal);
+        let outward_m = edge.point_m - print.center_m();
+        let by_size = normal.dot(in_picture(outward_m));
+        let toward_black = if edge.brightens { -1.0 } else { 1.0 };
+        edges.push(Edge {
+            print: index,
+            point_m: edge.point_m,
+            seen_px: projected.pixel + normal * offset_px,
+            normal,
+            offset_px,
+            variance: fit.variance_cells / (length * length) + FLOOR_PX * FLOOR_PX,
+            row: [rx, ry, rz, tx, ty, tz, toward_black, by_size],
+            blur_error: fit.blur_error,
+            weight: 1.0,
+        });
+    }
+}
+
+struct Solved {
+    step: [f64; PARAMETERS],
+    /// Inverse of the variance of the size in the step.
+    size_certainty: f64,
+}
+
+/// The step that explains the offsets, robustly. Leaves each edge its weight.
+fn solve(edges: &mut [Edge], condition: &Condition) -> Option<Solved> {
+    const ROUNDS: usize = 5;
+    let mut found = None;
+    let mut scale = f64::INFINITY;
+    for _ in 0..ROUNDS {
+        let mut normal = [[0.0; PARAMETERS]; PARAMETERS];
+        let mut right = [0.0; PARAMETERS];
+        for edge in edges.iter() {
+            let certainty = (edge.weight / edge.variance).sqrt();
+            let row = edge.row.map(|entry| entry * certainty);
+            accumulate(&mut normal, &mut right, &row, edge.offset_px * certainty);
+        }
+        let (size_error, size_certainty) = condition.size();
+        normal[SPILL][SPILL] += 1.0 / (SPILL_PX * SPILL_PX);
+        normal[SIZE][SIZE] += size_certainty;
+        right[SIZE] += size_certainty * size_error;
+        let step = solve_positive_definite(&normal, &right)?;
+
+        let deviation = |edge: &Edge| edge.left_px(&step) / edge.variance.sqrt();
+        let mut distances: Vec<f64> = edges.iter().map(|edge| deviation(edge).abs()).collect();
+        let middle = distances.len() / 2;
+        let (_, median, _) = distances.select_nth_unstable_by(middle, f64::total_cmp);
+        // The median of |x| of a unit Gaussian is 0.6745.
+        scale = (*median / 0.6745).clamp(1.0, scale);
+        for edge in edges.iter_mut() {
+            let share = deviation(edge) / (TUKEY * scale);
+            edge.weight = (1.0 - share * share).max(0.0).powi(2);
+        }
+        found = Some((step, normal));
+    }
+    let (step, normal) = found?;
+    Some(Solved {
+        step,
+        size_certainty: 1.0 / inverse(&normal)?[SIZE][SIZE],
+    })
+}
+
+fn fitted(
+    prints: &[Print],
+    pose: DAffine3,
+    mut edges: Vec<Edge>,
+    solved: &Solved,
+) -> Option<PixelPose> {
+    for edge in &mut edges {
+        let not_by_pose = edge.row[SPILL] * solved.step[SPILL] + edge.row[SIZE] * solved.step[SIZE];
+        edge.seen_px -= edge.normal * not_by_pose;
+    }
+    let mut fitting = vec![0; prints.len()];
+    for edge in edges.iter().filter(|edge| edge.weight > FITTING) {
+        fitting[edge.print] += 1;
+    }
+    let seen: Vec<bool> = prints
+        .iter()
+        .zip(fitting)
+        .map(|(print, fitting)| {
+            fitting >= SEEN_EDGES && fitting as f64 >= SEEN_SHARE * print.edges.len() as f64
+        })
+        .collect();
+    if !seen.contains(&true) {
+        return None;
+    }
+    let mut normal = [[0.0; POSE_PARAMETERS]; POSE_PARAMETERS];
+    let (mut squares_px, mut squares, mut used) = (0.0, 0.0, 0.0);
+    for edge in &edges {
+        let certainty = (edge.weight / edge.variance).sqrt();
+        let row = pose_part(&edge.row).map(|entry| entry * certainty);
+        accumulate(&mut normal, &mut [0.0; POSE_PARAMETERS], &row, 0.0);
+        let left_px = edge.left_px(&solved.step);
+        squares_px += edge.weight * left_px * left_px;
+        squares += edge.weight * left_px * left_px / edge.variance;
+        used += edge.weight;
+    }
+    // Edges err more than their pixels' noise says where a codec has been at work.
+    let excess = (squares / (used - PARAMETERS as f64).max(1.0)).max(1.0);
+    let covariance = inverse(&normal)?.map(|row| row.map(|entry| entry * excess));
+    Some(PixelPose {
+        camera_from_anchor: pose,
+        covariance,
+        seen,
+        rms_px: (squares_px / used).sqrt(),
+        excess,
+        edges,
+    })
+}
