@@ -166,7 +166,7 @@ fn anchor_row((number, anchor): (usize, &Anchor)) -> Row {
     let markers = &anchor.markers;
     let family = markers
         .first()
-        .map_or("no family", |marker| marker.family.name());
+        .map_or("no family".to_owned(), |marker| marker.family.to_string());
     let ids: Vec<u32> = markers.iter().map(|marker| marker.id).collect();
     let mut sizes_mm: Vec<String> = markers
         .iter()
@@ -181,7 +181,7 @@ fn anchor_row((number, anchor): (usize, &Anchor)) -> Row {
             markers.len(),
             if markers.len() == 1 { "" } else { "s" }
         ),
-        family.to_owned(),
+        family,
         format!("id {}", ranges(&ids)),
         format!("{} mm", sizes_mm.join(", ")),
         if number == 0 {

@@ -22,10 +22,13 @@ pub fn anchors(root: &Table, detector: DetectorKind) -> Result<Vec<Anchor>, Scen
         owners: HashMap::new(),
     };
     let mut anchors = Vec::new();
-    for board in root.tables("board", &["name", "family", "markers"])? {
+    for board in root.tables("board", &["name", "family", "border_cells", "markers"])? {
         anchors.push(reader.board(&board)?);
     }
-    for marker in root.tables("marker", &["name", "family", "id", "size_m"])? {
+    for marker in root.tables(
+        "marker",
+        &["name", "family", "border_cells", "id", "size_m"],
+    )? {
         anchors.push(reader.lone_marker(&marker)?);
     }
     if anchors.is_empty() {
@@ -87,9 +90,20 @@ impl AnchorReader {
     }
 
     fn family(&self, table: &Table) -> Result<Family, SceneError> {
-        let Some(value) = table.optional("family") else {
-            return Ok(Family::Tag36h11);
+        let family = match table.optional("family") {
+            Some(written) => self.named_family(&written)?,
+            None => Family::TAG36H11,
         };
+        let Some(border) = table.optional("border_cells") else {
+            return Ok(family);
+        };
+        let border_cells = border.integer(Family::BORDERS)?;
+        family
+            .with_border(border_cells)
+            .ok_or_else(|| border.error("no marker is printed so"))
+    }
+
+    fn named_family(&self, value: &Value) -> Result<Family, SceneError> {
         let written = value.text()?;
         let family = Family::from_name(written).ok_or_else(|| {
             value.error(format!(
@@ -97,8 +111,7 @@ impl AnchorReader {
                 suggestion(written, &Family::all_names().collect::<Vec<_>>())
             ))
         })?;
-        let aruco = matches!(family, Family::Aruco { .. } | Family::ArucoOriginal);
-        if aruco && self.detector == DetectorKind::AprilTag {
+        if !family.is_april_tag() && self.detector == DetectorKind::AprilTag {
             return Err(value.error(
                 "libapriltag does not know this family; set tracking.detector = \"aruco\" for it",
             ));
@@ -115,8 +128,7 @@ impl AnchorReader {
         })?;
         match self.owners.insert((family, id), (anchor.to_owned(), value.line())) {
             Some((owner, line)) => Err(value.error(format!(
-                "marker {id} of {} is taken by \"{owner}\" on line {line}; allowed: each marker once",
-                family.name()
+                "marker {id} of {family} is taken by \"{owner}\" on line {line}; allowed: each marker once"
             ))),
             None => Ok(id),
         }

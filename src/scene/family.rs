@@ -1,8 +1,19 @@
 //! The families of square markers, by the names under which people print them.
 
-/// A family (AprilTag) or dictionary (ArUco) of square markers.
+use std::fmt;
+use std::ops::RangeInclusive;
+
+/// A family of markers as printed: its codes and the black border around them. The same code in another border is
+/// another marker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Family {
+pub struct Family {
+    codes: Codes,
+    border_cells: u8,
+}
+
+/// The codes of a family (AprilTag) or dictionary (ArUco).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Codes {
     /// AprilTag 16h5: 4 × 4 cells; false ids are common.
     Tag16h5,
     /// AprilTag 25h9: 5 × 5 cells.
@@ -22,151 +33,90 @@ pub enum Family {
     ArucoOriginal,
 }
 
-/// Every family with its name.
-const NAMES: [(&str, Family); 21] = [
-    ("tag16h5", Family::Tag16h5),
-    ("tag25h9", Family::Tag25h9),
-    ("tag36h10", Family::Tag36h10),
-    ("tag36h11", Family::Tag36h11),
-    (
-        "DICT_4X4_50",
-        Family::Aruco {
-            cells: 4,
-            count: 50,
-        },
-    ),
-    (
-        "DICT_4X4_100",
-        Family::Aruco {
-            cells: 4,
-            count: 100,
-        },
-    ),
-    (
-        "DICT_4X4_250",
-        Family::Aruco {
-            cells: 4,
-            count: 250,
-        },
-    ),
-    (
-        "DICT_4X4_1000",
-        Family::Aruco {
-            cells: 4,
-            count: 1000,
-        },
-    ),
-    (
-        "DICT_5X5_50",
-        Family::Aruco {
-            cells: 5,
-            count: 50,
-        },
-    ),
-    (
-        "DICT_5X5_100",
-        Family::Aruco {
-            cells: 5,
-            count: 100,
-        },
-    ),
-    (
-        "DICT_5X5_250",
-        Family::Aruco {
-            cells: 5,
-            count: 250,
-        },
-    ),
-    (
-        "DICT_5X5_1000",
-        Family::Aruco {
-            cells: 5,
-            count: 1000,
-        },
-    ),
-    (
-        "DICT_6X6_50",
-        Family::Aruco {
-            cells: 6,
-            count: 50,
-        },
-    ),
-    (
-        "DICT_6X6_100",
-        Family::Aruco {
-            cells: 6,
-            count: 100,
-        },
-    ),
-    (
-        "DICT_6X6_250",
-        Family::Aruco {
-            cells: 6,
-            count: 250,
-        },
-    ),
-    (
-        "DICT_6X6_1000",
-        Family::Aruco {
-            cells: 6,
-            count: 1000,
-        },
-    ),
-    (
-        "DICT_7X7_50",
-        Family::Aruco {
-            cells: 7,
-            count: 50,
-        },
-    ),
-    (
-        "DICT_7X7_100",
-        Family::Aruco {
-            cells: 7,
-            count: 100,
-        },
-    ),
-    (
-        "DICT_7X7_250",
-        Family::Aruco {
-            cells: 7,
-            count: 250,
-        },
-    ),
-    (
-        "DICT_7X7_1000",
-        Family::Aruco {
-            cells: 7,
-            count: 1000,
-        },
-    ),
-    ("DICT_ARUCO_ORIGINAL", Family::ArucoOriginal),
+/// All codes with their names.
+const NAMES: [(&str, Codes); 21] = [
+    ("tag16h5", Codes::Tag16h5),
+    ("tag25h9", Codes::Tag25h9),
+    ("tag36h10", Codes::Tag36h10),
+    ("tag36h11", Codes::Tag36h11),
+    ("DICT_4X4_50", aruco(4, 50)),
+    ("DICT_4X4_100", aruco(4, 100)),
+    ("DICT_4X4_250", aruco(4, 250)),
+    ("DICT_4X4_1000", aruco(4, 1000)),
+    ("DICT_5X5_50", aruco(5, 50)),
+    ("DICT_5X5_100", aruco(5, 100)),
+    ("DICT_5X5_250", aruco(5, 250)),
+    ("DICT_5X5_1000", aruco(5, 1000)),
+    ("DICT_6X6_50", aruco(6, 50)),
+    ("DICT_6X6_100", aruco(6, 100)),
+    ("DICT_6X6_250", aruco(6, 250)),
+    ("DICT_6X6_1000", aruco(6, 1000)),
+    ("DICT_7X7_50", aruco(7, 50)),
+    ("DICT_7X7_100", aruco(7, 100)),
+    ("DICT_7X7_250", aruco(7, 250)),
+    ("DICT_7X7_1000", aruco(7, 1000)),
+    ("DICT_ARUCO_ORIGINAL", Codes::ArucoOriginal),
 ];
 
+const fn aruco(cells: u8, count: u16) -> Codes {
+    Codes::Aruco { cells, count }
+}
+
 /// OpenCV's own names of the AprilTag families, understood as well.
-const OPENCV_NAMES: [(&str, Family); 4] = [
-    ("DICT_APRILTAG_16h5", Family::Tag16h5),
-    ("DICT_APRILTAG_25h9", Family::Tag25h9),
-    ("DICT_APRILTAG_36h10", Family::Tag36h10),
-    ("DICT_APRILTAG_36h11", Family::Tag36h11),
+const OPENCV_NAMES: [(&str, Codes); 4] = [
+    ("DICT_APRILTAG_16h5", Codes::Tag16h5),
+    ("DICT_APRILTAG_25h9", Codes::Tag25h9),
+    ("DICT_APRILTAG_36h10", Codes::Tag36h10),
+    ("DICT_APRILTAG_36h11", Codes::Tag36h11),
 ];
 
 impl Family {
-    /// The family of a name like `tag36h11` or `DICT_4X4_50`, capitals or not.
+    /// AprilTag's 16h5 as AprilTag prints it.
+    pub const TAG16H5: Self = Self::of(Codes::Tag16h5);
+    /// AprilTag's 25h9 as AprilTag prints it.
+    pub const TAG25H9: Self = Self::of(Codes::Tag25h9);
+    /// AprilTag's 36h10 as AprilTag prints it.
+    pub const TAG36H10: Self = Self::of(Codes::Tag36h10);
+    /// AprilTag's 36h11 as AprilTag prints it: the usual choice.
+    pub const TAG36H11: Self = Self::of(Codes::Tag36h11);
+
+    /// How wide borders may be, cells; all but Kalibr's targets have 1.
+    pub const BORDERS: RangeInclusive<u32> = 1..=2;
+
+    /// Codes in the usual border of one cell.
+    pub const fn of(codes: Codes) -> Self {
+        Self {
+            codes,
+            border_cells: 1,
+        }
+    }
+
+    /// The same codes in a border of so many cells; `None` outside [`Family::BORDERS`].
+    pub fn with_border(self, border_cells: u32) -> Option<Self> {
+        let border_cells = u8::try_from(border_cells)
+            .ok()
+            .filter(|&cells| Self::BORDERS.contains(&u32::from(cells)))?;
+        Some(Self {
+            border_cells,
+            ..self
+        })
+    }
+
+    /// The family of a name like `tag36h11` or `DICT_4X4_50`, capitals or not, in a border of one cell.
     pub fn from_name(name: &str) -> Option<Self> {
         NAMES
             .iter()
             .chain(&OPENCV_NAMES)
             .find(|(known, _)| known.eq_ignore_ascii_case(name))
-            .map(|&(_, family)| family)
+            .map(|&(_, codes)| Self::of(codes))
     }
 
-    /// The name that [`Family::from_name`] knows.
+    /// The name that [`Family::from_name`] knows; it does not tell the border.
     pub fn name(self) -> &'static str {
         // An `Aruco` of a size that does not exist can be written down in code, never read from a scene.
         NAMES
             .iter()
-            .find(|&&(_, family)| family == self)
+            .find(|&&(_, codes)| codes == self.codes)
             .map_or("DICT_UNKNOWN", |&(name, _)| name)
     }
 
@@ -175,8 +125,49 @@ impl Family {
         NAMES.iter().map(|&(name, _)| name)
     }
 
+    /// Its codes.
+    pub fn codes(self) -> Codes {
+        self.codes
+    }
+
+    /// Width of the black border, cells.
+    pub fn border_cells(self) -> u32 {
+        u32::from(self.border_cells)
+    }
+
+    /// Cells a side of the black square, border and code.
+    pub fn cells_across(self) -> u32 {
+        self.codes.cells() + 2 * self.border_cells()
+    }
+
     /// Number of markers; their ids run from 0.
     pub fn id_count(self) -> u32 {
+        self.codes.id_count()
+    }
+
+    /// Wrong bits that the smallest distance between two of its codes allows to correct, at most.
+    pub fn correctable_bits(self) -> u32 {
+        self.codes.correctable_bits()
+    }
+
+    /// Whether it is one of AprilTag's families, which both detectors know.
+    pub fn is_april_tag(self) -> bool {
+        self.codes.is_april_tag()
+    }
+}
+
+impl fmt::Display for Family {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())?;
+        match self.border_cells {
+            1 => Ok(()),
+            cells => write!(f, " with a border of {cells} cells"),
+        }
+    }
+}
+
+impl Codes {
+    fn id_count(self) -> u32 {
         match self {
             Self::Tag16h5 => 30,
             Self::Tag25h9 => 35,
@@ -197,8 +188,7 @@ impl Family {
         }
     }
 
-    /// Wrong bits that the smallest distance between two of its codes allows to correct, at most.
-    pub fn correctable_bits(self) -> u32 {
+    fn correctable_bits(self) -> u32 {
         let distance = match self {
             Self::Tag16h5 => 5,
             Self::Tag25h9 => 9,
@@ -226,8 +216,7 @@ impl Family {
         (distance - 1) / 2
     }
 
-    /// Whether it is one of AprilTag's families, which both detectors know.
-    pub fn is_april_tag(self) -> bool {
+    fn is_april_tag(self) -> bool {
         matches!(
             self,
             Self::Tag16h5 | Self::Tag25h9 | Self::Tag36h10 | Self::Tag36h11
@@ -244,13 +233,24 @@ mod tests {
         for name in Family::all_names() {
             assert_eq!(Family::from_name(name).map(Family::name), Some(name));
         }
-        assert_eq!(Family::from_name("TAG36H11"), Some(Family::Tag36h11));
+        assert_eq!(Family::from_name("TAG36H11"), Some(Family::TAG36H11));
         assert_eq!(
             Family::from_name("DICT_APRILTAG_36h11"),
-            Some(Family::Tag36h11)
+            Some(Family::TAG36H11)
         );
         for wrong in ["", "tag36h12", "DICT_4X4_51", "DICT_8X8_50", "36h11"] {
             assert_eq!(Family::from_name(wrong), None);
+        }
+    }
+    #[test]
+    fn a_border_makes_another_family_of_the_same_codes() {
+        let wide = Family::TAG36H11.with_border(2).unwrap();
+        assert_ne!(wide, Family::TAG36H11);
+        assert_eq!(wide.with_border(1), Some(Family::TAG36H11));
+        assert_eq!((wide.cells_across(), wide.id_count()), (10, 587));
+        assert_eq!(wide.to_string(), "tag36h11 with a border of 2 cells");
+        for wrong in [0, 3, 257] {
+            assert_eq!(Family::TAG36H11.with_border(wrong), None);
         }
     }
 }

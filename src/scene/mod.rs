@@ -19,7 +19,7 @@ mod reader;
 mod settings;
 
 pub use error::{Place, SceneError};
-pub use family::Family;
+pub use family::{Codes, Family};
 
 /// What one scene file says, checked.
 #[derive(Debug, Clone, Default)]

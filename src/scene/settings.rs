@@ -3,8 +3,8 @@
 use super::error::SceneError;
 use super::reader::{Numbers, Table, Value};
 use super::{
-    ArucoRefinement, CameraSettings, Counting, DetectorKind, ShadowSettings, Technique,
-    Search, TrackingSettings,
+    ArucoRefinement, CameraSettings, Counting, DetectorKind, Search, ShadowSettings, Technique,
+    TrackingSettings,
 };
 use crate::geometry::outline_scale::LARGEST_MOVE_PX;
 

@@ -2,35 +2,109 @@
 
 use std::ffi::{CStr, c_char};
 use std::ptr::{self, NonNull};
+use std::sync::LazyLock;
 
 use glam::DVec2;
 
 use super::conventions::corners_from_apriltag;
 use super::{Detection, TrackingError};
-use crate::scene::{Family, TrackingSettings};
+use crate::scene::{Codes, Family, TrackingSettings};
 
 /// More corrected bits cost libapriltag gigabytes of tables.
 const MAX_CORRECTED_BITS: u32 = 3;
 
-/// A detector with its families; built once, used by one thread at a time.
+/// Grey levels that are added before the logarithm of [`between_corner_squares`]: a dark picture's noise stays small.
+const LOG_OFFSET: f64 = 64.0;
+
+/// A detector for some families; built once, used by one thread at a time.
 pub(super) struct AprilTagDetector {
+    /// One for each width of border.
+    searches: Vec<Search>,
+    min_margin: f64,
+    /// The picture with [`between_corner_squares`] applied.
+    parted: Vec<u8>,
+}
+
+/// libapriltag's detector with the families of one border.
+struct Search {
     raw: NonNull<RawDetector>,
     families: Vec<Family>,
-    min_margin: f64,
 }
 
 // SAFETY: the shim keeps no thread-local or shared state; `&mut self` on every use keeps it to one thread at a time.
-unsafe impl Send for AprilTagDetector {}
+unsafe impl Send for Search {}
 
 impl AprilTagDetector {
     pub(super) fn new(
         settings: &TrackingSettings,
         families: &[Family],
     ) -> Result<Self, TrackingError> {
+        if settings.corrected_bits > MAX_CORRECTED_BITS {
+            return Err(TrackingError::Setting {
+                name: "corrected_bits",
+                value: settings.corrected_bits.to_string(),
+                allowed: "0 to 3 with libapriltag",
+            });
+        }
+        let mut searches = Vec::new();
+        for border_cells in Family::BORDERS {
+            let of_border = families
+                .iter()
+                .copied()
+                .filter(|family| family.border_cells() == border_cells)
+                .collect::<Vec<_>>();
+            if !of_border.is_empty() {
+                searches.push(Search::new(settings, of_border)?);
+            }
+        }
+        Ok(Self {
+            searches,
+            min_margin: settings.min_margin,
+            parted: Vec::new(),
+        })
+    }
+
+    pub(super) fn detect(
+        &mut self,
+        grey: &[u8],
+        size_px: [u32; 2],
+    ) -> Result<Vec<Detection>, TrackingError> {
+        let mut detections = Vec::new();
+        for search in &mut self.searches {
+            let picture = if search.has_wide_borders() {
+                self.parted.clear();
+                self.parted.extend(
+                    grey.iter()
+                        .map(|&level| between_corner_squares()[usize::from(level)]),
+                );
+                &self.parted
+            } else {
+                grey
+            };
+            detections.extend(search.detect(picture, size_px, self.min_margin)?);
+        }
+        Ok(detections)
+    }
+}
+
+/// The levels in which tags with black squares at their corners (Kalibr's AprilGrids, the one use of wide borders) come
+/// apart. libapriltag takes what is darker than the middle between a neighbourhood's extremes for black; where two
+/// black corners meet, blur makes a bridge that is just that dark. In the logarithm of the levels the middle lies
+/// lower. Thin white rims around other tags suffer from it.
+fn between_corner_squares() -> &'static [u8; 256] {
+    static LEVELS: LazyLock<[u8; 256]> = LazyLock::new(|| {
+        let log = |level: f64| (1.0 + level / LOG_OFFSET).ln();
+        std::array::from_fn(|level| (255.0 * log(level as f64) / log(255.0)).round() as u8)
+    });
+    &LEVELS
+}
+
+impl Search {
+    fn new(settings: &TrackingSettings, families: Vec<Family>) -> Result<Self, TrackingError> {
         let names = families
             .iter()
             .map(|&family| {
-                c_name(family).ok_or_else(|| TrackingError::FamilyNotAvailable {
+                c_name(family.codes()).ok_or_else(|| TrackingError::FamilyNotAvailable {
                     family: family.name(),
                     detector: "libapriltag",
                     allowed: Family::all_names()
@@ -40,13 +114,6 @@ impl AprilTagDetector {
                 })
             })
             .collect::<Result<Vec<_>, _>>()?;
-        if settings.corrected_bits > MAX_CORRECTED_BITS {
-            return Err(TrackingError::Setting {
-                name: "corrected_bits",
-                value: settings.corrected_bits.to_string(),
-                allowed: "0 to 3 with libapriltag",
-            });
-        }
         // SAFETY: no argument is a pointer; the settings were checked by `Detector::new`.
         let raw = unsafe {
             gnomon_apriltag_create(
@@ -57,28 +124,36 @@ impl AprilTagDetector {
         };
         let raw = NonNull::new(raw)
             .ok_or_else(|| TrackingError::Library("libapriltag gave no detector".into()))?;
-        let detector = Self {
-            raw,
-            families: families.to_vec(),
-            min_margin: settings.min_margin,
-        };
-        for (&family, name) in families.iter().zip(names) {
+        let search = Self { raw, families };
+        for (&family, name) in search.families.iter().zip(names) {
             let bits = settings.corrected_bits.min(family.correctable_bits()) as i32;
             // SAFETY: `raw` lives, `name` ends in 0.
-            if !unsafe { gnomon_apriltag_add_family(detector.raw.as_ptr(), name.as_ptr(), bits) } {
+            let taken = unsafe {
+                gnomon_apriltag_add_family(
+                    search.raw.as_ptr(),
+                    name.as_ptr(),
+                    family.border_cells() as i32,
+                    bits,
+                )
+            };
+            if !taken {
                 return Err(TrackingError::Library(format!(
-                    "libapriltag did not take {}",
-                    family.name()
+                    "libapriltag did not take {family}"
                 )));
             }
         }
-        Ok(detector)
+        Ok(search)
     }
 
-    pub(super) fn detect(
+    fn has_wide_borders(&self) -> bool {
+        self.families.iter().any(|family| family.border_cells() > 1)
+    }
+
+    fn detect(
         &mut self,
         grey: &[u8],
         size_px: [u32; 2],
+        min_margin: f64,
     ) -> Result<Vec<Detection>, TrackingError> {
         let [width, height] = size_px;
         let mut found: *const RawDetection = ptr::null();
@@ -103,7 +178,7 @@ impl AprilTagDetector {
         };
         Ok(found
             .iter()
-            .filter(|raw| f64::from(raw.margin) >= self.min_margin)
+            .filter(|raw| f64::from(raw.margin) >= min_margin)
             .filter_map(|raw| {
                 let family = *self.families.get(usize::try_from(raw.family).ok()?)?;
                 let [x0, y0, x1, y1, x2, y2, x3, y3] = raw.corners;
@@ -120,7 +195,7 @@ impl AprilTagDetector {
     }
 }
 
-impl Drop for AprilTagDetector {
+impl Drop for Search {
     fn drop(&mut self) {
         // SAFETY: `raw` came from `gnomon_apriltag_create` and is freed once; the shim frees the detector first, then
         // its families.
@@ -134,7 +209,8 @@ pub(super) fn printed_cells(family: Family, id: u32) -> Option<Vec<bool>> {
     // SAFETY: the name ends in 0 and the capacity is the picture's.
     let side = unsafe {
         gnomon_apriltag_picture(
-            c_name(family)?.as_ptr(),
+            c_name(family.codes())?.as_ptr(),
+            family.border_cells() as i32,
             id,
             picture.as_mut_ptr(),
             picture.len(),
@@ -149,13 +225,13 @@ pub(super) fn printed_cells(family: Family, id: u32) -> Option<Vec<bool>> {
     )
 }
 
-fn c_name(family: Family) -> Option<&'static CStr> {
-    match family {
-        Family::Tag16h5 => Some(c"tag16h5"),
-        Family::Tag25h9 => Some(c"tag25h9"),
-        Family::Tag36h10 => Some(c"tag36h10"),
-        Family::Tag36h11 => Some(c"tag36h11"),
-        Family::Aruco { .. } | Family::ArucoOriginal => None,
+fn c_name(codes: Codes) -> Option<&'static CStr> {
+    match codes {
+        Codes::Tag16h5 => Some(c"tag16h5"),
+        Codes::Tag25h9 => Some(c"tag25h9"),
+        Codes::Tag36h10 => Some(c"tag36h10"),
+        Codes::Tag36h11 => Some(c"tag36h11"),
+        Codes::Aruco { .. } | Codes::ArucoOriginal => None,
     }
 }
 
@@ -178,6 +254,7 @@ unsafe extern "C" {
     fn gnomon_apriltag_add_family(
         detector: *mut RawDetector,
         name: *const c_char,
+        border_cells: i32,
         corrected_bits: i32,
     ) -> bool;
     fn gnomon_apriltag_detect(
@@ -190,6 +267,7 @@ unsafe extern "C" {
     fn gnomon_apriltag_destroy(detector: *mut RawDetector);
     fn gnomon_apriltag_picture(
         name: *const c_char,
+        border_cells: i32,
         id: u32,
         cells: *mut u8,
         capacity: usize,

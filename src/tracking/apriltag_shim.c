@@ -13,6 +13,7 @@
 #include <apriltag/tag36h11.h>
 
 #define FAMILIES 4
+#define MOST_BORDER_CELLS 2
 
 static const struct {
     const char *name;
@@ -50,6 +51,22 @@ static int known_index(const char *name) {
     return -1;
 }
 
+// A family of the caller's own, with its codes moved into the middle of a border of so many cells.
+static apriltag_family_t *create_family(int known, int32_t border_cells) {
+    if (known < 0 || border_cells < 1 || border_cells > MOST_BORDER_CELLS) return NULL;
+    apriltag_family_t *family = KNOWN[known].create();
+    if (!family) return NULL;
+    // The library's are printed with one cell; it counts the bits' places from the border's outer corner.
+    uint32_t wider = (uint32_t)border_cells - 1;
+    family->width_at_border += 2 * (int)wider;
+    family->total_width += 2 * (int)wider;
+    for (uint32_t bit = 0; bit < family->nbits; bit++) {
+        family->bit_x[bit] += wider;
+        family->bit_y[bit] += wider;
+    }
+    return family;
+}
+
 void gnomon_apriltag_destroy(struct gnomon_apriltag *self) {
     if (!self) return;
     if (self->detector) apriltag_detector_destroy(self->detector);
@@ -75,10 +92,11 @@ struct gnomon_apriltag *gnomon_apriltag_create(float decimation, float blur_px, 
     return self;
 }
 
-bool gnomon_apriltag_add_family(struct gnomon_apriltag *self, const char *name, int32_t corrected_bits) {
+bool gnomon_apriltag_add_family(struct gnomon_apriltag *self, const char *name, int32_t border_cells,
+                                int32_t corrected_bits) {
     int k = known_index(name);
-    if (k < 0 || self->family_count == FAMILIES) return false;
-    apriltag_family_t *family = KNOWN[k].create();
+    if (self->family_count == FAMILIES) return false;
+    apriltag_family_t *family = create_family(k, border_cells);
     if (!family) return false;
     self->families[self->family_count] = family;
     self->known[self->family_count] = k;
@@ -139,10 +157,10 @@ int32_t gnomon_apriltag_detect(struct gnomon_apriltag *self, const uint8_t *grey
 
 // Writes the picture of a marker as printed, one byte a cell (0 black, else white), its white rim included.
 // Returns the cells a side, or -1.
-int32_t gnomon_apriltag_picture(const char *name, uint32_t id, uint8_t *cells, size_t capacity) {
+int32_t gnomon_apriltag_picture(const char *name, int32_t border_cells, uint32_t id, uint8_t *cells,
+                                size_t capacity) {
     int k = known_index(name);
-    if (k < 0) return -1;
-    apriltag_family_t *family = KNOWN[k].create();
+    apriltag_family_t *family = create_family(k, border_cells);
     if (!family) return -1;
     int32_t side = -1;
     image_u8_t *image = id < family->ncodes ? apriltag_to_image(family, (int)id) : NULL;

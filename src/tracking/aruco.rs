@@ -7,7 +7,7 @@ use opencv::prelude::*;
 use super::apriltag;
 use super::conventions::{corners_from_aruco, quarter_turns_between};
 use super::{Detection, TrackingError};
-use crate::scene::{ArucoRefinement, Family, TrackingSettings};
+use crate::scene::{ArucoRefinement, Codes, Family, TrackingSettings};
 
 /// OpenCV's detector for some dictionaries, each with the turn of its pictures against the prints.
 pub(super) struct ArucoDetector {
@@ -25,15 +25,20 @@ impl ArucoDetector {
         let dictionaries = families
             .iter()
             .map(|&family| {
-                let number =
-                    dictionary_number(family).ok_or_else(|| TrackingError::FamilyNotAvailable {
+                let number = dictionary_number(family.codes()).ok_or_else(|| {
+                    TrackingError::FamilyNotAvailable {
                         family: family.name(),
                         detector: "OpenCV's ArUco",
                         allowed: Family::all_names().collect::<Vec<_>>().join(", "),
-                    })?;
+                    }
+                })?;
                 let bits = settings.corrected_bits.min(family.correctable_bits()) as i32;
-                let dictionary =
-                    installed::Dictionary::new(number, bits, settings.aruco_refinement)?;
+                let dictionary = installed::Dictionary::new(
+                    number,
+                    family.border_cells() as i32,
+                    bits,
+                    settings.aruco_refinement,
+                )?;
                 Ok((family, quarter_turns(family, &dictionary)?, dictionary))
             })
             .collect::<Result<Vec<_>, TrackingError>>()?;
@@ -83,11 +88,12 @@ pub(super) fn printed_cells(family: Family, id: u32) -> Result<Option<Vec<bool>>
     if family.is_april_tag() {
         return Ok(apriltag::printed_cells(family, id));
     }
-    let Some(number) = dictionary_number(family).filter(|_| id < family.id_count()) else {
+    let Some(number) = dictionary_number(family.codes()).filter(|_| id < family.id_count()) else {
         return Ok(None);
     };
-    let dictionary = installed::Dictionary::new(number, 0, ArucoRefinement::None)?;
-    let side = family.cells() as usize + 2;
+    let border = family.border_cells() as i32;
+    let dictionary = installed::Dictionary::new(number, border, 0, ArucoRefinement::None)?;
+    let side = family.cells_across() as usize;
     Ok(Some(dictionary.cells(id as i32, side)?))
 }
 
@@ -99,7 +105,7 @@ fn quarter_turns(
     if !family.is_april_tag() {
         return Ok(0);
     }
-    let side = family.cells() as usize + 2;
+    let side = family.cells_across() as usize;
     let opencv = dictionary.cells(0, side)?;
     apriltag::printed_cells(family, 0)
         .and_then(|print| quarter_turns_between(&print, &opencv, side))
@@ -109,14 +115,14 @@ fn quarter_turns(
 }
 
 /// The number of OpenCV's predefined dictionary, the same in all its releases.
-fn dictionary_number(family: Family) -> Option<i32> {
-    Some(match family {
-        Family::Tag16h5 => 17,
-        Family::Tag25h9 => 18,
-        Family::Tag36h10 => 19,
-        Family::Tag36h11 => 20,
-        Family::ArucoOriginal => 16,
-        Family::Aruco { cells, count } => {
+fn dictionary_number(codes: Codes) -> Option<i32> {
+    Some(match codes {
+        Codes::Tag16h5 => 17,
+        Codes::Tag25h9 => 18,
+        Codes::Tag36h10 => 19,
+        Codes::Tag36h11 => 20,
+        Codes::ArucoOriginal => 16,
+        Codes::Aruco { cells, count } => {
             let of_size = [50, 100, 250, 1000]
                 .iter()
                 .position(|&known| known == count)?;
@@ -162,12 +168,14 @@ mod installed {
     impl Dictionary {
         pub(super) fn new(
             number: i32,
+            border_cells: i32,
             corrected_bits: i32,
             refinement: ArucoRefinement,
         ) -> opencv::Result<Self> {
             let mut dictionary = aruco::get_predefined_dictionary_i32(number)?;
             dictionary.set_max_correction_bits(corrected_bits);
             let mut parameters = aruco::DetectorParameters::create()?;
+            parameters.set_marker_border_bits(border_cells);
             parameters.set_error_correction_rate(1.0);
             parameters.set_corner_refinement_method(refinement_number(refinement));
             Ok(Self {
@@ -194,7 +202,14 @@ mod installed {
 
         pub(super) fn cells(&self, id: i32, side: usize) -> opencv::Result<Vec<bool>> {
             let mut picture = Mat::default();
-            aruco::draw_marker_def(&self.dictionary, id, side as i32, &mut picture)?;
+            let border_cells = self.parameters.marker_border_bits();
+            aruco::draw_marker(
+                &self.dictionary,
+                id,
+                side as i32,
+                &mut picture,
+                border_cells,
+            )?;
             white_cells(&picture)
         }
     }
@@ -218,12 +233,14 @@ mod installed {
     impl Dictionary {
         pub(super) fn new(
             number: i32,
+            border_cells: i32,
             corrected_bits: i32,
             refinement: ArucoRefinement,
         ) -> opencv::Result<Self> {
             let mut dictionary = objdetect::get_predefined_dictionary_i32(number)?;
             dictionary.set_max_correction_bits(corrected_bits);
             let mut parameters = objdetect::DetectorParameters::default()?;
+            parameters.set_marker_border_bits(border_cells);
             parameters.set_error_correction_rate(1.0);
             parameters.set_corner_refinement_method(refinement_number(refinement));
             let refine = objdetect::RefineParameters::new_def()?;
@@ -245,7 +262,17 @@ mod installed {
 
         pub(super) fn cells(&self, id: i32, side: usize) -> opencv::Result<Vec<bool>> {
             let mut picture = Mat::default();
-            objdetect::generate_image_marker_def(&self.dictionary, id, side as i32, &mut picture)?;
+            let border_cells = self
+                .detector
+                .get_detector_parameters()?
+                .marker_border_bits();
+            objdetect::generate_image_marker(
+                &self.dictionary,
+                id,
+                side as i32,
+                &mut picture,
+                border_cells,
+            )?;
             white_cells(&picture)
         }
     }
@@ -255,17 +282,24 @@ mod installed {
 mod tests {
     use super::*;
 
+    fn installed_dictionary(family: Family) -> installed::Dictionary {
+        let number = dictionary_number(family.codes()).unwrap();
+        let border_cells = family.border_cells() as i32;
+        installed::Dictionary::new(number, border_cells, 0, ArucoRefinement::None).unwrap()
+    }
+
     #[test]
     fn every_april_tag_of_opencv_is_april_tags_own_up_to_one_turn() {
-        for family in [
-            Family::Tag16h5,
-            Family::Tag25h9,
-            Family::Tag36h10,
-            Family::Tag36h11,
-        ] {
-            let number = dictionary_number(family).unwrap();
-            let dictionary = installed::Dictionary::new(number, 0, ArucoRefinement::None).unwrap();
-            let side = family.cells() as usize + 2;
+        let usual = [
+            Family::TAG16H5,
+            Family::TAG25H9,
+            Family::TAG36H10,
+            Family::TAG36H11,
+        ];
+        let wide = usual.map(|family| family.with_border(2).unwrap());
+        for family in usual.into_iter().chain(wide) {
+            let dictionary = installed_dictionary(family);
+            let side = family.cells_across() as usize;
             let turn = quarter_turns(family, &dictionary).unwrap();
             for id in 0..family.id_count() {
                 let print = apriltag::printed_cells(family, id).unwrap();
@@ -273,8 +307,7 @@ mod tests {
                 assert_eq!(
                     quarter_turns_between(&print, &opencv, side),
                     Some(turn),
-                    "{} {id}",
-                    family.name()
+                    "{family} {id}"
                 );
             }
             assert!(apriltag::printed_cells(family, family.id_count()).is_none());
@@ -284,9 +317,8 @@ mod tests {
     #[test]
     fn the_dictionaries_have_the_ids_that_they_claim() {
         for family in Family::all_names().filter_map(Family::from_name) {
-            let number = dictionary_number(family).unwrap();
-            let dictionary = installed::Dictionary::new(number, 0, ArucoRefinement::None).unwrap();
-            let side = family.cells() as usize + 2;
+            let dictionary = installed_dictionary(family);
+            let side = family.cells_across() as usize;
             assert!(
                 dictionary.cells(family.id_count() as i32 - 1, side).is_ok(),
                 "{}",

@@ -221,15 +221,22 @@ impl Sums {
         }
         // What is left of the fourth equation once the other three are solved.
         let blurring: [f64; 3] = std::array::from_fn(|i| entry(i, 3));
-        let blur_left = f64::from(self.right[3]) - (0..3).map(|i| blurring[i] * solution[i]).sum::<f64>();
+        let blur_left =
+            f64::from(self.right[3]) - (0..3).map(|i| blurring[i] * solution[i]).sum::<f64>();
         let blur_information = entry(3, 3)
             - (0..3)
                 .map(|i| blurring[i] * (0..3).map(|j| inverse[i][j] * blurring[j]).sum::<f64>())
                 .sum::<f64>();
         // By the logarithm of the deviation, hence twice the variance.
-        let (unit, certainty) = (2.0 * blur_variance, blur_information * contrast * contrast / noise);
+        let (unit, certainty) = (
+            2.0 * blur_variance,
+            blur_information * contrast * contrast / noise,
+        );
         let blur_error = match blur_information > 1e-9 {
-            true => (unit * blur_left / (blur_information * contrast), certainty / (unit * unit)),
+            true => (
+                unit * blur_left / (blur_information * contrast),
+                certainty / (unit * unit),
+            ),
             false => (0.0, 0.0),
         };
         Some(EdgeView::Seen(EdgeFit {

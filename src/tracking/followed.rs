@@ -102,7 +102,13 @@ impl Followed {
             shifts.iter().any(Option::is_some).then_some(shifts)
         })?;
         let start = self.shifted(intrinsics, predicted, &near)?;
-        fit_pose(picture, intrinsics, &self.layout.prints, start, &mut self.condition)
+        fit_pose(
+            picture,
+            intrinsics,
+            &self.layout.prints,
+            start,
+            &mut self.condition,
+        )
     }
 
     /// The pose that explains by how much each print lies from where `pose` puts it.
@@ -112,7 +118,11 @@ impl Followed {
         pose: DAffine3,
         shifts: &[Option<DVec2>],
     ) -> Option<DAffine3> {
-        let largest_px = shifts.iter().flatten().map(|shift| shift.length()).fold(0.0, f64::max);
+        let largest_px = shifts
+            .iter()
+            .flatten()
+            .map(|shift| shift.length())
+            .fold(0.0, f64::max);
         if largest_px <= SMALL_SHIFT_PX {
             return Some(pose);
         }
@@ -136,7 +146,13 @@ impl Followed {
         intrinsics: &Intrinsics,
         start: DAffine3,
     ) -> Option<PixelPose> {
-        fit_pose(picture, intrinsics, &self.layout.prints, start, &mut self.condition)
+        fit_pose(
+            picture,
+            intrinsics,
+            &self.layout.prints,
+            start,
+            &mut self.condition,
+        )
     }
 
     /// Takes a pose of this frame for the anchor's, or its twin, as this frame and the earlier ones say.
@@ -154,8 +170,9 @@ impl Followed {
             // The earlier frames speak for whichever of the two is their pose.
             let predicted = last.predicted(now_secs);
             let off = |pose: &DAffine3| rotation_between(pose, &predicted);
-            let is_twins = twin
-                .is_some_and(|twin| off(&twin.camera_from_anchor) < off(&fitted.camera_from_anchor));
+            let is_twins = twin.is_some_and(|twin| {
+                off(&twin.camera_from_anchor) < off(&fitted.camera_from_anchor)
+            });
             let sign = if is_twins { -1.0 } else { 1.0 };
             odds += sign * REMEMBERED * last.odds;
             believed = last.believed;
@@ -183,7 +200,11 @@ impl Followed {
         };
         self.last = Some(sight);
         AnchorPose {
-            status: if believed { Status::Tracked } else { Status::Ambiguous },
+            status: if believed {
+                Status::Tracked
+            } else {
+                Status::Ambiguous
+            },
             why: (!believed).then_some(Why::TwoPoses),
             markers: fitted.seen.iter().filter(|&&seen| seen).count() as u32,
             camera_from_anchor: Some(fitted.camera_from_anchor),
@@ -219,7 +240,11 @@ impl Followed {
             believed: !solutions.ambiguous,
         });
         AnchorPose {
-            status: if solutions.ambiguous { Status::Ambiguous } else { Status::Tracked },
+            status: if solutions.ambiguous {
+                Status::Ambiguous
+            } else {
+                Status::Tracked
+            },
             why: solutions.ambiguous.then_some(Why::TwoPoses),
             markers: located.markers as u32,
             camera_from_anchor: Some(chosen.camera_from_anchor),

@@ -78,7 +78,12 @@ pub(super) struct Edge {
 impl Edge {
     /// What a step does not explain of the offset, pixels.
     fn left_px(&self, step: &[f64; PARAMETERS]) -> f64 {
-        let explained: f64 = self.row.iter().zip(step).map(|(row, step)| row * step).sum();
+        let explained: f64 = self
+            .row
+            .iter()
+            .zip(step)
+            .map(|(row, step)| row * step)
+            .sum();
         self.offset_px - explained
     }
 }
@@ -160,7 +165,14 @@ pub(super) fn fit_pose(
     for _ in 0..ROUNDS {
         edges.clear();
         for (index, print) in prints.iter().enumerate() {
-            measure(picture, intrinsics, (index, print), &pose, &learned, &mut edges);
+            measure(
+                picture,
+                intrinsics,
+                (index, print),
+                &pose,
+                &learned,
+                &mut edges,
+            );
         }
         if edges.is_empty() {
             return None;
@@ -171,7 +183,9 @@ pub(super) fn fit_pose(
         let explained: f64 = edges
             .iter()
             .map(|edge| {
-                let by_pose: f64 = (0..POSE_PARAMETERS).map(|k| edge.row[k] * solved.step[k]).sum();
+                let by_pose: f64 = (0..POSE_PARAMETERS)
+                    .map(|k| edge.row[k] * solved.step[k])
+                    .sum();
                 edge.weight * by_pose * by_pose
             })
             .sum();
@@ -209,7 +223,8 @@ fn measure(
             continue;
         };
         let in_picture = |step_m: DVec2| projected.step_px(pose.matrix3 * step_m.extend(0.0));
-        let pixels_from_cells = DMat2::from_cols(in_picture(edge.across_m), in_picture(edge.along_m));
+        let pixels_from_cells =
+            DMat2::from_cols(in_picture(edge.across_m), in_picture(edge.along_m));
         // The gradient of the place across.
         let gradient = pixels_from_cells.inverse().row(0);
         let length = gradient.length();
@@ -218,7 +233,13 @@ fn measure(
         }
         let normal = gradient / length;
         let blur_variance = condition.blur_variance_along(normal);
-        let fit = match fit_edge(picture, edge, projected.pixel, pixels_from_cells, blur_variance) {
+        let fit = match fit_edge(
+            picture,
+            edge,
+            projected.pixel,
+            pixels_from_cells,
+            blur_variance,
+        ) {
             EdgeView::Seen(fit) => fit,
             EdgeView::Reversed => {
                 reversed += 1;

@@ -108,7 +108,10 @@ fn is_seen_from_the_front(camera_from_anchor: &DAffine3, sightings: &[Sighting])
 }
 
 /// The two poses that the homography's derivative at the points' centre allows (IPPE, section 4).
-pub(super) fn ippe_starts(intrinsics: &Intrinsics, sightings: &[Sighting]) -> Option<[DAffine3; 2]> {
+pub(super) fn ippe_starts(
+    intrinsics: &Intrinsics,
+    sightings: &[Sighting],
+) -> Option<[DAffine3; 2]> {
     if sightings.len() < 4 {
         return None;
     }
@@ -262,7 +265,11 @@ fn translation_for(
 }
 
 /// Levenberg-Marquardt on the six parameters of the pose; `None` when it does not converge to a pose in front.
-pub(super) fn refine(intrinsics: &Intrinsics, sightings: &[Sighting], start: DAffine3) -> Option<Solution> {
+pub(super) fn refine(
+    intrinsics: &Intrinsics,
+    sightings: &[Sighting],
+    start: DAffine3,
+) -> Option<Solution> {
     const ROUNDS: usize = 100;
     const STEP_TOLERANCE: f64 = 1e-10;
     let mut pose = start;

@@ -14,8 +14,8 @@ use crate::scene::{Anchor, Search, TrackingSettings};
 
 /// The whole picture is searched again after this, even when nothing is missing, seconds.
 const SEARCH_AGAIN_SECS: f64 = 2.0;
-/// An anchor that has been missing for longer than this is looked for less often, seconds,
-const LONG_GONE_SECS: f64 = 3.0;
+/// An anchor that has been missing for longer than this is thoroughly looked for less often, seconds,
+const LONG_GONE_SECS: f64 = 10.0;
 /// in one of so many frames.
 const LONG_GONE_FRAMES: u32 = 3;
 /// A search that puts an anchor's corners farther than this from where it was followed to has found another place,
@@ -49,7 +49,9 @@ impl Tracker {
             .iter()
             .flat_map(|anchor| anchor.markers.iter().map(|marker| marker.family))
             .collect::<Vec<_>>();
-        let followed = anchors.iter().map(|anchor| Ok(Followed::new(Layout::new(anchor)?)));
+        let followed = anchors
+            .iter()
+            .map(|anchor| Ok(Followed::new(Layout::new(anchor)?)));
         Ok(Self {
             detector: Detector::new(settings, &families)?,
             anchors: followed.collect::<Result<_, TrackingError>>()?,
@@ -94,19 +96,31 @@ impl Tracker {
 
         if !self.needs_search(&found, now_secs) {
             self.detections.clear();
-            let poses = self.anchors.iter_mut().zip(found).map(|(anchor, found)| match found {
-                Some(fitted) => {
-                    add_seen(&mut self.detections, &self.intrinsics, &anchor.layout, &fitted);
-                    anchor.take(picture, &self.intrinsics, fitted, now_secs)
-                }
-                None => anchor.missed(Why::NoMarker, now_secs),
-            });
+            let poses = self
+                .anchors
+                .iter_mut()
+                .zip(found)
+                .map(|(anchor, found)| match found {
+                    Some(fitted) => {
+                        add_seen(
+                            &mut self.detections,
+                            &self.intrinsics,
+                            &anchor.layout,
+                            &fitted,
+                        );
+                        anchor.take(picture, &self.intrinsics, fitted, now_secs)
+                    }
+                    None => anchor.missed(Why::NoMarker, now_secs),
+                });
             let poses = poses.collect();
             self.detections.sort_by(Detection::by_id_and_place);
             return Ok(poses);
         }
         self.searched_secs = now_secs;
         self.detections = self.detector.detect(&self.grey, frame.size_px)?;
+        if self.needs_thorough_search(&found, now_secs) {
+            self.detections = self.detector.detect_thoroughly(&self.grey, frame.size_px)?;
+        }
         let poses = self
             .anchors
             .iter_mut()
@@ -154,13 +168,24 @@ impl Tracker {
     /// Whether the whole picture is to be searched.
     fn needs_search(&self, found: &[Option<PixelPose>], now_secs: f64) -> bool {
         let since_secs = now_secs - self.searched_secs;
-        if !(0.0..SEARCH_AGAIN_SECS).contains(&since_secs) {
-            return true;
-        }
-        found.iter().zip(&self.missing_since_secs).any(|(found, since_secs)| {
-            let long_gone = since_secs.is_some_and(|since_secs| now_secs - since_secs > LONG_GONE_SECS);
-            found.is_none() && (!long_gone || self.frames.is_multiple_of(LONG_GONE_FRAMES))
-        })
+        let is_due = !(0.0..SEARCH_AGAIN_SECS).contains(&since_secs);
+        is_due || found.iter().any(Option::is_none)
+    }
+
+    /// Whether it is to be searched once more and better, for an anchor that is in none of what was found.
+    fn needs_thorough_search(&self, found: &[Option<PixelPose>], now_secs: f64) -> bool {
+        let mut anchors = self.anchors.iter().zip(found).zip(&self.missing_since_secs);
+        self.follows
+            && anchors.any(|((anchor, found), since_secs)| {
+                let long_gone =
+                    since_secs.is_some_and(|since_secs| now_secs - since_secs > LONG_GONE_SECS);
+                found.is_none()
+                    && (!long_gone || self.frames.is_multiple_of(LONG_GONE_FRAMES))
+                    && anchor
+                        .layout
+                        .locate(&self.intrinsics, &self.detections)
+                        .is_err()
+            })
     }
 }
 
@@ -171,8 +196,11 @@ fn add_seen(
     layout: &Layout,
     fitted: &PixelPose,
 ) {
-    for (((family, id), print), _) in
-        layout.markers().zip(&layout.prints).zip(&fitted.seen).filter(|(_, seen)| **seen)
+    for (((family, id), print), _) in layout
+        .markers()
+        .zip(&layout.prints)
+        .zip(&fitted.seen)
+        .filter(|(_, seen)| **seen)
     {
         let corners = print
             .corners_m()

@@ -25,11 +25,7 @@ pub(super) struct Twin {
 }
 
 /// The other pose that explains the edges that `pose` rests on, refined on them. `None` where there is no other.
-pub(super) fn twin_of(
-    pose: &PixelPose,
-    intrinsics: &Intrinsics,
-    prints: &[Print],
-) -> Option<Twin> {
+pub(super) fn twin_of(pose: &PixelPose, intrinsics: &Intrinsics, prints: &[Print]) -> Option<Twin> {
     let here = &pose.camera_from_anchor;
     let seen = prints.iter().zip(&pose.seen).filter(|(_, seen)| **seen);
     let sightings: Vec<Sighting> = seen
@@ -50,7 +46,9 @@ pub(super) fn twin_of(
     let there = distances(pose, intrinsics, &other)?;
     let error = |distances_px: &[f64]| -> f64 {
         let edges = pose.edges.iter().zip(distances_px);
-        edges.map(|(edge, px)| edge.weight * px * px / edge.variance).sum()
+        edges
+            .map(|(edge, px)| edge.weight * px * px / edge.variance)
+            .sum()
     };
     Some(Twin {
         camera_from_anchor: other,

@@ -18,8 +18,8 @@ use gnomon::app::check::summary;
 use gnomon::geometry::mesh::Mesh;
 use gnomon::light::{Light, Material};
 use gnomon::scene::{
-    ArucoRefinement, Counting, DetectorKind, Family, Object, Scene, SceneError, ShadowSettings,
-    Technique,
+    ArucoRefinement, Codes, Counting, DetectorKind, Family, Object, Scene, SceneError,
+    ShadowSettings, Technique,
 };
 use tempfile::TempDir;
 
@@ -143,7 +143,7 @@ fn a_small_scene_has_the_defaults() {
     assert_eq!(scene.chosen_technique().0, Technique::Volumes);
     assert_eq!(scene.ambient_radiance, DVec3::ZERO);
     assert_eq!((scene.phantoms.len(), scene.lights.len()), (0, 0));
-    assert_eq!(scene.anchors[0].markers[0].family, Family::Tag36h11);
+    assert_eq!(scene.anchors[0].markers[0].family, Family::TAG36H11);
     let object = &scene.virtuals[0];
     assert_eq!(
         (object.anchor, object.casts, object.mesh_report.closed),
@@ -179,6 +179,7 @@ threads = 2
 [[marker]]
 name = \"card\"
 family = \"DICT_4X4_50\"
+border_cells = 2
 id = 0x11
 size_m = 0.036
 [[board]]
@@ -242,10 +243,12 @@ frame_budget_ms = 16
     assert!((scene.anchors[0].markers[0].rotation_rad - FRAC_PI_2).abs() < 1e-12);
     assert_eq!(
         scene.anchors[1].markers[0].family,
-        Family::Aruco {
+        Family::of(Codes::Aruco {
             cells: 4,
             count: 50
-        }
+        })
+        .with_border(2)
+        .unwrap()
     );
     assert_eq!(scene.anchors[1].markers[0].id, 17);
     let object = &scene.virtuals[0];
