@@ -148,6 +148,19 @@ pub(super) fn moved(pose: &DAffine3, step: [f64; POSE_PARAMETERS]) -> DAffine3 {
     )
 }
 
+/// The turn (left of the rotation) and the shift from one pose to another.
+pub(super) fn difference(to: &DAffine3, from: &DAffine3) -> [f64; 6] {
+    let rotation = DQuat::from_mat3(&(to.matrix3 * from.matrix3.transpose())).normalize();
+    let turn = rotation.to_scaled_axis();
+    // The short way round.
+    let turn = match turn.length() > std::f64::consts::PI {
+        true => turn * (1.0 - std::f64::consts::TAU / turn.length()),
+        false => turn,
+    };
+    let shift_m: DVec3 = to.translation - from.translation;
+    [turn.x, turn.y, turn.z, shift_m.x, shift_m.y, shift_m.z]
+}
+
 /// The pose near `start` that puts the edges of the prints where the picture has them. `None` when too few edges are
 /// where they should be; `condition` is then as it was.
 pub(super) fn fit_pose(

@@ -51,7 +51,7 @@ impl Tracker {
             .collect::<Vec<_>>();
         let followed = anchors
             .iter()
-            .map(|anchor| Ok(Followed::new(Layout::new(anchor)?)));
+            .map(|anchor| Ok(Followed::new(Layout::new(anchor)?, settings.filter)));
         Ok(Self {
             detector: Detector::new(settings, &families)?,
             anchors: followed.collect::<Result<_, TrackingError>>()?,
@@ -145,7 +145,7 @@ impl Tracker {
                 };
                 match (found.take(), located) {
                     (Some(fitted), _) => anchor.take(picture, &self.intrinsics, fitted, now_secs),
-                    (None, Ok(located)) => anchor.take_located(&located, now_secs),
+                    (None, Ok(located)) => anchor.take_located(&self.intrinsics, &located, now_secs),
                     (None, Err(why)) => anchor.missed(why, now_secs),
                 }
             })
