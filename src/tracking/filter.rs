@@ -103,7 +103,12 @@ impl Filter {
             let by_pose = sum(&drifted, &jolt);
             let certainty = inverse(&sum(&by_pose, &noise))?;
             let weighed = product_with(&certainty, &innovation);
-            let surprise = innovation.iter().zip(weighed).map(|(a, b)| a * b).sum::<f64>() / 6.0;
+            let surprise = innovation
+                .iter()
+                .zip(weighed)
+                .map(|(a, b)| a * b)
+                .sum::<f64>()
+                / 6.0;
             Some((by_pose, certainty, surprise))
         };
         let mut weighed = weigh(self.liveliness);

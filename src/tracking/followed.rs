@@ -35,8 +35,10 @@ const BELIEVED: f64 = 4.6;
 const DOUBTED: f64 = 2.3;
 /// The most that earlier frames can say for a pose.
 const MOST_ODDS: f64 = 20.0;
-/// What of the earlier frames' odds counts in the next one; errors of neighbouring frames are not independent.
-const REMEMBERED: f64 = 0.8;
+/// What of the earlier frames' odds counts in the next one,
+const REMEMBERED: f64 = 0.9;
+/// and what of its own: errors of neighbouring frames are not independent.
+const NEW_SHARE: f64 = 0.3;
 
 /// An anchor and what is known of it from earlier frames.
 pub(super) struct Followed {
@@ -203,19 +205,17 @@ impl Followed {
     ) -> AnchorPose {
         let mut twin = twin_of(&fitted, intrinsics, &self.layout.prints);
         let mut odds = twin.map_or(MOST_ODDS, |twin| twin.odds);
-        let mut believed = false;
-        if let Some(last) = &self.last {
-            // The earlier frames speak for whichever of the two is their pose.
-            let predicted = last.predicted(now_secs);
-            let off = |pose: &DAffine3| rotation_between(pose, &predicted);
-            let is_twins = twin.is_some_and(|twin| {
-                off(&twin.camera_from_anchor) < off(&fitted.camera_from_anchor)
-            });
-            let sign = if is_twins { -1.0 } else { 1.0 };
-            odds += sign * REMEMBERED * last.odds;
+        let (mut believed, mut turns_below) = (false, 0.0);
+        if let (Some(last), Some(twin)) = (&self.last, &twin) {
+            // The earlier frames speak for whichever of the two is their pose, and it takes something to turn it over.
+            let (here, there) = (&fitted.camera_from_anchor, &twin.camera_from_anchor);
+            let off = |pose| rotation_between(pose, &last.camera_from_anchor);
+            let nearer = (off(there) - off(here)) / rotation_between(here, there);
+            odds = NEW_SHARE * odds + nearer.clamp(-1.0, 1.0) * REMEMBERED * last.odds;
             believed = last.believed;
+            turns_below = -DOUBTED * nearer.signum();
         }
-        let turned = odds < 0.0;
+        let turned = odds < turns_below;
         if let (true, Some(other)) = (turned, twin)
             && let Some(better) = self.fit(picture, intrinsics, other.camera_from_anchor)
         {
@@ -227,7 +227,7 @@ impl Followed {
             });
             fitted = better;
         }
-        let odds = odds.clamp(0.0, MOST_ODDS);
+        let odds = odds.clamp(-DOUBTED, MOST_ODDS);
         let believed = odds > if believed { DOUBTED } else { BELIEVED };
         let sight = Sight {
             time_secs: now_secs,
@@ -362,12 +362,16 @@ impl Sight {
     /// Where the anchor is by now.
     fn predicted(&self, now_secs: f64) -> DAffine3 {
         let moving_secs = coasting_secs(now_secs - self.time_secs);
-        moved(&self.camera_from_anchor, self.motion.map(|speed| speed * moving_secs))
+        moved(
+            &self.camera_from_anchor,
+            self.motion.map(|speed| speed * moving_secs),
+        )
     }
 }
 
 /// A motion goes on from frame to frame, and dies down where none shows it: for how long it goes on as it was.
 fn coasting_secs(age_secs: f64) -> f64 {
     let unseen_secs = (age_secs - PREDICTED_SECS).max(0.0);
-    age_secs.clamp(0.0, PREDICTED_SECS) + COASTING_SECS * (1.0 - (-unseen_secs / COASTING_SECS).exp())
+    age_secs.clamp(0.0, PREDICTED_SECS)
+        + COASTING_SECS * (1.0 - (-unseen_secs / COASTING_SECS).exp())
 }
