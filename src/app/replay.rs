@@ -414,7 +414,8 @@ impl Run<'_> {
         let whole = Stopwatch::start();
         let (uploaded, upload_ms) = Stopwatch::time(|| renderer.upload(frame));
         uploaded?;
-        let ((), submit_ms) = Stopwatch::time(|| renderer.draw(&placed, shown));
+        let visibility: Vec<_> = poses.iter().map(|pose| pose.visibility).collect();
+        let ((), submit_ms) = Stopwatch::time(|| renderer.draw_fading(&placed, &visibility, shown));
         let waiting = Stopwatch::start();
         renderer.wait()?;
         let wait_ms = waiting.elapsed_ms();
