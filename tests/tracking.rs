@@ -463,7 +463,7 @@ fn a_lone_marker_keeps_both_poses_and_says_when_it_cannot_tell() {
                     "tilt {tilt_deg}: {off}° and {other}° off"
                 );
             }
-            Status::Lost => panic!("tilt {tilt_deg}: lost"),
+            Status::Predicted | Status::Lost => panic!("tilt {tilt_deg}: not seen"),
         }
     }
     assert!(
@@ -909,13 +909,18 @@ fn photographs_of_an_april_grid_show_all_its_tags() {
         };
         let mut tracker = Tracker::new(&settings, &anchors, camera).unwrap();
         let (mut visible, mut found, mut off_px) = (0, 0, Vec::new());
-        for still in &stills {
+        for (number, still) in stills.iter().enumerate() {
+            // Minutes apart: none is where the one before it was.
+            let photograph = Frame {
+                time_secs: 60.0 * number as f64,
+                ..read_photograph(still)
+            };
             let name = still.file_stem().unwrap().to_string_lossy();
             let known = grid_corners_px(&folder.join(format!("grid0/cam0/data/{name}.csv")));
-            let pose = &tracker.track(&read_photograph(still)).unwrap()[0];
+            let pose = &tracker.track(&photograph).unwrap()[0];
             assert_eq!(pose.status, Status::Tracked, "{name}");
             assert!(
-                pose.markers >= 5 && pose.reprojection_px < 0.6,
+                pose.markers >= 5 && pose.reprojection_px < 1.0,
                 "{name}: {pose:?}"
             );
             for (id, corners_px) in &known {
