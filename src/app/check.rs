@@ -90,7 +90,7 @@ pub fn summary(scene: &Scene) -> String {
     };
     line(&mut text, "detail", &detail);
     for warning in warnings(scene) {
-        line(&mut text, "warning", &warning);
+        text.push_str(&warning_line(&warning));
     }
     text
 }
@@ -120,6 +120,13 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
         }
     }
     warnings
+}
+
+/// A line of the summary for what more there is to warn of.
+pub fn warning_line(warning: &str) -> String {
+    let mut text = String::new();
+    line(&mut text, "warning", warning);
+    text
 }
 
 fn line(text: &mut String, label: &str, value: &str) {

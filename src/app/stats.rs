@@ -1,8 +1,10 @@
-//! What a replay cost, as `--stats` writes it.
+//! What a job on a recording cost, as `--stats` writes it.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
+
+use crate::scene::{DetectorKind, TrackingSettings};
 
 /// Times of one stage over all frames, milliseconds.
 #[derive(Debug, Clone, Copy, Serialize, PartialEq)]
@@ -71,8 +73,8 @@ pub struct Stats {
     pub lost: BTreeMap<String, u32>,
     /// The detector and its decimation, or where the poses came from.
     pub detector: String,
-    /// How shadows were made.
-    pub technique: String,
+    /// How shadows were made; `None` where none are.
+    pub technique: Option<&'static str>,
     /// `None` where nothing was drawn.
     pub adapter: Option<String>,
     /// Times by stage.
@@ -81,6 +83,14 @@ pub struct Stats {
     pub total_secs: f64,
     /// `None` where the system does not tell.
     pub peak_memory_mib: Option<f64>,
+}
+
+/// The detector of `--stats`.
+pub fn detector_in_words(tracking: &TrackingSettings) -> String {
+    match tracking.detector {
+        DetectorKind::AprilTag => format!("apriltag, decimation {}", tracking.decimation),
+        DetectorKind::Aruco => "aruco".to_owned(),
+    }
 }
 
 /// The largest resident memory of this process so far, MiB (Linux).

@@ -32,6 +32,17 @@ pub struct Frame {
     pub rgba: Vec<u8>,
 }
 
+impl Frame {
+    /// Turns the picture left for right.
+    pub fn mirror(&mut self) {
+        let pixels: &mut [[u8; 4]] = bytemuck::cast_slice_mut(&mut self.rgba);
+        let width = self.size_px[0] as usize;
+        if width > 0 {
+            pixels.chunks_exact_mut(width).for_each(<[_]>::reverse);
+        }
+    }
+}
+
 /// A recording that hands out its frames in order: a session folder, a video file or a folder of images.
 ///
 /// Frames that cannot be decoded are left out and told of in [`FrameSource::notices`]; all others come, each with
@@ -43,6 +54,7 @@ pub struct FrameSource {
     calibration: Option<Intrinsics>,
     notices: Vec<Notice>,
     good_frames: u32,
+    mirrored: bool,
 }
 
 enum Pictures {
@@ -153,7 +165,15 @@ impl FrameSource {
             calibration,
             notices: Vec::new(),
             good_frames: 0,
+            mirrored: false,
         }
+    }
+
+    /// Whether each picture is turned left for right before anything else sees it: some webcams mirror theirs. The
+    /// calibration is then that of the turned pictures.
+    #[must_use]
+    pub fn mirrored(self, mirrored: bool) -> Self {
+        Self { mirrored, ..self }
     }
 
     /// Where the recording lies.
@@ -200,12 +220,16 @@ impl FrameSource {
         self.good_frames += 1;
         let nominal_secs = f64::from(index) / self.nominal_fps();
         let time_secs = self.times.time_secs(index).unwrap_or(nominal_secs);
-        Ok(Some(Frame {
+        let mut frame = Frame {
             index,
             time_secs,
             size_px: self.size_px(),
             rgba,
-        }))
+        };
+        if self.mirrored {
+            frame.mirror();
+        }
+        Ok(Some(frame))
     }
 
     /// What went wrong so far without ending the recording; whole once [`FrameSource::next_frame`] gave `None`.

@@ -49,6 +49,8 @@ pub struct CameraSettings {
     pub source: String,
     /// `None`: what the recording itself carries.
     pub calibration: Option<PathBuf>,
+    /// Whether the pictures come mirrored and are turned back first.
+    pub mirror: bool,
 }
 
 /// Which library finds the markers.

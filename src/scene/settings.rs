@@ -12,7 +12,7 @@ pub fn camera(root: &Table) -> Result<CameraSettings, SceneError> {
     let what = "a scene needs [camera] with a source";
     let camera = root
         .required("camera", what)?
-        .table(&["source", "calibration"])?;
+        .table(&["source", "calibration", "mirror"])?;
     let what = "a session, a video, a folder of images, \"webcam:0\" or an address is expected";
     Ok(CameraSettings {
         source: source(&camera.required("source", what)?)?,
@@ -20,6 +20,7 @@ pub fn camera(root: &Table) -> Result<CameraSettings, SceneError> {
             .optional("calibration")
             .map(|path| path.existing_path())
             .transpose()?,
+        mirror: camera.flag_or("mirror", false)?,
     })
 }
 

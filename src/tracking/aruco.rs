@@ -88,13 +88,15 @@ pub(super) fn printed_cells(family: Family, id: u32) -> Result<Option<Vec<bool>>
     if family.is_april_tag() {
         return Ok(apriltag::printed_cells(family, id));
     }
-    let Some(number) = dictionary_number(family.codes()).filter(|_| id < family.id_count()) else {
+    let number = dictionary_number(family.codes()).filter(|_| id < family.id_count());
+    let Some(number) = number else {
         return Ok(None);
     };
-    let border = family.border_cells() as i32;
-    let dictionary = installed::Dictionary::new(number, border, 0, ArucoRefinement::None)?;
-    let side = family.cells_across() as usize;
-    Ok(Some(dictionary.cells(id as i32, side)?))
+    let border_cells = family.border_cells() as i32;
+    let dictionary = installed::Dictionary::new(number, border_cells, 0, ArucoRefinement::None)?;
+    Ok(Some(
+        dictionary.cells(id as i32, family.cells_across() as usize)?,
+    ))
 }
 
 /// The turn of the installed dictionary against the prints; its own pictures are the prints of OpenCV's families.

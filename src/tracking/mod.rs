@@ -30,7 +30,7 @@ mod undistort;
 use glam::DAffine3;
 
 pub use detector::{Detection, Detector};
-pub use tracker::Tracker;
+pub use tracker::{Tracker, grey_from_rgba};
 
 /// How far a pose can be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

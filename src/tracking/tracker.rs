@@ -232,7 +232,11 @@ fn add_seen(
     }
 }
 
-fn grey_from_rgba(frame: &Frame, grey: &mut Vec<u8>) -> Result<(), TrackingError> {
+/// The grey levels of a frame as detectors want them: rows from the top, no padding.
+///
+/// # Errors
+/// The frame's bytes do not make up its size.
+pub fn grey_from_rgba(frame: &Frame, grey: &mut Vec<u8>) -> Result<(), TrackingError> {
     let [width, height] = frame.size_px;
     let wrong_size = || TrackingError::PictureSize {
         bytes: frame.rgba.len(),

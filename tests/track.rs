@@ -1,0 +1,379 @@
+//! `gnomon track` and mirrored recordings: the same poses as replay's, lone markers where the board puts them, and
+//! cameras that mirror.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use assert_cmd::Command;
+use glam::{DAffine3, DQuat, DVec3};
+use gnomon::app::picture_files::write_rgb_png;
+use gnomon::capture::FrameSource;
+use gnomon::scene::Scene;
+
+fn project_file(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
+}
+
+fn plain(path: &Path) -> &str {
+    path.to_str().expect("a plain path")
+}
+
+/// Runs gnomon where no Vulkan driver is found.
+fn gnomon(folder: &Path, arguments: &[&str]) -> Output {
+    Command::cargo_bin("gnomon")
+        .expect("the program")
+        .current_dir(folder)
+        .args(arguments)
+        .env("VK_DRIVER_FILES", "/nonexistent")
+        .env("VK_ICD_FILENAMES", "/nonexistent")
+        .output()
+        .expect("a run")
+}
+
+fn done(folder: &Path, arguments: &[&str]) -> String {
+    let output = gnomon(folder, arguments);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{arguments:?}: {said}");
+    said
+}
+
+fn refused(folder: &Path, arguments: &[&str], parts: &[&str]) {
+    let output = gnomon(folder, arguments);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!output.status.success(), "{arguments:?} succeeded: {said}");
+    for part in parts {
+        assert!(said.contains(part), "{arguments:?} lacks {part:?}: {said}");
+    }
+    let left: Vec<_> = std::fs::read_dir(folder).expect("a folder").collect();
+    assert!(left.is_empty(), "{arguments:?} left {left:?}");
+}
+
+/// The rows of a CSV file without its header, split.
+fn rows(path: &Path) -> Vec<Vec<String>> {
+    let text = std::fs::read_to_string(path).expect("a file");
+    let fields = |line: &str| line.split(',').map(str::to_owned).collect();
+    text.lines().skip(1).map(fields).collect()
+}
+
+/// All but the times that the work took.
+fn without_costs(rows: Vec<Vec<String>>) -> Vec<Vec<String>> {
+    rows.into_iter().map(|row| row[..11].to_vec()).collect()
+}
+
+fn pose_of(row: &[String]) -> Option<DAffine3> {
+    let numbers: Vec<f64> = row[5..11]
+        .iter()
+        .map_while(|field| field.parse().ok())
+        .collect();
+    let [tx, ty, tz, rx, ry, rz] = numbers[..] else {
+        return None;
+    };
+    let rotation = DQuat::from_scaled_axis(DVec3::new(rx, ry, rz));
+    Some(DAffine3::from_rotation_translation(
+        rotation,
+        DVec3::new(tx, ty, tz),
+    ))
+}
+
+#[test]
+fn tracking_alone_gives_the_poses_of_a_replay_and_needs_no_gpu() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = project_file("config/hand.toml");
+    let lamp = [
+        "track",
+        plain(&scene),
+        "--poses",
+        "track.csv",
+        "--stats",
+        "stats.json",
+    ];
+    done(folder.path(), &lamp);
+    done(
+        folder.path(),
+        &["replay", plain(&scene), "--poses", "replay.csv"],
+    );
+    let poses = |name: &str| without_costs(rows(&folder.path().join(name)));
+    assert_eq!(poses("track.csv"), poses("replay.csv"));
+    assert_eq!(poses("track.csv").len(), 240);
+    let stats = std::fs::read(folder.path().join("stats.json")).unwrap();
+    let stats: serde_json::Value = serde_json::from_slice(&stats).unwrap();
+    assert_eq!(
+        (&stats["frames"], &stats["drawn"]),
+        (&120.into(), &0.into())
+    );
+    assert_eq!(stats["technique"], serde_json::Value::Null);
+    assert!(stats["stages"]["track"]["median_ms"].as_f64().unwrap() > 0.0);
+
+    // The same recording with the scene's anchors alone.
+    let recording = project_file("recordings/hand");
+    let anchors = ["--anchors", plain(&scene), "--poses", "anchors.csv"];
+    done(
+        folder.path(),
+        &[&["track", plain(&recording)], &anchors[..]].concat(),
+    );
+    assert_eq!(poses("anchors.csv"), poses("track.csv"));
+}
+
+#[test]
+fn markers_that_no_scene_names_stand_where_the_board_puts_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene_file = project_file("config/lamp.toml");
+    let recording = project_file("recordings/lamp");
+    done(
+        folder.path(),
+        &["track", plain(&scene_file), "--poses", "board.csv"],
+    );
+    let lone = [
+        "--size-mm",
+        "45",
+        "--poses",
+        "lone.csv",
+        "--markers",
+        "markers.csv",
+    ];
+    let said = done(
+        folder.path(),
+        &[&["track", plain(&recording)], &lone[..]].concat(),
+    );
+    assert!(said.contains("5 markers found"), "{said}");
+
+    let board = Scene::load(&scene_file).unwrap().anchors.remove(0);
+    let camera_from_board: BTreeMap<String, DAffine3> = rows(&folder.path().join("board.csv"))
+        .iter()
+        .filter_map(|row| Some((row[0].clone(), pose_of(row)?)))
+        .collect();
+    let (mut off_deg, mut nearness) = (Vec::new(), Vec::new());
+    let mut names = BTreeSet::new();
+    for row in rows(&folder.path().join("lone.csv")) {
+        names.insert(row[2].clone());
+        let Some(pose) = pose_of(&row) else { continue };
+        let marker = board
+            .markers
+            .iter()
+            .find(|marker| marker.id.to_string() == row[2]);
+        let center_m = marker.expect("a marker of the board").center_m.extend(0.0);
+        let expected_m = camera_from_board[&row[0]].transform_point3(center_m);
+        off_deg.push(expected_m.angle_between(pose.translation).to_degrees());
+        nearness.push(pose.translation.length() / expected_m.length());
+    }
+    // Marker 5 lies under the tin.
+    assert_eq!(
+        names.iter().map(String::as_str).collect::<Vec<_>>(),
+        ["0", "1", "2", "3", "4"]
+    );
+    let quantile = |values: &mut Vec<f64>, part: f64| {
+        values.sort_by(f64::total_cmp);
+        values[(part * (values.len() - 1) as f64) as usize]
+    };
+    let far_off_deg = quantile(&mut off_deg, 0.95);
+    let [low, middle, high] = [0.05, 0.5, 0.95].map(|part| quantile(&mut nearness, part));
+    eprintln!(
+        "{} poses: p95 {far_off_deg:.3}° off, distances {low:.4} {middle:.4} {high:.4} of the board's",
+        off_deg.len()
+    );
+    // A pixel is 0.093°. The path tracer's texture filter made each printed square 2 % smaller than its 45 mm; a tenth
+    // of a pixel of a square's 40 is 0.25 %.
+    assert!(far_off_deg < 0.01, "{far_off_deg}°");
+    assert!((1.0..1.03).contains(&middle), "{middle}");
+    assert!(high - low < 0.01, "{low} to {high}");
+
+    let seen = rows(&folder.path().join("markers.csv"));
+    assert!(seen.len() > 450, "{} detections", seen.len());
+    for row in &seen {
+        assert_eq!((row.len(), &*row[10], &*row[11]), (13, "tag36h11", "1"));
+        assert!(
+            row[2..10]
+                .iter()
+                .all(|pixel| (0.0..640.0).contains(&pixel.parse::<f64>().unwrap()))
+        );
+    }
+}
+
+#[test]
+fn mistakes_are_told_and_leave_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scene, recording) = (
+        project_file("config/lamp.toml"),
+        project_file("recordings/lamp"),
+    );
+    let (scene, recording) = (plain(&scene), plain(&recording));
+    let refused = |arguments: &[&str], parts: &[&str]| refused(folder.path(), arguments, parts);
+    refused(&["track", scene], &["nothing to do", "--poses"]);
+    refused(
+        &["track", recording, "--poses", "p.csv"],
+        &["what is tracked", "--anchors", "--size-mm"],
+    );
+    refused(
+        &["track", scene, "--size-mm", "45", "--poses", "p.csv"],
+        &["is a scene"],
+    );
+    refused(
+        &["track", recording, "--size-mm", "0", "--poses", "p.csv"],
+        &["--size-mm 0", "allowed: 0.1"],
+    );
+    refused(
+        &[
+            "track",
+            recording,
+            "--size-mm",
+            "4",
+            "--family",
+            "tag36h12",
+            "--poses",
+            "p",
+        ],
+        &["allowed: tag16h5"],
+    );
+    refused(
+        &[
+            "track",
+            recording,
+            "--size-mm",
+            "4",
+            "--border-cells",
+            "3",
+            "--poses",
+            "p",
+        ],
+        &["1..=2"],
+    );
+    refused(
+        &[
+            "track",
+            recording,
+            "--size-mm",
+            "4",
+            "--decimation",
+            "0",
+            "--poses",
+            "p",
+        ],
+        &["decimation = 0", "1 to 16"],
+    );
+    refused(
+        &[
+            "track",
+            "no/such/place",
+            "--size-mm",
+            "45",
+            "--poses",
+            "p.csv",
+        ],
+        &["no/such/place"],
+    );
+    let video = project_file("recordings/lamp/video.mp4");
+    refused(
+        &[
+            "track",
+            plain(&video),
+            "--size-mm",
+            "45",
+            "--poses",
+            "p.csv",
+        ],
+        &["carries no calibration"],
+    );
+    let inside = project_file("recordings/lamp/poses.csv");
+    refused(
+        &[
+            "track",
+            recording,
+            "--size-mm",
+            "45",
+            "--poses",
+            plain(&inside),
+        ],
+        &["write elsewhere"],
+    );
+}
+
+/// Frames of the lamp as pictures, as they are and as a camera that mirrors gives them.
+fn picture_folders(folder: &Path) -> [PathBuf; 2] {
+    let folders = ["as-is", "mirrored"].map(|name| folder.join(name));
+    let mut source = FrameSource::open(plain(&project_file("recordings/lamp"))).unwrap();
+    for _ in 0..6 {
+        let mut frame = source.next_frame().unwrap().unwrap();
+        let name = format!("{:06}.png", frame.index);
+        write_rgb_png(&folders[0].join(&name), frame.size_px, &frame.rgba).unwrap();
+        let width = frame.size_px[0] as usize;
+        let before = frame.rgba.clone();
+        frame.mirror();
+        for (place, pixel) in frame.rgba.chunks_exact(4).enumerate() {
+            let (row, column) = (place / width, place % width);
+            let from = 4 * (row * width + width - 1 - column);
+            assert_eq!(pixel, &before[from..from + 4]);
+        }
+        write_rgb_png(&folders[1].join(&name), frame.size_px, &frame.rgba).unwrap();
+    }
+    folders
+}
+
+#[test]
+fn a_mirrored_recording_is_told_and_turned_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let [as_is, mirrored] = picture_folders(folder.path());
+    let calibration = project_file("recordings/lamp/camera.toml");
+    let scene = |name: &str, source: &Path, mirror: &str| {
+        let text = format!(
+            "[camera]\nsource = \"{}\"\ncalibration = \"{}\"\n{mirror}\n[[board]]\nname = \"table\"\nmarkers = [\n\
+             {{ id = 0, size_m = 0.045, center_m = [-0.175, 0.115] }},\n\
+             {{ id = 4, size_m = 0.045, center_m = [0, -0.115] }} ]\n",
+            source.display(),
+            calibration.display()
+        );
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        plain(&path).to_owned()
+    };
+    let plain_scene = scene("plain.toml", &as_is, "");
+    let unaware = scene("unaware.toml", &mirrored, "");
+    let aware = scene("aware.toml", &mirrored, "mirror = true");
+    let wrongly = scene("wrongly.toml", &as_is, "mirror = true");
+    let poses = |scene: &str, command: &str| {
+        let said = done(folder.path(), &[command, scene, "--poses", "poses.csv"]);
+        (without_costs(rows(&folder.path().join("poses.csv"))), said)
+    };
+    let hint = "markers are seen only when the pictures are turned left for right: ";
+    let (expected, said) = poses(&plain_scene, "track");
+    assert!(
+        expected.iter().all(|row| row[3] == "tracked") && !said.contains(hint),
+        "{said}"
+    );
+    for command in ["track", "replay"] {
+        let (turned, said) = poses(&aware, command);
+        assert_eq!(turned, expected, "{command}");
+        assert!(!said.contains(hint), "{said}");
+        let (lost, said) = poses(&unaware, command);
+        assert!(lost.iter().all(|row| row[3] == "lost"), "{lost:?}");
+        assert!(
+            said.contains(&format!("{hint}set [camera] mirror = true")),
+            "{said}"
+        );
+        let (_, said) = poses(&wrongly, command);
+        assert!(
+            said.contains(&format!("{hint}leave out [camera] mirror = true")),
+            "{said}"
+        );
+    }
+    let checked = |scene: &str| {
+        let output = gnomon(folder.path(), &["check", scene]);
+        assert!(output.status.success());
+        String::from_utf8(output.stdout).unwrap()
+    };
+    assert!(checked(&unaware).contains(hint));
+    assert!(!checked(&aware).contains("warning") && !checked(&plain_scene).contains("warning"));
+
+    let without_scene = |more: &[&str]| {
+        let tracked = [
+            "track",
+            plain(&mirrored),
+            "--calibration",
+            plain(&calibration),
+        ];
+        let rest = ["--size-mm", "45", "--poses", "lone.csv"];
+        done(folder.path(), &[&tracked[..], &rest[..], more].concat())
+    };
+    assert!(without_scene(&[]).contains("--mirror"));
+    assert!(without_scene(&["--mirror"]).contains("markers found"));
+}
