@@ -138,9 +138,9 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
     Ok(Report::new(
         format!("{} frames, {} drawn", run.tally.frames, run.drawn),
         remarks,
-        &ended,
+        &scene.anchors,
+        (&ended, &mut run.tally),
         scene.camera.mirror,
-        run.tally.reprojection_px(),
         stop.load(Ordering::Relaxed),
     ))
 }

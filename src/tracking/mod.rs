@@ -46,7 +46,7 @@ pub enum Status {
 }
 
 /// Why an anchor is not simply tracked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum Why {
     /// The usual one.
     #[error("none of its markers is in the picture")]
