@@ -20,6 +20,7 @@ mod settings;
 
 pub use error::{Place, SceneError};
 pub use family::{Codes, Family};
+pub use reader::{NAMES, is_name};
 
 /// What one scene file says, checked.
 #[derive(Debug, Clone, Default)]
