@@ -576,6 +576,43 @@ fn perfect_lens_passes_the_video_bit_for_bit() {
 }
 
 #[test]
+fn what_goes_fades_and_the_rest_stays_bit_for_bit() {
+    let light = sun([0.6, 0.3, -1.0], [1.2, 0.9, 0.6]);
+    let scene = scene(
+        vec![table()],
+        vec![CASTER.object("box")],
+        vec![light],
+        AMBIENT,
+    );
+    let mut renderer = Renderer::new(gpu(), &scene, PERFECT_LENS).expect("a renderer");
+    let frame = Frame {
+        index: 0,
+        time_secs: 0.0,
+        size_px: SIZE_PX,
+        rgba: noise(SIZE_PX),
+    };
+    renderer.upload(&frame).expect("an uploaded frame");
+    let mut picture = |visibility: f64| {
+        renderer.draw_fading(&[Some(table_camera())], &[visibility], Shown::Composite);
+        renderer.read_picture().expect("a picture")
+    };
+    let [whole, half, tenth, none] = [1.0, 0.5, 0.1, 0.0].map(&mut picture);
+    assert_eq!(none, frame.rgba, "the video alone");
+    let mut faded = 0;
+    for (part, picture) in [(0.5, half), (0.1, tenth)] {
+        for ((&whole, &none), &mixed) in whole.iter().zip(&none).zip(&picture) {
+            let expected = f64::from(none) + part * (f64::from(whole) - f64::from(none));
+            assert!(
+                (f64::from(mixed) - expected).abs() <= 0.51,
+                "{none}, {whole}: {mixed}"
+            );
+            faded += usize::from(whole != none);
+        }
+    }
+    assert!(faded > 5000, "{faded}");
+}
+
+#[test]
 fn lens_distortion_is_undone_bilinearly() {
     let lens = Intrinsics {
         distortion: [0.08, -0.19, 0.004, -0.003, 0.05],

@@ -10,7 +10,7 @@ use gnomon::geometry::camera::Intrinsics;
 use gnomon::scene::{
     Anchor, ArucoRefinement, Codes, DetectorKind, Family, Marker, TrackingSettings,
 };
-use gnomon::tracking::{AnchorPose, Detection, Detector, Status, Tracker, TrackingError};
+use gnomon::tracking::{AnchorPose, Detection, Detector, Status, Tracker, TrackingError, Why};
 
 // ---------------------------------------------------------------------------------------------------------------------
 // Sheets as printed, written down here so that no library under test draws its own question.
@@ -147,6 +147,26 @@ fn photograph(camera: &Intrinsics, sheets: &[(&[Marker], DAffine3)], time_secs: 
         size_px: camera.size_px,
         rgba,
     }
+}
+
+/// A picture with the noise of a camera in the dark: Gaussian, of a standard deviation in levels, the same each time.
+fn with_noise(frame: &Frame, deviation: f64, seed: u64) -> Frame {
+    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    let mut uniform = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let mut noisy = frame.clone();
+    for pixel in noisy.rgba.chunks_exact_mut(4) {
+        let gaussian = (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
+        let level = (f64::from(pixel[0]) + deviation * gaussian)
+            .round()
+            .clamp(0.0, 255.0) as u8;
+        pixel[..3].fill(level);
+    }
+    noisy
 }
 
 fn grey_of(frame: &Frame) -> Vec<u8> {
@@ -430,44 +450,50 @@ fn a_turned_marker_on_a_board_counts_with_its_turn() {
 }
 
 #[test]
-fn a_lone_marker_keeps_both_poses_and_says_when_it_cannot_tell() {
+fn a_lone_marker_is_never_sure_of_the_wrong_pose() {
     let card = [marker(17, 0.036, 0.0, 0.0)];
     let anchors = [anchor("card", &card)];
-    let (mut tracked, mut ambiguous) = (0, 0);
-    for (tilt_deg, distance_m) in [
-        (3.0, 0.7),
-        (10.0, 0.8),
-        (20.0, 0.6),
-        (35.0, 0.35),
-        (45.0, 0.3),
-        (60.0, 0.3),
-    ] {
-        let truth = camera_above(tilt_deg, 30.0, DVec3::new(0.02, 0.01, distance_m));
-        let frame = photograph(&CAMERA, &[(&card, truth)], 0.0);
-        let pose = &track_once(&settings(DetectorKind::AprilTag), &anchors, CAMERA, &frame)[0];
-        let off = angle_between(&pose.camera_from_anchor.unwrap(), &truth);
-        let other = pose
-            .alternative
-            .map(|other| angle_between(&other.camera_from_anchor, &truth));
-        match pose.status {
-            Status::Tracked => {
-                tracked += 1;
-                assert!(off < 4.0, "tilt {tilt_deg}: sure and {off}° off");
+    let (mut tracked, mut ambiguous, mut nearer_is_other) = (0, 0, 0);
+    for tilt_deg in [2.0, 5.0, 10.0, 20.0, 45.0] {
+        // 54, 31, 22 and 17 pixels a side.
+        for distance_m in [0.4, 0.7, 1.0, 1.3] {
+            let truth = camera_above(tilt_deg, 30.0, DVec3::new(0.02, 0.01, distance_m));
+            let clean = photograph(&CAMERA, &[(&card, truth)], 0.0);
+            for seed in 1..5 {
+                let frame = with_noise(&clean, 3.0, seed);
+                let settings = settings(DetectorKind::AprilTag);
+                let pose = &track_once(&settings, &anchors, CAMERA, &frame)[0];
+                let what = format!("tilt {tilt_deg}° at {distance_m} m");
+                let found = pose
+                    .camera_from_anchor
+                    .unwrap_or_else(|| panic!("{what}: not seen"));
+                let off_deg = angle_between(&found, &truth);
+                let other_deg = pose.alternative.map_or(f64::INFINITY, |other| {
+                    angle_between(&other.camera_from_anchor, &truth)
+                });
+                if pose.status == Status::Tracked {
+                    tracked += 1;
+                    assert!(off_deg < 2.0, "{what}: sure and {off_deg}° off");
+                } else {
+                    assert_eq!(
+                        (pose.status, pose.why),
+                        (Status::Ambiguous, Some(Why::TwoPoses))
+                    );
+                    ambiguous += 1;
+                    nearer_is_other += usize::from(other_deg < off_deg);
+                    assert!(
+                        off_deg.min(other_deg) < 8.0,
+                        "{what}: {off_deg}° and {other_deg}° off"
+                    );
+                }
             }
-            Status::Ambiguous => {
-                ambiguous += 1;
-                let other = other.expect("two poses");
-                assert!(pose.alternative.unwrap().reprojection_px >= pose.reprojection_px);
-                assert!(
-                    off.min(other) < 8.0,
-                    "tilt {tilt_deg}: {off}° and {other}° off"
-                );
-            }
-            Status::Predicted | Status::Lost => panic!("tilt {tilt_deg}: not seen"),
         }
     }
+    eprintln!(
+        "{tracked} tracked, {ambiguous} ambiguous, the other pose nearer in {nearer_is_other}"
+    );
     assert!(
-        tracked >= 2 && ambiguous >= 1,
+        tracked >= 50 && ambiguous >= 10,
         "{tracked} tracked, {ambiguous} ambiguous"
     );
 }
@@ -476,9 +502,9 @@ fn a_lone_marker_keeps_both_poses_and_says_when_it_cannot_tell() {
 fn an_earlier_pose_decides_an_ambiguous_one_while_it_is_fresh() {
     let card = [marker(17, 0.036, 0.0, 0.0)];
     let anchors = [anchor("card", &card)];
-    let at_m = DVec3::new(0.02, 0.01, 0.7);
-    let unclear = camera_above(12.0, 30.0, at_m);
-    let alone = photograph(&CAMERA, &[(&card, unclear)], 10.0);
+    let at_m = DVec3::new(0.02, 0.01, 1.3);
+    let unclear = camera_above(5.0, 30.0, at_m);
+    let alone = with_noise(&photograph(&CAMERA, &[(&card, unclear)], 10.0), 3.0, 1);
     let first = &track_once(&settings(DetectorKind::AprilTag), &anchors, CAMERA, &alone)[0];
     assert_eq!(first.status, Status::Ambiguous);
     let [chosen, other] = [
@@ -495,25 +521,28 @@ fn an_earlier_pose_decides_an_ambiguous_one_while_it_is_fresh() {
             DMat3::from_quat(DQuat::from_axis_angle(axis, angle.signum() * 0.75)) * frontal.matrix3,
             DVec3::new(0.0, 0.0, 0.3),
         );
+        let plain = photograph(&CAMERA, &[(&card, plain)], 9.9);
         let mut tracker =
             Tracker::new(&settings(DetectorKind::AprilTag), &anchors, CAMERA).unwrap();
-        let seen = &tracker
-            .track(&photograph(&CAMERA, &[(&card, plain)], 9.9))
-            .unwrap()[0];
-        assert_eq!(seen.status, Status::Tracked);
-        let now = &tracker.track(&alone).unwrap()[0];
-        assert_eq!(now.status, Status::Ambiguous);
-        assert!(angle_between(&now.camera_from_anchor.unwrap(), &expected) < 0.1);
+        assert_eq!(tracker.track(&plain).unwrap()[0].status, Status::Tracked);
+        // It stays so, frame after frame.
+        for frame in 0..8 {
+            let seen = Frame {
+                time_secs: 10.0 + f64::from(frame) / 30.0,
+                ..alone.clone()
+            };
+            let now = &tracker.track(&seen).unwrap()[0];
+            let off_deg = angle_between(&now.camera_from_anchor.unwrap(), &expected);
+            assert!(off_deg < 2.0, "frame {frame}: {off_deg}°");
+        }
         // Half a minute later the memory is worth nothing.
         let later = Frame {
             time_secs: 40.0,
             ..alone.clone()
         };
-        tracker
-            .track(&photograph(&CAMERA, &[(&card, plain)], 9.9))
-            .unwrap();
         let late = &tracker.track(&later).unwrap()[0];
-        assert!(angle_between(&late.camera_from_anchor.unwrap(), &chosen) < 0.1);
+        assert_eq!(late.status, Status::Ambiguous);
+        assert!(angle_between(&late.camera_from_anchor.unwrap(), &chosen) < 0.5);
     }
 }
 
@@ -530,15 +559,15 @@ fn a_lost_marker_is_a_value() {
         let poses = tracker
             .track(&photograph(&CAMERA, &[(&markers, truth)], 0.0))
             .unwrap();
-        assert_eq!(
-            (poses[0].status, &poses[1]),
-            (Status::Tracked, &AnchorPose::LOST)
-        );
-        let nothing = photograph(&CAMERA, &[], 0.1);
-        assert_eq!(
-            tracker.track(&nothing).unwrap(),
-            [AnchorPose::LOST, AnchorPose::LOST]
-        );
+        assert_eq!(poses[0].status, Status::Tracked);
+        let not_there = AnchorPose {
+            why: Some(Why::NoMarker),
+            ..AnchorPose::LOST
+        };
+        assert_eq!(poses[1], not_there);
+        let nothing = photograph(&CAMERA, &[], 1.0);
+        let poses = tracker.track(&nothing).unwrap();
+        assert_eq!(poses, [not_there.clone(), not_there]);
         assert!(tracker.detections().is_empty());
     }
 }
@@ -555,7 +584,10 @@ fn of_two_markers_with_one_id_none_is_trusted_unless_the_board_decides() {
             [17, 17]
         );
         let poses = track_once(&settings(kind), &[anchor("card", &lone)], CAMERA, &twice);
-        assert_eq!(poses, [AnchorPose::LOST]);
+        assert_eq!(
+            (poses[0].status, poses[0].why),
+            (Status::Lost, Some(Why::DoubleId))
+        );
         // A card with a copy of the board's own marker lies in the middle.
         let truth = camera_above(20.0, 10.0, DVec3::new(0.0, 0.0, 0.5));
         let intruder = [marker(17, 0.04, 0.0, 0.0)];
@@ -790,7 +822,9 @@ fn photographs_of_a_room_show_the_markers_that_people_counted() {
             .map(|word| word.parse::<u32>().unwrap())
             .collect::<BTreeSet<_>>();
         let frame = read_photograph(&folder.join(name));
-        let seen = detector.detect(&grey_of(&frame), frame.size_px).unwrap();
+        let seen = detector
+            .detect_thoroughly(&grey_of(&frame), frame.size_px)
+            .unwrap();
         let seen = seen
             .iter()
             .map(|detection| detection.id)

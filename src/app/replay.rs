@@ -138,9 +138,9 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
     Ok(Report::new(
         format!("{} frames, {} drawn", run.tally.frames, run.drawn),
         remarks,
-        &ended,
+        &scene.anchors,
+        (&ended, &mut run.tally),
         scene.camera.mirror,
-        run.tally.reprojection_px(),
         stop.load(Ordering::Relaxed),
     ))
 }
@@ -282,7 +282,8 @@ impl Run<'_> {
         let whole = Stopwatch::start();
         let (uploaded, upload_ms) = Stopwatch::time(|| renderer.upload(frame));
         uploaded?;
-        let ((), submit_ms) = Stopwatch::time(|| renderer.draw(&placed, shown));
+        let visibility: Vec<_> = poses.iter().map(|pose| pose.visibility).collect();
+        let ((), submit_ms) = Stopwatch::time(|| renderer.draw_fading(&placed, &visibility, shown));
         let waiting = Stopwatch::start();
         renderer.wait()?;
         let wait_ms = waiting.elapsed_ms();

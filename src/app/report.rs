@@ -2,7 +2,12 @@
 
 use anyhow::{Result, bail};
 
+use super::tally::Tally;
 use super::tracked::Ended;
+use crate::scene::Anchor;
+
+/// Markers of a size that is off by a smaller part are not worth a word.
+const TOLD_SIZE_ERROR: f64 = 0.01;
 
 /// What was done, and what was wrong.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,16 +23,27 @@ pub struct Report {
 }
 
 impl Report {
-    /// `mirror`: whether the frames were mirrored; `reprojection_px`: the median over the frames.
+    /// `mirror`: whether the frames were mirrored.
     pub(super) fn new(
         done: String,
         mut remarks: Vec<String>,
-        ended: &Ended,
+        anchors: &[Anchor],
+        (ended, tally): (&Ended, &mut Tally),
         mirror: bool,
-        reprojection_px: Option<f64>,
         interrupted: bool,
     ) -> Self {
-        if let Some(error_px) = reprojection_px.filter(|&error_px| error_px > 1.0) {
+        remarks.extend(tally.hindrances(anchors));
+        remarks.extend(anchors.iter().zip(&ended.size_errors).filter_map(|(anchor, error)| {
+            let error = error.filter(|error| error.abs() > TOLD_SIZE_ERROR)?;
+            let than = if error > 0.0 { "larger" } else { "smaller" };
+            Some(format!(
+                "the markers of {} are printed {:.1} % {than} than the scene says; poses allow for it, size_m is to be \
+                 corrected",
+                anchor.name,
+                100.0 * error.abs()
+            ))
+        }));
+        if let Some(error_px) = tally.reprojection_px().filter(|&error_px| error_px > 1.0) {
             remarks.push(format!(
                 "markers lie {error_px:.1} px (median) from where their poses put them: the calibration or the \
                  markers' sizes and places in the scene are wrong"

@@ -1,8 +1,11 @@
 //! What tracking gave, counted over a recording.
 
+use std::collections::BTreeMap;
+
 use super::stats::StageLog;
 use super::tracked::TrackedFrame;
-use crate::tracking::Status;
+use crate::scene::Anchor;
+use crate::tracking::{Status, Why};
 
 /// Counts and times, frame by frame.
 pub(super) struct Tally {
@@ -15,6 +18,8 @@ pub(super) struct Tally {
     /// Index of the frame that was read last; a damaged recording lacks some before it.
     pub last_read: Option<u32>,
     reprojections_px: Vec<f64>,
+    /// For each anchor the frames in which something else than its absence kept it from having a pose.
+    hindered: Vec<BTreeMap<Why, u32>>,
 }
 
 impl Tally {
@@ -25,6 +30,7 @@ impl Tally {
             frames: 0,
             last_read: None,
             reprojections_px: Vec::new(),
+            hindered: vec![BTreeMap::new(); anchors],
         }
     }
 
@@ -44,6 +50,27 @@ impl Tally {
         for (lost, pose) in self.lost.iter_mut().zip(&tracked.poses) {
             *lost += u32::from(pose.camera_from_anchor.is_none());
         }
+        for (hindered, pose) in self.hindered.iter_mut().zip(&tracked.poses) {
+            let why = pose
+                .why
+                .filter(|why| matches!(why, Why::DoubleId | Why::NoPose));
+            if let Some(why) = why {
+                *hindered.entry(why).or_default() += 1;
+            }
+        }
+    }
+
+    /// What kept anchors from having a pose although their markers were seen, in words.
+    pub(super) fn hindrances(&self, anchors: &[Anchor]) -> impl Iterator<Item = String> {
+        anchors
+            .iter()
+            .zip(&self.hindered)
+            .flat_map(|(anchor, hindered)| {
+                let name = &anchor.name;
+                hindered.iter().map(move |(why, frames)| {
+                    format!("{name} has no pose in {frames} frames: {why}")
+                })
+            })
     }
 
     /// Median over the frames of the reprojection error of the first anchor that is seen, pixels; `None` without a

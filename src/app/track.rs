@@ -148,9 +148,9 @@ pub fn track(request: &Request, stop: &AtomicBool) -> Result<Report> {
     Ok(Report::new(
         done,
         remarks,
-        &ended,
+        &anchors,
+        (&ended, &mut tally),
         camera.mirror,
-        tally.reprojection_px(),
         stop.load(Ordering::Relaxed),
     ))
 }

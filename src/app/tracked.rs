@@ -42,6 +42,8 @@ pub(super) struct Ended {
     pub notices: Vec<Notice>,
     /// Tells whether it is mirrored; `None` where poses were given.
     pub mirror_watch: Option<MirrorWatch>,
+    /// Per anchor by what part of their size its markers are larger than the scene says, where that is known.
+    pub size_errors: Vec<Option<f64>>,
 }
 
 /// Calls `each` with the frames of a recording in their order: all, or those up to `last`, or until `stop`.
@@ -80,9 +82,11 @@ pub(super) fn each_tracked_frame(
         progress.finish();
         // A stage that fails stops those before it: the last one knows why.
         outcome?;
+        let (mirror_watch, size_errors) = tracked?;
         Ok(Ended {
-            mirror_watch: tracked?,
             notices: captured?,
+            mirror_watch,
+            size_errors,
         })
     })
 }
@@ -117,7 +121,7 @@ fn track_stage(
     mut poser: Poser,
     from_camera: &Receiver<(Frame, f64)>,
     to_caller: &SyncSender<TrackedFrame>,
-) -> Result<Option<MirrorWatch>> {
+) -> Result<(Option<MirrorWatch>, Vec<Option<f64>>)> {
     for (frame, decode_ms) in from_camera {
         let (poses, track_ms) = poser
             .poses(&frame)
@@ -133,8 +137,8 @@ fn track_stage(
         }
     }
     Ok(match poser {
-        Poser::Tracker(_, watch) => Some(watch),
-        Poser::Given(_) => None,
+        Poser::Tracker(tracker, watch) => (Some(watch), tracker.size_errors().collect()),
+        Poser::Given(_) => (None, Vec::new()),
     })
 }
 

@@ -10,6 +10,7 @@ mod casters;
 mod composite;
 mod detail;
 mod direct;
+mod fade;
 mod gpu;
 mod gpu_clock;
 mod indirect;

@@ -14,6 +14,7 @@ use super::anchor_geometry::Role;
 use super::background::{Background, PICTURE_FORMAT, extent};
 use super::composite::GAIN_FORMAT;
 use super::direct::Direct;
+use super::fade::{self, Fade};
 use super::gpu::{Gpu, RenderError};
 use super::gpu_clock::{GpuClock, GpuTimes, Stretch};
 use super::layers::{LayerPasses, Layers};
@@ -48,6 +49,8 @@ pub struct Renderer {
     picture: wgpu::Texture,
     picture_readback: Readback,
     clock: Option<GpuClock>,
+    /// Made when something fades for the first time.
+    fade: Option<Fade>,
     layer_passes: Option<LayerPasses>,
     /// What the frame that was drawn last showed.
     shown: Shown,
@@ -124,12 +127,15 @@ impl Renderer {
             picture: texture(
                 "picture",
                 PICTURE_FORMAT,
-                wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::COPY_DST,
+                wgpu::TextureUsages::COPY_SRC
+                    | wgpu::TextureUsages::COPY_DST
+                    | wgpu::TextureUsages::TEXTURE_BINDING,
             ),
             picture_readback: Readback::new(device, size_px, 4),
             clock: gpu
                 .timestamp_period_ns
                 .map(|period_ns| GpuClock::new(device, period_ns)),
+            fade: None,
             layer_passes: None,
             shown: Shown::Bare,
             touched: None,
@@ -149,6 +155,36 @@ impl Renderer {
     /// A frame of another size than the camera's calibration.
     pub fn upload(&mut self, frame: &Frame) -> Result<(), RenderError> {
         self.background.upload(&self.gpu, frame)
+    }
+
+    /// As [`draw`](Self::draw), where of what stands on each anchor only a part is to be seen, 0 to 1: things that come
+    /// or go are drawn over a picture without them.
+    pub fn draw_fading(
+        &mut self,
+        camera_from_anchor: &[Option<DAffine3>],
+        visibility: &[f64],
+        shown: Shown,
+    ) {
+        let seen_at_least = |least: f64| -> Vec<Option<DAffine3>> {
+            let anchors = camera_from_anchor.iter().zip(visibility);
+            anchors
+                .map(|(pose, &visibility)| pose.filter(|_| visibility >= least))
+                .collect()
+        };
+        let fading = fade::steps(visibility)
+            .into_iter()
+            .filter(|&part| part < 1.0);
+        self.draw(&seen_at_least(1.0), shown);
+        for part in fading {
+            let fade = self
+                .fade
+                .take()
+                .unwrap_or_else(|| Fade::new(&self.gpu.device, &self.picture));
+            fade.keep(&self.gpu, &self.picture);
+            self.draw(&seen_at_least(part), shown);
+            fade.mix(&self.gpu, &self.picture, part);
+            self.fade = Some(fade);
+        }
     }
 
     /// Draws the uploaded picture with what stands on the anchors, whose poses come in the scene's order. Without

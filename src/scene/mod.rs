@@ -99,6 +99,8 @@ pub struct TrackingSettings {
     pub search: Search,
     /// Poses from all pixels around the markers' edges, not from a detector's corners alone.
     pub pose_from_pixels: bool,
+    /// Smooth poses over time: what rests stays where it is to the bit, what moves is not held back.
+    pub filter: bool,
 }
 
 /// Where markers are looked for.
@@ -123,6 +125,7 @@ impl Default for TrackingSettings {
             threads: 1,
             search: Search::Near,
             pose_from_pixels: true,
+            filter: true,
         }
     }
 }

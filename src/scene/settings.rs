@@ -45,7 +45,7 @@ fn source(value: &Value) -> Result<String, SceneError> {
 }
 
 pub fn tracking(root: &Table) -> Result<TrackingSettings, SceneError> {
-    const KEYS: [&str; 10] = [
+    const KEYS: [&str; 11] = [
         "detector",
         "decimation",
         "blur_px",
@@ -56,6 +56,7 @@ pub fn tracking(root: &Table) -> Result<TrackingSettings, SceneError> {
         "threads",
         "search",
         "pose_from_pixels",
+        "filter",
     ];
     const SEARCHES: [(&str, Search); 2] = [("near", Search::Near), ("full", Search::Full)];
     const DETECTORS: [(&str, DetectorKind); 2] = [
@@ -104,6 +105,7 @@ pub fn tracking(root: &Table) -> Result<TrackingSettings, SceneError> {
         threads: tracking.integer_or("threads", default.threads, 1..=64)?,
         search: search.transpose()?.unwrap_or(default.search),
         pose_from_pixels: tracking.flag_or("pose_from_pixels", default.pose_from_pixels)?,
+        filter: tracking.flag_or("filter", default.filter)?,
     })
 }
 

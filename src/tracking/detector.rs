@@ -1,6 +1,7 @@
 //! Markers in a grey picture, by libapriltag or OpenCV's ArUco behind one small interface.
 
 use std::cmp::Ordering;
+use std::sync::LazyLock;
 
 use glam::DVec2;
 
@@ -28,6 +29,13 @@ pub struct Detection {
 }
 
 impl Detection {
+    /// Whether both are one marker, found twice.
+    fn is_same(&self, other: &Self) -> bool {
+        let mut corners = self.corners_px.iter().zip(&other.corners_px);
+        (self.family, self.id) == (other.family, other.id)
+            && corners.all(|(a, b)| a.distance(*b) < SAME_CORNER_PX)
+    }
+
     /// By family and id; of one id the upper left one comes first.
     pub(super) fn by_id_and_place(a: &Self, b: &Self) -> Ordering {
         let key = |detection: &Self| (detection.family, detection.id);
@@ -39,14 +47,36 @@ impl Detection {
     }
 }
 
+/// Corners of one marker found twice lie this near to each other, pixels.
+const SAME_CORNER_PX: f64 = 5.0;
+
+/// Grey levels halfway from their encoding to light: light itself leaves too few levels for the dark.
+static LIGHT: LazyLock<[u8; 256]> = LazyLock::new(|| {
+    const POWER: f64 = 1.8;
+    std::array::from_fn(|level| (255.0 * (level as f64 / 255.0).powf(POWER)).round() as u8)
+});
+
 /// No marker is smaller in a picture.
 const MIN_SIDE_PX: u32 = 16;
 
 /// A detector for some families, built once and used by one thread at a time.
 pub struct Detector {
     backend: Backend,
+    /// What a thorough search looks with, built when there is one for the first time.
+    thorough: Thorough,
+    /// A picture in another encoding.
+    encoded_anew: Vec<u8>,
     /// Whether corners are fitted again in linear light.
     refines: bool,
+}
+
+enum Thorough {
+    /// What the detector itself does not find, nothing does.
+    Never,
+    /// To be built from these.
+    Later(Box<TrackingSettings>, Vec<Family>),
+    /// libapriltag at full resolution.
+    Ready(AprilTagDetector),
 }
 
 enum Backend {
@@ -66,20 +96,35 @@ impl Detector {
         if families.is_empty() {
             return Ok(Self {
                 backend: Backend::Idle,
+                thorough: Thorough::Never,
+                encoded_anew: Vec::new(),
                 refines: false,
             });
         }
-        let (backend, refines) = match settings.detector {
-            DetectorKind::AprilTag => (
-                Backend::AprilTag(AprilTagDetector::new(settings, &families)?),
-                settings.refine_edges,
-            ),
+        let (backend, refines, thorough) = match settings.detector {
+            DetectorKind::AprilTag => {
+                let full = TrackingSettings {
+                    decimation: 1.0,
+                    ..settings.clone()
+                };
+                (
+                    Backend::AprilTag(AprilTagDetector::new(settings, &families)?),
+                    settings.refine_edges,
+                    Thorough::Later(Box::new(full), families),
+                )
+            }
             DetectorKind::Aruco => (
                 Backend::Aruco(ArucoDetector::new(settings, &families)?),
                 settings.aruco_refinement != ArucoRefinement::None,
+                Thorough::Never,
             ),
         };
-        Ok(Self { backend, refines })
+        Ok(Self {
+            backend,
+            thorough,
+            encoded_anew: Vec::new(),
+            refines,
+        })
     }
 
     /// The markers of an 8-bit grey picture (rows from the top, no padding), sorted by family and id.
@@ -88,23 +133,52 @@ impl Detector {
         grey: &[u8],
         size_px: [u32; 2],
     ) -> Result<Vec<Detection>, TrackingError> {
-        let [width, height] = size_px;
-        let fits = i32::try_from(width).is_ok() && i32::try_from(height).is_ok();
-        if !fits || grey.len() as u64 != u64::from(width) * u64::from(height) {
-            return Err(TrackingError::PictureSize {
-                bytes: grey.len(),
-                size_px,
-            });
-        }
-        // OpenCV refuses an empty picture; libapriltag's tiles of thresholds need some room.
-        if width < MIN_SIDE_PX || height < MIN_SIDE_PX {
+        if !holds_markers(grey, size_px)? {
             return Ok(Vec::new());
         }
-        let mut detections = match &mut self.backend {
+        let detections = match &mut self.backend {
             Backend::Idle => Vec::new(),
             Backend::AprilTag(detector) => detector.detect(grey, size_px)?,
             Backend::Aruco(detector) => detector.detect(grey, size_px)?,
         };
+        Ok(self.finished(detections, grey, size_px))
+    }
+
+    /// As [`detect`](Self::detect), but at full resolution and at any price: in the picture as it is, and in one of
+    /// light, where a marker in the shade stands out less and one in a glare more. OpenCV's ArUco finds no more than
+    /// it does anyway.
+    pub fn detect_thoroughly(
+        &mut self,
+        grey: &[u8],
+        size_px: [u32; 2],
+    ) -> Result<Vec<Detection>, TrackingError> {
+        if let Thorough::Later(settings, families) = &self.thorough {
+            self.thorough = Thorough::Ready(AprilTagDetector::new(settings, families)?);
+        }
+        let Thorough::Ready(detector) = &mut self.thorough else {
+            return self.detect(grey, size_px);
+        };
+        if !holds_markers(grey, size_px)? {
+            return Ok(Vec::new());
+        }
+        let mut detections = detector.detect(grey, size_px)?;
+        self.encoded_anew.clear();
+        let as_light = grey.iter().map(|&level| LIGHT[usize::from(level)]);
+        self.encoded_anew.extend(as_light);
+        for found in detector.detect(&self.encoded_anew, size_px)? {
+            if !detections.iter().any(|known| known.is_same(&found)) {
+                detections.push(found);
+            }
+        }
+        Ok(self.finished(detections, grey, size_px))
+    }
+
+    fn finished(
+        &self,
+        mut detections: Vec<Detection>,
+        grey: &[u8],
+        size_px: [u32; 2],
+    ) -> Vec<Detection> {
         detections.retain(|detection| detection.corners_px.iter().all(|corner| corner.is_finite()));
         if self.refines {
             let picture = Grey {
@@ -117,8 +191,21 @@ impl Detector {
         }
         // Threads may find them in any order.
         detections.sort_by(Detection::by_id_and_place);
-        Ok(detections)
+        detections
     }
+}
+
+/// Whether a picture is large enough; OpenCV refuses an empty one, libapriltag's tiles of thresholds need some room.
+fn holds_markers(grey: &[u8], size_px: [u32; 2]) -> Result<bool, TrackingError> {
+    let [width, height] = size_px;
+    let fits = i32::try_from(width).is_ok() && i32::try_from(height).is_ok();
+    if !fits || grey.len() as u64 != u64::from(width) * u64::from(height) {
+        return Err(TrackingError::PictureSize {
+            bytes: grey.len(),
+            size_px,
+        });
+    }
+    Ok(width >= MIN_SIDE_PX && height >= MIN_SIDE_PX)
 }
 
 /// What the types do not rule out; the scene refuses the same with file and line.

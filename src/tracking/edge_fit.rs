@@ -25,28 +25,35 @@ const LEAST_CONTRAST: f64 = 0.004;
 /// Variance of a pixel's light that no picture is without: what 8 bits leave out.
 const NOISE_FLOOR: f64 = 1e-6;
 
+/// What the picture says of an edge.
+pub(super) enum EdgeView {
+    /// It is there.
+    Seen(EdgeFit),
+    /// The side that should be white is the darker one.
+    Reversed,
+    /// Out of the picture, covered, or in the dark.
+    Blank,
+}
+
 /// An edge as the picture shows it.
 pub(super) struct EdgeFit {
     /// How far across the edge it lies from where it was expected, cells.
     pub offset_cells: f64,
     /// Variance of the offset, cells².
     pub variance_cells: f64,
-    /// Light of white above that of black.
-    pub contrast: f64,
     /// What the blur's variance is short of, pixels², and how sure that is: the inverse of its own variance.
     pub blur_error: (f64, f64),
 }
 
 /// Fits one edge. `middle_px` is where its middle is expected, the columns of `pixels_from_cells` are one cell across
 /// and one along it there (distorted pixels); `blur_variance` is the blur's across the edge, pixels².
-/// `None` where the window leaves the picture or the light does not look like the edge.
 pub(super) fn fit_edge(
     picture: Grey<'_>,
     edge: &Edge,
     middle_px: DVec2,
     pixels_from_cells: DMat2,
     blur_variance: f64,
-) -> Option<EdgeFit> {
+) -> EdgeView {
     let cells_from_pixels = pixels_from_cells.inverse();
     let (across_cells_per_px, along_cells_per_px) = (
         cells_from_pixels.row(0).length(),
@@ -63,7 +70,7 @@ pub(super) fn fit_edge(
     let (low, high) = ((middle_px - extent).ceil(), (middle_px + extent).floor());
     let [width, height] = picture.size_px.map(f64::from);
     if !(low.cmpge(DVec2::ZERO).all() && high.x < width && high.y < height) {
-        return None;
+        return EdgeView::Blank;
     }
 
     let deviation_px = blur_variance.sqrt();
@@ -88,7 +95,7 @@ pub(super) fn fit_edge(
             cells += to_cells.x_axis;
         }
     }
-    sums.solve(blur_variance)
+    sums.solve(blur_variance).unwrap_or(EdgeView::Blank)
 }
 
 /// The integral of the unit Gaussian up to a place, and its density there.
@@ -193,7 +200,8 @@ impl Sums {
         self.count += 1;
     }
 
-    fn solve(&self, blur_variance: f64) -> Option<EdgeFit> {
+    /// `None` where the equations have no solution.
+    fn solve(&self, blur_variance: f64) -> Option<EdgeView> {
         if self.count < FEWEST_PIXELS {
             return None;
         }
@@ -208,26 +216,33 @@ impl Sums {
         let unexplained = (f64::from(self.squares) - explained).max(0.0);
         let noise = unexplained / f64::from(self.count - 3) + NOISE_FLOOR;
         if contrast < LEAST_CONTRAST {
-            return None;
+            let reversed = contrast < -LEAST_CONTRAST;
+            return reversed.then_some(EdgeView::Reversed);
         }
         // What is left of the fourth equation once the other three are solved.
         let blurring: [f64; 3] = std::array::from_fn(|i| entry(i, 3));
-        let blur_left = f64::from(self.right[3]) - (0..3).map(|i| blurring[i] * solution[i]).sum::<f64>();
+        let blur_left =
+            f64::from(self.right[3]) - (0..3).map(|i| blurring[i] * solution[i]).sum::<f64>();
         let blur_information = entry(3, 3)
             - (0..3)
                 .map(|i| blurring[i] * (0..3).map(|j| inverse[i][j] * blurring[j]).sum::<f64>())
                 .sum::<f64>();
         // By the logarithm of the deviation, hence twice the variance.
-        let (unit, certainty) = (2.0 * blur_variance, blur_information * contrast * contrast / noise);
+        let (unit, certainty) = (
+            2.0 * blur_variance,
+            blur_information * contrast * contrast / noise,
+        );
         let blur_error = match blur_information > 1e-9 {
-            true => (unit * blur_left / (blur_information * contrast), certainty / (unit * unit)),
+            true => (
+                unit * blur_left / (blur_information * contrast),
+                certainty / (unit * unit),
+            ),
             false => (0.0, 0.0),
         };
-        Some(EdgeFit {
+        Some(EdgeView::Seen(EdgeFit {
             offset_cells: shift / contrast,
             variance_cells: inverse[2][2] * noise / (contrast * contrast),
-            contrast,
             blur_error,
-        })
+        }))
     }
 }

@@ -63,7 +63,10 @@ pub(super) fn find_shift(
 
     // The darker and the lighter cell of each edge, as indices into the picture.
     let [width, height] = picture.size_px.map(f64::from);
-    let (low, high) = (DVec2::splat(margin), DVec2::new(width - 1.0, height - 1.0) - margin);
+    let (low, high) = (
+        DVec2::splat(margin),
+        DVec2::new(width - 1.0, height - 1.0) - margin,
+    );
     let row = picture.size_px[0] as i32;
     let index = |point_m: DVec2| {
         let pixel = place(point_m)?.round();
@@ -76,7 +79,11 @@ pub(super) fn find_shift(
         .filter_map(|edge| {
             let half = 0.5 * edge.across_m;
             let pair = [index(edge.point_m - half)?, index(edge.point_m + half)?];
-            Some(if edge.brightens { pair } else { [pair[1], pair[0]] })
+            Some(if edge.brightens {
+                pair
+            } else {
+                [pair[1], pair[0]]
+            })
         })
         .collect();
     if pairs.len() < FEWEST_PAIRS {
@@ -91,7 +98,8 @@ pub(super) fn find_shift(
             (sum + difference, most + difference.abs())
         })
     };
-    let shifts = (-steps..=steps).flat_map(|y| (-steps..=steps).map(move |x| (x * stride, y * stride)));
+    let shifts =
+        (-steps..=steps).flat_map(|y| (-steps..=steps).map(move |x| (x * stride, y * stride)));
     let sums: Vec<((i32, i32), (i32, i32))> =
         shifts.map(|(x, y)| ((x, y), differences(x, y))).collect();
     let &(_, (best, all)) = sums.iter().max_by_key(|(_, (sum, _))| *sum)?;
@@ -103,7 +111,10 @@ pub(super) fn find_shift(
     // About a cell is as good as its middle: the middle of all shifts that are nearly as good.
     let good = sums.iter().filter(|(_, (sum, _))| 10 * sum >= 9 * best);
     let (total, count) = good.fold((DVec2::ZERO, 0.0), |(total, count), ((x, y), _)| {
-        (total + DVec2::new(f64::from(*x), f64::from(*y)), count + 1.0)
+        (
+            total + DVec2::new(f64::from(*x), f64::from(*y)),
+            count + 1.0,
+        )
     });
     Some(total / count)
 }

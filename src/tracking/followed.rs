@@ -1,12 +1,14 @@
 //! One anchor from frame to frame: predicted, found again, and which of its two poses it has.
 
-use glam::{DAffine3, DQuat, DVec2, DVec3};
+use glam::{DAffine3, DVec2};
 
 use super::condition::Condition;
+use super::filter::Filter;
 use super::follow::{REACHES, find_shift};
 use super::layout::{Layout, Located};
+use super::least_squares::Matrix6;
 use super::light::Grey;
-use super::pixel_pose::{PixelPose, fit_pose, project};
+use super::pixel_pose::{PixelPose, difference, fit_pose, moved, project};
 use super::pose::{Sighting, refine, rotation_between};
 use super::twin::{Twin, twin_of};
 use super::undistort::undistorted_pixel;
@@ -25,20 +27,32 @@ const FADED_SECS: f64 = 0.4;
 const COASTING_SECS: f64 = 0.08;
 /// A shift that the edges make up for themselves, pixels.
 const SMALL_SHIFT_PX: f64 = 0.75;
+/// A pose that moves no corner by more than this since it was shown is not shown anew, pixels.
+const INVISIBLE_PX: f64 = 0.02;
 /// Logarithm of the odds, 100 : 1, from which on a pose is believed to be the right one of the two,
 const BELIEVED: f64 = 4.6;
 /// and below which it is doubted again: between the two it stays what it was.
 const DOUBTED: f64 = 2.3;
 /// The most that earlier frames can say for a pose.
 const MOST_ODDS: f64 = 20.0;
-/// What of the earlier frames' odds counts in the next one; errors of neighbouring frames are not independent.
-const REMEMBERED: f64 = 0.8;
+/// What of the earlier frames' odds counts in the next one,
+const REMEMBERED: f64 = 0.9;
+/// and what of its own: errors of neighbouring frames are not independent.
+const NEW_SHARE: f64 = 0.3;
 
 /// An anchor and what is known of it from earlier frames.
 pub(super) struct Followed {
     pub(super) layout: Layout,
     condition: Condition,
     last: Option<Sight>,
+    smoothing: Option<Smoothing>,
+}
+
+/// What is shown of an anchor, where poses are smoothed.
+struct Smoothing {
+    filter: Option<Filter>,
+    /// Kept as it is as long as the filter's pose looks the same.
+    shown: DAffine3,
 }
 
 /// An anchor as it was seen.
@@ -52,25 +66,20 @@ struct Sight {
     believed: bool,
 }
 
-/// In camera axes, per second.
-#[derive(Clone, Copy, Default)]
-struct Motion {
-    turn: DVec3,
-    shift_m: DVec3,
-}
+/// A turn (left of the rotation, rad/s) and a shift (m/s).
+type Motion = [f64; 6];
 
 impl Followed {
-    pub(super) fn new(layout: Layout) -> Self {
+    pub(super) fn new(layout: Layout, smooths: bool) -> Self {
         Self {
             layout,
             condition: Condition::UNKNOWN,
             last: None,
+            smoothing: smooths.then_some(Smoothing {
+                filter: None,
+                shown: DAffine3::IDENTITY,
+            }),
         }
-    }
-
-    /// When the anchor was seen last, if that is not long ago.
-    pub(super) fn last_seen_secs(&self) -> Option<f64> {
-        self.last.as_ref().map(|last| last.time_secs)
     }
 
     /// By what part of its size each marker is larger than the scene says, once that is known.
@@ -86,7 +95,33 @@ impl Followed {
         };
         if self.last.as_ref().is_some_and(|sight| !recent(sight)) {
             self.last = None;
+            if let Some(smoothing) = &mut self.smoothing {
+                smoothing.filter = None;
+            }
         }
+    }
+
+    /// The pose to be shown for one that was found, and its covariance.
+    fn smoothed(
+        &mut self,
+        intrinsics: &Intrinsics,
+        now_secs: f64,
+        pose: DAffine3,
+        covariance: Matrix6,
+    ) -> (DAffine3, Matrix6) {
+        let Some(Smoothing { filter, shown }) = &mut self.smoothing else {
+            return (pose, covariance);
+        };
+        let is_new = filter.is_none();
+        let filter = filter.get_or_insert_with(|| Filter::new(now_secs, pose, &covariance));
+        if !is_new {
+            filter.add(now_secs, &pose, &covariance);
+        }
+        // Where nothing moves, not a bit of the picture does.
+        if is_new || self.layout.distance_px(intrinsics, shown, filter.pose()) > INVISIBLE_PX {
+            *shown = *filter.pose();
+        }
+        (*shown, *filter.covariance())
     }
 
     /// The anchor near where its motion puts it, without a detector.
@@ -107,7 +142,13 @@ impl Followed {
             shifts.iter().any(Option::is_some).then_some(shifts)
         })?;
         let start = self.shifted(intrinsics, predicted, &near)?;
-        fit_pose(picture, intrinsics, &self.layout.prints, start, &mut self.condition)
+        fit_pose(
+            picture,
+            intrinsics,
+            &self.layout.prints,
+            start,
+            &mut self.condition,
+        )
     }
 
     /// The pose that explains by how much each print lies from where `pose` puts it.
@@ -117,7 +158,11 @@ impl Followed {
         pose: DAffine3,
         shifts: &[Option<DVec2>],
     ) -> Option<DAffine3> {
-        let largest_px = shifts.iter().flatten().map(|shift| shift.length()).fold(0.0, f64::max);
+        let largest_px = shifts
+            .iter()
+            .flatten()
+            .map(|shift| shift.length())
+            .fold(0.0, f64::max);
         if largest_px <= SMALL_SHIFT_PX {
             return Some(pose);
         }
@@ -141,7 +186,13 @@ impl Followed {
         intrinsics: &Intrinsics,
         start: DAffine3,
     ) -> Option<PixelPose> {
-        fit_pose(picture, intrinsics, &self.layout.prints, start, &mut self.condition)
+        fit_pose(
+            picture,
+            intrinsics,
+            &self.layout.prints,
+            start,
+            &mut self.condition,
+        )
     }
 
     /// Takes a pose of this frame for the anchor's, or its twin, as this frame and the earlier ones say.
@@ -154,18 +205,17 @@ impl Followed {
     ) -> AnchorPose {
         let mut twin = twin_of(&fitted, intrinsics, &self.layout.prints);
         let mut odds = twin.map_or(MOST_ODDS, |twin| twin.odds);
-        let mut believed = false;
-        if let Some(last) = &self.last {
-            // The earlier frames speak for whichever of the two is their pose.
-            let predicted = last.predicted(now_secs);
-            let off = |pose: &DAffine3| rotation_between(pose, &predicted);
-            let is_twins = twin
-                .is_some_and(|twin| off(&twin.camera_from_anchor) < off(&fitted.camera_from_anchor));
-            let sign = if is_twins { -1.0 } else { 1.0 };
-            odds += sign * REMEMBERED * last.odds;
+        let (mut believed, mut turns_below) = (false, 0.0);
+        if let (Some(last), Some(twin)) = (&self.last, &twin) {
+            // The earlier frames speak for whichever of the two is their pose, and it takes something to turn it over.
+            let (here, there) = (&fitted.camera_from_anchor, &twin.camera_from_anchor);
+            let off = |pose| rotation_between(pose, &last.camera_from_anchor);
+            let nearer = (off(there) - off(here)) / rotation_between(here, there);
+            odds = NEW_SHARE * odds + nearer.clamp(-1.0, 1.0) * REMEMBERED * last.odds;
             believed = last.believed;
+            turns_below = -DOUBTED * nearer.signum();
         }
-        let turned = odds < 0.0;
+        let turned = odds < turns_below;
         if let (true, Some(other)) = (turned, twin)
             && let Some(better) = self.fit(picture, intrinsics, other.camera_from_anchor)
         {
@@ -177,7 +227,7 @@ impl Followed {
             });
             fitted = better;
         }
-        let odds = odds.clamp(0.0, MOST_ODDS);
+        let odds = odds.clamp(-DOUBTED, MOST_ODDS);
         let believed = odds > if believed { DOUBTED } else { BELIEVED };
         let sight = Sight {
             time_secs: now_secs,
@@ -187,12 +237,22 @@ impl Followed {
             believed,
         };
         self.last = Some(sight);
+        let (camera_from_anchor, covariance) = self.smoothed(
+            intrinsics,
+            now_secs,
+            fitted.camera_from_anchor,
+            fitted.covariance,
+        );
         AnchorPose {
-            status: if believed { Status::Tracked } else { Status::Ambiguous },
+            status: if believed {
+                Status::Tracked
+            } else {
+                Status::Ambiguous
+            },
             why: (!believed).then_some(Why::TwoPoses),
             markers: fitted.seen.iter().filter(|&&seen| seen).count() as u32,
-            camera_from_anchor: Some(fitted.camera_from_anchor),
-            covariance: Some(fitted.covariance),
+            camera_from_anchor: Some(camera_from_anchor),
+            covariance: Some(covariance),
             // An edge tells one coordinate of a corner's two.
             reprojection_px: fitted.rms_px * std::f64::consts::SQRT_2,
             alternative: twin.map(|twin| Alternative {
@@ -204,7 +264,12 @@ impl Followed {
     }
 
     /// Takes what a detector's corners say, where the pixels have no better pose.
-    pub(super) fn take_located(&mut self, located: &Located, now_secs: f64) -> AnchorPose {
+    pub(super) fn take_located(
+        &mut self,
+        intrinsics: &Intrinsics,
+        located: &Located,
+        now_secs: f64,
+    ) -> AnchorPose {
         let solutions = &located.solutions;
         let (mut chosen, mut other) = (solutions.best, solutions.alternative);
         let before = self.last.as_ref().map(|last| last.camera_from_anchor);
@@ -223,12 +288,22 @@ impl Followed {
             odds: 0.0,
             believed: !solutions.ambiguous,
         });
+        let (camera_from_anchor, covariance) = self.smoothed(
+            intrinsics,
+            now_secs,
+            chosen.camera_from_anchor,
+            located.covariance,
+        );
         AnchorPose {
-            status: if solutions.ambiguous { Status::Ambiguous } else { Status::Tracked },
+            status: if solutions.ambiguous {
+                Status::Ambiguous
+            } else {
+                Status::Tracked
+            },
             why: solutions.ambiguous.then_some(Why::TwoPoses),
             markers: located.markers as u32,
-            camera_from_anchor: Some(chosen.camera_from_anchor),
-            covariance: None,
+            camera_from_anchor: Some(camera_from_anchor),
+            covariance: Some(covariance),
             reprojection_px: chosen.rms_px(corners),
             alternative: other.map(|solution| Alternative {
                 camera_from_anchor: solution.camera_from_anchor,
@@ -251,9 +326,23 @@ impl Followed {
         }
         AnchorPose {
             status: Status::Predicted,
-            camera_from_anchor: Some(last.predicted(now_secs)),
+            camera_from_anchor: Some(self.shown_at(last, now_secs)),
             visibility: ((FADED_SECS - age_secs) / (FADED_SECS - PREDICTED_SECS)).min(1.0),
             ..lost
+        }
+    }
+
+    /// Where what was shown goes on to.
+    fn shown_at(&self, last: &Sight, now_secs: f64) -> DAffine3 {
+        match &self.smoothing {
+            Some(Smoothing {
+                filter: Some(filter),
+                shown,
+            }) => {
+                let moving_secs = coasting_secs(now_secs - last.time_secs);
+                moved(shown, filter.velocity().map(|speed| speed * moving_secs))
+            }
+            _ => last.predicted(now_secs),
         }
     }
 
@@ -265,29 +354,24 @@ impl Followed {
         if !(step_secs > 0.0 && step_secs <= LONGEST_STEP_SECS) {
             return Motion::default();
         }
-        let turn = pose.matrix3 * last.camera_from_anchor.matrix3.transpose();
-        Motion {
-            turn: DQuat::from_mat3(&turn).normalize().to_scaled_axis() / step_secs,
-            shift_m: (pose.translation - last.camera_from_anchor.translation) / step_secs,
-        }
+        difference(pose, &last.camera_from_anchor).map(|step| step / step_secs)
     }
 }
 
 impl Sight {
-    /// Where the anchor is by now: the motion goes on from frame to frame, and dies down where none shows it.
+    /// Where the anchor is by now.
     fn predicted(&self, now_secs: f64) -> DAffine3 {
-        let age_secs = (now_secs - self.time_secs).max(0.0);
-        let moving_secs = if age_secs <= PREDICTED_SECS {
-            age_secs
-        } else {
-            PREDICTED_SECS
-                + COASTING_SECS * (1.0 - (-(age_secs - PREDICTED_SECS) / COASTING_SECS).exp())
-        };
-        let turn = DQuat::from_scaled_axis(self.motion.turn * moving_secs);
-        let rotation = (turn * DQuat::from_mat3(&self.camera_from_anchor.matrix3)).normalize();
-        DAffine3::from_rotation_translation(
-            rotation,
-            self.camera_from_anchor.translation + self.motion.shift_m * moving_secs,
+        let moving_secs = coasting_secs(now_secs - self.time_secs);
+        moved(
+            &self.camera_from_anchor,
+            self.motion.map(|speed| speed * moving_secs),
         )
     }
+}
+
+/// A motion goes on from frame to frame, and dies down where none shows it: for how long it goes on as it was.
+fn coasting_secs(age_secs: f64) -> f64 {
+    let unseen_secs = (age_secs - PREDICTED_SECS).max(0.0);
+    age_secs.clamp(0.0, PREDICTED_SECS)
+        + COASTING_SECS * (1.0 - (-unseen_secs / COASTING_SECS).exp())
 }

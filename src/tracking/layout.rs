@@ -3,6 +3,7 @@
 use glam::{DAffine3, DVec2};
 
 use super::aruco::printed_cells;
+use super::least_squares::Matrix6;
 use super::pixel_pose::project;
 use super::pose::{self, Sighting, Solutions, pixel_of};
 use super::print::Print;
@@ -27,6 +28,8 @@ pub(super) struct Layout {
 /// Poses that a detector's corners allow.
 pub(super) struct Located {
     pub(super) solutions: Solutions,
+    /// Of the better one: a turn about the anchor's origin (left of the rotation) and a shift.
+    pub(super) covariance: Matrix6,
     /// Markers that they rest on.
     pub(super) markers: usize,
 }
@@ -125,7 +128,10 @@ impl Layout {
                 solutions = better;
             }
         }
+        let sightings: Vec<Sighting> = seen.iter().flat_map(|marker| marker.sightings).collect();
+        let best = &solutions.best.camera_from_anchor;
         Ok(Located {
+            covariance: pose::covariance(intrinsics, &sightings, best).ok_or(Why::NoPose)?,
             solutions,
             markers: seen.len(),
         })

@@ -1,4 +1,23 @@
-//! Small systems of linear equations.
+//! Small matrices and systems of linear equations.
+
+/// Rows of a covariance of a pose.
+pub(super) type Matrix6 = [[f64; 6]; 6];
+
+pub(super) fn sum(a: &Matrix6, b: &Matrix6) -> Matrix6 {
+    std::array::from_fn(|i| std::array::from_fn(|j| a[i][j] + b[i][j]))
+}
+
+pub(super) fn times(matrix: &Matrix6, factor: f64) -> Matrix6 {
+    matrix.map(|row| row.map(|entry| entry * factor))
+}
+
+pub(super) fn transposed(matrix: &Matrix6) -> Matrix6 {
+    std::array::from_fn(|i| std::array::from_fn(|j| matrix[j][i]))
+}
+
+pub(super) fn product(a: &Matrix6, b: &Matrix6) -> Matrix6 {
+    std::array::from_fn(|i| std::array::from_fn(|j| (0..6).map(|k| a[i][k] * b[k][j]).sum()))
+}
 
 /// Adds one equation `row · x = value` to the normal equations.
 pub(super) fn accumulate<const N: usize>(

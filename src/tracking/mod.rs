@@ -13,6 +13,7 @@ mod condition;
 mod conventions;
 mod detector;
 mod edge_fit;
+mod filter;
 mod follow;
 mod followed;
 mod layout;
@@ -46,7 +47,7 @@ pub enum Status {
 }
 
 /// Why an anchor is not simply tracked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum Why {
     /// The usual one.
     #[error("none of its markers is in the picture")]
@@ -73,7 +74,7 @@ pub struct AnchorPose {
     pub markers: u32,
     /// `None` when lost.
     pub camera_from_anchor: Option<DAffine3>,
-    /// Covariance of the pose where it comes from pixels: of a small turn about the anchor's origin in camera axes
+    /// Covariance of the pose: of a small turn about the anchor's origin in camera axes
     /// (radians; it stands left of the rotation), then of a shift (metres).
     pub covariance: Option<[[f64; 6]; 6]>,
     /// Root mean square distance of the corners from where the pose puts them, pixels; 0 when lost. Above a pixel the

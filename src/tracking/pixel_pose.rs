@@ -9,7 +9,7 @@
 use glam::{DAffine3, DMat2, DMat3, DQuat, DVec2, DVec3};
 
 use super::condition::Condition;
-use super::edge_fit::fit_edge;
+use super::edge_fit::{EdgeView, fit_edge};
 use super::least_squares::{accumulate, inverse, solve_positive_definite};
 use super::light::Grey;
 use super::print::Print;
@@ -31,12 +31,14 @@ const FLOOR_PX: f64 = 0.02;
 /// Tukey's constant, standard deviations.
 const TUKEY: f64 = 4.685;
 /// Once a step moves no edge by more than this (root mean square), the pose is found, pixels.
-const SETTLED_PX: f64 = 0.01;
+const SETTLED_PX: f64 = 0.05;
 /// Weight from which on an edge counts as being where it should be.
 const FITTING: f64 = 0.3;
-/// A marker is seen when so large a part of its edges fits, and so many of them.
+/// A marker is seen when so large a part of its edges fits, and so many of them,
 const SEEN_SHARE: f64 = 0.4;
 const SEEN_EDGES: usize = 10;
+/// and of those that are to be seen no larger part is the wrong way round: of a marker that is not there, half are.
+const MOST_REVERSED: f64 = 0.15;
 
 /// A pose that the pixels agree on.
 pub(super) struct PixelPose {
@@ -45,7 +47,8 @@ pub(super) struct PixelPose {
     pub(super) covariance: [[f64; POSE_PARAMETERS]; POSE_PARAMETERS],
     /// Per print, whether it was seen.
     pub(super) seen: Vec<bool>,
-    /// Root mean square distance, pixels, of the edges that fit from where the pose puts them.
+    /// Root mean square distance, pixels, of the edges from where the pose and the scene put them; without those that
+    /// something else lies across.
     pub(super) rms_px: f64,
     /// By what factor the edges vary more than their pixels' noise says.
     pub(super) excess: f64,
@@ -75,7 +78,12 @@ pub(super) struct Edge {
 impl Edge {
     /// What a step does not explain of the offset, pixels.
     fn left_px(&self, step: &[f64; PARAMETERS]) -> f64 {
-        let explained: f64 = self.row.iter().zip(step).map(|(row, step)| row * step).sum();
+        let explained: f64 = self
+            .row
+            .iter()
+            .zip(step)
+            .map(|(row, step)| row * step)
+            .sum();
         self.offset_px - explained
     }
 }
@@ -140,6 +148,19 @@ pub(super) fn moved(pose: &DAffine3, step: [f64; POSE_PARAMETERS]) -> DAffine3 {
     )
 }
 
+/// The turn (left of the rotation) and the shift from one pose to another.
+pub(super) fn difference(to: &DAffine3, from: &DAffine3) -> [f64; 6] {
+    let rotation = DQuat::from_mat3(&(to.matrix3 * from.matrix3.transpose())).normalize();
+    let turn = rotation.to_scaled_axis();
+    // The short way round.
+    let turn = match turn.length() > std::f64::consts::PI {
+        true => turn * (1.0 - std::f64::consts::TAU / turn.length()),
+        false => turn,
+    };
+    let shift_m: DVec3 = to.translation - from.translation;
+    [turn.x, turn.y, turn.z, shift_m.x, shift_m.y, shift_m.z]
+}
+
 /// The pose near `start` that puts the edges of the prints where the picture has them. `None` when too few edges are
 /// where they should be; `condition` is then as it was.
 pub(super) fn fit_pose(
@@ -157,7 +178,17 @@ pub(super) fn fit_pose(
     for _ in 0..ROUNDS {
         edges.clear();
         for (index, print) in prints.iter().enumerate() {
-            measure(picture, intrinsics, (index, print), &pose, &learned, &mut edges);
+            measure(
+                picture,
+                intrinsics,
+                (index, print),
+                &pose,
+                &learned,
+                &mut edges,
+            );
+        }
+        if edges.is_empty() {
+            return None;
         }
         let solved = solve(&mut edges, condition)?;
         pose = moved(&pose, pose_part(&solved.step));
@@ -165,7 +196,9 @@ pub(super) fn fit_pose(
         let explained: f64 = edges
             .iter()
             .map(|edge| {
-                let by_pose: f64 = (0..POSE_PARAMETERS).map(|k| edge.row[k] * solved.step[k]).sum();
+                let by_pose: f64 = (0..POSE_PARAMETERS)
+                    .map(|k| edge.row[k] * solved.step[k])
+                    .sum();
                 edge.weight * by_pose * by_pose
             })
             .sum();
@@ -188,7 +221,7 @@ fn pose_part(step: &[f64; PARAMETERS]) -> [f64; POSE_PARAMETERS] {
     std::array::from_fn(|k| step[k])
 }
 
-/// Adds the edges of one print that the picture shows near where the pose puts them.
+/// Adds the edges of one print that the picture shows near where the pose puts them; none of a print that is not there.
 fn measure(
     picture: Grey<'_>,
     intrinsics: &Intrinsics,
@@ -197,12 +230,14 @@ fn measure(
     condition: &Condition,
     edges: &mut Vec<Edge>,
 ) {
+    let (known, mut reversed) = (edges.len(), 0);
     for edge in &print.edges {
         let Some(projected) = project(intrinsics, pose, edge.point_m) else {
             continue;
         };
         let in_picture = |step_m: DVec2| projected.step_px(pose.matrix3 * step_m.extend(0.0));
-        let pixels_from_cells = DMat2::from_cols(in_picture(edge.across_m), in_picture(edge.along_m));
+        let pixels_from_cells =
+            DMat2::from_cols(in_picture(edge.across_m), in_picture(edge.along_m));
         // The gradient of the place across.
         let gradient = pixels_from_cells.inverse().row(0);
         let length = gradient.length();
@@ -211,8 +246,20 @@ fn measure(
         }
         let normal = gradient / length;
         let blur_variance = condition.blur_variance_along(normal);
-        let fit = fit_edge(picture, edge, projected.pixel, pixels_from_cells, blur_variance);
-        let Some(fit) = fit else { continue };
+        let fit = match fit_edge(
+            picture,
+            edge,
+            projected.pixel,
+            pixels_from_cells,
+            blur_variance,
+        ) {
+            EdgeView::Seen(fit) => fit,
+            EdgeView::Reversed => {
+                reversed += 1;
+                continue;
+            }
+            EdgeView::Blank => continue,
+        };
         let offset_px = fit.offset_cells / length;
         let [rx, ry, rz, tx, ty, tz] = projected.row(normal);
         let outward_m = edge.point_m - print.center_m();
@@ -229,6 +276,10 @@ fn measure(
             blur_error: fit.blur_error,
             weight: 1.0,
         });
+    }
+    let shown = edges.len() - known + reversed;
+    if reversed as f64 > MOST_REVERSED * shown as f64 {
+        edges.truncate(known);
     }
 }
 
@@ -257,14 +308,10 @@ fn solve(edges: &mut [Edge], condition: &Condition) -> Option<Solved> {
         right[SIZE] += size_certainty * size_error;
         let step = solve_positive_definite(&normal, &right)?;
 
-        let deviation = |edge: &Edge| edge.left_px(&step) / edge.variance.sqrt();
-        let mut distances: Vec<f64> = edges.iter().map(|edge| deviation(edge).abs()).collect();
-        let middle = distances.len() / 2;
-        let (_, median, _) = distances.select_nth_unstable_by(middle, f64::total_cmp);
-        // The median of |x| of a unit Gaussian is 0.6745.
-        scale = (*median / 0.6745).clamp(1.0, scale);
+        let left = |edge: &Edge| edge.left_px(&step) / edge.variance.sqrt();
+        scale = deviation(edges.iter().map(left)).clamp(1.0, scale);
         for edge in edges.iter_mut() {
-            let share = deviation(edge) / (TUKEY * scale);
+            let share = left(edge) / (TUKEY * scale);
             edge.weight = (1.0 - share * share).max(0.0).powi(2);
         }
         found = Some((step, normal));
@@ -276,15 +323,30 @@ fn solve(edges: &mut [Edge], condition: &Condition) -> Option<Solved> {
     })
 }
 
+/// The standard deviation of a Gaussian with the median of these distances from 0; there must be one.
+fn deviation(distances: impl Iterator<Item = f64>) -> f64 {
+    let mut distances: Vec<f64> = distances.map(f64::abs).collect();
+    let middle = distances.len() / 2;
+    let (_, median, _) = distances.select_nth_unstable_by(middle, f64::total_cmp);
+    // The median of |x| of a unit Gaussian.
+    *median / 0.6745
+}
+
 fn fitted(
     prints: &[Print],
     pose: DAffine3,
     mut edges: Vec<Edge>,
     solved: &Solved,
 ) -> Option<PixelPose> {
+    let not_by_pose_px =
+        |edge: &Edge| edge.row[SPILL] * solved.step[SPILL] + edge.row[SIZE] * solved.step[SIZE];
+    let (mut squares_px, mut counted) = (0.0, 0.0);
+    for edge in edges.iter().filter(|edge| edge.weight > 0.0) {
+        squares_px += (edge.left_px(&solved.step) + not_by_pose_px(edge)).powi(2);
+        counted += 1.0;
+    }
     for edge in &mut edges {
-        let not_by_pose = edge.row[SPILL] * solved.step[SPILL] + edge.row[SIZE] * solved.step[SIZE];
-        edge.seen_px -= edge.normal * not_by_pose;
+        edge.seen_px -= edge.normal * not_by_pose_px(edge);
     }
     let mut fitting = vec![0; prints.len()];
     for edge in edges.iter().filter(|edge| edge.weight > FITTING) {
@@ -301,13 +363,12 @@ fn fitted(
         return None;
     }
     let mut normal = [[0.0; POSE_PARAMETERS]; POSE_PARAMETERS];
-    let (mut squares_px, mut squares, mut used) = (0.0, 0.0, 0.0);
+    let (mut squares, mut used) = (0.0, 0.0);
     for edge in &edges {
         let certainty = (edge.weight / edge.variance).sqrt();
         let row = pose_part(&edge.row).map(|entry| entry * certainty);
         accumulate(&mut normal, &mut [0.0; POSE_PARAMETERS], &row, 0.0);
         let left_px = edge.left_px(&solved.step);
-        squares_px += edge.weight * left_px * left_px;
         squares += edge.weight * left_px * left_px / edge.variance;
         used += edge.weight;
     }
@@ -318,7 +379,7 @@ fn fitted(
         camera_from_anchor: pose,
         covariance,
         seen,
-        rms_px: (squares_px / used).sqrt(),
+        rms_px: (squares_px / f64::max(counted, 1.0)).sqrt(),
         excess,
         edges,
     })

@@ -6,7 +6,7 @@
 
 use glam::{DAffine3, DMat2, DMat3, DVec2, DVec3};
 
-use super::least_squares::{accumulate, solve_positive_definite};
+use super::least_squares::{Matrix6, accumulate, inverse, solve_positive_definite, times};
 use crate::geometry::camera::Intrinsics;
 
 /// A point of the anchor's plane and where it was seen.
@@ -108,7 +108,10 @@ fn is_seen_from_the_front(camera_from_anchor: &DAffine3, sightings: &[Sighting])
 }
 
 /// The two poses that the homography's derivative at the points' centre allows (IPPE, section 4).
-pub(super) fn ippe_starts(intrinsics: &Intrinsics, sightings: &[Sighting]) -> Option<[DAffine3; 2]> {
+pub(super) fn ippe_starts(
+    intrinsics: &Intrinsics,
+    sightings: &[Sighting],
+) -> Option<[DAffine3; 2]> {
     if sightings.len() < 4 {
         return None;
     }
@@ -262,7 +265,11 @@ fn translation_for(
 }
 
 /// Levenberg-Marquardt on the six parameters of the pose; `None` when it does not converge to a pose in front.
-pub(super) fn refine(intrinsics: &Intrinsics, sightings: &[Sighting], start: DAffine3) -> Option<Solution> {
+pub(super) fn refine(
+    intrinsics: &Intrinsics,
+    sightings: &[Sighting],
+    start: DAffine3,
+) -> Option<Solution> {
     const ROUNDS: usize = 100;
     const STEP_TOLERANCE: f64 = 1e-10;
     let mut pose = start;
@@ -313,6 +320,16 @@ fn squared_error(intrinsics: &Intrinsics, sightings: &[Sighting], pose: &DAffine
         sum += (pixel_of(intrinsics, pose, sighting.point_m) - sighting.pixel).length_squared();
     }
     sum.is_finite().then_some(sum)
+}
+
+/// Covariance of a pose from corners: of a turn about the anchor's origin (left of the rotation) and a shift.
+pub(super) fn covariance(
+    intrinsics: &Intrinsics,
+    sightings: &[Sighting],
+    pose: &DAffine3,
+) -> Option<Matrix6> {
+    let (normal, _) = linearize(intrinsics, sightings, pose);
+    Some(times(&inverse(&normal)?, CORNER_NOISE_PX * CORNER_NOISE_PX))
 }
 
 /// The normal equations of the Gauss-Newton step: a turn about the anchor's origin (left of the rotation), a shift.

@@ -4,7 +4,7 @@ use opencv::core::Mat;
 use opencv::imgproc;
 
 use super::followed::Followed;
-use super::layout::Layout;
+use super::layout::{Layout, Located};
 use super::light::Grey;
 use super::pixel_pose::{PixelPose, project};
 use super::{AnchorPose, Detection, Detector, TrackingError, Why};
@@ -13,9 +13,9 @@ use crate::geometry::camera::Intrinsics;
 use crate::scene::{Anchor, Search, TrackingSettings};
 
 /// The whole picture is searched again after this, even when nothing is missing, seconds.
-const SEARCH_AGAIN_SECS: f64 = 1.0;
-/// An anchor that has been missing for longer than this is looked for less often, seconds,
-const LONG_GONE_SECS: f64 = 3.0;
+const SEARCH_AGAIN_SECS: f64 = 2.0;
+/// An anchor that has been missing for longer than this is thoroughly looked for less often, seconds,
+const LONG_GONE_SECS: f64 = 10.0;
 /// in one of so many frames.
 const LONG_GONE_FRAMES: u32 = 3;
 /// A search that puts an anchor's corners farther than this from where it was followed to has found another place,
@@ -49,7 +49,9 @@ impl Tracker {
             .iter()
             .flat_map(|anchor| anchor.markers.iter().map(|marker| marker.family))
             .collect::<Vec<_>>();
-        let followed = anchors.iter().map(|anchor| Ok(Followed::new(Layout::new(anchor)?)));
+        let followed = anchors
+            .iter()
+            .map(|anchor| Ok(Followed::new(Layout::new(anchor)?, settings.filter)));
         Ok(Self {
             detector: Detector::new(settings, &families)?,
             anchors: followed.collect::<Result<_, TrackingError>>()?,
@@ -73,74 +75,98 @@ impl Tracker {
                 calibration_px: self.intrinsics.size_px,
             });
         }
-        grey_from_rgba(frame, &mut self.grey)?;
-        let picture = Grey {
-            levels: &self.grey,
-            size_px: frame.size_px,
-        };
-        let now_secs = frame.time_secs;
+        let mut grey = std::mem::take(&mut self.grey);
+        let poses = grey_from_rgba(frame, &mut grey).and_then(|()| {
+            let picture = Grey {
+                levels: &grey,
+                size_px: frame.size_px,
+            };
+            self.track_grey(picture, frame.time_secs)
+        });
+        self.grey = grey;
+        poses
+    }
+
+    fn track_grey(
+        &mut self,
+        picture: Grey<'_>,
+        now_secs: f64,
+    ) -> Result<Vec<AnchorPose>, TrackingError> {
+        let intrinsics = &self.intrinsics;
         self.frames = self.frames.wrapping_add(1);
         for anchor in &mut self.anchors {
             anchor.forget(now_secs);
         }
-        let mut found: Vec<Option<PixelPose>> = self
+        let mut fits: Vec<Option<PixelPose>> = self
             .anchors
             .iter_mut()
             .map(|anchor| {
                 let follows = self.follows.then_some(anchor);
-                follows.and_then(|anchor| anchor.follow(picture, &self.intrinsics, now_secs))
+                follows.and_then(|anchor| anchor.follow(picture, intrinsics, now_secs))
             })
             .collect();
-
-        if !self.needs_search(&found, now_secs) {
-            self.detections.clear();
-            let poses = self.anchors.iter_mut().zip(found).map(|(anchor, found)| match found {
-                Some(fitted) => {
-                    add_seen(&mut self.detections, &self.intrinsics, &anchor.layout, &fitted);
-                    anchor.take(picture, &self.intrinsics, fitted, now_secs)
+        self.detections.clear();
+        let located: Vec<Result<Located, Why>> = match self.needs_search(&fits, now_secs) {
+            true => self.search(picture, now_secs, &mut fits)?,
+            false => self.anchors.iter().map(|_| Err(Why::NoMarker)).collect(),
+        };
+        let intrinsics = &self.intrinsics;
+        let mut poses = Vec::with_capacity(self.anchors.len());
+        for ((anchor, fit), located) in self.anchors.iter_mut().zip(fits).zip(located) {
+            poses.push(match (fit, located) {
+                (Some(fit), _) => {
+                    add_seen(&mut self.detections, intrinsics, &anchor.layout, &fit);
+                    anchor.take(picture, intrinsics, fit, now_secs)
                 }
-                None => anchor.missed(Why::NoMarker, now_secs),
+                (None, Ok(located)) => anchor.take_located(intrinsics, &located, now_secs),
+                (None, Err(why)) => anchor.missed(why, now_secs),
             });
-            let poses = poses.collect();
-            self.detections.sort_by(Detection::by_id_and_place);
-            return Ok(poses);
         }
-        self.searched_secs = now_secs;
-        self.detections = self.detector.detect(&self.grey, frame.size_px)?;
-        let poses = self
-            .anchors
-            .iter_mut()
-            .zip(found.iter_mut())
-            .zip(&mut self.missing_since_secs)
-            .map(|((anchor, found), missing_since_secs)| {
-                let located = anchor.layout.locate(&self.intrinsics, &self.detections);
-                if let Ok(located) = &located {
-                    let start = located.solutions.best.camera_from_anchor;
-                    // A search that finds the anchor elsewhere is right: its codes were read, not taken for granted.
-                    let elsewhere = found.as_ref().is_none_or(|followed| {
-                        let here = &followed.camera_from_anchor;
-                        anchor.layout.distance_px(&self.intrinsics, here, &start) > ELSEWHERE_PX
-                    });
-                    if self.fits_pixels && elsewhere {
-                        *found = anchor.fit(picture, &self.intrinsics, start);
-                    }
-                }
-                *missing_since_secs = match (&found, &located) {
-                    (None, Err(_)) => missing_since_secs.or(Some(now_secs)),
-                    _ => None,
-                };
-                match (found.take(), located) {
-                    (Some(fitted), _) => anchor.take(picture, &self.intrinsics, fitted, now_secs),
-                    (None, Ok(located)) => anchor.take_located(&located, now_secs),
-                    (None, Err(why)) => anchor.missed(why, now_secs),
-                }
-            })
-            .collect();
+        self.detections.sort_by(Detection::by_id_and_place);
         Ok(poses)
     }
 
-    /// All markers seen in the last frame, sorted by family and id: by the detector also those of no anchor, and between
-    /// its searches those that were followed.
+    /// Searches the whole picture. Gives each anchor that was not followed, or not to where the search has it, its pose
+    /// from the pixels there; what the corners say is returned.
+    fn search(
+        &mut self,
+        picture: Grey<'_>,
+        now_secs: f64,
+        fits: &mut [Option<PixelPose>],
+    ) -> Result<Vec<Result<Located, Why>>, TrackingError> {
+        self.searched_secs = now_secs;
+        let Grey { levels, size_px } = picture;
+        self.detections = self.detector.detect(levels, size_px)?;
+        if self.needs_thorough_search(fits, now_secs) {
+            self.detections = self.detector.detect_thoroughly(levels, size_px)?;
+        }
+        let intrinsics = &self.intrinsics;
+        let mut all_located = Vec::with_capacity(self.anchors.len());
+        for (k, (anchor, fit)) in self.anchors.iter_mut().zip(fits).enumerate() {
+            let located = anchor.layout.locate(intrinsics, &self.detections);
+            if let (Ok(located), true) = (&located, self.fits_pixels) {
+                let start = located.solutions.best.camera_from_anchor;
+                // A search that finds the anchor elsewhere is right: its codes were read, not taken for granted.
+                let is_there = fit.as_ref().is_some_and(|fit| {
+                    let here = &fit.camera_from_anchor;
+                    anchor.layout.distance_px(intrinsics, here, &start) <= ELSEWHERE_PX
+                });
+                if !is_there {
+                    *fit = anchor.fit(picture, intrinsics, start);
+                }
+            }
+            let missing_since_secs = &mut self.missing_since_secs[k];
+            *missing_since_secs = match (&fit, &located) {
+                (None, Err(_)) => missing_since_secs.or(Some(now_secs)),
+                _ => None,
+            };
+            all_located.push(located);
+        }
+        Ok(all_located)
+    }
+
+    /// All markers seen in the last frame, sorted by family and id: those of the anchors' poses, and, where the whole
+    /// picture was searched, all others.
     pub fn detections(&self) -> &[Detection] {
         &self.detections
     }
@@ -152,32 +178,49 @@ impl Tracker {
     }
 
     /// Whether the whole picture is to be searched.
-    fn needs_search(&self, found: &[Option<PixelPose>], now_secs: f64) -> bool {
+    fn needs_search(&self, fits: &[Option<PixelPose>], now_secs: f64) -> bool {
         let since_secs = now_secs - self.searched_secs;
-        if !(0.0..SEARCH_AGAIN_SECS).contains(&since_secs) {
-            return true;
-        }
-        found.iter().zip(&self.missing_since_secs).any(|(found, since_secs)| {
-            let long_gone = since_secs.is_some_and(|since_secs| now_secs - since_secs > LONG_GONE_SECS);
-            found.is_none() && (!long_gone || self.frames.is_multiple_of(LONG_GONE_FRAMES))
-        })
+        let is_due = !(0.0..SEARCH_AGAIN_SECS).contains(&since_secs);
+        is_due || fits.iter().any(Option::is_none)
+    }
+
+    /// Whether it is to be searched once more and better, for an anchor that is in none of what was found.
+    fn needs_thorough_search(&self, fits: &[Option<PixelPose>], now_secs: f64) -> bool {
+        let mut anchors = self.anchors.iter().zip(fits).zip(&self.missing_since_secs);
+        self.follows
+            && anchors.any(|((anchor, fit), since_secs)| {
+                let long_gone =
+                    since_secs.is_some_and(|since_secs| now_secs - since_secs > LONG_GONE_SECS);
+                fit.is_none()
+                    && (!long_gone || self.frames.is_multiple_of(LONG_GONE_FRAMES))
+                    && anchor
+                        .layout
+                        .locate(&self.intrinsics, &self.detections)
+                        .is_err()
+            })
     }
 }
 
-/// Adds the markers that a pose was found from, where the pose puts them.
+/// Adds the markers that a pose was found from, where the pose puts them; those that a search found are there already.
 fn add_seen(
     detections: &mut Vec<Detection>,
     intrinsics: &Intrinsics,
     layout: &Layout,
     fitted: &PixelPose,
 ) {
-    for (((family, id), print), _) in
-        layout.markers().zip(&layout.prints).zip(&fitted.seen).filter(|(_, seen)| **seen)
+    for (((family, id), print), _) in layout
+        .markers()
+        .zip(&layout.prints)
+        .zip(&fitted.seen)
+        .filter(|(_, seen)| **seen)
     {
         let corners = print
             .corners_m()
             .map(|corner_m| Some(project(intrinsics, &fitted.camera_from_anchor, corner_m)?.pixel));
-        if let [Some(a), Some(b), Some(c), Some(d)] = corners {
+        let is_there = detections
+            .iter()
+            .any(|detection| (detection.family, detection.id) == (family, id));
+        if let ([Some(a), Some(b), Some(c), Some(d)], false) = (corners, is_there) {
             detections.push(Detection {
                 family,
                 id,

@@ -6,7 +6,7 @@
 use glam::DAffine3;
 
 use super::least_squares::{accumulate, solve_positive_definite};
-use super::pixel_pose::{PixelPose, moved, project};
+use super::pixel_pose::{Edge, PixelPose, moved, project};
 use super::pose::{Sighting, ippe_starts, pixel_of, rotation_between};
 use super::print::Print;
 use crate::geometry::camera::Intrinsics;
@@ -25,11 +25,7 @@ pub(super) struct Twin {
 }
 
 /// The other pose that explains the edges that `pose` rests on, refined on them. `None` where there is no other.
-pub(super) fn twin_of(
-    pose: &PixelPose,
-    intrinsics: &Intrinsics,
-    prints: &[Print],
-) -> Option<Twin> {
+pub(super) fn twin_of(pose: &PixelPose, intrinsics: &Intrinsics, prints: &[Print]) -> Option<Twin> {
     let here = &pose.camera_from_anchor;
     let seen = prints.iter().zip(&pose.seen).filter(|(_, seen)| **seen);
     let sightings: Vec<Sighting> = seen
@@ -46,12 +42,18 @@ pub(super) fn twin_of(
     if rotation_between(&other, here) < SAME {
         return None;
     }
-    let (error_here, _) = error(pose, intrinsics, here)?;
-    let (error_there, rms_px) = error(pose, intrinsics, &other)?;
+    let here = distances(pose, intrinsics, here)?;
+    let there = distances(pose, intrinsics, &other)?;
+    let error = |distances_px: &[f64]| -> f64 {
+        let edges = pose.edges.iter().zip(distances_px);
+        edges
+            .map(|(edge, px)| edge.weight * px * px / edge.variance)
+            .sum()
+    };
     Some(Twin {
         camera_from_anchor: other,
-        odds: 0.5 * (error_there - error_here) / pose.excess,
-        rms_px,
+        odds: 0.5 * (error(&there) - error(&here)) / pose.excess,
+        rms_px: (there.iter().map(|px| px * px).sum::<f64>() / there.len() as f64).sqrt(),
     })
 }
 
@@ -75,15 +77,11 @@ fn refined(pose: &PixelPose, intrinsics: &Intrinsics, start: DAffine3) -> Option
     (place.is_finite() && faces).then_some(place)
 }
 
-/// Sum of the squared distances over their variances, and their root mean square in pixels.
-fn error(pose: &PixelPose, intrinsics: &Intrinsics, place: &DAffine3) -> Option<(f64, f64)> {
-    let (mut sum, mut squares_px, mut used) = (0.0, 0.0, 0.0);
-    for edge in &pose.edges {
+/// Of each edge from where a pose puts it, pixels.
+fn distances(pose: &PixelPose, intrinsics: &Intrinsics, place: &DAffine3) -> Option<Vec<f64>> {
+    let distance_px = |edge: &Edge| {
         let projected = project(intrinsics, place, edge.point_m)?;
-        let distance_px = edge.normal.dot(edge.seen_px - projected.pixel);
-        sum += edge.weight * distance_px * distance_px / edge.variance;
-        squares_px += edge.weight * distance_px * distance_px;
-        used += edge.weight;
-    }
-    Some((sum, (squares_px / used).sqrt()))
+        Some(edge.normal.dot(edge.seen_px - projected.pixel))
+    };
+    pose.edges.iter().map(distance_px).collect()
 }
