@@ -40,7 +40,7 @@ enum Command {
                       --calibration camera.toml --size-mm 40 --poses out/walk.csv"
     )]
     Track(TrackArgs),
-    /// Learns where markers lie that are stuck about a table, from a recording of them: a [[board]] for a scene file.
+    /// Learns from a recording where markers lie about a table.
     #[command(
         after_help = "Example:\n  gnomon board --from walk.mp4 --calibration camera.toml --size-mm 40 --out table.toml"
     )]
