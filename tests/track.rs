@@ -291,11 +291,13 @@ fn mistakes_are_told_and_leave_nothing() {
 /// Frames of the lamp as pictures, as they are and as a camera that mirrors gives them.
 fn picture_folders(folder: &Path) -> [PathBuf; 2] {
     let folders = ["as-is", "mirrored"].map(|name| folder.join(name));
-    let mut source = FrameSource::open(plain(&project_file("recordings/lamp"))).expect("a picture");
+    let mut source =
+        FrameSource::open(plain(&project_file("recordings/lamp"))).expect("the shipped recording");
     for _ in 0..6 {
-        let mut frame = source.next_frame().expect("a picture").expect("a picture");
+        let mut frame = source.next_frame().expect("a frame").expect("a frame");
         let name = format!("{:06}.png", frame.index);
-        write_rgb_png(&folders[0].join(&name), frame.size_px, &frame.rgba).expect("a picture");
+        write_rgb_png(&folders[0].join(&name), frame.size_px, &frame.rgba)
+            .expect("a written picture");
         let width = frame.size_px[0] as usize;
         let before = frame.rgba.clone();
         frame.mirror();
@@ -304,7 +306,8 @@ fn picture_folders(folder: &Path) -> [PathBuf; 2] {
             let from = 4 * (row * width + width - 1 - column);
             assert_eq!(pixel, &before[from..from + 4]);
         }
-        write_rgb_png(&folders[1].join(&name), frame.size_px, &frame.rgba).expect("a picture");
+        write_rgb_png(&folders[1].join(&name), frame.size_px, &frame.rgba)
+            .expect("a written picture");
     }
     folders
 }

@@ -35,14 +35,22 @@ pub(super) enum EdgeView {
     Blank,
 }
 
+/// What the variance of the blur across an edge is short of.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct BlurError {
+    /// Pixels².
+    pub error: f64,
+    /// Inverse of the error's own variance.
+    pub certainty: f64,
+}
+
 /// An edge as the picture shows it.
 pub(super) struct EdgeFit {
     /// How far across the edge it lies from where it was expected, cells.
     pub offset_cells: f64,
     /// Variance of the offset, cells².
     pub variance_cells: f64,
-    /// What the blur's variance is short of, pixels², and how sure that is: the inverse of its own variance.
-    pub blur_error: (f64, f64),
+    pub blur_error: BlurError,
 }
 
 /// Fits one edge. `middle_px` is where its middle is expected, the columns of `pixels_from_cells` are one cell across
@@ -233,11 +241,14 @@ impl Sums {
             blur_information * contrast * contrast / noise,
         );
         let blur_error = match blur_information > 1e-9 {
-            true => (
-                unit * blur_left / (blur_information * contrast),
-                certainty / (unit * unit),
-            ),
-            false => (0.0, 0.0),
+            true => BlurError {
+                error: unit * blur_left / (blur_information * contrast),
+                certainty: certainty / (unit * unit),
+            },
+            false => BlurError {
+                error: 0.0,
+                certainty: 0.0,
+            },
         };
         Some(EdgeView::Seen(EdgeFit {
             offset_cells: shift / contrast,

@@ -9,7 +9,7 @@
 use glam::{DAffine3, DMat2, DMat3, DQuat, DVec2, DVec3};
 
 use super::condition::Condition;
-use super::edge_fit::{EdgeView, fit_edge};
+use super::edge_fit::{BlurError, EdgeView, fit_edge};
 use super::least_squares::{accumulate, inverse, solve_positive_definite};
 use super::light::Grey;
 use super::print::Print;
@@ -69,8 +69,7 @@ pub(super) struct Edge {
     pub(super) variance: f64,
     /// Derivative of the offset that a step explains.
     row: [f64; PARAMETERS],
-    /// As [`EdgeFit::blur_error`](super::edge_fit::EdgeFit::blur_error).
-    pub(super) blur_error: (f64, f64),
+    blur_error: BlurError,
     /// Tukey's, 0 to 1.
     pub(super) weight: f64,
 }
@@ -192,7 +191,10 @@ pub(super) fn fit_pose(
         }
         let solved = solve(&mut edges, condition)?;
         pose = moved(&pose, pose_part(&solved.step));
-        learned.correct_blur(&edges);
+        let blurs = edges
+            .iter()
+            .map(|edge| (edge.normal, edge.weight, edge.blur_error));
+        learned.correct_blur(blurs);
         let explained: f64 = edges
             .iter()
             .map(|edge| {
