@@ -16,7 +16,7 @@ use gnomon::app::layer_files::Layer;
 use gnomon::app::replay::{self, replay};
 use gnomon::app::report::Report;
 use gnomon::app::track::{self, is_scene, track};
-use gnomon::scene::{CameraSettings, Family, Scene};
+use gnomon::scene::{CameraSettings, Family, Scene, TrackingSettings};
 use gnomon::tracking::mapping::MapSettings;
 
 /// Virtual things on a real table, lit and shadowed as if they stood there.
@@ -161,20 +161,20 @@ struct RecordingArgs {
     /// The camera mirrors its pictures: turn them back first
     #[arg(long)]
     mirror: bool,
+    /// libapriltag searches pictures shrunk by this: 2 without it, 1 finds smaller markers
+    #[arg(long, value_name = "FACTOR")]
+    decimation: Option<f64>,
 }
 
 /// Markers that no scene describes.
 #[derive(Args)]
 struct FamilyArgs {
     /// Family of the markers: tag16h5, tag25h9, tag36h10, tag36h11, DICT_4X4_50, …
-    #[arg(long, value_name = "NAME", default_value = "tag36h11", value_parser = family_of)]
+    #[arg(long, value_name = "NAME", default_value = "tag36h11", value_parser = family_of, requires = "size_mm")]
     family: Family,
     /// Width of the markers' black border, cells: 1, or 2 as on Kalibr's AprilGrids
-    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=2))]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=2), requires = "size_mm")]
     border_cells: u32,
-    /// libapriltag searches pictures shrunk by this; 1 finds smaller markers
-    #[arg(long, value_name = "FACTOR", default_value = "2")]
-    decimation: f64,
 }
 
 fn main() -> ExitCode {
@@ -234,21 +234,12 @@ fn run_track(args: TrackArgs) -> Result<()> {
 fn run_board(args: BoardArgs) -> Result<()> {
     let stop = interrupts()?;
     let input = if is_scene(&args.from) {
-        let RecordingArgs {
-            calibration,
-            mirror,
-        } = &args.recording;
-        if calibration.is_some() || *mirror {
-            bail!(
-                "{} is a scene; --calibration and --mirror go with a recording",
-                args.from.display()
-            );
-        }
+        args.recording.refuse_beside(&args.from)?;
         board::Input::Scene(args.from.clone())
     } else {
         board::Input::Recording {
             camera: camera_of(&args.from, &args.recording)?,
-            decimation: args.family.decimation,
+            decimation: args.recording.decimation(),
         }
     };
     if !(0.0..=1e4).contains(&args.plane_tolerance_mm) {
@@ -291,14 +282,10 @@ fn distance_of(text: &str) -> Result<Distance, String> {
 
 fn track_input(args: &TrackArgs) -> Result<track::Input> {
     if is_scene(&args.source) {
-        let RecordingArgs {
-            calibration,
-            mirror,
-        } = &args.recording;
-        if calibration.is_some() || *mirror || args.anchors.is_some() || args.size_mm.is_some() {
+        args.recording.refuse_beside(&args.source)?;
+        if args.anchors.is_some() || args.size_mm.is_some() {
             bail!(
-                "{} is a scene, which says itself what is tracked in what; --calibration, --mirror, --anchors and \
-                 --size-mm go with a recording",
+                "{} is a scene, which says itself what is tracked; --anchors and --size-mm go with a recording",
                 args.source.display()
             );
         }
@@ -306,17 +293,38 @@ fn track_input(args: &TrackArgs) -> Result<track::Input> {
     }
     let camera = camera_of(&args.source, &args.recording)?;
     match (&args.anchors, args.size_mm) {
+        (Some(_), _) if args.recording.decimation.is_some() => {
+            bail!("--anchors takes the scene's [tracking]; --decimation does not go with it")
+        }
         (Some(scene), _) => Ok(track::Input::RecordingWithScene(camera, scene.clone())),
         (None, Some(size_mm)) => Ok(track::Input::LoneMarkers {
             camera,
             family: args.family.family()?,
             size_m: size_m(size_mm)?,
-            decimation: args.family.decimation,
+            decimation: args.recording.decimation(),
         }),
         (None, None) => bail!(
             "what is tracked in {}? Give --anchors SCENE, or --size-mm MM for markers each on its own",
             args.source.display()
         ),
+    }
+}
+
+impl RecordingArgs {
+    fn decimation(&self) -> f64 {
+        self.decimation
+            .unwrap_or(TrackingSettings::default().decimation)
+    }
+
+    /// A scene says all of this itself.
+    fn refuse_beside(&self, scene: &Path) -> Result<()> {
+        if self.calibration.is_some() || self.mirror || self.decimation.is_some() {
+            bail!(
+                "{} is a scene; --calibration, --mirror and --decimation go with a recording",
+                scene.display()
+            );
+        }
+        Ok(())
     }
 }
 

@@ -1,5 +1,5 @@
-//! `gnomon board`: layouts learnt from corners with known noise, from a path-traced session and from photographs of a
-//! grid that is known.
+//! `gnomon board`: layouts learnt from corners with known noise, from rendered sheets, from a path-traced session and
+//! from photographs of a known grid.
 
 mod common;
 
@@ -9,12 +9,13 @@ use std::process::Output;
 use assert_cmd::Command;
 use common::project_file;
 use common::random::Random;
+use common::sheets;
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 use gnomon::app::board::board_block;
 use gnomon::geometry::camera::Intrinsics;
-use gnomon::scene::{Anchor, Family, Marker, Scene};
-use gnomon::tracking::Detection;
+use gnomon::scene::{Anchor, Family, Marker, Scene, TrackingSettings};
 use gnomon::tracking::mapping::{LearntBoard, MapError, MapSettings, learn_board};
+use gnomon::tracking::{Detection, Detector, grey_from_rgba};
 
 const CAMERA: Intrinsics = Intrinsics {
     size_px: [1280, 720],
@@ -252,6 +253,57 @@ fn errors_are_as_large_as_is_said() {
     assert!(
         (0.7..1.3).contains(&ratio),
         "errors are {ratio} of the deviations told"
+    );
+}
+
+#[test]
+fn photographs_of_random_sheets_give_their_layouts() {
+    let intrinsics = sheets::CAMERA;
+    let mut all = Vec::new();
+    for seed in 0..3 {
+        let mut random = Random::new(seed);
+        // In the quarters of a sheet, each turned in its own way.
+        let printed: Vec<Marker> = [
+            (0, -1.0, 1.0),
+            (1, 1.0, 1.0),
+            (2, -1.0, -1.0),
+            (17, 1.0, -1.0),
+        ]
+        .map(|(id, x, y)| Marker {
+            rotation_rad: random.between(-3.1, 3.1),
+            ..sheets::marker(
+                id,
+                0.04,
+                x * random.between(0.04, 0.07),
+                y * random.between(0.035, 0.06),
+            )
+        })
+        .to_vec();
+        let mut detector =
+            Detector::new(&TrackingSettings::default(), &[Family::TAG36H11]).unwrap();
+        let pictures: Vec<Vec<Detection>> = (0..12)
+            .map(|k| {
+                let turn_deg = f64::from(k) * 30.0;
+                let at_m = DVec3::new(
+                    random.between(-0.01, 0.01),
+                    random.between(-0.01, 0.01),
+                    0.4,
+                );
+                let pose = sheets::camera_above(random.between(20.0, 40.0), turn_deg, at_m);
+                let frame = sheets::photograph(&intrinsics, &[(&printed, pose)], 0.0);
+                let mut grey = Vec::new();
+                grey_from_rgba(&frame, &mut grey).unwrap();
+                detector.detect(&grey, frame.size_px).unwrap()
+            })
+            .collect();
+        let learnt = learn_board(&intrinsics, Family::TAG36H11, &pictures, &SETTINGS).unwrap();
+        all.extend(errors(&markers(&learnt), &printed));
+    }
+    let (center_mm, turn_deg) = worst(&all);
+    eprintln!("sheets: {center_mm:.3} mm, {turn_deg:.3}° at most");
+    assert!(
+        center_mm < 0.1 && turn_deg < 0.1,
+        "{center_mm} mm, {turn_deg}°"
     );
 }
 

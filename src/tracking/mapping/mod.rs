@@ -407,7 +407,7 @@ fn into_plane(
     }
     let world_from_plane = plane_from_world.inverse();
     for view in &mut bundle.views {
-        view.camera_from_world = view.camera_from_world * world_from_plane;
+        view.camera_from_world *= world_from_plane;
     }
     for placed in &mut bundle.markers {
         let in_plane = plane_from_world * placed.world_from_marker;
