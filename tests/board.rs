@@ -422,6 +422,27 @@ fn outliers_are_dropped_and_counted() {
 }
 
 #[test]
+fn a_marker_that_moved_bends_no_other() {
+    let mut random = Random::new(13);
+    let mut stuck = table(&mut random, 10);
+    let mut pictures = filmed(&mut random, &stuck, 40, 0.1);
+    let before = truth(&stuck);
+    stuck[6].world_from_marker.translation += DVec3::new(0.02, 0.01, 0.0);
+    pictures.extend(filmed(&mut random, &stuck, 20, 0.1));
+    let learnt = learn(&pictures, &SETTINGS).unwrap();
+    let moved = &learnt.markers[6];
+    assert!(
+        moved.dropped > 10 && moved.dropped < moved.sightings,
+        "{moved:?}"
+    );
+    let (center_mm, turn_deg) = worst(&errors(&markers(&learnt), &before));
+    assert!(
+        center_mm < 0.15 && turn_deg < 0.15,
+        "{center_mm} mm, {turn_deg}°"
+    );
+}
+
+#[test]
 fn what_does_not_hang_together_is_told() {
     let mut random = Random::new(5);
     let stuck = table(&mut random, 9);

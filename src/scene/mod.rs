@@ -154,6 +154,22 @@ pub struct Anchor {
     pub markers: Vec<Marker>,
 }
 
+impl Anchor {
+    /// A marker alone, in a frame of its own.
+    pub fn lone(name: String, family: Family, id: u32, size_m: f64) -> Self {
+        Self {
+            name,
+            markers: vec![Marker {
+                family,
+                id,
+                size_m,
+                center_m: DVec2::ZERO,
+                rotation_rad: 0.0,
+            }],
+        }
+    }
+}
+
 /// A phantom or a virtual thing.
 #[derive(Debug, Clone)]
 pub struct Object {
