@@ -9,13 +9,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Context as _, Result, bail};
 use clap::{Args, Parser, Subcommand};
 
+use gnomon::app::board::{self, Distance, board};
 use gnomon::app::check;
 use gnomon::app::first_look::first_look;
 use gnomon::app::layer_files::Layer;
 use gnomon::app::replay::{self, replay};
 use gnomon::app::report::Report;
 use gnomon::app::track::{self, is_scene, track};
-use gnomon::scene::{CameraSettings, Family, Scene};
+use gnomon::scene::{CameraSettings, Family, Scene, TrackingSettings};
+use gnomon::tracking::mapping::MapSettings;
 
 /// Virtual things on a real table, lit and shadowed as if they stood there.
 #[derive(Parser)]
@@ -38,6 +40,11 @@ enum Command {
                       --calibration camera.toml --size-mm 40 --poses out/walk.csv"
     )]
     Track(TrackArgs),
+    /// Learns from a recording where markers lie about a table.
+    #[command(
+        after_help = "Example:\n  gnomon board --from walk.mp4 --calibration camera.toml --size-mm 40 --out table.toml"
+    )]
+    Board(BoardArgs),
     /// Reads a scene, says what is wrong with it or what is in it.
     #[command(after_help = "Example:\n  gnomon check config/lamp.toml")]
     Check {
@@ -104,6 +111,47 @@ struct TrackArgs {
     stats: Option<PathBuf>,
 }
 
+#[derive(Args)]
+struct BoardArgs {
+    /// Scene file (.toml), session, video or folder of pictures that show the markers from all around
+    #[arg(long, value_name = "SOURCE")]
+    from: PathBuf,
+    #[command(flatten)]
+    recording: RecordingArgs,
+    /// Side of the markers' black squares (of the gauge's with --sizes estimate)
+    #[arg(long, value_name = "MM")]
+    size_mm: f64,
+    /// Whether all markers have that size, or the others' are to be learnt
+    #[arg(long, value_enum, default_value = "given")]
+    sizes: Sizes,
+    /// Marker whose centre is the origin, its right the board's x; the lowest id without this
+    #[arg(long, value_name = "ID")]
+    gauge: Option<u32>,
+    /// Distance measured between two markers' centres: a better scale than a marker's size
+    #[arg(long, value_name = "ID:ID:MM", value_parser = distance_of)]
+    distance: Option<Distance>,
+    /// What a marker may lie off the plane of the others
+    #[arg(long, value_name = "MM", default_value = "2")]
+    plane_tolerance_mm: f64,
+    #[command(flatten)]
+    family: FamilyArgs,
+    /// Name of the board
+    #[arg(long, value_name = "NAME", default_value = "table")]
+    name: String,
+    /// Write the [[board]] to a file rather than to stdout
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Where markers' sizes come from.
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum Sizes {
+    /// All are --size-mm
+    Given,
+    /// The gauge's is --size-mm, the others are learnt
+    Estimate,
+}
+
 /// A recording that no scene describes.
 #[derive(Args)]
 struct RecordingArgs {
@@ -113,20 +161,20 @@ struct RecordingArgs {
     /// The camera mirrors its pictures: turn them back first
     #[arg(long)]
     mirror: bool,
+    /// libapriltag searches pictures shrunk by this: 2 without it, 1 finds smaller markers
+    #[arg(long, value_name = "FACTOR")]
+    decimation: Option<f64>,
 }
 
 /// Markers that no scene describes.
 #[derive(Args)]
 struct FamilyArgs {
     /// Family of the markers: tag16h5, tag25h9, tag36h10, tag36h11, DICT_4X4_50, …
-    #[arg(long, value_name = "NAME", default_value = "tag36h11", value_parser = family_of)]
+    #[arg(long, value_name = "NAME", default_value = "tag36h11", value_parser = family_of, requires = "size_mm")]
     family: Family,
     /// Width of the markers' black border, cells: 1, or 2 as on Kalibr's AprilGrids
-    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=2))]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=2), requires = "size_mm")]
     border_cells: u32,
-    /// libapriltag searches pictures shrunk by this; 1 finds smaller markers
-    #[arg(long, value_name = "FACTOR", default_value = "2")]
-    decimation: f64,
 }
 
 fn main() -> ExitCode {
@@ -143,6 +191,7 @@ fn run(cli: Cli) -> Result<()> {
     match cli.command {
         Command::Replay(args) => run_replay(args),
         Command::Track(args) => run_track(args),
+        Command::Board(args) => run_board(args),
         Command::Check { scene } => {
             let scene = Scene::load(&scene)?;
             print!("{}", check::summary(&scene));
@@ -182,16 +231,61 @@ fn run_track(args: TrackArgs) -> Result<()> {
     conclude(&track(&request, &stop)?)
 }
 
+fn run_board(args: BoardArgs) -> Result<()> {
+    let stop = interrupts()?;
+    let input = if is_scene(&args.from) {
+        args.recording.refuse_beside(&args.from)?;
+        board::Input::Scene(args.from.clone())
+    } else {
+        board::Input::Recording {
+            camera: camera_of(&args.from, &args.recording)?,
+            decimation: args.recording.decimation(),
+        }
+    };
+    if !(0.0..=1e4).contains(&args.plane_tolerance_mm) {
+        bail!(
+            "--plane-tolerance-mm {}: out of range; allowed: 0 to 10000 mm",
+            args.plane_tolerance_mm
+        );
+    }
+    let request = board::Request {
+        input,
+        family: args.family.family()?,
+        map: MapSettings {
+            size_m: size_m(args.size_mm)?,
+            gauge: args.gauge,
+            learns_sizes: args.sizes == Sizes::Estimate,
+            plane_tolerance_m: args.plane_tolerance_mm * 1e-3,
+        },
+        distance: args.distance,
+        name: args.name,
+        out: args.out,
+    };
+    board(&request, &stop)
+}
+
+fn distance_of(text: &str) -> Result<Distance, String> {
+    let parts: Vec<&str> = text.split(':').collect();
+    let parsed = match parts[..] {
+        [a, b, mm] => (a.parse().ok()).zip(b.parse().ok()).zip(mm.parse().ok()),
+        _ => None,
+    };
+    let expected = "two ids and the millimetres between their centres are expected, like 0:7:412.5";
+    match parsed {
+        Some(((a, b), mm)) if a != b && (1e-3..1e6).contains(&mm) => Ok(Distance {
+            ids: [a, b],
+            distance_m: mm * 1e-3,
+        }),
+        _ => Err(expected.to_owned()),
+    }
+}
+
 fn track_input(args: &TrackArgs) -> Result<track::Input> {
     if is_scene(&args.source) {
-        let RecordingArgs {
-            calibration,
-            mirror,
-        } = &args.recording;
-        if calibration.is_some() || *mirror || args.anchors.is_some() || args.size_mm.is_some() {
+        args.recording.refuse_beside(&args.source)?;
+        if args.anchors.is_some() || args.size_mm.is_some() {
             bail!(
-                "{} is a scene, which says itself what is tracked in what; --calibration, --mirror, --anchors and \
-                 --size-mm go with a recording",
+                "{} is a scene, which says itself what is tracked; --anchors and --size-mm go with a recording",
                 args.source.display()
             );
         }
@@ -199,17 +293,38 @@ fn track_input(args: &TrackArgs) -> Result<track::Input> {
     }
     let camera = camera_of(&args.source, &args.recording)?;
     match (&args.anchors, args.size_mm) {
+        (Some(_), _) if args.recording.decimation.is_some() => {
+            bail!("--anchors takes the scene's [tracking]; --decimation does not go with it")
+        }
         (Some(scene), _) => Ok(track::Input::RecordingWithScene(camera, scene.clone())),
         (None, Some(size_mm)) => Ok(track::Input::LoneMarkers {
             camera,
             family: args.family.family()?,
             size_m: size_m(size_mm)?,
-            decimation: args.family.decimation,
+            decimation: args.recording.decimation(),
         }),
         (None, None) => bail!(
             "what is tracked in {}? Give --anchors SCENE, or --size-mm MM for markers each on its own",
             args.source.display()
         ),
+    }
+}
+
+impl RecordingArgs {
+    fn decimation(&self) -> f64 {
+        self.decimation
+            .unwrap_or(TrackingSettings::default().decimation)
+    }
+
+    /// A scene says all of this itself.
+    fn refuse_beside(&self, scene: &Path) -> Result<()> {
+        if self.calibration.is_some() || self.mirror || self.decimation.is_some() {
+            bail!(
+                "{} is a scene; --calibration, --mirror and --decimation go with a recording",
+                scene.display()
+            );
+        }
+        Ok(())
     }
 }
 

@@ -252,6 +252,27 @@ fn mistakes_are_told_and_leave_nothing() {
         &["decimation = 0", "1 to 16"],
     );
     refused(
+        &["track", scene, "--decimation", "1", "--poses", "p.csv"],
+        &["is a scene", "--decimation"],
+    );
+    refused(
+        &["track", scene, "--family", "tag16h5", "--poses", "p.csv"],
+        &["--size-mm"],
+    );
+    refused(
+        &[
+            "track",
+            recording,
+            "--anchors",
+            scene,
+            "--decimation",
+            "1",
+            "--poses",
+            "p.csv",
+        ],
+        &["does not go with it"],
+    );
+    refused(
         &[
             "track",
             "no/such/place",

@@ -1,5 +1,6 @@
-//! The jobs: replay, track, check; their clock, files and progress.
+//! The jobs: replay, track, board, check; their clock, files and progress.
 
+pub mod board;
 pub mod check;
 pub mod contact_sheet;
 pub mod detections_file;

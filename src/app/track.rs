@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Result, bail};
-use glam::DVec2;
 
 use super::detections_file::DetectionsText;
 use super::mirror_watch::MirrorWatch;
@@ -18,7 +17,7 @@ use super::stopwatch::Stopwatch;
 use super::tally::Tally;
 use super::tracked::{Ended, Poser, TrackedFrame, each_tracked_frame};
 use crate::capture::Notice;
-use crate::scene::{Anchor, CameraSettings, DetectorKind, Family, Marker, Scene, TrackingSettings};
+use crate::scene::{Anchor, CameraSettings, DetectorKind, Family, Scene, TrackingSettings};
 use crate::tracking::{AnchorPose, Detector, Tracker, grey_from_rgba};
 
 /// What tracking is asked for.
@@ -215,17 +214,9 @@ pub(super) fn settings_for(family: Family, decimation: f64) -> TrackingSettings 
 
 /// An anchor for each marker of a family, by the name of its number.
 fn lone_anchors(family: Family, size_m: f64) -> Vec<Anchor> {
-    let anchor = |id: u32| Anchor {
-        name: id.to_string(),
-        markers: vec![Marker {
-            family,
-            id,
-            size_m,
-            center_m: DVec2::ZERO,
-            rotation_rad: 0.0,
-        }],
-    };
-    (0..family.id_count()).map(anchor).collect()
+    (0..family.id_count())
+        .map(|id| Anchor::lone(id.to_string(), family, id, size_m))
+        .collect()
 }
 
 /// What is kept of a frame until all anchors are known.

@@ -20,6 +20,7 @@ mod settings;
 
 pub use error::{Place, SceneError};
 pub use family::{Codes, Family};
+pub use reader::{NAMES, is_name};
 
 /// What one scene file says, checked.
 #[derive(Debug, Clone, Default)]
@@ -151,6 +152,22 @@ pub struct Anchor {
     pub name: String,
     /// Its markers; a lone one lies at the origin.
     pub markers: Vec<Marker>,
+}
+
+impl Anchor {
+    /// A marker alone, in a frame of its own.
+    pub fn lone(name: String, family: Family, id: u32, size_m: f64) -> Self {
+        Self {
+            name,
+            markers: vec![Marker {
+                family,
+                id,
+                size_m,
+                center_m: DVec2::ZERO,
+                rotation_rad: 0.0,
+            }],
+        }
+    }
 }
 
 /// A phantom or a virtual thing.

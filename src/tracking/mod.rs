@@ -19,6 +19,7 @@ mod followed;
 mod layout;
 mod least_squares;
 mod light;
+pub mod mapping;
 mod pixel_pose;
 mod pose;
 mod print;

@@ -5,6 +5,7 @@ pub mod judge;
 pub mod random;
 pub mod ray_cast;
 pub mod shapes;
+pub mod sheets;
 pub mod truth;
 
 use std::path::{Path, PathBuf};
