@@ -2,7 +2,7 @@
 # Mesa's layer that asks the desktop for its favourite card complains on machines without a desktop; gnomon chooses itself.
 export NODEVICE_SELECT = 1
 
-.PHONY: demo test bench bench-volumes setup
+.PHONY: demo test bench bench-volumes bench-tracking setup
 
 demo: setup
 	cargo build --release
@@ -33,6 +33,9 @@ bench: setup
 # Beside what a user would run instead, where ../shared/peers has it.
 bench-volumes: setup
 	tools/bench_volumes.sh
+
+bench-tracking: setup
+	tools/bench_tracking.sh
 
 setup:
 	@scripts/setup
