@@ -6,9 +6,7 @@ use std::f64::consts::PI;
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 use gnomon::capture::Frame;
 use gnomon::geometry::camera::Intrinsics;
-use gnomon::scene::{
-    Anchor, ArucoRefinement, Codes, DetectorKind, Family, Marker, Search, TrackingSettings,
-};
+use gnomon::scene::{Anchor, Codes, DetectorKind, Family, Marker, Search, TrackingSettings};
 use gnomon::tracking::{AnchorPose, Tracker};
 
 pub const CAMERA: Intrinsics = Intrinsics {
@@ -92,7 +90,6 @@ pub fn detector_alone(detector: DetectorKind) -> TrackingSettings {
         search: Search::Full,
         pose_from_pixels: false,
         filter: false,
-        aruco_refinement: ArucoRefinement::AprilTag,
         ..settings(detector)
     }
 }
@@ -232,9 +229,14 @@ pub struct Light {
 }
 
 impl Light {
-    /// Of sheets of markers, the first one on top; 4 × 4 samples a pixel.
+    /// Of sheets of markers, the first one on top; 16 samples a pixel, no two of them in one row or column, since an edge
+    /// that runs along the rows of a grid lies where a row is, not where it is.
     pub fn of(camera: &Intrinsics, sheets: &[(&[Marker], DAffine3)]) -> Self {
-        const SAMPLES: usize = 4;
+        const SAMPLES: usize = 16;
+        let offsets: [DVec2; SAMPLES] = std::array::from_fn(|k| {
+            let mirrored_bits = (k as u8).reverse_bits() >> 4;
+            (DVec2::new(k as f64, f64::from(mirrored_bits)) + 0.5) / SAMPLES as f64 - 0.5
+        });
         let views: Vec<SheetView<'_>> = sheets
             .iter()
             .map(|(markers, pose)| SheetView::new(camera, markers, pose))
@@ -245,9 +247,8 @@ impl Light {
             if !views.iter().any(|view| view.may_touch(x, y)) {
                 return SURROUNDINGS;
             }
-            let samples = (0..SAMPLES * SAMPLES).map(|k| {
-                let offset = DVec2::new((k % SAMPLES) as f64, (k / SAMPLES) as f64) + 0.5;
-                let pixel = DVec2::new(f64::from(x), f64::from(y)) - 0.5 + offset / SAMPLES as f64;
+            let samples = offsets.map(|offset| {
+                let pixel = DVec2::new(f64::from(x), f64::from(y)) + offset;
                 let target = camera.plane_from_pixel(pixel);
                 let mut point = target;
                 if camera.distortion != [0.0; 5] {
@@ -258,7 +259,7 @@ impl Light {
                 let seen = views.iter().find_map(|view| view.light(point));
                 seen.unwrap_or(SURROUNDINGS)
             });
-            samples.sum::<f64>() / (SAMPLES * SAMPLES) as f64
+            samples.iter().sum::<f64>() / SAMPLES as f64
         });
         Self {
             size_px: camera.size_px,
