@@ -50,8 +50,11 @@ impl Condition {
     }
 
     /// Moves the blur toward what the edges of a picture say: each by the unit vector across it, how much it counts (0 to
-    /// 1), and what it lacks.
-    pub(super) fn correct_blur(&mut self, edges: impl Iterator<Item = (DVec2, f64, BlurError)>) {
+    /// 1), and what it lacks. Returns by what part of itself its variance changed.
+    pub(super) fn correct_blur(
+        &mut self,
+        edges: impl Iterator<Item = (DVec2, f64, BlurError)>,
+    ) -> f64 {
         let mut normal = [[0.0; 3]; 3];
         let mut right = [0.0; 3];
         for (DVec2 { x, y }, weight, missing) in edges {
@@ -65,14 +68,17 @@ impl Condition {
         for (k, row) in normal.iter_mut().enumerate() {
             row[k] += 1.0 / (BLUR_CHANGE * BLUR_CHANGE);
         }
-        if let Some(change) = solve_positive_definite(&normal, &right) {
-            let [least, most] = BLUR_VARIANCES;
-            let [xx, xy, yy] = &mut self.blur;
-            *xx = (*xx + change[0]).clamp(least, most);
-            *yy = (*yy + change[2]).clamp(least, most);
-            let most_mixed = (*xx * *yy).sqrt() - least;
-            *xy = (*xy + change[1]).clamp(-most_mixed, most_mixed);
-        }
+        let Some(change) = solve_positive_definite(&normal, &right) else {
+            return 0.0;
+        };
+        let [least, most] = BLUR_VARIANCES;
+        let before = self.blur[0] + self.blur[2];
+        let [xx, xy, yy] = &mut self.blur;
+        *xx = (*xx + change[0]).clamp(least, most);
+        *yy = (*yy + change[2]).clamp(least, most);
+        let most_mixed = (*xx * *yy).sqrt() - least;
+        *xy = (*xy + change[1]).clamp(-most_mixed, most_mixed);
+        (*xx + *yy - before).abs() / before
     }
 
     /// The size error as it is believed, and the inverse of its variance.
