@@ -2,8 +2,8 @@
 # Tracks the sessions of ../shared with gnomon and with the libraries that it is built on (../shared/peers), in turn and
 # in one run, for absolute times swing with whatever else the machine does.
 #   tools/bench_tracking.sh [ROUNDS]     default: 5 rounds
-# Per session and program: frames without a pose, shift of the table in the picture (median/p95, pixels), its jitter
-# (rms from frame to frame), and the time of a frame (median/p95 over all rounds, ms), by the peers' own judge.
+# Prints a CSV: per session and program the frames of all rounds and those without a pose, the shift of the table in the
+# picture, its jitter (rms of the error's change from frame to frame), and the time of a frame, by the peers' own judge.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 rounds=${1:-5}
@@ -63,10 +63,11 @@ for round in $(seq "$rounds"); do
         done
     done
 done
+number='\([0-9.]*\)'
+echo "session,program,frames,lost,shift_median_px,shift_p95_px,jitter_px,track_median_ms,track_p95_ms"
 for session in "${sessions[@]}"; do
-    echo "$session"
     for name in "${peers[@]}" "${mine[@]}"; do
-        printf '  %-15s ' "$name"
-        python3 "$shared/peers/pose_error.py" "$shared/sessions/$session" "$work/all_${session}_$name.csv"
+        python3 "$shared/peers/pose_error.py" "$shared/sessions/$session" "$work/all_${session}_$name.csv" |
+            sed -n "s|^frames $number lost $number .*shift px $number/$number  jitter px $number  ms $number/$number|$session,$name,\1,\2,\3,\4,\5,\6,\7|p"
     done
 done
