@@ -4,7 +4,6 @@
 use glam::DVec2;
 
 use super::least_squares::{accumulate, solve_positive_definite};
-use super::pixel_pose::Edge;
 
 /// The variance of the blur that a lens in focus leaves, the pixel's own square included, pixels².
 const SHARP_VARIANCE: f64 = 0.25;
@@ -22,6 +21,16 @@ const SIZE_DEVIATION: f64 = 0.03;
 const LEAST_SIZE_DEVIATION: f64 = 0.001;
 /// The size is worth telling once it is known to this.
 const KNOWN_SIZE_DEVIATION: f64 = 0.004;
+
+/// What one edge says of the blur.
+pub(super) struct BlurSight {
+    /// Across the edge, a unit vector of the picture.
+    pub(super) normal: DVec2,
+    /// What the blur's variance is short of along it, pixels², and the inverse of that one's own variance.
+    pub(super) error: (f64, f64),
+    /// How much the edge is trusted, 0 to 1.
+    pub(super) weight: f64,
+}
 
 /// Learned from an anchor's pictures.
 #[derive(Debug, Clone, Copy)]
@@ -50,13 +59,13 @@ impl Condition {
     }
 
     /// Moves the blur toward what the edges of a picture say. Returns by what part of itself its variance changed.
-    pub(super) fn correct_blur(&mut self, edges: &[Edge]) -> f64 {
+    pub(super) fn correct_blur(&mut self, sights: impl Iterator<Item = BlurSight>) -> f64 {
         let mut normal = [[0.0; 3]; 3];
         let mut right = [0.0; 3];
-        for edge in edges {
-            let DVec2 { x, y } = edge.normal;
-            let (error, certainty) = edge.blur_error;
-            let weight = edge.weight * certainty / (1.0 + BLUR_FLOOR * BLUR_FLOOR * certainty);
+        for sight in sights {
+            let DVec2 { x, y } = sight.normal;
+            let (error, certainty) = sight.error;
+            let weight = sight.weight * certainty / (1.0 + BLUR_FLOOR * BLUR_FLOOR * certainty);
             let scale = weight.sqrt();
             let row = [x * x, 2.0 * x * y, y * y].map(|entry| entry * scale);
             let error = error.clamp(-MOST_BLUR_CHANGE, MOST_BLUR_CHANGE);

@@ -8,7 +8,7 @@
 
 use glam::{DAffine3, DMat2, DMat3, DQuat, DVec2, DVec3};
 
-use super::condition::Condition;
+use super::condition::{BlurSight, Condition};
 use super::edge_fit::{EdgeView, fit_edge};
 use super::least_squares::{accumulate, inverse, solve_positive_definite};
 use super::light::Grey;
@@ -202,7 +202,11 @@ pub(super) fn fit_pose(
             camera_from_anchor: moved(&guess.camera_from_anchor, pose_part(&solved.step)),
             size_error: guess.size_error + solved.step[SIZE],
         };
-        let blur_change = learned.correct_blur(&edges);
+        let blur_change = learned.correct_blur(edges.iter().map(|edge| BlurSight {
+            normal: edge.normal,
+            error: edge.blur_error,
+            weight: edge.weight,
+        }));
         let explained: f64 = edges
             .iter()
             .map(|edge| {
