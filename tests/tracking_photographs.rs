@@ -397,7 +397,7 @@ fn photographs_of_an_april_grid_agree_with_motion_capture() {
     let mut shift_sum_m = DVec3::ZERO;
     for (_, target) in &targets {
         let turn = DQuat::from_mat3(&target.matrix3);
-        turn_sum = turn_sum + turn * turn.dot(first).signum();
+        turn_sum += turn * turn.dot(first).signum();
         shift_sum_m += target.translation;
     }
     let world_from_target = DAffine3::from_rotation_translation(

@@ -1137,7 +1137,7 @@ fn many_anchors_at_once() {
         let rest = camera_above(
             25.0 + 2.0 * n as f64,
             40.0 * n as f64,
-            DVec3::new(0.148 * column, 0.105 * row, 0.5),
+            DVec3::new(0.228 * column, 0.15 * row, 0.5),
         );
         held(&rest, k, n as u64, 3.0, 0.003)
     };
