@@ -13,6 +13,7 @@ mod direct;
 mod gpu;
 mod gpu_clock;
 mod indirect;
+mod insides;
 mod layers;
 mod readback;
 mod renderer;
