@@ -162,6 +162,7 @@ impl Renderer {
             fade.keep(&self.gpu, &self.picture);
             self.draw(&seen_at_least(part), shown);
             fade.mix(&self.gpu, &self.picture, part);
+            self.stale = PixelRect::whole(self.size_px);
             self.fade = Some(fade);
         }
     }
