@@ -13,6 +13,7 @@ use gnomon::app::board::{self, Distance, board};
 use gnomon::app::check;
 use gnomon::app::first_look::first_look;
 use gnomon::app::layer_files::Layer;
+use gnomon::app::markers::{self, Paper, Sheet};
 use gnomon::app::replay::{self, replay};
 use gnomon::app::report::Report;
 use gnomon::app::track::{self, is_scene, track};
@@ -45,6 +46,13 @@ enum Command {
         after_help = "Example:\n  gnomon board --from walk.mp4 --calibration camera.toml --size-mm 40 --out table.toml"
     )]
     Board(BoardArgs),
+    /// Makes sheets of markers, or a chessboard, to print.
+    #[command(
+        after_help = "Examples:\n  gnomon markers --board 3x2 --size-mm 45 --gap-mm 40 --landscape --out table.pdf\n  \
+                      gnomon markers --ids 17,18 --size-mm 36 --out cards.pdf\n  \
+                      gnomon markers --chessboard 9x6 --square-mm 25 --landscape --out chessboard.pdf"
+    )]
+    Markers(MarkersArgs),
     /// Reads a scene, says what is wrong with it or what is in it.
     #[command(after_help = "Example:\n  gnomon check config/lamp.toml")]
     Check {
@@ -143,6 +151,60 @@ struct BoardArgs {
     out: Option<PathBuf>,
 }
 
+#[derive(Args)]
+#[command(group = clap::ArgGroup::new("sheet").required(true).args(["board", "ids", "chessboard"]))]
+struct MarkersArgs {
+    /// The sheet: .pdf (true size), .svg or .png; what a scene file takes is written beside it as .toml
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// A board of so many columns and rows of markers, which are one anchor
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = counts_of, requires_all = ["size_mm", "gap_mm"])]
+    board: Option<[u32; 2]>,
+    /// Markers to be cut out, each on its own
+    #[arg(long, value_name = "ID,…", value_delimiter = ',', requires = "size_mm")]
+    ids: Option<Vec<u32>>,
+    /// A chessboard with so many inner corners, to calibrate a camera with
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = counts_of, requires = "square_mm")]
+    chessboard: Option<[u32; 2]>,
+    /// Side of the markers' black squares
+    #[arg(long, value_name = "MM")]
+    size_mm: Option<f64>,
+    /// White between the markers of a board
+    #[arg(long, value_name = "MM")]
+    gap_mm: Option<f64>,
+    /// Side of the chessboard's squares
+    #[arg(long, value_name = "MM")]
+    square_mm: Option<f64>,
+    /// Id of the board's upper left marker; the others follow row by row
+    #[arg(long, value_name = "ID", default_value = "0")]
+    first_id: u32,
+    /// Name of the board
+    #[arg(long, value_name = "NAME", default_value = "table")]
+    name: String,
+    #[command(flatten)]
+    family: FamilyArgs,
+    /// Paper to print on
+    #[arg(long, value_enum, default_value = "a4")]
+    page: PageSize,
+    /// The paper lies on its side
+    #[arg(long)]
+    landscape: bool,
+    /// Pixels per inch of a PNG
+    #[arg(long, value_name = "DPI", default_value = "300")]
+    dpi: f64,
+}
+
+/// Sizes of paper.
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum PageSize {
+    /// 210 x 297 mm
+    A4,
+    /// 297 x 420 mm
+    A3,
+    /// 8.5 x 11 inches
+    Letter,
+}
+
 /// Where markers' sizes come from.
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 enum Sizes {
@@ -192,6 +254,7 @@ fn run(cli: Cli) -> Result<()> {
         Command::Replay(args) => run_replay(args),
         Command::Track(args) => run_track(args),
         Command::Board(args) => run_board(args),
+        Command::Markers(args) => run_markers(args),
         Command::Check { scene } => {
             let scene = Scene::load(&scene)?;
             print!("{}", check::summary(&scene));
@@ -229,6 +292,61 @@ fn run_track(args: TrackArgs) -> Result<()> {
         stats: args.stats,
     };
     conclude(&track(&request, &stop)?)
+}
+
+fn run_markers(args: MarkersArgs) -> Result<()> {
+    let family = args.family.family()?;
+    // Each kind of sheet requires its sizes (`requires` above).
+    let mm = |size: Option<f64>| size.unwrap_or(f64::NAN);
+    let sheet = match (args.board, args.ids, args.chessboard) {
+        (Some([columns, rows]), ..) => Sheet::Board {
+            family,
+            first_id: args.first_id,
+            rows,
+            columns,
+            size_mm: mm(args.size_mm),
+            gap_mm: mm(args.gap_mm),
+            name: args.name,
+        },
+        (_, Some(ids), _) => Sheet::Lone {
+            family,
+            ids,
+            size_mm: mm(args.size_mm),
+        },
+        (.., corners) => {
+            let [columns, rows] = corners.unwrap_or_default();
+            Sheet::Chessboard {
+                columns,
+                rows,
+                square_mm: mm(args.square_mm),
+            }
+        }
+    };
+    let written = markers::markers(&markers::Request {
+        out: args.out,
+        sheet,
+        paper: match args.page {
+            PageSize::A4 => Paper::A4,
+            PageSize::A3 => Paper::A3,
+            PageSize::Letter => Paper::Letter,
+        },
+        landscape: args.landscape,
+        dpi: args.dpi,
+    })?;
+    for path in written {
+        eprintln!("{}", path.display());
+    }
+    Ok(())
+}
+
+/// Columns and rows, "9x6".
+fn counts_of(text: &str) -> Result<[u32; 2], String> {
+    let counts = text.split_once('x').and_then(|(columns, rows)| {
+        Some([columns.trim().parse().ok()?, rows.trim().parse().ok()?])
+    });
+    counts
+        .filter(|counts| counts.iter().all(|&count| (1..=1000).contains(&count)))
+        .ok_or_else(|| "columns and rows are expected, as in 9x6".to_owned())
 }
 
 fn run_board(args: BoardArgs) -> Result<()> {

@@ -6,12 +6,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context as _, Result, bail};
 
+use super::anchor_block;
 use super::picture_files::write_text;
 use super::progress::Progress;
 use super::recording::{self, refuse_to_overwrite};
 use super::track::settings_for;
 use crate::capture::{FrameSource, Notice};
-use crate::scene::{CameraSettings, DetectorKind, Family, NAMES, Scene, TrackingSettings, is_name};
+use crate::scene::{
+    CameraSettings, DetectorKind, Family, Marker, NAMES, Scene, TrackingSettings, is_name,
+};
 use crate::tracking::mapping::{LearntBoard, MapSettings, learn_board};
 use crate::tracking::{Detection, Detector, grey_from_rgba};
 
@@ -152,30 +155,8 @@ fn to_scale(learnt: &LearntBoard, distance: &Distance) -> Result<LearntBoard> {
 
 /// The layout as a scene file takes it.
 pub fn board_block(learnt: &LearntBoard, name: &str) -> String {
-    let name = toml::Value::from(name);
-    let mut text = format!("[[board]]\nname = {name}\n");
-    if let Some(first) = learnt.markers.first() {
-        let family = first.marker.family;
-        let _ = writeln!(text, "family = \"{}\"", family.name());
-        if family.border_cells() != 1 {
-            let _ = writeln!(text, "border_cells = {}", family.border_cells());
-        }
-    }
-    text.push_str("markers = [\n");
-    for learnt in &learnt.markers {
-        let marker = &learnt.marker;
-        let _ = writeln!(
-            text,
-            "    {{ id = {}, size_m = {:.6}, center_m = [{:.6}, {:.6}], rotation_deg = {:.4} }},",
-            marker.id,
-            marker.size_m,
-            marker.center_m.x,
-            marker.center_m.y,
-            marker.rotation_rad.to_degrees()
-        );
-    }
-    text.push_str("]\n");
-    text
+    let markers: Vec<Marker> = learnt.markers.iter().map(|learnt| learnt.marker).collect();
+    anchor_block::board(name, &markers)
 }
 
 /// A row for each marker: where it is, how sure that is, and how well the pictures agree.

@@ -1,11 +1,13 @@
-//! The jobs: replay, track, board, check; their clock, files and progress.
+//! The jobs: replay, track, board, markers, check; their clock, files and progress.
 
+mod anchor_block;
 pub mod board;
 pub mod check;
 pub mod contact_sheet;
 pub mod detections_file;
 pub mod first_look;
 pub mod layer_files;
+pub mod markers;
 mod mirror_watch;
 pub mod output;
 mod output_error;

@@ -30,6 +30,7 @@ mod undistort;
 
 use glam::DAffine3;
 
+pub use aruco::printed_cells;
 pub use detector::{Detection, Detector};
 pub use tracker::{Tracker, grey_from_rgba};
 
