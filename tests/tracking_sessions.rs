@@ -154,11 +154,7 @@ impl PoseError {
 /// Median, 95th percentile and jitter of the board and of the other anchors, without and with the filter.
 fn hold(folder: &Path, config: &str, bounds_px: &[[f64; 3]]) {
     let recording = Recording::open(folder, config);
-    let full = TrackingSettings {
-        decimation: 1.0,
-        ..detector_alone(DetectorKind::AprilTag)
-    };
-    let alone = recording.errors(&full);
+    let alone = recording.errors(&detector_alone(DetectorKind::AprilTag));
     for filter in [false, true] {
         let settings = TrackingSettings {
             filter,

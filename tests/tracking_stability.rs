@@ -220,8 +220,8 @@ fn the_flip_of_a_lone_marker_in_a_hand() {
     const FRAMES: usize = 45;
     let card = [marker(17, 0.036, 0.0, 0.0)];
     let (mut frames, mut tracked) = (0, 0);
-    let mut flipped = [0; 4];
-    let mut turned_over = [0; 4];
+    let [(_, full_resolution), ..] = peers();
+    let (mut flipped, mut turned_over) = ([0; 2], [0; 2]);
     for (sequence, (tilt_deg, distance_m)) in [0.0, 4.0, 9.0, 18.0]
         .into_iter()
         .flat_map(|tilt_deg| [0.5, 0.8, 1.1].map(|distance_m| (tilt_deg, distance_m)))
@@ -270,16 +270,10 @@ fn the_flip_of_a_lone_marker_in_a_hand() {
             turned_over[k] += turnings(verdicts, &moments);
         };
         count(0, &ours);
-        for (k, (_, settings)) in peers().iter().enumerate() {
-            count(k + 1, &run(settings, &MIDDLE, &card, &moments));
-        }
+        count(1, &run(&full_resolution, &MIDDLE, &card, &moments));
     }
     eprintln!(
-        "of {frames}: tracked {tracked}; flipped: ours {}, peers {:?}; turned over: ours {}, peers {:?}",
-        flipped[0],
-        &flipped[1..],
-        turned_over[0],
-        &turned_over[1..]
+        "of {frames}: tracked {tracked}; flipped, ours and libapriltag's: {flipped:?}; turned over: {turned_over:?}"
     );
     assert!(2 * tracked > frames, "only {tracked} of {frames} decided");
     assert!(
@@ -1328,7 +1322,7 @@ fn empty_pictures_and_extreme_cameras() {
         frames
     };
     let mut seen = 0;
-    for round in 0..60 {
+    for round in 0..40 {
         let id = random.below(10) as u32;
         let size_m = 10f64.powf(random.between(-5.0, 3.0));
         let lone = [marker(id, size_m, 0.0, 0.0)];
@@ -1391,5 +1385,5 @@ fn empty_pictures_and_extreme_cameras() {
         }
     }
     eprintln!("tracked in {seen} frames");
-    assert!(seen > 10, "{seen}");
+    assert!(seen > 5, "{seen}");
 }
