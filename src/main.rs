@@ -10,6 +10,7 @@ use anyhow::{Context as _, Result, bail};
 use clap::{Args, Parser, Subcommand};
 
 use gnomon::app::board::{self, Distance, board};
+use gnomon::app::calibrate;
 use gnomon::app::check;
 use gnomon::app::first_look::first_look;
 use gnomon::app::layer_files::Layer;
@@ -18,6 +19,7 @@ use gnomon::app::replay::{self, replay};
 use gnomon::app::report::Report;
 use gnomon::app::track::{self, is_scene, track};
 use gnomon::scene::{CameraSettings, Family, Scene, TrackingSettings};
+use gnomon::tracking::calibrating::Chessboard;
 use gnomon::tracking::mapping::MapSettings;
 
 /// Virtual things on a real table, lit and shadowed as if they stood there.
@@ -35,7 +37,7 @@ enum Command {
         after_help = "Example:\n  gnomon replay config/lamp.toml --out out/lamp.mp4 --sheet out/lamp.png"
     )]
     Replay(ReplayArgs),
-    /// Finds where the markers are in a recording, without drawing: poses as a file. Needs no GPU.
+    /// Finds where the markers are in a recording; draws nothing and needs no GPU.
     #[command(
         after_help = "Example:\n  gnomon track config/lamp.toml --poses out/lamp.csv\n  gnomon track walk.mp4 \
                       --calibration camera.toml --size-mm 40 --poses out/walk.csv"
@@ -46,9 +48,14 @@ enum Command {
         after_help = "Example:\n  gnomon board --from walk.mp4 --calibration camera.toml --size-mm 40 --out table.toml"
     )]
     Board(BoardArgs),
+    /// Calibrates a camera from a video or pictures of a chessboard.
+    #[command(
+        after_help = "Example:\n  gnomon calibrate walk.mp4 --chessboard 9x6 --square-mm 25 --out camera.toml --coverage out/coverage.png"
+    )]
+    Calibrate(CalibrateArgs),
     /// Makes sheets of markers, or a chessboard, to print.
     #[command(
-        after_help = "Examples:\n  gnomon markers --board 3x2 --size-mm 45 --gap-mm 40 --landscape --out table.pdf\n  \
+        after_help = "Example:\n  gnomon markers --board 3x2 --size-mm 45 --gap-mm 40 --landscape --out table.pdf\n  \
                       gnomon markers --ids 17,18 --size-mm 36 --out cards.pdf\n  \
                       gnomon markers --chessboard 9x6 --square-mm 25 --landscape --out chessboard.pdf"
     )]
@@ -149,6 +156,24 @@ struct BoardArgs {
     /// Write the [[board]] to a file rather than to stdout
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+}
+
+#[derive(Args)]
+struct CalibrateArgs {
+    /// Video, folder of pictures or session that shows the chessboard from all around
+    source: String,
+    /// Its inner corners, where four squares meet
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = counts_of)]
+    chessboard: [u32; 2],
+    /// Side of its squares
+    #[arg(long, value_name = "MM")]
+    square_mm: f64,
+    /// Write the calibration (TOML)
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Write a picture of where in the picture there were corners (PNG)
+    #[arg(long, value_name = "FILE")]
+    coverage: Option<PathBuf>,
 }
 
 #[derive(Args)]
@@ -254,6 +279,19 @@ fn run(cli: Cli) -> Result<()> {
         Command::Replay(args) => run_replay(args),
         Command::Track(args) => run_track(args),
         Command::Board(args) => run_board(args),
+        Command::Calibrate(args) => {
+            let request = calibrate::Request {
+                source: args.source,
+                board: Chessboard {
+                    corners: args.chessboard,
+                    square_m: args.square_mm / 1000.0,
+                },
+                out: args.out,
+                coverage: args.coverage,
+            };
+            print!("{}", calibrate::calibrate(&request, &*interrupts()?)?);
+            Ok(())
+        }
         Command::Markers(args) => run_markers(args),
         Command::Check { scene } => {
             let scene = Scene::load(&scene)?;

@@ -1,7 +1,8 @@
-//! The jobs: replay, track, board, markers, check; their clock, files and progress.
+//! The jobs: replay, track, board, calibrate, markers, check; their clock, files and progress.
 
 mod anchor_block;
 pub mod board;
+pub mod calibrate;
 pub mod check;
 pub mod contact_sheet;
 pub mod detections_file;

@@ -9,6 +9,7 @@
 )]
 mod apriltag;
 mod aruco;
+pub mod calibrating;
 mod condition;
 mod conventions;
 mod detector;
