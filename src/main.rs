@@ -15,7 +15,7 @@ use gnomon::app::layer_files::Layer;
 use gnomon::app::replay::{self, replay};
 use gnomon::app::report::Report;
 use gnomon::app::track::{self, is_scene, track};
-use gnomon::scene::{CameraSettings, Family, Scene};
+use gnomon::scene::{CameraSettings, Family, PixelFormat, Scene, WantedFormat};
 
 /// Virtual things on a real table, lit and shadowed as if they stood there.
 #[derive(Parser)]
@@ -113,6 +113,25 @@ struct RecordingArgs {
     /// The camera mirrors its pictures: turn them back first
     #[arg(long)]
     mirror: bool,
+    /// Ask a webcam for pictures of this size; without it the calibration's
+    #[arg(long, value_name = "WxH", value_parser = size_of)]
+    size: Option<[u32; 2]>,
+    /// Ask a webcam for this rate
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    fps: Option<u32>,
+    /// Ask a webcam for this format: MJPEG, YUYV, NV12, GREY, RGB, BGR
+    #[arg(long, value_name = "NAME", value_parser = pixel_format_of)]
+    format: Option<PixelFormat>,
+}
+
+impl RecordingArgs {
+    fn is_given(&self) -> bool {
+        self.calibration.is_some()
+            || self.mirror
+            || self.size.is_some()
+            || self.fps.is_some()
+            || self.format.is_some()
+    }
 }
 
 /// Markers that no scene describes.
@@ -184,14 +203,10 @@ fn run_track(args: TrackArgs) -> Result<()> {
 
 fn track_input(args: &TrackArgs) -> Result<track::Input> {
     if is_scene(&args.source) {
-        let RecordingArgs {
-            calibration,
-            mirror,
-        } = &args.recording;
-        if calibration.is_some() || *mirror || args.anchors.is_some() || args.size_mm.is_some() {
+        if args.recording.is_given() || args.anchors.is_some() || args.size_mm.is_some() {
             bail!(
-                "{} is a scene, which says itself what is tracked in what; --calibration, --mirror, --anchors and \
-                 --size-mm go with a recording",
+                "{} is a scene, which says itself what is tracked in what; --calibration, --mirror, --size, --fps, \
+                 --format, --anchors and --size-mm go with a recording or a camera",
                 args.source.display()
             );
         }
@@ -239,6 +254,28 @@ fn camera_of(source: &Path, args: &RecordingArgs) -> Result<CameraSettings> {
         source: source.to_owned(),
         calibration: args.calibration.clone(),
         mirror: args.mirror,
+        wanted: WantedFormat {
+            size_px: args.size,
+            fps: args.fps,
+            pixels: args.format,
+        },
+    })
+}
+
+fn size_of(written: &str) -> Result<[u32; 2], String> {
+    let side = |side: &str| side.parse().ok().filter(|side| (1..=32768).contains(side));
+    written
+        .split_once('x')
+        .and_then(|(width, height)| Some([side(width)?, side(height)?]))
+        .ok_or_else(|| "not a size; write WIDTHxHEIGHT, as 1280x720".to_owned())
+}
+
+fn pixel_format_of(name: &str) -> Result<PixelFormat, String> {
+    let mut known = PixelFormat::BY_NAME.into_iter();
+    let found = known.find(|(known, _)| known.eq_ignore_ascii_case(name));
+    found.map(|(_, format)| format).ok_or_else(|| {
+        let allowed: Vec<&str> = PixelFormat::BY_NAME.iter().map(|(name, _)| *name).collect();
+        format!("unknown format; allowed: {}", allowed.join(", "))
     })
 }
 

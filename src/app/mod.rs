@@ -5,6 +5,8 @@ pub mod contact_sheet;
 pub mod detections_file;
 pub mod first_look;
 pub mod layer_files;
+pub mod live_capture;
+pub mod mailbox;
 mod mirror_watch;
 pub mod output;
 mod output_error;
