@@ -9,9 +9,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Context as _, Result, bail};
 use clap::{Args, Parser, Subcommand};
 
+use gnomon::app::cameras;
 use gnomon::app::check;
 use gnomon::app::first_look::first_look;
 use gnomon::app::layer_files::Layer;
+use gnomon::app::record;
 use gnomon::app::replay::{self, replay};
 use gnomon::app::report::Report;
 use gnomon::app::track::{self, is_scene, track};
@@ -38,6 +40,14 @@ enum Command {
                       --calibration camera.toml --size-mm 40 --poses out/walk.csv"
     )]
     Track(TrackArgs),
+    /// Records a camera as a session that replay and track take up, without a window, until Ctrl-C.
+    #[command(
+        after_help = "Example:\n  gnomon record webcam:0 --calibration camera.toml --out out/session --seconds 20"
+    )]
+    Record(RecordArgs),
+    /// Lists the cameras and their formats.
+    #[command(after_help = "Example:\n  gnomon cameras ")]
+    Cameras,
     /// Reads a scene, says what is wrong with it or what is in it.
     #[command(after_help = "Example:\n  gnomon check config/lamp.toml")]
     Check {
@@ -81,7 +91,7 @@ struct ReplayArgs {
 
 #[derive(Args)]
 struct TrackArgs {
-    /// Scene file (.toml), session, video, picture or folder of pictures
+    /// Scene file (.toml), session, video, picture or folder of pictures, webcam (webcam:0) or address (http://…)
     source: PathBuf,
     #[command(flatten)]
     recording: RecordingArgs,
@@ -104,7 +114,21 @@ struct TrackArgs {
     stats: Option<PathBuf>,
 }
 
-/// A recording that no scene describes.
+#[derive(Args)]
+struct RecordArgs {
+    /// Scene file (.toml), webcam (webcam:0, webcam:NAME, /dev/video0), address (http://…, rtsp://…), or recording
+    source: PathBuf,
+    #[command(flatten)]
+    recording: RecordingArgs,
+    /// The session's folder: a new one
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// End after this many seconds of frames
+    #[arg(long, value_name = "N", value_parser = seconds_of)]
+    seconds: Option<f64>,
+}
+
+/// A recording or a camera that no scene describes.
 #[derive(Args)]
 struct RecordingArgs {
     /// Calibration of the camera; without it the one that the recording carries
@@ -162,6 +186,11 @@ fn run(cli: Cli) -> Result<()> {
     match cli.command {
         Command::Replay(args) => run_replay(args),
         Command::Track(args) => run_track(args),
+        Command::Record(args) => run_record(args),
+        Command::Cameras => {
+            print!("{}", cameras::cameras()?);
+            Ok(())
+        }
         Command::Check { scene } => {
             let scene = Scene::load(&scene)?;
             print!("{}", check::summary(&scene));
@@ -199,6 +228,36 @@ fn run_track(args: TrackArgs) -> Result<()> {
         stats: args.stats,
     };
     conclude(&track(&request, &stop)?)
+}
+
+fn run_record(args: RecordArgs) -> Result<()> {
+    let stop = interrupts()?;
+    let input = if is_scene(&args.source) {
+        if args.recording.is_given() {
+            bail!(
+                "{} is a scene, which says itself which camera; --calibration, --mirror, --size, --fps and --format go \
+                 with a camera",
+                args.source.display()
+            );
+        }
+        record::Input::Scene(args.source)
+    } else {
+        record::Input::Camera(camera_of(&args.source, &args.recording)?)
+    };
+    let request = record::Request {
+        input,
+        out: args.out,
+        seconds: args.seconds,
+    };
+    eprintln!("{}", record::record(&request, &stop)?);
+    Ok(())
+}
+
+fn seconds_of(written: &str) -> Result<f64, String> {
+    let seconds = written.parse().ok();
+    seconds
+        .filter(|seconds: &f64| *seconds > 0.0 && seconds.is_finite())
+        .ok_or_else(|| "not a time; a number above 0 is expected".to_owned())
 }
 
 fn track_input(args: &TrackArgs) -> Result<track::Input> {

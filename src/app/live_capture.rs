@@ -29,8 +29,17 @@ pub enum CaptureEvent {
     Ended,
 }
 
-/// Takes every frame, on the capture thread: it must not wait for anything.
-pub type Tap = Box<dyn FnMut(&Arc<Frame>) + Send>;
+/// Takes everything, on the capture thread: it must not wait for anything.
+pub type Tap = Box<dyn FnMut(Tapped) + Send>;
+
+/// What a tap takes.
+#[derive(Debug, Clone, Copy)]
+pub enum Tapped<'a> {
+    /// The source was opened, for the first time or again.
+    Opened(&'a Opened),
+    /// A frame came.
+    Frame(&'a Arc<Frame>),
+}
 
 /// A live source that is being read. Dropped, it stops within a moment, whatever the camera does.
 pub struct LiveCapture {
@@ -49,11 +58,15 @@ struct Shared {
 }
 
 impl LiveCapture {
-    /// Begins to read `source` (as [`LiveSource::open`] takes it) by the clock `now`.
-    pub fn start(source: &str, options: &LiveOptions, now: Now) -> Self {
+    /// Begins to read `source` (as [`LiveSource::open`] takes it) by the clock `now`. `tap` misses nothing; one that is set
+    /// later does.
+    pub fn start(source: &str, options: &LiveOptions, now: Now, tap: Option<Tap>) -> Self {
         let frames = Arc::new(Mailbox::new());
         let (to_owner, events) = channel();
-        let shared = Arc::new(Shared::default());
+        let shared = Arc::new(Shared {
+            tap: Mutex::new(tap),
+            ..Shared::default()
+        });
         let thread = {
             let (frames, shared) = (Arc::clone(&frames), Arc::clone(&shared));
             let source = LiveSource::open(source, options, now);
@@ -89,7 +102,7 @@ impl LiveCapture {
         event.ok()
     }
 
-    /// From now on every frame goes to `tap` as well; in place of the one before.
+    /// From now on everything goes to `tap` as well; in place of the one before.
     pub fn set_tap(&self, tap: Option<Tap>) {
         *self
             .shared
@@ -145,9 +158,15 @@ fn capture(
                 shared.take(Arc::new(frame), frames);
                 continue;
             }
-            Some(LiveEvent::Opened(opened)) => (CaptureEvent::Opened(opened), false),
+            Some(LiveEvent::Opened(opened)) => {
+                shared.tap(Tapped::Opened(&opened));
+                (CaptureEvent::Opened(opened), false)
+            }
             Some(LiveEvent::Lost(error)) => (CaptureEvent::Lost(error), false),
-            Some(LiveEvent::Back(opened)) => (CaptureEvent::Back(opened), false),
+            Some(LiveEvent::Back(opened)) => {
+                shared.tap(Tapped::Opened(&opened));
+                (CaptureEvent::Back(opened), false)
+            }
             Some(LiveEvent::Ended) => (CaptureEvent::Ended, true),
         };
         // The owner may have gone, and then sets `stop`.
@@ -161,10 +180,14 @@ fn capture(
 impl Shared {
     fn take(&self, frame: Arc<Frame>, frames: &Mailbox<Arc<Frame>>) {
         self.captured.fetch_add(1, Ordering::Relaxed);
-        if let Some(tap) = &mut *self.tap.lock().unwrap_or_else(PoisonError::into_inner) {
-            tap(&frame);
-        }
+        self.tap(Tapped::Frame(&frame));
         frames.put(frame);
+    }
+
+    fn tap(&self, tapped: Tapped) {
+        if let Some(tap) = &mut *self.tap.lock().unwrap_or_else(PoisonError::into_inner) {
+            tap(tapped);
+        }
     }
 }
 
@@ -177,12 +200,16 @@ mod tests {
     use std::sync::mpsc::sync_channel;
 
     fn play(source: &str, repeats: bool) -> LiveCapture {
+        play_with(source, repeats, None)
+    }
+
+    fn play_with(source: &str, repeats: bool, tap: Option<Tap>) -> LiveCapture {
         let options = LiveOptions {
             wanted: WantedFormat::default(),
             mirror: false,
             repeats,
         };
-        LiveCapture::start(source, &options, Arc::new(Stopwatch::clock()))
+        LiveCapture::start(source, &options, Arc::new(Stopwatch::clock()), tap)
     }
 
     const LAMP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/recordings/lamp");
@@ -191,11 +218,12 @@ mod tests {
     #[test]
     fn a_recording_is_played_to_its_end_and_each_frame_reaches_the_tap() {
         let watch = Stopwatch::start();
-        let capture = play(LAMP, false);
         let (to_test, tapped) = sync_channel(200);
-        capture.set_tap(Some(Box::new(move |frame| {
-            to_test.send(frame.index).unwrap();
-        })));
+        let tap: Tap = Box::new(move |tapped| match tapped {
+            Tapped::Opened(opened) => assert_eq!(opened.fps, Some(30.0)),
+            Tapped::Frame(frame) => to_test.send(frame.index).unwrap(),
+        });
+        let capture = play_with(LAMP, false, Some(tap));
         let frames = capture.frames();
         let mut newest = None;
         // A slow reader.
