@@ -46,7 +46,7 @@ enum Command {
     )]
     Record(RecordArgs),
     /// Lists the cameras and their formats.
-    #[command(after_help = "Example:\n  gnomon cameras ")]
+    #[command(after_help = "Example:\n  gnomon cameras    # and then: gnomon record webcam:0 --out out/session")]
     Cameras,
     /// Reads a scene, says what is wrong with it or what is in it.
     #[command(after_help = "Example:\n  gnomon check config/lamp.toml")]

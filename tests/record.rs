@@ -85,7 +85,14 @@ fn a_recorded_session_replays_as_its_source_to_the_bit() {
     for (scene, out) in [(&copy, &of_copy), (&scene, &of_lamp)] {
         let poses = out.with_extension("csv");
         done(&[
-            "replay", plain(scene), "--out", plain(out), "--frames", "0,40,119", "--poses", plain(&poses),
+            "replay",
+            plain(scene),
+            "--out",
+            plain(out),
+            "--frames",
+            "0,40,119",
+            "--poses",
+            plain(&poses),
         ]);
     }
     for name in ["000000.png", "000040.png", "000119.png"] {
@@ -100,7 +107,12 @@ fn a_recorded_session_replays_as_its_source_to_the_bit() {
 /// Starts recording and waits until the session's video is there.
 fn start_recording(session: &Path) -> std::process::Child {
     let child = Process::new(assert_cmd::cargo::cargo_bin("gnomon"))
-        .args(["record", plain(&project_file("recordings/lamp")), "--out", plain(session)])
+        .args([
+            "record",
+            plain(&project_file("recordings/lamp")),
+            "--out",
+            plain(session),
+        ])
         .stderr(Stdio::piped())
         .spawn()
         .expect("a start");
@@ -111,7 +123,10 @@ fn start_recording(session: &Path) -> std::process::Child {
 fn wait_for(what: &str, mut is_there: impl FnMut() -> bool) {
     let start = Instant::now();
     while !is_there() {
-        assert!(start.elapsed() < Duration::from_secs(120), "{what} does not come");
+        assert!(
+            start.elapsed() < Duration::from_secs(120),
+            "{what} does not come"
+        );
         std::thread::sleep(Duration::from_millis(20));
     }
 }
@@ -140,21 +155,31 @@ fn what_was_recorded_before_a_kill_is_whole() {
     assert!((5..120).contains(&frames), "{frames} frames");
     let poses = folder.path().join("poses.csv");
     let scene = project_file("config/lamp.toml");
-    done(&["track", plain(&session), "--anchors", plain(&scene), "--poses", plain(&poses)]);
+    done(&[
+        "track",
+        plain(&session),
+        "--anchors",
+        plain(&scene),
+        "--poses",
+        plain(&poses),
+    ]);
     assert_eq!(without_costs(&poses).len(), frames + 1);
 }
 
 /// The encoder that a process has started (Linux).
 #[cfg(target_os = "linux")]
 fn encoder_of(parent: u32) -> Option<u32> {
-    std::fs::read_dir("/proc").ok()?.flatten().find_map(|entry| {
-        let pid: u32 = entry.file_name().to_str()?.parse().ok()?;
-        let status = std::fs::read_to_string(entry.path().join("stat")).ok()?;
-        // After the name in parentheses: state, then the parent.
-        let (name, rest) = status.rsplit_once(')')?;
-        let of_parent = rest.split_whitespace().nth(1)?.parse() == Ok(parent);
-        (of_parent && name.ends_with("(ffmpeg")).then_some(pid)
-    })
+    std::fs::read_dir("/proc")
+        .ok()?
+        .flatten()
+        .find_map(|entry| {
+            let pid: u32 = entry.file_name().to_str()?.parse().ok()?;
+            let status = std::fs::read_to_string(entry.path().join("stat")).ok()?;
+            // After the name in parentheses: state, then the parent.
+            let (name, rest) = status.rsplit_once(')')?;
+            let of_parent = rest.split_whitespace().nth(1)?.parse() == Ok(parent);
+            (of_parent && name.ends_with("(ffmpeg")).then_some(pid)
+        })
 }
 
 #[cfg(target_os = "linux")]
@@ -166,7 +191,9 @@ fn a_kill_of_the_encoder_too_costs_no_more_than_the_last_moment() {
     let encoder = encoder_of(child.id()).expect("ffmpeg");
     std::thread::sleep(Duration::from_millis(2500));
     child.kill().unwrap();
-    let killed = Process::new("kill").args(["-9", &encoder.to_string()]).status();
+    let killed = Process::new("kill")
+        .args(["-9", &encoder.to_string()])
+        .status();
     assert!(killed.unwrap().success());
     child.wait().unwrap();
     wait_until_settled(&session);
@@ -182,11 +209,21 @@ fn an_interrupt_ends_a_recording_well() {
     let child = start_recording(&session);
     std::thread::sleep(Duration::from_millis(500));
     let pid = child.id().to_string();
-    assert!(Process::new("kill").args(["-INT", &pid]).status().unwrap().success());
+    assert!(
+        Process::new("kill")
+            .args(["-INT", &pid])
+            .status()
+            .unwrap()
+            .success()
+    );
     let output = child.wait_with_output().unwrap();
     assert!(output.status.success(), "{}", said(&output));
     let frames = assert_begins_as_lamp(&session);
-    assert!(said(&output).contains(&format!("{frames} frames in ")), "{}", said(&output));
+    assert!(
+        said(&output).contains(&format!("{frames} frames in ")),
+        "{}",
+        said(&output)
+    );
 }
 
 /// A limit on the size of files stands for a disk that is full: writing beyond it fails with an error.
@@ -203,7 +240,10 @@ fn what_was_recorded_before_the_disk_was_full_is_whole() {
     let output = Process::new("bash").args(["-c", &script]).output().unwrap();
     assert!(!output.status.success());
     let said = said(&output);
-    assert!(said.contains("video.mkv") && said.contains("File too large"), "{said}");
+    assert!(
+        said.contains("video.mkv") && said.contains("File too large"),
+        "{said}"
+    );
     assert!(!said.contains("panicked"), "{said}");
     let frames = assert_begins_as_lamp(&session);
     assert!((5..120).contains(&frames), "{frames} frames");
@@ -214,7 +254,14 @@ fn recording_ends_by_itself_after_a_time() {
     let folder = tempfile::tempdir().unwrap();
     let session = folder.path().join("session");
     let lamp = project_file("recordings/lamp");
-    done(&["record", plain(&lamp), "--out", plain(&session), "--seconds", "0.5"]);
+    done(&[
+        "record",
+        plain(&lamp),
+        "--out",
+        plain(&session),
+        "--seconds",
+        "0.5",
+    ]);
     let frames = assert_begins_as_lamp(&session);
     assert!((16..100).contains(&frames), "{frames} frames");
 }
@@ -227,7 +274,10 @@ fn what_cannot_be_recorded_leaves_nothing_and_says_why() {
     for (arguments, part) in [
         (vec!["recordings/none"], "no such file or folder"),
         (vec!["webcam:77"], "camera"),
-        (vec!["http://127.0.0.1:9/video"], "no video comes from there"),
+        (
+            vec!["http://127.0.0.1:9/video"],
+            "no video comes from there",
+        ),
         (vec![plain(&lamp), "--seconds", "0"], "a number above 0"),
         (vec!["webcam:0", "--size", "640"], "WIDTHxHEIGHT"),
         (vec!["webcam:0", "--format", "H264"], "MJPEG, YUYV"),
@@ -242,7 +292,11 @@ fn what_cannot_be_recorded_leaves_nothing_and_says_why() {
     std::fs::create_dir(&out).unwrap();
     std::fs::write(out.join("mine.txt"), "mine").unwrap();
     let output = gnomon(&["record", plain(&lamp), "--out", plain(&out)]);
-    assert!(said(&output).contains("holds something already"), "{}", said(&output));
+    assert!(
+        said(&output).contains("holds something already"),
+        "{}",
+        said(&output)
+    );
     assert_eq!(std::fs::read_dir(&out).unwrap().count(), 1);
 }
 
@@ -250,25 +304,36 @@ fn what_cannot_be_recorded_leaves_nothing_and_says_why() {
 #[cfg(target_os = "linux")]
 #[test]
 fn cameras_says_when_there_is_none() {
-    let any = std::fs::read_dir("/dev").unwrap().flatten().any(|entry| {
-        entry.file_name().to_string_lossy().starts_with("video")
-    });
+    let any = std::fs::read_dir("/dev")
+        .unwrap()
+        .flatten()
+        .any(|entry| entry.file_name().to_string_lossy().starts_with("video"));
     let output = gnomon(&["cameras"]);
     assert_eq!(output.status.success(), any);
     if !any {
-        assert!(said(&output).contains("no /dev/video*"), "{}", said(&output));
+        assert!(
+            said(&output).contains("no /dev/video*"),
+            "{}",
+            said(&output)
+        );
     }
 }
 
 /// ffmpeg serves a video over HTTP as a phone's camera app does, once.
 #[test]
 fn a_stream_is_tracked_until_an_interrupt() {
-    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let port = std::net::TcpListener::bind("127.0.0.1:0")
+        .unwrap()
+        .local_addr()
+        .unwrap()
+        .port();
     let address = format!("http://127.0.0.1:{port}/video");
     let mut server = Process::new("ffmpeg")
         .args(["-v", "error", "-re", "-stream_loop", "-1", "-i"])
         .arg(project_file("recordings/lamp/video.mp4"))
-        .args(["-c:v", "mjpeg", "-q:v", "3", "-f", "mpjpeg", "-listen", "1", &address])
+        .args([
+            "-c:v", "mjpeg", "-q:v", "3", "-f", "mpjpeg", "-listen", "1", &address,
+        ])
         .stdin(Stdio::null())
         .spawn()
         .unwrap();
@@ -276,20 +341,42 @@ fn a_stream_is_tracked_until_an_interrupt() {
     let folder = tempfile::tempdir().unwrap();
     let poses = folder.path().join("poses.csv");
     let child = Process::new(assert_cmd::cargo::cargo_bin("gnomon"))
-        .args(["track", &address, "--anchors", plain(&project_file("config/lamp.toml"))])
-        .args(["--calibration", plain(&project_file("recordings/lamp/camera.toml"))])
+        .args([
+            "track",
+            &address,
+            "--anchors",
+            plain(&project_file("config/lamp.toml")),
+        ])
+        .args([
+            "--calibration",
+            plain(&project_file("recordings/lamp/camera.toml")),
+        ])
         .args(["--poses", plain(&poses)])
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
     std::thread::sleep(Duration::from_millis(6000));
     let pid = child.id().to_string();
-    assert!(Process::new("kill").args(["-INT", &pid]).status().unwrap().success());
+    assert!(
+        Process::new("kill")
+            .args(["-INT", &pid])
+            .status()
+            .unwrap()
+            .success()
+    );
     let output = child.wait_with_output().unwrap();
     server.kill().unwrap();
     server.wait().unwrap();
     assert!(output.status.success(), "{}", said(&output));
     let rows = without_costs(&poses);
-    let tracked = rows.iter().filter(|row| row.contains(",table,tracked,")).count();
-    assert!(tracked > 10 && tracked * 10 > rows.len() * 9, "{tracked} of {}: {}", rows.len(), said(&output));
+    let tracked = rows
+        .iter()
+        .filter(|row| row.contains(",table,tracked,"))
+        .count();
+    assert!(
+        tracked > 10 && tracked * 10 > rows.len() * 9,
+        "{tracked} of {}: {}",
+        rows.len(),
+        said(&output)
+    );
 }
