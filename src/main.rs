@@ -34,19 +34,21 @@ enum Command {
         after_help = "Example:\n  gnomon replay config/lamp.toml --out out/lamp.mp4 --sheet out/lamp.png"
     )]
     Replay(ReplayArgs),
-    /// Finds where the markers are in a recording, without drawing: poses as a file. Needs no GPU.
+    /// Finds where the markers are, without drawing: poses as a file. Needs no GPU.
     #[command(
         after_help = "Example:\n  gnomon track config/lamp.toml --poses out/lamp.csv\n  gnomon track walk.mp4 \
                       --calibration camera.toml --size-mm 40 --poses out/walk.csv"
     )]
     Track(TrackArgs),
-    /// Records a camera as a session that replay and track take up, without a window, until Ctrl-C.
+    /// Records a camera as a session that replay and track take up, until Ctrl-C.
     #[command(
         after_help = "Example:\n  gnomon record webcam:0 --calibration camera.toml --out out/session --seconds 20"
     )]
     Record(RecordArgs),
     /// Lists the cameras and their formats.
-    #[command(after_help = "Example:\n  gnomon cameras    # and then: gnomon record webcam:0 --out out/session")]
+    #[command(
+        after_help = "Example:\n  gnomon cameras    # and then: gnomon record webcam:0 --out out/session"
+    )]
     Cameras,
     /// Reads a scene, says what is wrong with it or what is in it.
     #[command(after_help = "Example:\n  gnomon check config/lamp.toml")]

@@ -43,14 +43,14 @@ check_session() {
 
 for format in yuyv422 mjpeg; do
     echo "== $format"
-    bash "$with_camera" -o "$out/$format" -t 540 -r 3 -f "$format" "$video" -- tools/test_camera_inside.sh steady ||
+    bash "$with_camera" -o "$out/$format" -t 900 -r 3 -f "$format" "$video" -- tools/test_camera_inside.sh steady ||
         fail "$format (see $out/$format)"
     check_poses "$out/$format/live.csv"
     check_session "$out/$format/session"
 done
 
 echo "== the feed is killed"
-bash "$with_camera" -o "$out/killed" -t 540 -r 3 -k 40 "$video" -- tools/test_camera_inside.sh killed ||
+bash "$with_camera" -o "$out/killed" -t 900 -r 3 -k 90 "$video" -- tools/test_camera_inside.sh killed ||
     fail "the feed is killed (see $out/killed)"
 check_session "$out/killed/session"
 echo "test-camera: all is well"

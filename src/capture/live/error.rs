@@ -98,9 +98,7 @@ pub enum LiveError {
     #[error(transparent)]
     Recording(#[from] CaptureError),
     /// It is open, but no picture comes.
-    #[error(
-        "{source_name}: no picture for {silence_secs:.0} s; is it still plugged in and switched on?"
-    )]
+    #[error("{source_name}: no picture for {silence_secs:.0} s (unplugged, or switched off?)")]
     Silent {
         /// The source.
         source_name: String,
