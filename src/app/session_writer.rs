@@ -237,7 +237,9 @@ impl GrowingFile {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::app::poses_file::GivenPoses;
     use crate::capture::FrameSource;
+    use glam::{DAffine3, DVec3};
 
     fn frame(index: u32, time_secs: f64, size_px: [u32; 2]) -> Frame {
         let area = size_px[0] * size_px[1];
@@ -293,6 +295,41 @@ mod tests {
         }
         assert!(session.next_frame().unwrap().is_none());
         assert!(session.notices().is_empty(), "{:?}", session.notices());
+    }
+
+    #[test]
+    fn poses_go_by_the_numbers_of_the_session() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("session");
+        let anchors = vec![Anchor {
+            name: "card".to_owned(),
+            markers: Vec::new(),
+        }];
+        let head = SessionHead {
+            anchors: anchors.clone(),
+            ..head()
+        };
+        let mut writer = SessionWriter::create(&path, head).unwrap();
+        let pose_at = |x_m: f64| AnchorPose {
+            camera_from_anchor: Some(DAffine3::from_translation(DVec3::new(x_m, 0.25, 0.5))),
+            ..AnchorPose::LOST
+        };
+        for index in [7, 12] {
+            let frame = frame(index, f64::from(index), [32, 24]);
+            writer.push(&frame).unwrap();
+        }
+        writer
+            .add_poses((12, 12.0), &[pose_at(0.125)], None)
+            .unwrap();
+        // A frame that was not recorded.
+        writer.add_poses((9, 9.0), &[pose_at(0.75)], None).unwrap();
+        writer.finish().unwrap();
+        let given = GivenPoses::read(&path.join("poses.csv"), &anchors).unwrap();
+        let x_m = |number: u32| {
+            let pose = given.of_frame(number)[0].camera_from_anchor;
+            pose.map(|pose| pose.translation.x)
+        };
+        assert_eq!([x_m(0), x_m(1), x_m(9)], [None, Some(0.125), None]);
     }
 
     #[test]
