@@ -2,7 +2,7 @@
 # Mesa's layer that asks the desktop for its favourite card complains on machines without a desktop; gnomon chooses itself.
 export NODEVICE_SELECT = 1
 
-.PHONY: demo test bench bench-volumes bench-tracking setup
+.PHONY: demo test test-camera bench bench-volumes bench-tracking setup
 
 demo: setup
 	cargo build --release
@@ -19,6 +19,11 @@ test: setup
 	cargo clippy --release --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps
 	cargo test --release
+
+# On a real camera device in a small emulated machine (minutes; as root; not in CI), where ../shared/virtual-camera is.
+test-camera: setup
+	cargo build --release
+	tools/test_camera.sh
 
 # How the cost of shadow volumes grows, whether silhouettes belong on the CPU, and what phantoms that are off do: figures
 # in out/.

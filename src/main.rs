@@ -11,14 +11,16 @@ use clap::{Args, Parser, Subcommand};
 
 use gnomon::app::board::{self, Distance, board};
 use gnomon::app::calibrate;
+use gnomon::app::cameras;
 use gnomon::app::check;
 use gnomon::app::first_look::first_look;
 use gnomon::app::layer_files::Layer;
 use gnomon::app::markers::{self, Paper, Sheet};
+use gnomon::app::record;
 use gnomon::app::replay::{self, replay};
 use gnomon::app::report::Report;
 use gnomon::app::track::{self, is_scene, track};
-use gnomon::scene::{CameraSettings, Family, Scene, TrackingSettings};
+use gnomon::scene::{CameraSettings, Family, PixelFormat, Scene, TrackingSettings, WantedFormat};
 use gnomon::tracking::calibrating::Chessboard;
 use gnomon::tracking::mapping::MapSettings;
 
@@ -37,7 +39,7 @@ enum Command {
         after_help = "Example:\n  gnomon replay config/lamp.toml --out out/lamp.mp4 --sheet out/lamp.png"
     )]
     Replay(ReplayArgs),
-    /// Finds where the markers are in a recording; draws nothing and needs no GPU.
+    /// Finds where the markers are, without drawing: poses as a file. Needs no GPU.
     #[command(
         after_help = "Example:\n  gnomon track config/lamp.toml --poses out/lamp.csv\n  gnomon track walk.mp4 \
                       --calibration camera.toml --size-mm 40 --poses out/walk.csv"
@@ -60,6 +62,16 @@ enum Command {
                       gnomon markers --chessboard 9x6 --square-mm 25 --landscape --out chessboard.pdf"
     )]
     Markers(MarkersArgs),
+    /// Records a camera as a session that replay and track take up, until Ctrl-C.
+    #[command(
+        after_help = "Example:\n  gnomon record webcam:0 --calibration camera.toml --out out/session --seconds 20"
+    )]
+    Record(RecordArgs),
+    /// Lists the cameras and their formats.
+    #[command(
+        after_help = "Example:\n  gnomon cameras    # and then: gnomon record webcam:0 --out out/session"
+    )]
+    Cameras,
     /// Reads a scene, says what is wrong with it or what is in it.
     #[command(after_help = "Example:\n  gnomon check config/lamp.toml")]
     Check {
@@ -103,7 +115,7 @@ struct ReplayArgs {
 
 #[derive(Args)]
 struct TrackArgs {
-    /// Scene file (.toml), session, video, picture or folder of pictures
+    /// Scene file (.toml), session, video, picture or folder of pictures, webcam (webcam:0) or address (http://…)
     source: PathBuf,
     #[command(flatten)]
     recording: RecordingArgs,
@@ -239,7 +251,21 @@ enum Sizes {
     Estimate,
 }
 
-/// A recording that no scene describes.
+#[derive(Args)]
+struct RecordArgs {
+    /// Scene file (.toml), webcam (webcam:0, webcam:NAME, /dev/video0), address (http://…, rtsp://…), or recording
+    source: PathBuf,
+    #[command(flatten)]
+    recording: RecordingArgs,
+    /// The session's folder: a new one
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// End after this many seconds of frames
+    #[arg(long, value_name = "N", value_parser = seconds_of)]
+    seconds: Option<f64>,
+}
+
+/// A recording or a camera that no scene describes.
 #[derive(Args)]
 struct RecordingArgs {
     /// Calibration of the camera; without it the one that the recording carries
@@ -251,6 +277,26 @@ struct RecordingArgs {
     /// libapriltag searches pictures shrunk by this: 2 without it, 1 finds smaller markers
     #[arg(long, value_name = "FACTOR")]
     decimation: Option<f64>,
+    /// Ask a webcam for pictures of this size; without it the calibration's
+    #[arg(long, value_name = "WxH", value_parser = size_of)]
+    size: Option<[u32; 2]>,
+    /// Ask a webcam for this rate
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    fps: Option<u32>,
+    /// Ask a webcam for this format: MJPEG, YUYV, NV12, GREY, RGB, BGR
+    #[arg(long, value_name = "NAME", value_parser = pixel_format_of)]
+    format: Option<PixelFormat>,
+}
+
+impl RecordingArgs {
+    fn is_given(&self) -> bool {
+        self.calibration.is_some()
+            || self.decimation.is_some()
+            || self.mirror
+            || self.size.is_some()
+            || self.fps.is_some()
+            || self.format.is_some()
+    }
 }
 
 /// Markers that no scene describes.
@@ -293,6 +339,11 @@ fn run(cli: Cli) -> Result<()> {
             Ok(())
         }
         Command::Markers(args) => run_markers(args),
+        Command::Record(args) => run_record(args),
+        Command::Cameras => {
+            print!("{}", cameras::cameras()?);
+            Ok(())
+        }
         Command::Check { scene } => {
             let scene = Scene::load(&scene)?;
             print!("{}", check::summary(&scene));
@@ -436,6 +487,30 @@ fn distance_of(text: &str) -> Result<Distance, String> {
     }
 }
 
+fn run_record(args: RecordArgs) -> Result<()> {
+    let stop = interrupts()?;
+    let input = if is_scene(&args.source) {
+        args.recording.refuse_beside(&args.source)?;
+        record::Input::Scene(args.source)
+    } else {
+        record::Input::Camera(camera_of(&args.source, &args.recording)?)
+    };
+    let request = record::Request {
+        input,
+        out: args.out,
+        seconds: args.seconds,
+    };
+    eprintln!("{}", record::record(&request, &stop)?);
+    Ok(())
+}
+
+fn seconds_of(written: &str) -> Result<f64, String> {
+    let seconds = written.parse().ok();
+    seconds
+        .filter(|seconds: &f64| *seconds > 0.0 && seconds.is_finite())
+        .ok_or_else(|| "not a time; a number above 0 is expected".to_owned())
+}
+
 fn track_input(args: &TrackArgs) -> Result<track::Input> {
     if is_scene(&args.source) {
         args.recording.refuse_beside(&args.source)?;
@@ -474,9 +549,10 @@ impl RecordingArgs {
 
     /// A scene says all of this itself.
     fn refuse_beside(&self, scene: &Path) -> Result<()> {
-        if self.calibration.is_some() || self.mirror || self.decimation.is_some() {
+        if self.is_given() {
             bail!(
-                "{} is a scene; --calibration, --mirror and --decimation go with a recording",
+                "{} is a scene, which says itself which camera; --calibration, --mirror, --decimation, --size, --fps \
+                 and --format go with a recording or a camera",
                 scene.display()
             );
         }
@@ -510,6 +586,28 @@ fn camera_of(source: &Path, args: &RecordingArgs) -> Result<CameraSettings> {
         source: source.to_owned(),
         calibration: args.calibration.clone(),
         mirror: args.mirror,
+        wanted: WantedFormat {
+            size_px: args.size,
+            fps: args.fps,
+            pixels: args.format,
+        },
+    })
+}
+
+fn size_of(written: &str) -> Result<[u32; 2], String> {
+    let side = |side: &str| side.parse().ok().filter(|side| (1..=32768).contains(side));
+    written
+        .split_once('x')
+        .and_then(|(width, height)| Some([side(width)?, side(height)?]))
+        .ok_or_else(|| "not a size; write WIDTHxHEIGHT, as 1280x720".to_owned())
+}
+
+fn pixel_format_of(name: &str) -> Result<PixelFormat, String> {
+    let mut known = PixelFormat::BY_NAME.into_iter();
+    let found = known.find(|(known, _)| known.eq_ignore_ascii_case(name));
+    found.map(|(_, format)| format).ok_or_else(|| {
+        let allowed: Vec<&str> = PixelFormat::BY_NAME.iter().map(|(name, _)| *name).collect();
+        format!("unknown format; allowed: {}", allowed.join(", "))
     })
 }
 

@@ -2,11 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Result, bail};
 
 use super::detections_file::DetectionsText;
+use super::live_capture::LiveCapture;
+use super::live_input::LiveInput;
 use super::mirror_watch::MirrorWatch;
 use super::picture_files::write_text;
 use super::poses_file::PosesText;
@@ -15,8 +18,9 @@ use super::report::Report;
 use super::stats::{Stats, detector_in_words, peak_memory_mib};
 use super::stopwatch::Stopwatch;
 use super::tally::Tally;
-use super::tracked::{Ended, Poser, TrackedFrame, each_tracked_frame};
-use crate::capture::Notice;
+use super::tracked::{Ended, Frames, Poser, TrackedFrame, each_tracked_frame};
+use crate::capture::live::is_live;
+use crate::geometry::camera::Intrinsics;
 use crate::scene::{Anchor, CameraSettings, DetectorKind, Family, Scene, TrackingSettings};
 use crate::tracking::{AnchorPose, Detector, Tracker, grey_from_rgba};
 
@@ -71,10 +75,7 @@ pub fn track(request: &Request, stop: &AtomicBool) -> Result<Report> {
         anchors,
         lists_found_alone,
     } = Plan::of(&request.input)?;
-    let (source, intrinsics) = recording::open(&camera)?;
-    for written in [&request.poses, &request.markers, &request.stats] {
-        refuse_to_overwrite(&source, written.as_deref())?;
-    }
+    let (frames_in, intrinsics) = open(&camera, request)?;
     let poser = Poser::Tracker(
         Box::new(Tracker::new(&settings, &anchors, intrinsics)?),
         MirrorWatch::new(&settings, &anchors),
@@ -86,9 +87,10 @@ pub fn track(request: &Request, stop: &AtomicBool) -> Result<Report> {
         .transpose()?;
     let mut frames = Vec::new();
     let mut tally = Tally::new(anchors.len());
-    let size_px = source.size_px();
+    // A camera is tracked until somebody says stop.
+    let interrupts = matches!(frames_in, Frames::Recorded(_));
     // What was done before a failure is kept: the files are finished either way.
-    let ended = each_tracked_frame(source, poser, None, stop, |tracked| {
+    let ended = each_tracked_frame(frames_in, poser, None, stop, |tracked| {
         tally.add(&tracked);
         if let Some(raw) = &mut raw {
             raw.add(&tracked)?;
@@ -113,10 +115,10 @@ pub fn track(request: &Request, stop: &AtomicBool) -> Result<Report> {
     if let Some(path) = &request.stats {
         let stats = Stats {
             source: camera.source.clone(),
-            size_px,
+            size_px: intrinsics.size_px,
             frames: tally.frames,
             drawn: 0,
-            drops: ended.notices.iter().map(Notice::lost_frames).sum(),
+            drops: ended.dropped,
             lost: listed.iter().map(lost).collect(),
             detector: detector_in_words(&settings),
             technique: None,
@@ -150,8 +152,29 @@ pub fn track(request: &Request, stop: &AtomicBool) -> Result<Report> {
         &anchors,
         (&ended, &mut tally),
         camera.mirror,
-        stop.load(Ordering::Relaxed),
+        interrupts && stop.load(Ordering::Relaxed),
     ))
+}
+
+/// Opens a recording or begins to open a camera, with its calibration.
+fn open(camera: &CameraSettings, request: &Request) -> Result<(Frames, Intrinsics)> {
+    if !is_live(&camera.source) {
+        let (source, intrinsics) = recording::open(camera)?;
+        for written in [&request.poses, &request.markers, &request.stats] {
+            refuse_to_overwrite(&source, written.as_deref())?;
+        }
+        return Ok((Frames::Recorded(source), intrinsics));
+    }
+    let input = LiveInput::of(camera)?;
+    let Some(intrinsics) = input.calibration else {
+        bail!(
+            "{} carries no calibration: give one (--calibration FILE; in a scene, [camera] calibration)",
+            camera.source
+        );
+    };
+    let now = Arc::new(Stopwatch::clock());
+    let capture = LiveCapture::start(&camera.source, &input.options(false), now, None);
+    Ok((Frames::Live(capture, intrinsics), intrinsics))
 }
 
 /// What an [`Input`] comes to.
