@@ -6,8 +6,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Lowest first; `main.rs` and what lies beside it stand on top of all.
-const FLOORS: [&str; 7] = [
-    "geometry", "light", "scene", "capture", "tracking", "render", "app",
+const FLOORS: [&str; 8] = [
+    "geometry", "light", "shafts", "scene", "capture", "tracking", "render", "app",
 ];
 
 /// A word of code, and the only places (below `src/`) where it may stand.
