@@ -82,21 +82,26 @@ impl ArucoDetector {
     }
 }
 
-/// The cells of a marker as printed, rows from the top, true for white; black border included, white rim not. `None`
-/// where the family has no such marker.
-pub fn printed_cells(family: Family, id: u32) -> Result<Option<Vec<bool>>, TrackingError> {
-    if family.is_april_tag() {
-        return Ok(apriltag::printed_cells(family, id));
-    }
-    let number = dictionary_number(family.codes()).filter(|_| id < family.id_count());
-    let Some(number) = number else {
-        return Ok(None);
+/// The cells of a marker as printed, rows from the top, true for white; black border included, white rim not. AprilTag's
+/// families stand as AprilTag prints them, the others as OpenCV does.
+///
+/// # Errors
+/// A marker that the family does not have.
+pub fn printed_cells(family: Family, id: u32) -> Result<Vec<bool>, TrackingError> {
+    let no_such_marker = || TrackingError::NoSuchMarker {
+        family: family.name(),
+        id,
+        count: family.id_count(),
     };
+    if family.is_april_tag() {
+        return apriltag::printed_cells(family, id).ok_or_else(no_such_marker);
+    }
+    let number = dictionary_number(family.codes())
+        .filter(|_| id < family.id_count())
+        .ok_or_else(no_such_marker)?;
     let border_cells = family.border_cells() as i32;
     let dictionary = installed::Dictionary::new(number, border_cells, 0, ArucoRefinement::None)?;
-    Ok(Some(
-        dictionary.cells(id as i32, family.cells_across() as usize)?,
-    ))
+    Ok(dictionary.cells(id as i32, family.cells_across() as usize)?)
 }
 
 /// The turn of the installed dictionary against the prints; its own pictures are the prints of OpenCV's families.
