@@ -17,6 +17,7 @@ use gnomon::calibration::{
 use gnomon::capture::load_calibration;
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::scene::Family;
+use gnomon::tracking::printed_cells;
 
 const CHESSBOARD: &str = "--chessboard 8x5 --square-mm 25";
 const CHARUCO: &str = "--charuco 9x6 --square-mm 25 --marker-mm 18 --dictionary DICT_5X5_100";
@@ -365,6 +366,50 @@ fn a_charuco_board_tells_a_bent_lens_by_parts_of_it() {
     let found = solve(&views).expect("a calibration");
     assert_camera(&found, &BENT_CAMERA, 0.3);
     assert!(found.rms_px < 0.1, "{}", found.rms_px);
+}
+
+#[test]
+fn boards_of_all_releases_of_opencv_are_found() {
+    const SQUARE_PX: u32 = 70;
+    let (rim_px, cell_px) = (40, 7);
+    // An even number of rows: before 4.6 such boards began with a white square.
+    let target = charuco_of([5, 6], 0.07, 0.049, "DICT_5X5_100");
+    let family = target.markers.expect("markers").family;
+    for starts_white in [false, true] {
+        let [width, height] = target.squares.map(|count| count * SQUARE_PX + 2 * rim_px);
+        let mut picture = image::GrayImage::from_pixel(width, height, image::Luma([230]));
+        let mut blacken = |left: u32, top: u32, side: u32| {
+            for (x, y) in (0..side).flat_map(|y| (0..side).map(move |x| (x, y))) {
+                picture.put_pixel(rim_px + left + x, rim_px + top + y, image::Luma([20]));
+            }
+        };
+        for row in 0..target.squares[1] {
+            for column in 0..target.squares[0] {
+                if ((row + column) % 2 == 0) != starts_white {
+                    blacken(column * SQUARE_PX, row * SQUARE_PX, SQUARE_PX);
+                }
+            }
+        }
+        for (id, [column, row]) in (0..).zip(target.marker_squares(starts_white)) {
+            let white = printed_cells(family, id).expect("a marker");
+            let inset = (SQUARE_PX - 7 * cell_px) / 2;
+            for (k, _) in (0..).zip(&white).filter(|(_, white)| !**white) {
+                let left = column * SQUARE_PX + inset + k % 7 * cell_px;
+                blacken(left, row * SQUARE_PX + inset + k / 7 * cell_px, cell_px);
+            }
+        }
+        let mut finder = TargetFinder::new(target).expect("a finder");
+        let corners = finder
+            .find(picture.as_raw(), [width, height])
+            .expect("corners");
+        assert_eq!(corners.len(), 20, "starts white: {starts_white}");
+        for corner in corners {
+            // A square of 70 mm is one of 70 pixels; the picture begins half a pixel before its first pixel's centre.
+            let expected_px = corner.target_m * 1000.0 + f64::from(rim_px) - 0.5;
+            let off_px = corner.pixel.distance(expected_px);
+            assert!(off_px < 0.02, "{off_px} px off at {expected_px}");
+        }
+    }
 }
 
 #[test]
