@@ -305,6 +305,10 @@ fn assert_camera(found: &Calibration, truth: &Intrinsics, within_px: f64) {
     let off = (found.intrinsics.focal_px / truth.focal_px - 1.0).abs();
     assert!(off.max_element() < 1e-3, "{:?}", found.intrinsics);
     let off_px = farthest_px(&found.intrinsics, truth);
+    eprintln!(
+        "focal lengths off by {off:.5}, the farthest pixel by {off_px:.3} px, rms {:.3} px, deviation {}",
+        found.rms_px, found.focal_deviation_px
+    );
     assert!(
         off_px < within_px,
         "{off_px:.3} px off: {:?}",

@@ -172,7 +172,7 @@ impl fmt::Display for Target {
                 let [across, down] = self.squares;
                 write!(
                     f,
-                    "ChArUco board, {across} x {down} squares of {square_mm} mm, {} of {} mm",
+                    "ChArUco board, {across} x {down} squares of {square_mm} mm, {} markers of {} mm",
                     markers.family,
                     millimetres(markers.size_m)
                 )
