@@ -194,7 +194,7 @@ struct TargetArgs {
     /// Side of the black squares of a ChArUco board's markers
     #[arg(long, value_name = "MM", requires = "charuco")]
     marker_mm: Option<f64>,
-    /// Family of a ChArUco board's markers: DICT_4X4_50, DICT_6X6_250, tag36h11, …
+    /// Family of a ChArUco board's markers: DICT_4X4_50, DICT_6X6_250, tag36h11, …, or a dictionary's file (.yml)
     #[arg(long, value_name = "NAME", default_value = "DICT_5X5_100", value_parser = family_of, requires = "charuco")]
     dictionary: Family,
 }
@@ -275,7 +275,7 @@ struct RecordingArgs {
 /// Markers that no scene describes.
 #[derive(Args)]
 struct FamilyArgs {
-    /// Family of the markers: tag16h5, tag25h9, tag36h10, tag36h11, DICT_4X4_50, …
+    /// Family of the markers: tag16h5, tag25h9, tag36h10, tag36h11, DICT_4X4_50, …, or a dictionary's file (.yml)
     #[arg(long, value_name = "NAME", default_value = "tag36h11", value_parser = family_of, requires = "size_mm")]
     family: Family,
     /// Width of the markers' black border, cells: 1, or 2 as on Kalibr's AprilGrids
@@ -535,6 +535,9 @@ impl FamilyArgs {
 }
 
 fn family_of(name: &str) -> Result<Family, String> {
+    if Family::is_file_name(name) {
+        return Family::from_file(Path::new(name)).map_err(|error| error.to_string());
+    }
     Family::from_name(name).ok_or_else(|| {
         let known: Vec<&str> = Family::all_names().collect();
         format!("unknown family; allowed: {}", known.join(", "))

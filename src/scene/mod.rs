@@ -8,6 +8,7 @@ use crate::geometry::mesh::{Mesh, MeshReport};
 use crate::light::{Light, Material};
 
 mod anchors;
+mod dictionary;
 mod error;
 mod family;
 mod lights;
@@ -18,6 +19,7 @@ mod objects;
 mod reader;
 mod settings;
 
+pub use dictionary::Dictionary;
 pub use error::{Place, SceneError};
 pub use family::{Codes, Family};
 pub use reader::{NAMES, is_name};
