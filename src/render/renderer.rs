@@ -216,7 +216,14 @@ impl Renderer {
                 self.draw_direct(&mut encoder, direct, touched);
             } else if let Some((shafts, targets)) = &self.shafts {
                 let (stage, pixels) = (&self.stage, touched.pixels);
-                draw_shafts(&mut encoder, shafts, targets, stage, pixels, self.clock.as_ref());
+                draw_shafts(
+                    &mut encoder,
+                    shafts,
+                    targets,
+                    stage,
+                    pixels,
+                    self.clock.as_ref(),
+                );
                 self.composite(&mut encoder, targets, pixels);
                 drawn.push(Stretch::Composite);
             } else if let Some(accumulation) = &self.accumulation {

@@ -9,6 +9,7 @@ use crate::light::probe::Probe;
 use crate::light::{Light, Material};
 
 mod anchors;
+mod dictionary;
 mod error;
 mod family;
 mod lights;
@@ -21,6 +22,7 @@ mod probe_file;
 mod reader;
 mod settings;
 
+pub use dictionary::Dictionary;
 pub use error::{Place, SceneError};
 pub use family::{Codes, Family};
 pub use reader::{NAMES, is_name};
