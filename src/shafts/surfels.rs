@@ -51,14 +51,19 @@ pub fn thrown_back<'a>(
     normal: Vec3,
     surfels: impl IntoIterator<Item = &'a LitSurfel>,
 ) -> Vec3 {
-    let from_surfel = |lit: &LitSurfel| {
-        let part = from_disc(place, normal, &lit.surfel);
-        match part > 0.0 && is_open(lit.open, place - lit.surfel.position) {
-            true => lit.radiance * part,
-            false => Vec3::ZERO,
-        }
-    };
+    let from_surfel = |lit: &LitSurfel| lit.radiance * lit.irradiance_part(place, normal);
     surfels.into_iter().map(from_surfel).sum()
+}
+
+impl LitSurfel {
+    /// Irradiance of a place for each unit of its radiance.
+    pub fn irradiance_part(&self, place: Vec3, normal: Vec3) -> f32 {
+        let part = from_disc(place, normal, &self.surfel);
+        match part > 0.0 && is_open(self.open, place - self.surfel.position) {
+            true => part,
+            false => 0.0,
+        }
+    }
 }
 
 /// About `count` surfels of equal area on triangles (with their albedo), spread over them.

@@ -18,6 +18,7 @@ use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::{self, PixelRect};
 use crate::light::cores::on_all_cores;
 use crate::scene::{Scene, ShaftSettings};
+use crate::shafts::patches::PatchVertex;
 use crate::shafts::prepared::Prepared;
 use crate::shafts::selection::{Representative, representatives};
 use crate::shafts::source_tree::BoxM;
@@ -36,6 +37,9 @@ use pipelines::Pipelines;
 const LEAST_WEIGHT: f32 = 1.0 / 2048.0;
 /// Penumbras are given room in the maps up to this many radii behind the casters.
 const REACH: f32 = 4.0;
+
+/// Sources nearer to the casters' middle than so many of their radii are among them.
+const NEAREST_SOURCE: f32 = 1.2;
 
 /// What shafts need from frame to frame.
 pub(super) struct Shafts {
@@ -181,7 +185,14 @@ impl Shafts {
     fn hide(&mut self, gpu: &Gpu, placed: &PlacedCasters) -> Hidden {
         let room = &self.room;
         let marks = room.mark(&placed.boxes);
-        let may_be_hidden = marks.sources(&room.sources);
+        let mut may_be_hidden = marks.sources(&room.sources);
+        // Sources among the casters have no shadow map that could show them.
+        let among = room.sources_within(placed.ball.center, NEAREST_SOURCE * placed.ball.radius);
+        let mut is_among = vec![false; room.patches.patches.len()];
+        for &source in &among {
+            may_be_hidden[source] = false;
+            is_among[room.sources.patches[source] as usize] = true;
+        }
         let may_notice = marks.receivers(&room.receivers);
         let noticing: Vec<usize> = (0..may_notice.len())
             .filter(|&patch| may_notice[patch])
@@ -197,7 +208,13 @@ impl Shafts {
             .settings
             .sources
             .map_or(usize::MAX, |count| count as usize);
-        let mut chosen = representatives(&room.sources, &weighed, count, LEAST_WEIGHT);
+        let mut chosen = representatives(
+            &room.sources,
+            &weighed,
+            count,
+            LEAST_WEIGHT,
+            placed.ball.center,
+        );
         let limit = gpu.device.limits().max_texture_dimension_2d;
         let tiling = Tiling::new(chosen.len(), self.settings.map_px, limit);
         let reach_m = REACH * placed.ball.radius;
@@ -218,6 +235,7 @@ impl Shafts {
             .iter()
             .map(|&vertex| room.irradiance[vertex as usize].extend(0.0))
             .collect();
+        let hidden_among = hidden_among(room, &vertices, &surfels, &is_among);
         let mut lists: Vec<u32> = Vec::new();
         let mut corners: Vec<PatchCorner> = Vec::new();
         for &patch in &noticing {
@@ -236,18 +254,21 @@ impl Shafts {
             let before = corners.len();
             corners.extend(parts(placed.parts(places)).map(|weights| {
                 let [a, b] = weights;
-                let position = places[0] * a + places[1] * b + places[2] * (1.0 - a - b);
+                let c = 1.0 - a - b;
+                let position = places[0] * a + places[1] * b + places[2] * c;
+                let [at_a, at_b, at_c] = rows.map(|row| hidden_among[row as usize]);
+                let hidden = at_a * a + at_b * b + at_c * c;
                 PatchCorner {
                     position,
                     rows,
                     weights,
                     list,
-                    thrown_back: thrown_back(position, normal, &surfels),
+                    thrown_back: thrown_back(position, normal, &surfels) - hidden,
                 }
             }));
             let least = rows.map(|row| irradiances[row as usize].truncate() * LEAST_WEIGHT);
             let least = least.into_iter().fold(Vec3::MAX, Vec3::min);
-            let gains = |corner: &PatchCorner| corner.thrown_back.cmpgt(least).any();
+            let gains = |corner: &PatchCorner| corner.thrown_back.abs().cmpgt(least).any();
             if list[1] == 0 && !corners[before..].iter().any(gains) {
                 corners.truncate(before);
             }
@@ -360,6 +381,23 @@ impl Shafts {
         pass.set_vertex_buffer(0, hidden.corners.slice(..));
         pass.draw(0..hidden.corner_count, 0..1);
     }
+}
+
+/// For each vertex the irradiance from patches among the casters that the casters hide from it: what their surfels cover.
+fn hidden_among(
+    room: &Prepared,
+    vertices: &[u32],
+    surfels: &[LitSurfel],
+    is_among: &[bool],
+) -> Vec<Vec3> {
+    let shares = on_all_cores(vertices.len(), |range| {
+        let hidden = |&vertex: &u32| {
+            let PatchVertex { position, normal } = room.patches.vertices[vertex as usize];
+            room.hidden_among(position, normal, surfels, is_among)
+        };
+        vertices[range].iter().map(hidden).collect::<Vec<_>>()
+    });
+    shares.concat()
 }
 
 /// Cuts a triangle's edges into parts and returns the corners of all small triangles, three each, as the weights of its
