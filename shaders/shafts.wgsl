@@ -143,7 +143,8 @@ fn light_on_virtual(surface: Surface, @builtin(front_facing) outside: bool) -> L
         let facing = dot(normal, way);
         if facing > 0.0 {
             let hidden = hidden(index, point_in_world, SAME_PART);
-            taken += hidden * sources[index].intensity * facing * inverseSqrt(distance_squared) / distance_squared;
+            let spread = 2.0 * sources[index].spread_m * sources[index].spread_m;
+            taken += hidden * sources[index].intensity * facing * inverseSqrt(distance_squared) / (distance_squared + spread);
         }
     }
     let arriving = max(surface.indirect - taken, vec3f(0.0));

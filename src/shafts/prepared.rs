@@ -6,6 +6,7 @@ use glam::Vec3;
 
 use crate::geometry::bounds::Bounds;
 use crate::geometry::ray_caster::RayCaster;
+use crate::light::cores::on_all_cores;
 
 use super::hierarchy::{Arriving, Hierarchy, Marks};
 use super::irradiance_volume::IrradianceVolume;
@@ -44,6 +45,8 @@ pub struct Prepared {
     pub source_radiance: Vec<Vec3>,
     /// Form factors of each vertex: the sources in the tree's order, then all other patches.
     pub transfers: Transfers,
+    /// For each patch its place in the rows of `transfers`.
+    pub sender_of_patch: Vec<u32>,
     /// All light of each vertex: irradiance.
     pub irradiance: Vec<Vec3>,
     /// The receivers.
@@ -87,6 +90,7 @@ impl Prepared {
                     patch: patch as u32,
                     corners: corners[patch],
                     power: power(patch),
+                    luminance: luminance(light[patch].radiance),
                 })
                 .collect(),
         );
@@ -97,6 +101,10 @@ impl Prepared {
             .map(|&patch| light[patch as usize].radiance)
             .collect();
         let transfers = Transfers::new(&patches, &senders, &caster);
+        let mut sender_of_patch = vec![0; senders.len()];
+        for (sender, &patch) in (0..).zip(&senders) {
+            sender_of_patch[patch as usize] = sender;
+        }
         let rows = || (0..patches.vertices.len()).map(|vertex| transfers.row(vertex));
         let irradiance: Vec<Vec3> = rows()
             .map(|row| irradiance(row, &sender_radiance))
@@ -127,6 +135,7 @@ impl Prepared {
             light,
             sources,
             transfers,
+            sender_of_patch,
             irradiance,
             receivers,
             hierarchy,
@@ -204,6 +213,52 @@ impl Prepared {
         surfels.iter().map(covered).sum()
     }
 
+    /// The patches within `near`, each with the radiance that it loses to the casters' shadows on it.
+    pub fn dimmed(
+        &self,
+        caster: &RayCaster,
+        sources: &[(Representative, Vec3)],
+        near: &BoxM,
+    ) -> Vec<(usize, Vec3)> {
+        let weight: f32 = sources.iter().map(|(source, _)| source.weight).sum();
+        let close: Vec<usize> = (0..self.patches.patches.len())
+            .filter(|&patch| {
+                near.touches(&BoxM::around([self
+                    .patches
+                    .center(&self.patches.patches[patch])]))
+            })
+            .collect();
+        let shares = on_all_cores(close.len(), |range| {
+            let dimmed = |&index: &usize| {
+                let patch = &self.patches.patches[index];
+                let (center, normal) = (self.patches.center(patch), self.patches.normal(patch));
+                let start = center + normal * SURFEL_OFFSET_M;
+                let (mut arriving, mut hidden) = (0, 0);
+                for ray in 0..DIMMING_RAYS {
+                    let at = (ray as f32 + 0.5) / DIMMING_RAYS as f32 * weight;
+                    let way = at_weight(sources, at) - start;
+                    if way.dot(normal) > 0.0 {
+                        arriving += 1;
+                        hidden += u32::from(caster.is_hidden(start, way, 1.0));
+                    }
+                }
+                let part = hidden as f32 / arriving.max(1) as f32;
+                (index, self.light[index].radiance * part)
+            };
+            close[range].iter().map(dimmed).collect::<Vec<_>>()
+        });
+        let all = shares.into_iter().flatten();
+        all.filter(|(_, lost)| *lost != Vec3::ZERO).collect()
+    }
+
+    /// Irradiance that a vertex loses with patches' lost radiance.
+    pub fn lost_at(&self, vertex: u32, dimmed: &[(usize, Vec3)]) -> Vec3 {
+        let row = self.transfers.row(vertex as usize);
+        let part =
+            |(patch, lost): &(usize, Vec3)| *lost * row[self.sender_of_patch[*patch] as usize];
+        dimmed.iter().map(part).sum::<Vec3>() * PI
+    }
+
     /// Radiant intensity of a representative's marked sources towards a place, as far as the room lets it through.
     pub fn intensity(&self, one: &Representative, is_marked: &[bool], place: Vec3) -> Vec3 {
         let range = one.first as usize..one.last as usize;
@@ -237,53 +292,65 @@ impl Prepared {
 }
 
 impl Prepared {
-    /// Irradiance of a surfel past what `caster` hides. The room within `near` is seen with the casters' shadows on it:
-    /// a part of its light is gone, as representatives of its sources tell that `caster` hides.
+    /// Irradiance of a surfel past what `caster` hides: from representatives of sources, with their radiant intensities,
+    /// and from the patches `is_near` by `rays`, which see them with the casters' shadows on them.
     pub fn light_on_surfel(
         &self,
         surfel: &Surfel,
         rays: usize,
         caster: &RayCaster,
-        sources: &[Representative],
-        near: &BoxM,
+        sources: &[(Representative, Vec3)],
+        is_near: &[bool],
     ) -> Vec3 {
-        let weight: f32 = sources.iter().map(|source| source.weight).sum();
+        let weight: f32 = sources.iter().map(|(source, _)| source.weight).sum();
         let start = surfel.position + surfel.normal * SURFEL_OFFSET_M;
-        let mut sum = Vec3::ZERO;
-        for (index, direction) in hemisphere(surfel.normal, rays).enumerate() {
-            if caster.is_hidden(start, direction, f32::INFINITY) {
-                continue;
+        let from_source = |(source, intensity): &(Representative, Vec3)| {
+            let way = source.position - start;
+            let facing = surfel.normal.dot(way);
+            if facing <= 0.0 || caster.is_hidden(start, way, 1.0) {
+                return Vec3::ZERO;
             }
-            let Some((radiance, patch, distance)) = self.radiance_along(start, direction) else {
+            // Seen from among its sources, a representative is no point.
+            let squared = way.length_squared() + source.spread_trace();
+            *intensity * (facing / (squared * way.length()))
+        };
+        let mut near = Vec3::ZERO;
+        for (index, direction) in hemisphere(surfel.normal, rays).enumerate() {
+            let seen = self.radiance_along(start, direction);
+            let Some((radiance, patch, distance)) = seen.filter(|(_, patch, _)| is_near[*patch])
+            else {
                 continue;
             };
-            let place = start + direction * distance;
-            let mut left = 1.0;
-            if near.touches(&BoxM::around([place])) && weight > 0.0 {
-                let at = (index as f32 * 0.618_034 + 0.5).fract() * weight;
-                let source = at_weight(sources, at);
-                let patch = &self.patches.patches[patch];
-                let place = place + self.patches.normal(patch) * SURFEL_OFFSET_M;
-                let hidden = caster.is_hidden(place, source - place, 1.0);
-                left = f32::from(!hidden);
+            if caster.is_hidden(start, direction, distance) {
+                continue;
             }
-            sum += radiance * left;
+            let normal = self.patches.normal(&self.patches.patches[patch]);
+            let place = start + direction * distance + normal * SURFEL_OFFSET_M;
+            let at = (index as f32 * 0.618_034 + 0.5).fract() * weight;
+            let way = at_weight(sources, at) - place;
+            if weight == 0.0 || !caster.is_hidden(place, way, 1.0) {
+                near += radiance;
+            }
         }
-        sum * (PI / rays as f32)
+        sources.iter().map(from_source).sum::<Vec3>() + near * (PI / rays as f32)
     }
 }
 
 /// The place of the representative at a part of all weight.
-fn at_weight(sources: &[Representative], mut at: f32) -> Vec3 {
-    for source in sources {
+fn at_weight(sources: &[(Representative, Vec3)], mut at: f32) -> Vec3 {
+    for (source, _) in sources {
         at -= source.weight;
         if at <= 0.0 {
             return source.position;
         }
     }
-    sources.last().map_or(Vec3::ZERO, |source| source.position)
+    sources
+        .last()
+        .map_or(Vec3::ZERO, |(source, _)| source.position)
 }
 
+/// Rays that tell how much of a patch's light the casters hide.
+const DIMMING_RAYS: usize = 48;
 /// Surfels that cover less of a place's hemisphere (over π) hide nothing that shows.
 const LEAST_COVERED: f32 = 1e-4;
 /// How far off a surfel rays start, metres: past the rounding of a simplified thing.

@@ -156,7 +156,7 @@ pub fn representatives(
 
 impl Representative {
     /// Sum of its variances along all axes, square metres.
-    fn spread_trace(&self) -> f32 {
+    pub fn spread_trace(&self) -> f32 {
         (self.spread.x_axis.x + self.spread.y_axis.y + self.spread.z_axis.z).max(0.0)
     }
 }
@@ -186,6 +186,7 @@ mod tests {
             patch,
             corners: corners(patch),
             power: 1.0 + (patch * 3 % 5) as f32,
+            luminance: 1.0,
         });
         let tree = SourceTree::new(sources.collect());
         let weighed = tree.patches.iter().map(|&patch| WeighedSource {

@@ -1,6 +1,6 @@
 //! The sources of light in a kd-tree down to one patch (Gibson et al. 2003, section 6).
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// A source of light before it has its place in the tree.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,6 +11,8 @@ pub struct Source {
     pub corners: [Vec3; 3],
     /// Luminous power, in any unit.
     pub power: f32,
+    /// Luminance, in any unit.
+    pub luminance: f32,
 }
 
 /// A box, metres.
@@ -69,7 +71,8 @@ pub struct SourceTree {
 }
 
 impl SourceTree {
-    /// Sorts sources into a tree, whose halves have about the same power.
+    /// Sorts sources into a tree: those that differ much in brightness are parted first, so that no lamp is one with the
+    /// ceiling that it hangs from; then those that stand apart.
     pub fn new(mut sources: Vec<Source>) -> Self {
         let mut tree = Self::default();
         if !sources.is_empty() {
@@ -88,7 +91,7 @@ impl SourceTree {
             bounds: BoxM::around(sources.iter().flat_map(|source| source.corners)),
         });
         if sources.len() > 1 {
-            let cut = cut(sources);
+            let cut = cut_by_brightness(sources).unwrap_or_else(|| cut(sources));
             let (low, high) = sources.split_at_mut(cut);
             let low_node = self.build(low, first);
             let high_node = self.build(high, first + cut as u32);
@@ -98,27 +101,56 @@ impl SourceTree {
     }
 }
 
-/// Sorts sources along the axis in which their power is spread most, and returns where to cut: at half of the power.
+/// Brightest over darkest of sources that may stay together.
+const LARGEST_CONTRAST: f32 = 4.0;
+
+/// Sorts sources by brightness where they differ much, and returns where to cut: at the mean of their magnitudes.
+fn cut_by_brightness(sources: &mut [Source]) -> Option<usize> {
+    let luminances = || sources.iter().map(|source| source.luminance.max(1e-12));
+    let (darkest, brightest) = (
+        luminances().fold(f32::MAX, f32::min),
+        luminances().fold(0.0, f32::max),
+    );
+    (brightest > LARGEST_CONTRAST * darkest).then(|| {
+        let limit = (brightest * darkest).sqrt();
+        sources.sort_by(|one, other| one.luminance.total_cmp(&other.luminance));
+        let dark = sources.partition_point(|source| source.luminance < limit);
+        dark.clamp(1, sources.len() - 1)
+    })
+}
+
+/// Sorts sources along the axis, and returns where to cut, so that both parts are as narrow as can be: the sum of their
+/// second moments by power is least.
 fn cut(sources: &mut [Source]) -> usize {
     let middle = |source: &Source| source.corners.iter().sum::<Vec3>() / 3.0;
-    let power: f32 = sources.iter().map(|source| source.power).sum();
-    let weighted = |value: &dyn Fn(&Source) -> Vec3| {
-        let sum: Vec3 = sources
-            .iter()
-            .map(|source| value(source) * source.power)
-            .sum();
-        sum / power.max(f32::MIN_POSITIVE)
-    };
-    let mean = weighted(&middle);
-    let spread = weighted(&|source| (middle(source) - mean).powf(2.0));
-    let axis = spread.max_position();
+    let mut best = (f64::INFINITY, 0, 1);
+    for axis in 0..3 {
+        sources.sort_by(|one, other| middle(one)[axis].total_cmp(&middle(other)[axis]));
+        let forth: Vec<f64> = moments(sources.iter()).collect();
+        let back: Vec<f64> = moments(sources.iter().rev()).collect();
+        for count in 1..sources.len() {
+            let moments = forth[count - 1] + back[sources.len() - count - 1];
+            if moments < best.0 {
+                best = (moments, axis, count);
+            }
+        }
+    }
+    let (_, axis, count) = best;
     sources.sort_by(|one, other| middle(one)[axis].total_cmp(&middle(other)[axis]));
-    let mut sum = 0.0;
-    let below_half = sources.iter().take_while(|source| {
-        sum += source.power;
-        sum <= power / 2.0
-    });
-    below_half.count().clamp(1, sources.len() - 1)
+    count
+}
+
+/// Second moments by power of the first source, the first two, and so on, each about its own middle.
+fn moments<'a>(sources: impl Iterator<Item = &'a Source>) -> impl Iterator<Item = f64> {
+    let (mut power, mut first, mut second) = (0.0, DVec3::ZERO, 0.0);
+    sources.map(move |source| {
+        let middle = (source.corners.iter().sum::<Vec3>() / 3.0).as_dvec3();
+        let weight = f64::from(source.power).max(1e-12);
+        power += weight;
+        first += middle * weight;
+        second += middle.length_squared() * weight;
+        second - first.length_squared() / power
+    })
 }
 
 #[cfg(test)]
@@ -133,6 +165,7 @@ mod tests {
                     patch: index,
                     corners: [place, place + Vec3::X, place + Vec3::Y],
                     power: 1.0 + (index * 3 % 5) as f32,
+                    luminance: 1.0,
                 }
             })
             .collect()
@@ -163,23 +196,36 @@ mod tests {
     }
 
     #[test]
-    fn halves_have_about_the_same_power() {
-        let sources = sources();
-        let power_of = |patch: u32| sources[patch as usize].power;
-        let tree = SourceTree::new(sources.clone());
-        let power = |node: &SourceNode| -> f32 {
-            let range = node.first as usize..node.last as usize;
-            tree.patches[range]
-                .iter()
-                .map(|&patch| power_of(patch))
-                .sum()
-        };
-        for node in &tree.nodes {
-            if let Some([low, high]) = node.children {
-                let (low, high) = (&tree.nodes[low as usize], &tree.nodes[high as usize]);
-                // No farther apart than by the largest source.
-                assert!((power(low) - power(high)).abs() <= 2.0 * 5.0);
-            }
+    fn a_lamp_is_parted_from_the_ceiling_around_it() {
+        let mut sources = sources();
+        let lamp = [3, 11, 20];
+        for &patch in &lamp {
+            sources[patch as usize].luminance = 50.0;
         }
+        let tree = SourceTree::new(sources);
+        let children = tree.nodes[0].children.expect("children");
+        let bright = &tree.nodes[children[1] as usize];
+        let mut found = tree.patches[bright.first as usize..bright.last as usize].to_vec();
+        found.sort_unstable();
+        assert_eq!(found, lamp);
+    }
+
+    #[test]
+    fn groups_that_stand_apart_are_parted() {
+        let mut sources = sources();
+        let far = [2, 5, 30, 31];
+        for &patch in &far {
+            let source = &mut sources[patch as usize];
+            source.corners = source.corners.map(|corner| corner * 0.1 + Vec3::Y * 40.0);
+        }
+        let tree = SourceTree::new(sources);
+        let children = tree.nodes[0].children.expect("children");
+        let parts = children.map(|child| {
+            let node = &tree.nodes[child as usize];
+            let mut patches = tree.patches[node.first as usize..node.last as usize].to_vec();
+            patches.sort_unstable();
+            patches
+        });
+        assert!(parts.contains(&far.to_vec()), "{parts:?}");
     }
 }

@@ -46,6 +46,7 @@ pub(super) struct PlacedCasters {
     /// Around each caster.
     pub boxes: Vec<BoxM>,
     pub ball: Ball,
+    pub caster: RayCaster,
     surfels: Vec<Surfel>,
 }
 
@@ -68,6 +69,7 @@ impl ShaftCasters {
                 center: Vec3::ZERO,
                 radius: 0.0,
             },
+            caster: RayCaster::new(&[]),
             surfels: Vec::new(),
         };
         for caster in &self.casters {
@@ -136,13 +138,17 @@ fn caster(object: &Object, surfel_count: usize) -> Caster {
 impl PlacedCasters {
     /// The light that the casters throw back (one bounce): for each surfel what arrives past all casters, from the room as
     /// their shadows leave it.
-    pub fn lit_surfels(&self, room: &Prepared, sources: &[Representative]) -> Vec<LitSurfel> {
-        let caster = RayCaster::new(&self.triangles);
+    pub fn lit_surfels(
+        &self,
+        room: &Prepared,
+        sources: &[(Representative, Vec3)],
+        is_near: &[bool],
+    ) -> Vec<LitSurfel> {
+        let caster = &self.caster;
         let hides = |start, direction| caster.is_hidden(start, direction, f32::INFINITY);
-        let near = self.shadowed_room();
         let shares = on_all_cores(self.surfels.len(), |range| {
             let lit = |surfel: &Surfel| {
-                let irradiance = room.light_on_surfel(surfel, RAYS, &caster, sources, &near);
+                let irradiance = room.light_on_surfel(surfel, RAYS, caster, sources, is_near);
                 LitSurfel {
                     surfel: *surfel,
                     open: open_directions(surfel, hides),
@@ -171,7 +177,7 @@ impl PlacedCasters {
     }
 
     /// Where the casters' own shadows matter to the light that they get.
-    fn shadowed_room(&self) -> BoxM {
+    pub fn shadowed_room(&self) -> BoxM {
         let reach = Vec3::splat(3.0 * self.ball.radius);
         BoxM {
             min: self.ball.center - reach,

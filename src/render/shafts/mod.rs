@@ -38,8 +38,10 @@ const LEAST_WEIGHT: f32 = 1.0 / 2048.0;
 /// Penumbras are given room in the maps up to this many radii behind the casters.
 const REACH: f32 = 4.0;
 
+/// Sources that light the surfels.
+const SOURCES_OF_BOUNCE: usize = 96;
 /// Sources nearer to the casters' middle than so many of their radii are among them.
-const NEAREST_SOURCE: f32 = 1.2;
+const NEAREST_SOURCE: f32 = 3.0;
 
 /// What shafts need from frame to frame.
 pub(super) struct Shafts {
@@ -229,13 +231,29 @@ impl Shafts {
         self.maps.resize(&gpu.device, tiling);
 
         let transfers = transfers(room, &vertices, &chosen, &may_be_hidden);
-        let surfels = placed.lit_surfels(room, &chosen);
+        let detailed: Vec<(Representative, Vec3)> = representatives(
+            &room.sources,
+            &weighed,
+            SOURCES_OF_BOUNCE,
+            LEAST_WEIGHT,
+            placed.ball.center,
+        )
+        .into_iter()
+        .map(|one| {
+            (
+                one,
+                room.intensity(&one, &may_be_hidden, placed.ball.center),
+            )
+        })
+        .collect();
+        let surfels = placed.lit_surfels(room, &detailed, &is_among);
         let row_of = |vertex: u32| vertices.binary_search(&vertex).unwrap_or(0) as u32;
         let irradiances: Vec<Vec4> = vertices
             .iter()
             .map(|&vertex| room.irradiance[vertex as usize].extend(0.0))
             .collect();
-        let hidden_among = hidden_among(room, &vertices, &surfels, &is_among);
+        let dimmed = room.dimmed(&placed.caster, &detailed, &placed.shadowed_room());
+        let lost_nearby = lost_nearby(room, &vertices, &surfels, &is_among, &dimmed);
         let mut lists: Vec<u32> = Vec::new();
         let mut corners: Vec<PatchCorner> = Vec::new();
         for &patch in &noticing {
@@ -256,14 +274,14 @@ impl Shafts {
                 let [a, b] = weights;
                 let c = 1.0 - a - b;
                 let position = places[0] * a + places[1] * b + places[2] * c;
-                let [at_a, at_b, at_c] = rows.map(|row| hidden_among[row as usize]);
-                let hidden = at_a * a + at_b * b + at_c * c;
+                let [at_a, at_b, at_c] = rows.map(|row| lost_nearby[row as usize]);
+                let lost = at_a * a + at_b * b + at_c * c;
                 PatchCorner {
                     position,
                     rows,
                     weights,
                     list,
-                    thrown_back: thrown_back(position, normal, &surfels) - hidden,
+                    thrown_back: thrown_back(position, normal, &surfels) - lost,
                 }
             }));
             let least = rows.map(|row| irradiances[row as usize].truncate() * LEAST_WEIGHT);
@@ -383,17 +401,19 @@ impl Shafts {
     }
 }
 
-/// For each vertex the irradiance from patches among the casters that the casters hide from it: what their surfels cover.
-fn hidden_among(
+/// For each vertex the irradiance that it loses from patches among the casters: what the casters' surfels cover, and what
+/// their shadows took from patches around them.
+fn lost_nearby(
     room: &Prepared,
     vertices: &[u32],
     surfels: &[LitSurfel],
     is_among: &[bool],
+    dimmed: &[(usize, Vec3)],
 ) -> Vec<Vec3> {
     let shares = on_all_cores(vertices.len(), |range| {
         let hidden = |&vertex: &u32| {
             let PatchVertex { position, normal } = room.patches.vertices[vertex as usize];
-            room.hidden_among(position, normal, surfels, is_among)
+            room.hidden_among(position, normal, surfels, is_among) + room.lost_at(vertex, dimmed)
         };
         vertices[range].iter().map(hidden).collect::<Vec<_>>()
     });
