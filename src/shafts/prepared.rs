@@ -193,13 +193,14 @@ impl Prepared {
             .collect()
     }
 
-    /// Irradiance of a place from marked patches that surfels cover.
+    /// Irradiance of a place that surfels cover, from patches of which `left` knows the part of their light that the
+    /// casters' shadows leave.
     pub fn hidden_among(
         &self,
         place: Vec3,
         normal: Vec3,
         surfels: &[LitSurfel],
-        is_marked: &[bool],
+        left: &[Option<f32>],
     ) -> Vec3 {
         let start = place + normal * SURFEL_OFFSET_M;
         let covered = |surfel: &LitSurfel| {
@@ -208,8 +209,8 @@ impl Prepared {
                 return Vec3::ZERO;
             }
             match self.radiance_along(start, (surfel.surfel.position - start).normalize()) {
-                Some((radiance, patch, _)) if is_marked[patch] => radiance * part,
-                _ => Vec3::ZERO,
+                Some((radiance, patch, _)) => radiance * (part * left[patch].unwrap_or(0.0)),
+                None => Vec3::ZERO,
             }
         };
         surfels.iter().map(covered).sum()

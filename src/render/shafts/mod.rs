@@ -22,7 +22,7 @@ use crate::shafts::patches::PatchVertex;
 use crate::shafts::prepared::Prepared;
 use crate::shafts::selection::{Representative, representatives};
 use crate::shafts::source_tree::BoxM;
-use crate::shafts::surfels::{LitSurfel, thrown_back};
+use crate::shafts::surfels::{LitSurfel, thrown_back, thrown_on_caster};
 
 use super::anchor_geometry::Role;
 use super::gpu::Gpu;
@@ -154,7 +154,7 @@ impl Shafts {
             let volume = &self.room.volume;
             stage.set_indirect(&gpu.queue, &world_from_anchor, |place, normal| {
                 let surfels = self.hidden.iter().flat_map(|hidden| &hidden.surfels[..]);
-                volume.radiance(place).irradiance(normal) + thrown_back(place, normal, surfels)
+                volume.radiance(place).irradiance(normal) + thrown_on_caster(place, normal, surfels)
             });
             self.world_from_anchor = world_from_anchor;
         }
@@ -190,10 +190,8 @@ impl Shafts {
         let mut may_be_hidden = marks.sources(&room.sources);
         // Sources among the casters have no shadow map that could show them.
         let among = room.sources_within(placed.ball.center, NEAREST_SOURCE * placed.ball.radius);
-        let mut is_among = vec![false; room.patches.patches.len()];
         for &source in &among {
             may_be_hidden[source] = false;
-            is_among[room.sources.patches[source] as usize] = true;
         }
         let may_notice = marks.receivers(&room.receivers);
         let noticing: Vec<usize> = (0..may_notice.len())
@@ -264,7 +262,7 @@ impl Shafts {
             .iter()
             .map(|&vertex| room.irradiance[vertex as usize].extend(0.0))
             .collect();
-        let lost_nearby = lost_nearby(room, &vertices, &surfels, &is_among, &left);
+        let lost_nearby = lost_nearby(room, &vertices, &surfels, &left);
         let mut lists: Vec<u32> = Vec::new();
         let mut corners: Vec<PatchCorner> = Vec::new();
         for &patch in &noticing {
@@ -418,13 +416,12 @@ fn lost_nearby(
     room: &Prepared,
     vertices: &[u32],
     surfels: &[LitSurfel],
-    is_among: &[bool],
     left: &[Option<f32>],
 ) -> Vec<Vec3> {
     let shares = on_all_cores(vertices.len(), |range| {
         let hidden = |&vertex: &u32| {
             let PatchVertex { position, normal } = room.patches.vertices[vertex as usize];
-            room.hidden_among(position, normal, surfels, is_among) + room.lost_at(vertex, left)
+            room.hidden_among(position, normal, surfels, left) + room.lost_at(vertex, left)
         };
         vertices[range].iter().map(hidden).collect::<Vec<_>>()
     });
