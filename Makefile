@@ -2,7 +2,7 @@
 # Mesa's layer that asks the desktop for its favourite card complains on machines without a desktop; gnomon chooses itself.
 export NODEVICE_SELECT = 1
 
-.PHONY: demo test bench bench-volumes setup
+.PHONY: demo test charts bench bench-volumes setup
 
 demo: setup
 	cargo build --release
@@ -20,15 +20,16 @@ test: setup
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps
 	cargo test --release
 
-# How the cost of shadow volumes grows, whether silhouettes belong on the CPU, and what phantoms that are off do: figures
-# in out/.
+# Speed against accuracy on this machine: charts/.
+charts: setup
+	cargo build --release
+	target/release/gnomon chart
+
+# What a frame with shadow volumes costs, and whether silhouettes belong on the CPU: figures in out/.
 bench: setup
 	mkdir -p out
 	cargo bench --bench volumes -- --csv $(CURDIR)/out/volumes.csv
-	cargo bench --bench volumes -- --sweep --csv $(CURDIR)/out/volumes_sweep.csv
 	cargo bench --bench extrusion -- --csv $(CURDIR)/out/extrusion.csv
-	cargo bench --bench displacement -- --csv $(CURDIR)/out/displacement.csv
-	cargo bench --bench displaced_lamp -- --csv $(CURDIR)/out/displaced_lamp.csv
 
 # Beside what a user would run instead, where ../shared/peers has it.
 bench-volumes: setup

@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Context as _, Result, bail};
 use clap::{Args, Parser, Subcommand};
 
+use gnomon::app::chart::{self, chart};
 use gnomon::app::check;
 use gnomon::app::first_look::first_look;
 use gnomon::app::layer_files::Layer;
@@ -44,6 +45,31 @@ enum Command {
         /// Scene file (TOML)
         scene: PathBuf,
     },
+    /// Measures speed against accuracy on this machine, and draws it.
+    #[command(
+        after_help = "Example:\n  gnomon chart --quick --only tracking --out out/charts\n\nIt runs in the project's folder. \
+                      What has been measured is not measured again by the same program from the same recordings: after \
+                      an interrupt it goes on where it was."
+    )]
+    Chart(ChartArgs),
+}
+
+#[derive(Args)]
+struct ChartArgs {
+    /// Folder for the charts
+    #[arg(long, value_name = "DIR", default_value = "charts")]
+    out: PathBuf,
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', help = format!("Make these alone: {}", chart::names().join(", ")))]
+    only: Vec<String>,
+    /// Fewer rounds: rougher times in a tenth of the time
+    #[arg(long)]
+    quick: bool,
+    /// Track the sessions of this folder too
+    #[arg(long, value_name = "DIR")]
+    sessions: Option<PathBuf>,
+    /// Graphics adapter, by a part of its name; the fastest kind without this
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
 }
 
 #[derive(Args)]
@@ -143,6 +169,7 @@ fn run(cli: Cli) -> Result<()> {
     match cli.command {
         Command::Replay(args) => run_replay(args),
         Command::Track(args) => run_track(args),
+        Command::Chart(args) => run_chart(args),
         Command::Check { scene } => {
             let scene = Scene::load(&scene)?;
             print!("{}", check::summary(&scene));
@@ -169,6 +196,19 @@ fn run_replay(args: ReplayArgs) -> Result<()> {
         adapter: args.adapter,
     };
     conclude(&replay(&request, &stop)?)
+}
+
+fn run_chart(args: ChartArgs) -> Result<()> {
+    let stop = interrupts()?;
+    let request = chart::Request {
+        out: args.out,
+        only: args.only,
+        quick: args.quick,
+        sessions: args.sessions,
+        adapter: args.adapter,
+    };
+    eprintln!("{}", chart(&request, &stop)?);
+    Ok(())
 }
 
 fn run_track(args: TrackArgs) -> Result<()> {

@@ -1,5 +1,6 @@
-//! The jobs: replay, track, check; their clock, files and progress.
+//! The jobs: replay, track, check, chart; their clock, files and progress.
 
+pub mod chart;
 pub mod check;
 pub mod contact_sheet;
 pub mod detections_file;
@@ -20,4 +21,5 @@ pub mod stopwatch;
 mod tally;
 pub mod track;
 mod tracked;
+pub mod truth;
 pub mod video_writer;

@@ -84,8 +84,10 @@ pub struct TrackingSettings {
     pub decimation: f64,
     /// libapriltag: standard deviation of the blur before the search, pixels.
     pub blur_px: f64,
-    /// libapriltag: fit the edges of what decodes at full resolution, in linear light.
+    /// Fit the edges of what decodes at full resolution, in linear light.
     pub refine_edges: bool,
+    /// libapriltag: let the library fit the edges of whatever is square before it decodes.
+    pub library_edges: bool,
     /// OpenCV's ArUco: corner refinement.
     pub aruco_refinement: ArucoRefinement,
     /// Bits that may be corrected in a marker's code.
@@ -118,6 +120,7 @@ impl Default for TrackingSettings {
             decimation: 2.0,
             blur_px: 0.0,
             refine_edges: true,
+            library_edges: false,
             aruco_refinement: ArucoRefinement::Contour,
             corrected_bits: 1,
             min_margin: 20.0,

@@ -45,11 +45,12 @@ fn source(value: &Value) -> Result<String, SceneError> {
 }
 
 pub fn tracking(root: &Table) -> Result<TrackingSettings, SceneError> {
-    const KEYS: [&str; 11] = [
+    const KEYS: [&str; 12] = [
         "detector",
         "decimation",
         "blur_px",
         "refine_edges",
+        "library_edges",
         "aruco_refinement",
         "corrected_bits",
         "min_margin",
@@ -95,6 +96,7 @@ pub fn tracking(root: &Table) -> Result<TrackingSettings, SceneError> {
             &Numbers::between(0.0, 10.0, "px"),
         )?,
         refine_edges: tracking.flag_or("refine_edges", default.refine_edges)?,
+        library_edges: tracking.flag_or("library_edges", default.library_edges)?,
         aruco_refinement: refinement.transpose()?.unwrap_or(default.aruco_refinement),
         corrected_bits: tracking.integer_or("corrected_bits", default.corrected_bits, 0..=3)?,
         min_margin: tracking.number_or(

@@ -4,15 +4,13 @@ use glam::{DAffine3, DVec2, DVec3};
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::light::Light;
 
-pub const REAL_HIDES: u8 = 1;
-pub const VIRTUAL_HIDES: u8 = 2;
-pub const FACES_AWAY: u8 = 4;
+pub use gnomon::app::truth::FACES_AWAY;
+pub use gnomon::render::{REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};
+
 /// The light passes along the surface: what hides it there is a matter of the last bits of single precision.
 pub const GRAZES: u8 = 8;
 
 pub const NONE: u8 = 0;
-pub const REAL: u8 = 100;
-pub const VIRTUAL: u8 = 200;
 
 /// The renderer draws nothing nearer, metres.
 const NEAREST_M: f64 = 1e-3;

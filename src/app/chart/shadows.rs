@@ -1,0 +1,248 @@
+//! Shadows: time per frame against how far the picture is from what the camera would have seen, for each technique and
+//! its knobs. All draw the same frame in turn.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use anyhow::Result;
+use serde::{Deserialize, Serialize};
+
+use super::family::Chart;
+use super::figure::{Axis, Figure, Panel, Point, Rule, Series, pareto_front};
+use super::lab::Lab;
+use super::measured::rounded;
+use super::shots::{Shots, mean};
+use crate::app::stats::quantile;
+use crate::app::stopwatch::Stopwatch;
+use crate::app::truth::{Drawn, Picture};
+use crate::render::{Renderer, Shown};
+use crate::scene::{Counting, Scene, Technique};
+
+/// The chart.
+pub struct Shadows;
+
+/// One way to make the shadows of one recording.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Row {
+    recording: String,
+    technique: String,
+    setting: String,
+    /// None for what is no technique.
+    frame_median_ms: Option<f64>,
+    residual_real: f64,
+    residual_virtual: f64,
+    change_real: f64,
+    factor_rms: f64,
+    wrong_shadow_pct: f64,
+}
+
+const VOLUMES: &str = "volumes";
+const TRUTH: &str = "truth on the video";
+const BARE: &str = "bare video";
+
+/// A setting and what it does to a scene.
+struct Way {
+    setting: String,
+    scene: Scene,
+}
+
+fn ways(scene: &Scene) -> Vec<Way> {
+    let way = |setting: String, samples, max_silhouette_error_px, counting| {
+        let mut scene = scene.clone();
+        scene.shadows.technique = Technique::Volumes;
+        scene.shadows.samples = samples;
+        scene.shadows.max_silhouette_error_px = max_silhouette_error_px;
+        scene.shadows.counting = counting;
+        Way { setting, scene }
+    };
+    let mut ways = Vec::new();
+    for samples in [1, 4] {
+        for error_px in [0.0, 0.5, 2.0, 8.0] {
+            let setting = format!("{samples}x, {error_px} px");
+            ways.push(way(setting, samples, error_px, Counting::Auto));
+        }
+        let setting = format!("{samples}x, depth-fail");
+        ways.push(way(setting, samples, 0.5, Counting::DepthFail));
+    }
+    ways
+}
+
+impl Chart for Shadows {
+    const NAME: &'static str = "shadows";
+    const FAMILY: &'static str = "shadows";
+    const SHOWS: &'static str = "Time to draw a frame at true poses against its error. Residual: the picture's error on real \
+        pixels that the virtual things change, over that of the bare video; what the video's own noise leaves, with the \
+        true change put on it, is the floor. Factor: rms error of what the shadow leaves of the light, 1 without a shadow. \
+        A setting is the samples per pixel and by how much coarser versions of things may move their silhouettes; \
+        `depth-fail` counts volumes that way everywhere. What is left of the error is light between surfaces and what the \
+        torus hides of the surroundings, which point lights do not have.";
+    type Row = Row;
+
+    fn inputs(&self, lab: &Lab<'_>) -> Result<Vec<PathBuf>> {
+        let mut inputs = vec![PathBuf::from("models")];
+        for name in self.units(lab)? {
+            let recording = lab.recording(&name)?;
+            inputs.extend([recording.folder, recording.scene]);
+        }
+        Ok(inputs)
+    }
+
+    fn units(&self, lab: &Lab<'_>) -> Result<Vec<String>> {
+        let recordings = lab.recordings()?.into_iter();
+        Ok(recordings.map(|recording| recording.name).collect())
+    }
+
+    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
+        const DRAWS: usize = 12;
+        let recording = lab.recording(unit)?;
+        let scene = recording.load_scene()?;
+        let shots = Shots::of(&recording, &scene)?;
+        let gpu = lab.gpu()?;
+        let ways = ways(&scene);
+        let mut rows = Vec::new();
+        for way in &ways {
+            if lab.is_stopped() {
+                return Ok(None);
+            }
+            let drawn = shots.draw(&gpu, &way.scene)?;
+            rows.push(row(unit, VOLUMES, &way.setting, &shots, &drawn)?);
+        }
+        let mut renderers = ways
+            .iter()
+            .map(|way| Renderer::new(Arc::clone(&gpu), &way.scene, shots.intrinsics))
+            .collect::<Result<Vec<_>, _>>()?;
+        // Of each frame the least of all draws: nothing takes less than it needs.
+        let mut least_ms = vec![vec![f64::INFINITY; shots.shots.len()]; ways.len()];
+        for _ in 0..DRAWS * lab.rounds() {
+            for (index, shot) in shots.shots.iter().enumerate() {
+                if lab.is_stopped() {
+                    return Ok(None);
+                }
+                for (renderer, least_ms) in renderers.iter_mut().zip(&mut least_ms) {
+                    renderer.upload(&shot.frame)?;
+                    let (waited, ms) = Stopwatch::time(|| {
+                        renderer.draw(&shot.camera_from_anchor, Shown::Composite);
+                        renderer.wait()
+                    });
+                    waited?;
+                    least_ms[index] = least_ms[index].min(ms);
+                }
+            }
+        }
+        for (row, least_ms) in rows.iter_mut().zip(&least_ms) {
+            row.frame_median_ms = Some(rounded(quantile(least_ms, 0.5)));
+        }
+        let drawn = shots.draw(&gpu, &scene)?;
+        rows.push(row(unit, TRUTH, "", &shots, &with_truth(&shots, &drawn))?);
+        let bare: Vec<Drawn> = drawn.into_iter().map(without_anything).collect();
+        rows.push(row(unit, BARE, "", &shots, &bare)?);
+        Ok(Some(rows))
+    }
+
+    fn figure(&self, rows: &[Row]) -> Figure {
+        let mut recordings: Vec<&str> = rows.iter().map(|row| row.recording.as_str()).collect();
+        recordings.dedup();
+        type Metric = (&'static str, fn(&Row) -> f64);
+        let metrics: [Metric; 2] = [
+            ("residual on real pixels", |row| row.residual_real),
+            ("error of the factor, rms", |row| row.factor_rms),
+        ];
+        let mut panels = Vec::new();
+        for &recording in &recordings {
+            for (name, value) in metrics {
+                let here = || rows.iter().filter(move |row| row.recording == recording);
+                let measured = || {
+                    here().filter_map(move |row| Some((row, [row.frame_median_ms?, value(row)])))
+                };
+                let series = [("4 samples", "4x, "), ("1 sample", "1x, ")];
+                let series = series.into_iter().enumerate();
+                let series = series.map(|(look, (kind, prefix))| Series {
+                    name: format!("{VOLUMES}, {kind}"),
+                    look,
+                    joined: false,
+                    points: measured()
+                        .filter_map(|(row, [x, y])| {
+                            let rest = row.setting.strip_prefix(prefix)?;
+                            Some(Point::named(x, y, rest))
+                        })
+                        .collect(),
+                });
+                let rule = |technique: &str| {
+                    let row = here().find(|row| row.technique == technique);
+                    row.map(|row| Rule {
+                        upright: false,
+                        at: value(row),
+                        label: technique.to_owned(),
+                    })
+                };
+                panels.push(Panel {
+                    title: format!("{recording}: {name}"),
+                    x: Axis::log("time per frame, ms"),
+                    y: Axis::from_zero(name),
+                    series: series.collect(),
+                    rules: [rule(TRUTH), rule(BARE)].into_iter().flatten().collect(),
+                    front: pareto_front(measured().map(|(_, at)| at)),
+                });
+            }
+        }
+        Figure {
+            title: "Shadows: what a frame costs and how far it is from the truth".to_owned(),
+            reading: "The lower and the farther left the better; a label is how far silhouettes may move.".to_owned(),
+            columns: metrics.len(),
+            panel_size: [600.0, 380.0],
+            panels,
+        }
+    }
+}
+
+fn row(
+    recording: &str,
+    technique: &str,
+    setting: &str,
+    shots: &Shots,
+    drawn: &[Drawn],
+) -> Result<Row> {
+    let errors = shots.errors(drawn)?;
+    let of = |of| rounded(mean(&errors, of));
+    Ok(Row {
+        recording: recording.to_owned(),
+        technique: technique.to_owned(),
+        setting: setting.to_owned(),
+        frame_median_ms: None,
+        residual_real: of(|e| e.residual_real),
+        residual_virtual: of(|e| e.residual_virtual),
+        change_real: of(|e| e.change_real),
+        factor_rms: of(|e| e.factor),
+        wrong_shadow_pct: of(|e| e.wrong_pct),
+    })
+}
+
+/// The best that anything could draw into the recorded video: the true change, and the true factor.
+fn with_truth(shots: &Shots, drawn: &[Drawn]) -> Vec<Drawn> {
+    let frames = shots.shots.iter().zip(drawn);
+    frames
+        .map(|(shot, drawn)| {
+            let width = shots.size_px()[0] as usize;
+            let change = shot.truth.with.minus(&shot.truth.without);
+            let out = Picture::from_rgba(width, &drawn.bare).plus(&change);
+            let mut with_truth = drawn.clone();
+            with_truth.out = out
+                .pixels
+                .iter()
+                .flat_map(|p| [p[0], p[1], p[2], 255.0].map(|level| level.round() as u8))
+                .collect();
+            let factor = &shot.truth.factor.pixels;
+            with_truth.layers.gain = factor.iter().map(|f| f.map(|part| part as f32)).collect();
+            with_truth.layers.shadow[0].clone_from(&shot.truth.mask);
+            with_truth
+        })
+        .collect()
+}
+
+/// The video as it is.
+fn without_anything(mut drawn: Drawn) -> Drawn {
+    drawn.out.clone_from(&drawn.bare);
+    drawn.layers.gain.fill([1.0; 3]);
+    drawn.layers.shadow.iter_mut().for_each(|bits| bits.fill(0));
+    drawn
+}
