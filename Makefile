@@ -2,7 +2,7 @@
 # Mesa's layer that asks the desktop for its favourite card complains on machines without a desktop; gnomon chooses itself.
 export NODEVICE_SELECT = 1
 
-.PHONY: demo test charts bench bench-volumes setup
+.PHONY: demo test test-camera charts bench bench-volumes bench-tracking setup
 
 demo: setup
 	cargo build --release
@@ -20,6 +20,11 @@ test: setup
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps
 	cargo test --release
 
+# On a real camera device in a small emulated machine (minutes; as root; not in CI), where ../shared/virtual-camera is.
+test-camera: setup
+	cargo build --release
+	tools/test_camera.sh
+
 # Speed against accuracy on this machine: charts/.
 charts: setup
 	cargo build --release
@@ -34,6 +39,9 @@ bench: setup
 # Beside what a user would run instead, where ../shared/peers has it.
 bench-volumes: setup
 	tools/bench_volumes.sh
+
+bench-tracking: setup
+	tools/bench_tracking.sh
 
 setup:
 	@scripts/setup

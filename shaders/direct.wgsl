@@ -1,6 +1,7 @@
 // Real and virtual surfaces drawn straight over the video, where one light and one sample leave nothing to add up.
 //!include "shading.wgsl"
 //!include "video.wgsl"
+//!include "whole_picture.wgsl"
 
 struct Place {
     @invariant @builtin(position) clip: vec4f,
@@ -26,6 +27,26 @@ fn hidden_on_real(surface: Surface, @builtin(front_facing) outside: bool) -> @lo
     return vec4f(select(recorded, srgb_from_linear(linear_from_srgb(recorded) * gain), loses), 1.0);
 }
 
+// Of a virtual surface the picture gets all its light, as if nothing hid any, and `ambient` what is left of it where
+// something does.
+struct Light {
+    @location(0) picture: vec4f,
+    // a: which surface is seen, one of the three below.
+    @location(1) ambient: vec4f,
+}
+
+const NOT_VIRTUAL: f32 = 0.0;
+// In the shadow if it lies in one volume.
+const IN_OPEN_LIGHT: f32 = 1.0;
+// In the shadow if it lies in two: the first is its own, and smooth shading lights it all the same. Otherwise the facets
+// would draw a jagged line where the light ends.
+const AT_TERMINATOR: f32 = 0.5;
+
+@fragment
+fn nothing() -> Light {
+    return Light(vec4f(0.0), vec4f(NOT_VIRTUAL));
+}
+
 struct AmbientSurface {
     @invariant @builtin(position) clip: vec4f,
     @location(0) radiance: vec3f,
@@ -36,13 +57,32 @@ fn place_in_ambient_light(@location(0) position: vec3f, @location(2) material: v
     return AmbientSurface(clip_from_point(view, vec4f(position, 1.0)), material.rgb / PI * indirect);
 }
 
+// No light reaches it that could be taken again.
 @fragment
-fn ambient_on_virtual(surface: AmbientSurface) -> @location(0) vec4f {
-    return vec4f(srgb_from_linear(surface.radiance), 1.0);
+fn ambient_on_virtual(surface: AmbientSurface) -> Light {
+    return Light(vec4f(srgb_from_linear(surface.radiance), 1.0), vec4f(NOT_VIRTUAL));
 }
 
+// Set when the shader is built.
+override SEEN: f32 = IN_OPEN_LIGHT;
+
 @fragment
-fn light_on_virtual(surface: Surface, @builtin(front_facing) outside: bool) -> @location(0) vec4f {
+fn light_on_virtual(surface: Surface, @builtin(front_facing) outside: bool) -> Light {
     let ambient = surface.material.rgb / PI * surface.indirect;
-    return vec4f(srgb_from_linear(ambient + radiance(surface, outside)), 1.0);
+    return Light(
+        vec4f(srgb_from_linear(ambient + radiance(surface, outside)), 1.0),
+        vec4f(srgb_from_linear(ambient), SEEN),
+    );
+}
+
+@group(3) @binding(0) var ambient: texture_2d<f32>;
+
+// What is left to virtual surfaces of one kind in the shadow.
+@fragment
+fn shadow_on_virtual(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    let left = textureLoad(ambient, vec2i(at.xy), 0);
+    if abs(left.a - SEEN) > 0.1 {
+        discard;
+    }
+    return vec4f(left.rgb, 1.0);
 }

@@ -48,7 +48,11 @@ fn linear_from_srgb(encoded: vec3f) -> vec3f {
     return select(pow((encoded + 0.055) / 1.055, vec3f(2.4)), encoded / 12.92, encoded <= vec3f(0.04045));
 }
 
+// Its power as a polynomial in the fourth root (minimax fit, off by less than 0.002 levels of 255): `pow` took as long as all
+// other shading.
 fn srgb_from_linear(linear: vec3f) -> vec3f {
     let displayed = clamp(linear, vec3f(0.0), vec3f(1.0));
-    return select(1.055 * pow(displayed, vec3f(1.0 / 2.4)) - 0.055, displayed * 12.92, displayed <= vec3f(0.0031308));
+    let root = sqrt(sqrt(displayed));
+    let curve = -0.06134024 + root * (0.16202654 + root * (1.25540335 + root * (-0.57748083 + root * (0.28953139 - root * 0.06814678))));
+    return select(curve, displayed * 12.92, displayed <= vec3f(0.0031308));
 }

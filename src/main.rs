@@ -9,14 +9,21 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Context as _, Result, bail};
 use clap::{Args, Parser, Subcommand};
 
+use gnomon::app::board::{self, Distance, board};
+use gnomon::app::calibrate;
+use gnomon::app::cameras;
 use gnomon::app::chart::{self, chart};
 use gnomon::app::check;
 use gnomon::app::first_look::first_look;
 use gnomon::app::layer_files::Layer;
+use gnomon::app::markers::{self, Paper, Sheet};
+use gnomon::app::record;
 use gnomon::app::replay::{self, replay};
 use gnomon::app::report::Report;
 use gnomon::app::track::{self, is_scene, track};
-use gnomon::scene::{CameraSettings, Family, Scene};
+use gnomon::scene::{CameraSettings, Family, PixelFormat, Scene, TrackingSettings, WantedFormat};
+use gnomon::tracking::calibrating::Chessboard;
+use gnomon::tracking::mapping::MapSettings;
 
 /// Virtual things on a real table, lit and shadowed as if they stood there.
 #[derive(Parser)]
@@ -33,12 +40,39 @@ enum Command {
         after_help = "Example:\n  gnomon replay config/lamp.toml --out out/lamp.mp4 --sheet out/lamp.png"
     )]
     Replay(ReplayArgs),
-    /// Finds where the markers are in a recording, without drawing: poses as a file. Needs no GPU.
+    /// Finds where the markers are, without drawing: poses as a file. Needs no GPU.
     #[command(
         after_help = "Example:\n  gnomon track config/lamp.toml --poses out/lamp.csv\n  gnomon track walk.mp4 \
                       --calibration camera.toml --size-mm 40 --poses out/walk.csv"
     )]
     Track(TrackArgs),
+    /// Learns from a recording where markers lie about a table.
+    #[command(
+        after_help = "Example:\n  gnomon board --from walk.mp4 --calibration camera.toml --size-mm 40 --out table.toml"
+    )]
+    Board(BoardArgs),
+    /// Calibrates a camera from a video or pictures of a chessboard.
+    #[command(
+        after_help = "Example:\n  gnomon calibrate walk.mp4 --chessboard 9x6 --square-mm 25 --out camera.toml --coverage out/coverage.png"
+    )]
+    Calibrate(CalibrateArgs),
+    /// Makes sheets of markers, or a chessboard, to print.
+    #[command(
+        after_help = "Example:\n  gnomon markers --board 3x2 --size-mm 45 --gap-mm 40 --landscape --out table.pdf\n  \
+                      gnomon markers --ids 17,18 --size-mm 36 --out cards.pdf\n  \
+                      gnomon markers --chessboard 9x6 --square-mm 25 --landscape --out chessboard.pdf"
+    )]
+    Markers(MarkersArgs),
+    /// Records a camera as a session that replay and track take up, until Ctrl-C.
+    #[command(
+        after_help = "Example:\n  gnomon record webcam:0 --calibration camera.toml --out out/session --seconds 20"
+    )]
+    Record(RecordArgs),
+    /// Lists the cameras and their formats.
+    #[command(
+        after_help = "Example:\n  gnomon cameras    # and then: gnomon record webcam:0 --out out/session"
+    )]
+    Cameras,
     /// Reads a scene, says what is wrong with it or what is in it.
     #[command(after_help = "Example:\n  gnomon check config/lamp.toml")]
     Check {
@@ -107,7 +141,7 @@ struct ReplayArgs {
 
 #[derive(Args)]
 struct TrackArgs {
-    /// Scene file (.toml), session, video, picture or folder of pictures
+    /// Scene file (.toml), session, video, picture or folder of pictures, webcam (webcam:0) or address (http://…)
     source: PathBuf,
     #[command(flatten)]
     recording: RecordingArgs,
@@ -130,7 +164,134 @@ struct TrackArgs {
     stats: Option<PathBuf>,
 }
 
-/// A recording that no scene describes.
+#[derive(Args)]
+struct BoardArgs {
+    /// Scene file (.toml), session, video or folder of pictures that show the markers from all around
+    #[arg(long, value_name = "SOURCE")]
+    from: PathBuf,
+    #[command(flatten)]
+    recording: RecordingArgs,
+    /// Side of the markers' black squares (of the gauge's with --sizes estimate)
+    #[arg(long, value_name = "MM")]
+    size_mm: f64,
+    /// Whether all markers have that size, or the others' are to be learnt
+    #[arg(long, value_enum, default_value = "given")]
+    sizes: Sizes,
+    /// Marker whose centre is the origin, its right the board's x; the lowest id without this
+    #[arg(long, value_name = "ID")]
+    gauge: Option<u32>,
+    /// Distance measured between two markers' centres: a better scale than a marker's size
+    #[arg(long, value_name = "ID:ID:MM", value_parser = distance_of)]
+    distance: Option<Distance>,
+    /// What a marker may lie off the plane of the others
+    #[arg(long, value_name = "MM", default_value = "2")]
+    plane_tolerance_mm: f64,
+    #[command(flatten)]
+    family: FamilyArgs,
+    /// Name of the board
+    #[arg(long, value_name = "NAME", default_value = "table")]
+    name: String,
+    /// Write the [[board]] to a file rather than to stdout
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+#[derive(Args)]
+struct CalibrateArgs {
+    /// Video, folder of pictures or session that shows the chessboard from all around
+    source: String,
+    /// Its inner corners, where four squares meet
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = counts_of)]
+    chessboard: [u32; 2],
+    /// Side of its squares
+    #[arg(long, value_name = "MM")]
+    square_mm: f64,
+    /// Write the calibration (TOML)
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Write a picture of where in the picture there were corners (PNG)
+    #[arg(long, value_name = "FILE")]
+    coverage: Option<PathBuf>,
+}
+
+#[derive(Args)]
+#[command(group = clap::ArgGroup::new("sheet").required(true).args(["board", "ids", "chessboard"]))]
+struct MarkersArgs {
+    /// The sheet: .pdf (true size), .svg or .png; what a scene file takes is written beside it as .toml
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// A board of so many columns and rows of markers, which are one anchor
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = counts_of, requires_all = ["size_mm", "gap_mm"])]
+    board: Option<[u32; 2]>,
+    /// Markers to be cut out, each on its own
+    #[arg(long, value_name = "ID,…", value_delimiter = ',', requires = "size_mm")]
+    ids: Option<Vec<u32>>,
+    /// A chessboard with so many inner corners, to calibrate a camera with
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = counts_of, requires = "square_mm")]
+    chessboard: Option<[u32; 2]>,
+    /// Side of the markers' black squares
+    #[arg(long, value_name = "MM")]
+    size_mm: Option<f64>,
+    /// White between the markers of a board
+    #[arg(long, value_name = "MM")]
+    gap_mm: Option<f64>,
+    /// Side of the chessboard's squares
+    #[arg(long, value_name = "MM")]
+    square_mm: Option<f64>,
+    /// Id of the board's upper left marker; the others follow row by row
+    #[arg(long, value_name = "ID", default_value = "0")]
+    first_id: u32,
+    /// Name of the board
+    #[arg(long, value_name = "NAME", default_value = "table")]
+    name: String,
+    #[command(flatten)]
+    family: FamilyArgs,
+    /// Paper to print on
+    #[arg(long, value_enum, default_value = "a4")]
+    page: PageSize,
+    /// The paper lies on its side
+    #[arg(long)]
+    landscape: bool,
+    /// Pixels per inch of a PNG
+    #[arg(long, value_name = "DPI", default_value = "300")]
+    dpi: f64,
+}
+
+/// Sizes of paper.
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum PageSize {
+    /// 210 x 297 mm
+    A4,
+    /// 297 x 420 mm
+    A3,
+    /// 8.5 x 11 inches
+    Letter,
+}
+
+/// Where markers' sizes come from.
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+enum Sizes {
+    /// All are --size-mm
+    Given,
+    /// The gauge's is --size-mm, the others are learnt
+    Estimate,
+}
+
+#[derive(Args)]
+struct RecordArgs {
+    /// Scene file (.toml), webcam (webcam:0, webcam:NAME, /dev/video0), address (http://…, rtsp://…), or recording
+    source: PathBuf,
+    #[command(flatten)]
+    recording: RecordingArgs,
+    /// The session's folder: a new one
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// End after this many seconds of frames
+    #[arg(long, value_name = "N", value_parser = seconds_of)]
+    seconds: Option<f64>,
+}
+
+/// A recording or a camera that no scene describes.
 #[derive(Args)]
 struct RecordingArgs {
     /// Calibration of the camera; without it the one that the recording carries
@@ -139,20 +300,40 @@ struct RecordingArgs {
     /// The camera mirrors its pictures: turn them back first
     #[arg(long)]
     mirror: bool,
+    /// libapriltag searches pictures shrunk by this: 2 without it, 1 finds smaller markers
+    #[arg(long, value_name = "FACTOR")]
+    decimation: Option<f64>,
+    /// Ask a webcam for pictures of this size; without it the calibration's
+    #[arg(long, value_name = "WxH", value_parser = size_of)]
+    size: Option<[u32; 2]>,
+    /// Ask a webcam for this rate
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    fps: Option<u32>,
+    /// Ask a webcam for this format: MJPEG, YUYV, NV12, GREY, RGB, BGR
+    #[arg(long, value_name = "NAME", value_parser = pixel_format_of)]
+    format: Option<PixelFormat>,
+}
+
+impl RecordingArgs {
+    fn is_given(&self) -> bool {
+        self.calibration.is_some()
+            || self.decimation.is_some()
+            || self.mirror
+            || self.size.is_some()
+            || self.fps.is_some()
+            || self.format.is_some()
+    }
 }
 
 /// Markers that no scene describes.
 #[derive(Args)]
 struct FamilyArgs {
     /// Family of the markers: tag16h5, tag25h9, tag36h10, tag36h11, DICT_4X4_50, …
-    #[arg(long, value_name = "NAME", default_value = "tag36h11", value_parser = family_of)]
+    #[arg(long, value_name = "NAME", default_value = "tag36h11", value_parser = family_of, requires = "size_mm")]
     family: Family,
     /// Width of the markers' black border, cells: 1, or 2 as on Kalibr's AprilGrids
-    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=2))]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=2), requires = "size_mm")]
     border_cells: u32,
-    /// libapriltag searches pictures shrunk by this; 1 finds smaller markers
-    #[arg(long, value_name = "FACTOR", default_value = "2")]
-    decimation: f64,
 }
 
 fn main() -> ExitCode {
@@ -169,6 +350,26 @@ fn run(cli: Cli) -> Result<()> {
     match cli.command {
         Command::Replay(args) => run_replay(args),
         Command::Track(args) => run_track(args),
+        Command::Board(args) => run_board(args),
+        Command::Calibrate(args) => {
+            let request = calibrate::Request {
+                source: args.source,
+                board: Chessboard {
+                    corners: args.chessboard,
+                    square_m: args.square_mm / 1000.0,
+                },
+                out: args.out,
+                coverage: args.coverage,
+            };
+            print!("{}", calibrate::calibrate(&request, &*interrupts()?)?);
+            Ok(())
+        }
+        Command::Markers(args) => run_markers(args),
+        Command::Record(args) => run_record(args),
+        Command::Cameras => {
+            print!("{}", cameras::cameras()?);
+            Ok(())
+        }
         Command::Chart(args) => run_chart(args),
         Command::Check { scene } => {
             let scene = Scene::load(&scene)?;
@@ -222,16 +423,140 @@ fn run_track(args: TrackArgs) -> Result<()> {
     conclude(&track(&request, &stop)?)
 }
 
+fn run_markers(args: MarkersArgs) -> Result<()> {
+    let family = args.family.family()?;
+    // Each kind of sheet requires its sizes (`requires` above).
+    let mm = |size: Option<f64>| size.unwrap_or(f64::NAN);
+    let sheet = match (args.board, args.ids, args.chessboard) {
+        (Some([columns, rows]), ..) => Sheet::Board {
+            family,
+            first_id: args.first_id,
+            rows,
+            columns,
+            size_mm: mm(args.size_mm),
+            gap_mm: mm(args.gap_mm),
+            name: args.name,
+        },
+        (_, Some(ids), _) => Sheet::Lone {
+            family,
+            ids,
+            size_mm: mm(args.size_mm),
+        },
+        (.., corners) => {
+            let [columns, rows] = corners.unwrap_or_default();
+            Sheet::Chessboard {
+                columns,
+                rows,
+                square_mm: mm(args.square_mm),
+            }
+        }
+    };
+    let written = markers::markers(&markers::Request {
+        out: args.out,
+        sheet,
+        paper: match args.page {
+            PageSize::A4 => Paper::A4,
+            PageSize::A3 => Paper::A3,
+            PageSize::Letter => Paper::Letter,
+        },
+        landscape: args.landscape,
+        dpi: args.dpi,
+    })?;
+    for path in written {
+        eprintln!("{}", path.display());
+    }
+    Ok(())
+}
+
+/// Columns and rows, "9x6".
+fn counts_of(text: &str) -> Result<[u32; 2], String> {
+    let counts = text.split_once('x').and_then(|(columns, rows)| {
+        Some([columns.trim().parse().ok()?, rows.trim().parse().ok()?])
+    });
+    counts
+        .filter(|counts| counts.iter().all(|&count| (1..=1000).contains(&count)))
+        .ok_or_else(|| "columns and rows are expected, as in 9x6".to_owned())
+}
+
+fn run_board(args: BoardArgs) -> Result<()> {
+    let stop = interrupts()?;
+    let input = if is_scene(&args.from) {
+        args.recording.refuse_beside(&args.from)?;
+        board::Input::Scene(args.from.clone())
+    } else {
+        board::Input::Recording {
+            camera: camera_of(&args.from, &args.recording)?,
+            decimation: args.recording.decimation(),
+        }
+    };
+    if !(0.0..=1e4).contains(&args.plane_tolerance_mm) {
+        bail!(
+            "--plane-tolerance-mm {}: out of range; allowed: 0 to 10000 mm",
+            args.plane_tolerance_mm
+        );
+    }
+    let request = board::Request {
+        input,
+        family: args.family.family()?,
+        map: MapSettings {
+            size_m: size_m(args.size_mm)?,
+            gauge: args.gauge,
+            learns_sizes: args.sizes == Sizes::Estimate,
+            plane_tolerance_m: args.plane_tolerance_mm * 1e-3,
+        },
+        distance: args.distance,
+        name: args.name,
+        out: args.out,
+    };
+    board(&request, &stop)
+}
+
+fn distance_of(text: &str) -> Result<Distance, String> {
+    let parts: Vec<&str> = text.split(':').collect();
+    let parsed = match parts[..] {
+        [a, b, mm] => (a.parse().ok()).zip(b.parse().ok()).zip(mm.parse().ok()),
+        _ => None,
+    };
+    let expected = "two ids and the millimetres between their centres are expected, like 0:7:412.5";
+    match parsed {
+        Some(((a, b), mm)) if a != b && (1e-3..1e6).contains(&mm) => Ok(Distance {
+            ids: [a, b],
+            distance_m: mm * 1e-3,
+        }),
+        _ => Err(expected.to_owned()),
+    }
+}
+
+fn run_record(args: RecordArgs) -> Result<()> {
+    let stop = interrupts()?;
+    let input = if is_scene(&args.source) {
+        args.recording.refuse_beside(&args.source)?;
+        record::Input::Scene(args.source)
+    } else {
+        record::Input::Camera(camera_of(&args.source, &args.recording)?)
+    };
+    let request = record::Request {
+        input,
+        out: args.out,
+        seconds: args.seconds,
+    };
+    eprintln!("{}", record::record(&request, &stop)?);
+    Ok(())
+}
+
+fn seconds_of(written: &str) -> Result<f64, String> {
+    let seconds = written.parse().ok();
+    seconds
+        .filter(|seconds: &f64| *seconds > 0.0 && seconds.is_finite())
+        .ok_or_else(|| "not a time; a number above 0 is expected".to_owned())
+}
+
 fn track_input(args: &TrackArgs) -> Result<track::Input> {
     if is_scene(&args.source) {
-        let RecordingArgs {
-            calibration,
-            mirror,
-        } = &args.recording;
-        if calibration.is_some() || *mirror || args.anchors.is_some() || args.size_mm.is_some() {
+        args.recording.refuse_beside(&args.source)?;
+        if args.anchors.is_some() || args.size_mm.is_some() {
             bail!(
-                "{} is a scene, which says itself what is tracked in what; --calibration, --mirror, --anchors and \
-                 --size-mm go with a recording",
+                "{} is a scene, which says itself what is tracked; --anchors and --size-mm go with a recording",
                 args.source.display()
             );
         }
@@ -239,17 +564,39 @@ fn track_input(args: &TrackArgs) -> Result<track::Input> {
     }
     let camera = camera_of(&args.source, &args.recording)?;
     match (&args.anchors, args.size_mm) {
+        (Some(_), _) if args.recording.decimation.is_some() => {
+            bail!("--anchors takes the scene's [tracking]; --decimation does not go with it")
+        }
         (Some(scene), _) => Ok(track::Input::RecordingWithScene(camera, scene.clone())),
         (None, Some(size_mm)) => Ok(track::Input::LoneMarkers {
             camera,
             family: args.family.family()?,
             size_m: size_m(size_mm)?,
-            decimation: args.family.decimation,
+            decimation: args.recording.decimation(),
         }),
         (None, None) => bail!(
             "what is tracked in {}? Give --anchors SCENE, or --size-mm MM for markers each on its own",
             args.source.display()
         ),
+    }
+}
+
+impl RecordingArgs {
+    fn decimation(&self) -> f64 {
+        self.decimation
+            .unwrap_or(TrackingSettings::default().decimation)
+    }
+
+    /// A scene says all of this itself.
+    fn refuse_beside(&self, scene: &Path) -> Result<()> {
+        if self.is_given() {
+            bail!(
+                "{} is a scene, which says itself which camera; --calibration, --mirror, --decimation, --size, --fps \
+                 and --format go with a recording or a camera",
+                scene.display()
+            );
+        }
+        Ok(())
     }
 }
 
@@ -279,6 +626,28 @@ fn camera_of(source: &Path, args: &RecordingArgs) -> Result<CameraSettings> {
         source: source.to_owned(),
         calibration: args.calibration.clone(),
         mirror: args.mirror,
+        wanted: WantedFormat {
+            size_px: args.size,
+            fps: args.fps,
+            pixels: args.format,
+        },
+    })
+}
+
+fn size_of(written: &str) -> Result<[u32; 2], String> {
+    let side = |side: &str| side.parse().ok().filter(|side| (1..=32768).contains(side));
+    written
+        .split_once('x')
+        .and_then(|(width, height)| Some([side(width)?, side(height)?]))
+        .ok_or_else(|| "not a size; write WIDTHxHEIGHT, as 1280x720".to_owned())
+}
+
+fn pixel_format_of(name: &str) -> Result<PixelFormat, String> {
+    let mut known = PixelFormat::BY_NAME.into_iter();
+    let found = known.find(|(known, _)| known.eq_ignore_ascii_case(name));
+    found.map(|(_, format)| format).ok_or_else(|| {
+        let allowed: Vec<&str> = PixelFormat::BY_NAME.iter().map(|(name, _)| *name).collect();
+        format!("unknown format; allowed: {}", allowed.join(", "))
     })
 }
 

@@ -4,11 +4,18 @@
 mod common;
 
 use common::random::{Random, random_camera, random_stage};
-use common::{Stage, look_at, project_file, stability_row, sun};
-use glam::{DAffine3, DVec2, DVec3};
+use common::{Stage, Thing, lamp, look_at, project_file, shapes, stability_row, sun};
+use glam::{DAffine3, DVec2, DVec3, Vec3};
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::light::Light;
 use gnomon::scene::Counting;
+
+const CAMERA: Intrinsics = Intrinsics {
+    size_px: [320, 240],
+    focal_px: DVec2::splat(325.0),
+    center_px: DVec2::new(159.5, 119.5),
+    distortion: [0.0; 5],
+};
 
 /// Holds what both ways draw against each other, camera by camera.
 fn hold(name: &str, stage: &mut Stage, intrinsics: Intrinsics, cameras: &[DAffine3]) {
@@ -62,6 +69,41 @@ fn a_flight_through_a_shadow_looks_the_same_counted_either_way() {
         })
         .collect();
     hold("base", &mut stage, row.view.intrinsics, &cameras);
+}
+
+/// Of a ball with holes depth-pass needs the inside only where it shows through them, depth-fail all of it.
+#[test]
+fn what_shows_through_holes_looks_the_same_counted_either_way() {
+    let whole = shapes::sphere(0.03, 16, 24);
+    let middle = |index: usize| {
+        let corners = whole.triangles[index].map(|corner| whole.positions[corner as usize]);
+        corners.iter().sum::<Vec3>().normalize()
+    };
+    let holes = [Vec3::new(0.6, 0.0, 0.8), Vec3::new(-0.53, -0.8, 0.28)];
+    let is_hole = |index: usize| holes.iter().any(|hole| hole.dot(middle(index)) > 0.85);
+    let ball = || Thing::made(whole.clone().without(is_hole)).at([0.0, 0.0, 0.05]);
+    let crate_ = || Thing::made(shapes::cuboid([-0.02; 3], [0.02; 3])).at([0.07, -0.02, 0.02]);
+    let table = || Thing::file("plane.obj");
+    let cameras: Vec<DAffine3> = (0..18)
+        .map(|step| {
+            let turn = DVec2::from_angle(0.35 * f64::from(step));
+            let eye = (turn * 0.3).extend(0.05 + 0.02 * f64::from(step % 9));
+            look_at(eye, DVec3::new(0.02, 0.0, 0.03))
+        })
+        .collect();
+    for (name, phantoms, virtuals) in [
+        ("virtual", vec![table()], vec![ball(), crate_()]),
+        ("real", vec![table(), ball()], vec![crate_()]),
+    ] {
+        let lights = vec![lamp([-0.25, 0.1, 0.5], [0.9; 3])];
+        let card = Some(DAffine3::IDENTITY);
+        let mut stage = Stage::new(&phantoms, &virtuals, card, lights, DVec3::splat(0.1));
+        for samples in [1, 4] {
+            stage.scene.shadows.samples = samples;
+            let name = format!("{name}, {samples} samples");
+            hold(&name, &mut stage, CAMERA, &cameras);
+        }
+    }
 }
 
 /// A second light that gives nothing makes the renderer add up.

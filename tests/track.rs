@@ -252,6 +252,27 @@ fn mistakes_are_told_and_leave_nothing() {
         &["decimation = 0", "1 to 16"],
     );
     refused(
+        &["track", scene, "--decimation", "1", "--poses", "p.csv"],
+        &["is a scene", "--decimation"],
+    );
+    refused(
+        &["track", scene, "--family", "tag16h5", "--poses", "p.csv"],
+        &["--size-mm"],
+    );
+    refused(
+        &[
+            "track",
+            recording,
+            "--anchors",
+            scene,
+            "--decimation",
+            "1",
+            "--poses",
+            "p.csv",
+        ],
+        &["does not go with it"],
+    );
+    refused(
         &[
             "track",
             "no/such/place",
@@ -291,11 +312,13 @@ fn mistakes_are_told_and_leave_nothing() {
 /// Frames of the lamp as pictures, as they are and as a camera that mirrors gives them.
 fn picture_folders(folder: &Path) -> [PathBuf; 2] {
     let folders = ["as-is", "mirrored"].map(|name| folder.join(name));
-    let mut source = FrameSource::open(plain(&project_file("recordings/lamp"))).unwrap();
+    let mut source =
+        FrameSource::open(plain(&project_file("recordings/lamp"))).expect("the shipped recording");
     for _ in 0..6 {
-        let mut frame = source.next_frame().unwrap().unwrap();
+        let mut frame = source.next_frame().expect("a frame").expect("a frame");
         let name = format!("{:06}.png", frame.index);
-        write_rgb_png(&folders[0].join(&name), frame.size_px, &frame.rgba).unwrap();
+        write_rgb_png(&folders[0].join(&name), frame.size_px, &frame.rgba)
+            .expect("a written picture");
         let width = frame.size_px[0] as usize;
         let before = frame.rgba.clone();
         frame.mirror();
@@ -304,7 +327,8 @@ fn picture_folders(folder: &Path) -> [PathBuf; 2] {
             let from = 4 * (row * width + width - 1 - column);
             assert_eq!(pixel, &before[from..from + 4]);
         }
-        write_rgb_png(&folders[1].join(&name), frame.size_px, &frame.rgba).unwrap();
+        write_rgb_png(&folders[1].join(&name), frame.size_px, &frame.rgba)
+            .expect("a written picture");
     }
     folders
 }

@@ -1,225 +1,24 @@
-//! Tracking against known answers: sheets rendered through a known camera, and photographs with real markers.
+//! Tracking against known answers: sheets rendered through a known camera.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::f64::consts::PI;
-use std::path::{Path, PathBuf};
+mod common;
 
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 use gnomon::capture::Frame;
 use gnomon::geometry::camera::Intrinsics;
-use gnomon::scene::{
-    Anchor, ArucoRefinement, Codes, DetectorKind, Family, Marker, TrackingSettings,
-};
+use gnomon::scene::{ArucoRefinement, Codes, DetectorKind, Family, Marker, TrackingSettings};
 use gnomon::tracking::{AnchorPose, Detection, Detector, Status, Tracker, TrackingError, Why};
 
-// ---------------------------------------------------------------------------------------------------------------------
-// Sheets as printed, written down here so that no library under test draws its own question.
-
-const CAMERA: Intrinsics = Intrinsics {
-    size_px: [640, 480],
-    focal_px: DVec2::new(615.0, 613.0),
-    center_px: DVec2::new(321.4, 238.2),
-    distortion: [0.0; 5],
+use common::sheets::{
+    CAMERA, WIDE_CAMERA, anchor, angle_between_deg, camera_above, grey_of, marker, photograph,
+    settings, table, track_once, true_corners_px, with_noise,
 };
-
-const WIDE_CAMERA: Intrinsics = Intrinsics {
-    distortion: [-0.28, 0.09, 0.0015, -0.001, -0.01],
-    ..CAMERA
-};
-
-/// The cells of a marker as printed, without its black border; `#` is white.
-fn printed(family: Family, id: u32) -> &'static [&'static str] {
-    match (family.codes(), id) {
-        (Codes::Tag36h11, 0) => &["##.#.#", ".###.#", ".##...", "#.#...", ".#.##.", "...#.."],
-        (Codes::Tag36h11, 1) => &["##.##.", ".#.###", "####..", ".##...", "#.##.#", "..#..#"],
-        (Codes::Tag36h11, 2) => &["##.###", ".#..#.", "#.....", "..#..#", "...#..", "..###."],
-        (Codes::Tag36h11, 17) => &[".##.#.", "....##", "#.###.", "##.##.", "##...#", "..##.."],
-        // The bytes 181, 50 of OpenCV's DICT_4X4_50.
-        (Codes::Aruco { cells: 4, .. }, 0) => &["#.##", ".#.#", "..##", "..#."],
-        _ => panic!("not written down: {} {id}", family),
-    }
-}
-
-fn marker(id: u32, size_m: f64, x_m: f64, y_m: f64) -> Marker {
-    Marker {
-        family: Family::TAG36H11,
-        id,
-        size_m,
-        center_m: DVec2::new(x_m, y_m),
-        rotation_rad: 0.0,
-    }
-}
-
-fn anchor(name: &str, markers: &[Marker]) -> Anchor {
-    Anchor {
-        name: name.into(),
-        markers: markers.to_vec(),
-    }
-}
-
-/// Whether a marker prints white or black at a point of its anchor's plane; `None` beside it.
-fn is_white(marker: &Marker, point_m: DVec2) -> Option<bool> {
-    let local = DVec2::from_angle(-marker.rotation_rad).rotate(point_m - marker.center_m);
-    let cells = printed(marker.family, marker.id);
-    let border = marker.family.border_cells() as i32;
-    let across = cells.len() as i32 + 2 * border;
-    // In cells from the black square's top left corner.
-    let column = ((local.x / marker.size_m + 0.5) * f64::from(across)).floor() as i32;
-    let row = ((0.5 - local.y / marker.size_m) * f64::from(across)).floor() as i32;
-    if !(0..across).contains(&column) || !(0..across).contains(&row) {
-        return None;
-    }
-    let cell = |row: i32, column: i32| {
-        Some(cells.get(row as usize)?.as_bytes().get(column as usize)? == &b'#')
-    };
-    Some(cell(row - border, column - border).unwrap_or(false))
-}
-
-/// Linear light from a sheet: its markers on white paper that reaches half a marker beyond them; `None` beside the paper.
-fn sheet_level(markers: &[Marker], point_m: DVec2) -> Option<f64> {
-    let print = markers.iter().find_map(|marker| is_white(marker, point_m));
-    let on_paper = || {
-        let beyond = |marker: &Marker| DVec2::splat(marker.size_m);
-        let low = markers
-            .iter()
-            .map(|m| m.center_m - beyond(m))
-            .reduce(DVec2::min)?;
-        let high = markers
-            .iter()
-            .map(|m| m.center_m + beyond(m))
-            .reduce(DVec2::max)?;
-        (point_m.cmpge(low).all() && point_m.cmple(high).all()).then_some(true)
-    };
-    print
-        .or_else(on_paper)
-        .map(|white| if white { 0.8 } else { 0.02 })
-}
-
-/// A camera on which the sheet stands upright, tilted by `tilt_deg` about the picture's x and turned by `turn_deg`.
-fn camera_above(tilt_deg: f64, turn_deg: f64, at_m: DVec3) -> DAffine3 {
-    let rotation = DQuat::from_rotation_x(tilt_deg.to_radians())
-        * DQuat::from_rotation_x(PI)
-        * DQuat::from_rotation_z(turn_deg.to_radians());
-    DAffine3::from_rotation_translation(rotation, at_m)
-}
-
-/// Photographs sheets of markers, 4 × 4 samples a pixel.
-fn photograph(camera: &Intrinsics, sheets: &[(&[Marker], DAffine3)], time_secs: f64) -> Frame {
-    const SAMPLES: usize = 4;
-    let anchors_from_camera = sheets
-        .iter()
-        .map(|(_, pose)| pose.inverse())
-        .collect::<Vec<_>>();
-    let [width, height] = camera.size_px;
-    let mut rgba = Vec::with_capacity(4 * (width * height) as usize);
-    for y in 0..height {
-        for x in 0..width {
-            let mut sum = 0.0;
-            for k in 0..SAMPLES * SAMPLES {
-                let offset = DVec2::new((k % SAMPLES) as f64, (k / SAMPLES) as f64) + 0.5;
-                let pixel = DVec2::new(f64::from(x), f64::from(y)) - 0.5 + offset / SAMPLES as f64;
-                let target = camera.plane_from_pixel(pixel);
-                let mut point = target;
-                if camera.distortion != [0.0; 5] {
-                    for _ in 0..15 {
-                        point += target - camera.distort(point);
-                    }
-                }
-                let level = sheets.iter().zip(&anchors_from_camera).find_map(
-                    |((markers, _), anchor_from_camera)| {
-                        let eye = anchor_from_camera.translation;
-                        let ray = anchor_from_camera.transform_vector3(point.extend(1.0));
-                        let on_sheet = (eye - ray * (eye.z / ray.z)).truncate();
-                        sheet_level(markers, on_sheet)
-                    },
-                );
-                sum += level.unwrap_or(0.25);
-            }
-            let linear: f64 = sum / (SAMPLES * SAMPLES) as f64;
-            let encoded = 1.055 * linear.powf(1.0 / 2.4) - 0.055;
-            let grey = (255.0 * encoded).round() as u8;
-            rgba.extend([grey, grey, grey, 255]);
-        }
-    }
-    Frame {
-        index: 0,
-        time_secs,
-        size_px: camera.size_px,
-        rgba,
-    }
-}
-
-/// A picture with the noise of a camera in the dark: Gaussian, of a standard deviation in levels, the same each time.
-fn with_noise(frame: &Frame, deviation: f64, seed: u64) -> Frame {
-    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    let mut uniform = || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 11) as f64 / (1_u64 << 53) as f64
-    };
-    let mut noisy = frame.clone();
-    for pixel in noisy.rgba.chunks_exact_mut(4) {
-        let gaussian = (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
-        let level = (f64::from(pixel[0]) + deviation * gaussian)
-            .round()
-            .clamp(0.0, 255.0) as u8;
-        pixel[..3].fill(level);
-    }
-    noisy
-}
-
-fn grey_of(frame: &Frame) -> Vec<u8> {
-    frame
-        .rgba
-        .chunks_exact(4)
-        .map(|pixel| {
-            let [r, g, b] = [pixel[0], pixel[1], pixel[2]].map(f64::from);
-            (0.299 * r + 0.587 * g + 0.114 * b).round() as u8
-        })
-        .collect()
-}
-
-/// True corners as printed, distorted pixels.
-fn true_corners_px(
-    camera: &Intrinsics,
-    marker: &Marker,
-    camera_from_anchor: &DAffine3,
-) -> [DVec2; 4] {
-    let half_m = marker.size_m / 2.0;
-    let turn = DVec2::from_angle(marker.rotation_rad);
-    [
-        (-half_m, half_m),
-        (half_m, half_m),
-        (half_m, -half_m),
-        (-half_m, -half_m),
-    ]
-    .map(|corner| {
-        let point_m = marker.center_m + turn.rotate(DVec2::from(corner));
-        let in_camera = camera_from_anchor.transform_point3(point_m.extend(0.0));
-        camera.pixel_from_plane(camera.distort(in_camera.truncate() / in_camera.z))
-    })
-}
-
-fn settings(detector: DetectorKind) -> TrackingSettings {
-    TrackingSettings {
-        detector,
-        ..TrackingSettings::default()
-    }
-}
-
-fn angle_between(a: &DAffine3, b: &DAffine3) -> f64 {
-    DQuat::from_mat3(&a.matrix3)
-        .angle_between(DQuat::from_mat3(&b.matrix3))
-        .to_degrees()
-}
 
 fn assert_pose(found: &AnchorPose, truth: &DAffine3, within_mm: f64, within_deg: f64, what: &str) {
     let pose = found
         .camera_from_anchor
         .unwrap_or_else(|| panic!("{what}: lost"));
     let off_mm = (pose.translation - truth.translation).length() * 1000.0;
-    let off_deg = angle_between(&pose, truth);
+    let off_deg = angle_between_deg(&pose, truth);
     assert!(
         off_mm < within_mm && off_deg < within_deg,
         "{what}: {off_mm:.2} mm and {off_deg:.2}° off"
@@ -272,27 +71,6 @@ fn ids(detections: &[Detection]) -> Vec<u32> {
     detections.iter().map(|detection| detection.id).collect()
 }
 
-fn track_once(
-    settings: &TrackingSettings,
-    anchors: &[Anchor],
-    camera: Intrinsics,
-    frame: &Frame,
-) -> Vec<AnchorPose> {
-    Tracker::new(settings, anchors, camera)
-        .expect("a tracker")
-        .track(frame)
-        .expect("poses")
-}
-
-fn table() -> Vec<Marker> {
-    vec![
-        marker(0, 0.06, -0.09, 0.06),
-        marker(1, 0.06, 0.09, 0.06),
-        marker(2, 0.06, -0.09, -0.06),
-        marker(17, 0.06, 0.09, -0.06),
-    ]
-}
-
 // ---------------------------------------------------------------------------------------------------------------------
 
 #[test]
@@ -329,7 +107,7 @@ fn both_detectors_find_the_corners_as_printed() {
             }
             let apart_mm = (poses[0].translation - poses[1].translation).length() * 1000.0;
             assert!(
-                apart_mm < 0.2 && angle_between(&poses[0], &poses[1]) < 0.1,
+                apart_mm < 0.2 && angle_between_deg(&poses[0], &poses[1]) < 0.1,
                 "the detectors differ: {apart_mm} mm"
             );
         }
@@ -467,13 +245,19 @@ fn a_lone_marker_is_never_sure_of_the_wrong_pose() {
                 let found = pose
                     .camera_from_anchor
                     .unwrap_or_else(|| panic!("{what}: not seen"));
-                let off_deg = angle_between(&found, &truth);
+                let off_deg = angle_between_deg(&found, &truth);
                 let other_deg = pose.alternative.map_or(f64::INFINITY, |other| {
-                    angle_between(&other.camera_from_anchor, &truth)
+                    angle_between_deg(&other.camera_from_anchor, &truth)
                 });
                 if pose.status == Status::Tracked {
                     tracked += 1;
-                    assert!(off_deg < 2.0, "{what}: sure and {off_deg}° off");
+                    let turn_variance: f64 = (0..3).map(|k| pose.covariance.unwrap()[k][k]).sum();
+                    let known_to_deg = 3.5 * turn_variance.sqrt().to_degrees();
+                    assert!(
+                        off_deg < known_to_deg.max(2.0),
+                        "{what}: sure and {off_deg}° off, known to {known_to_deg}°"
+                    );
+                    assert!(other_deg + 2.0 > off_deg, "{what}: sure of the wrong one");
                 } else {
                     assert_eq!(
                         (pose.status, pose.why),
@@ -532,7 +316,7 @@ fn an_earlier_pose_decides_an_ambiguous_one_while_it_is_fresh() {
                 ..alone.clone()
             };
             let now = &tracker.track(&seen).unwrap()[0];
-            let off_deg = angle_between(&now.camera_from_anchor.unwrap(), &expected);
+            let off_deg = angle_between_deg(&now.camera_from_anchor.unwrap(), &expected);
             assert!(off_deg < 2.0, "frame {frame}: {off_deg}°");
         }
         // Half a minute later the memory is worth nothing.
@@ -542,7 +326,7 @@ fn an_earlier_pose_decides_an_ambiguous_one_while_it_is_fresh() {
         };
         let late = &tracker.track(&later).unwrap()[0];
         assert_eq!(late.status, Status::Ambiguous);
-        assert!(angle_between(&late.camera_from_anchor.unwrap(), &chosen) < 0.5);
+        assert!(angle_between_deg(&late.camera_from_anchor.unwrap(), &chosen) < 0.5);
     }
 }
 
@@ -798,245 +582,4 @@ fn blurring_leaves_the_picture_alone_and_threads_change_nothing() {
     // A detector may be built here and used there.
     let moved = std::thread::spawn(move || detector.detect(&grey, CAMERA.size_px).unwrap());
     assert_eq!(moved.join().unwrap(), first);
-}
-
-// ---------------------------------------------------------------------------------------------------------------------
-// Photographs; they lie beside the project and are not shipped with it.
-
-#[test]
-fn photographs_of_a_room_show_the_markers_that_people_counted() {
-    let Some(folder) = photographs("swatbotics/mapping_feb_2014") else {
-        return;
-    };
-    let truth = std::fs::read_to_string(folder.join("groundtruth.txt")).unwrap();
-    let full = TrackingSettings {
-        decimation: 1.0,
-        ..TrackingSettings::default()
-    };
-    let mut detector = Detector::new(&full, &[Family::TAG36H11]).unwrap();
-    let (mut visible, mut found, mut invented) = (0, 0, Vec::new());
-    for line in truth.lines().filter(|line| !line.trim().is_empty()) {
-        let mut words = line.split_whitespace();
-        let name = words.next().unwrap();
-        let expected = words
-            .map(|word| word.parse::<u32>().unwrap())
-            .collect::<BTreeSet<_>>();
-        let frame = read_photograph(&folder.join(name));
-        let seen = detector
-            .detect_thoroughly(&grey_of(&frame), frame.size_px)
-            .unwrap();
-        let seen = seen
-            .iter()
-            .map(|detection| detection.id)
-            .collect::<BTreeSet<_>>();
-        visible += expected.len();
-        found += expected.intersection(&seen).count();
-        invented.extend(
-            seen.difference(&expected)
-                .map(|id| format!("{id} in {name}")),
-        );
-    }
-    let recall = found as f64 / visible as f64;
-    eprintln!("recall {found} of {visible}: {:.1} %", 100.0 * recall);
-    assert_eq!(visible, 236);
-    assert!(recall >= 0.96, "{found} of {visible}");
-    assert!(invented.is_empty(), "{invented:?}");
-}
-
-#[test]
-fn photographs_of_a_turned_tag_show_its_turn() {
-    let Some(folder) = photographs("duckietown") else {
-        return;
-    };
-    let camera = Intrinsics {
-        size_px: [1056, 792],
-        focal_px: DVec2::new(329.8729619143081, 332.94611303946357),
-        center_px: DVec2::new(528.0, 396.0),
-        distortion: [0.0; 5],
-    };
-    let card = [marker(76, 0.065, 0.0, 0.0)];
-    // The contours of OpenCV's default miss a tag that is turned away by 70°.
-    let refinement = ArucoRefinement::AprilTag;
-    for kind in [DetectorKind::AprilTag, DetectorKind::Aruco] {
-        let settings = TrackingSettings {
-            aruco_refinement: refinement,
-            ..settings(kind)
-        };
-        let mut excess_deg = Vec::new();
-        for stated_deg in (-70..=70).step_by(10) {
-            let frame =
-                read_photograph(&folder.join(format!("test_image_rotation_{stated_deg}.png")));
-            let pose = &track_once(&settings, &[anchor("card", &card)], camera, &frame)[0];
-            let camera_from_card = pose
-                .camera_from_anchor
-                .unwrap_or_else(|| panic!("{kind:?}: lost at {stated_deg}°"));
-            assert_eq!(pose.status, Status::Tracked, "{kind:?}: at {stated_deg}°");
-            let distance_m = camera_from_card.translation.length();
-            assert!(
-                (0.200..0.220).contains(&distance_m),
-                "{kind:?}: {distance_m} m at {stated_deg}°"
-            );
-            let normal = camera_from_card.matrix3.z_axis;
-            excess_deg.push(normal.x.atan2(-normal.z).to_degrees() - f64::from(stated_deg));
-        }
-        // The stated angles are right to 4.7°, most of it one constant that the hand that placed the card left.
-        let constant_deg = excess_deg.iter().sum::<f64>() / excess_deg.len() as f64;
-        let rest_deg = excess_deg
-            .iter()
-            .map(|excess| (excess - constant_deg).abs())
-            .collect::<Vec<_>>();
-        eprintln!("{kind:?}: constant {constant_deg:.2}°, rest {rest_deg:.1?}");
-        assert!(
-            constant_deg.abs() < 3.0,
-            "{kind:?}: constant {constant_deg}°"
-        );
-        assert!(
-            rest_deg.iter().all(|&rest| rest < 4.7),
-            "{kind:?}: {rest_deg:?}"
-        );
-        let mean_deg = rest_deg.iter().sum::<f64>() / rest_deg.len() as f64;
-        assert!(mean_deg < 2.0, "{kind:?}: {rest_deg:?}");
-    }
-}
-
-/// The 6 x 6 tags of Kalibr's grids: 88 mm, 0.3 of it apart, black borders of 2 cells.
-fn april_grid() -> Vec<Marker> {
-    let family = Family::TAG36H11.with_border(2).expect("a border");
-    let pitch_m = 0.088 * 1.3;
-    (0..36)
-        .map(|id| Marker {
-            family,
-            ..marker(
-                id,
-                0.088,
-                f64::from(id % 6) * pitch_m,
-                f64::from(id / 6) * pitch_m,
-            )
-        })
-        .collect()
-}
-
-#[test]
-fn photographs_of_an_april_grid_show_all_its_tags() {
-    let Some(folder) = photographs("yac_mocap") else {
-        return;
-    };
-    let camera = Intrinsics {
-        size_px: [640, 480],
-        focal_px: DVec2::new(606.57, 609.98),
-        center_px: DVec2::new(324.44, 245.65),
-        distortion: [0.0; 5],
-    };
-    let grid = april_grid();
-    let anchors = [anchor("grid", &grid)];
-    let mut stills: Vec<_> = std::fs::read_dir(folder.join("cam0/data"))
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .collect();
-    stills.sort();
-    assert_eq!(stills.len(), 30);
-    // Blur joins the tags' corners to the black squares between them: without an answer to it 85 % and 73 % were found.
-    for (decimation, least_recall) in [(1.0, 0.97), (2.0, 0.89)] {
-        let settings = TrackingSettings {
-            decimation,
-            ..TrackingSettings::default()
-        };
-        let mut tracker = Tracker::new(&settings, &anchors, camera).unwrap();
-        let (mut visible, mut found, mut off_px) = (0, 0, Vec::new());
-        for (number, still) in stills.iter().enumerate() {
-            // Minutes apart: none is where the one before it was.
-            let photograph = Frame {
-                time_secs: 60.0 * number as f64,
-                ..read_photograph(still)
-            };
-            let name = still.file_stem().unwrap().to_string_lossy();
-            let known = grid_corners_px(&folder.join(format!("grid0/cam0/data/{name}.csv")));
-            let pose = &tracker.track(&photograph).unwrap()[0];
-            assert_eq!(pose.status, Status::Tracked, "{name}");
-            let camera_from_grid = pose.camera_from_anchor.unwrap();
-            let mut pose_off_px = Vec::new();
-            for (id, corners_px) in &known {
-                let marker = &grid[*id as usize];
-                let posed_px = true_corners_px(&camera, marker, &camera_from_grid);
-                pose_off_px.extend(distances_px(&posed_px, corners_px));
-                visible += 1;
-                let seen = tracker.detections().iter().find(|seen| seen.id == *id);
-                let Some(seen) = seen else { continue };
-                found += 1;
-                off_px.extend(distances_px(&seen.corners_px, corners_px));
-            }
-            let pose_off_px = median(&mut pose_off_px);
-            assert!(
-                pose_off_px < 0.5,
-                "{name}: the board is {pose_off_px} px off"
-            );
-        }
-        let median_px = median(&mut off_px);
-        let recall = f64::from(found) / f64::from(visible);
-        eprintln!(
-            "decimation {decimation}: {found} of {visible}, {:.1} %; corners {median_px:.2} px off",
-            100.0 * recall
-        );
-        assert_eq!(visible, 988);
-        assert!(recall >= least_recall, "{found} of {visible}");
-        assert!(median_px < 0.25, "{median_px} px");
-    }
-}
-
-fn distances_px(a: &[DVec2; 4], b: &[DVec2; 4]) -> [f64; 4] {
-    std::array::from_fn(|corner| a[corner].distance(b[corner]))
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
-}
-
-/// The corners of each whole tag as the photographs' authors found them, as printed.
-fn grid_corners_px(file: &Path) -> BTreeMap<u32, [DVec2; 4]> {
-    let mut corners_px = BTreeMap::<u32, Vec<DVec2>>::new();
-    for row in std::fs::read_to_string(file)
-        .expect("the photographs' corners")
-        .lines()
-        .skip(1)
-    {
-        let fields: Vec<f64> = row
-            .split(',')
-            .map(|field| field.parse().expect("a number"))
-            .collect();
-        let corners = corners_px.entry(fields[10] as u32).or_default();
-        corners.push(DVec2::new(fields[5], fields[6]));
-    }
-    corners_px
-        .into_iter()
-        .filter_map(|(id, corners)| {
-            // Counted from the bottom left, counter-clockwise.
-            let [a, b, c, d] = <[DVec2; 4]>::try_from(corners).ok()?;
-            Some((id, [d, c, b, a]))
-        })
-        .collect()
-}
-
-/// The folder beside the project, or `None` and a line on stderr where it is not there.
-fn photographs(name: &str) -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../shared/real")
-        .join(name);
-    if !folder.is_dir() {
-        eprintln!("skipped: {} is not there", folder.display());
-        return None;
-    }
-    Some(folder)
-}
-
-fn read_photograph(path: &Path) -> Frame {
-    let picture = image::open(path)
-        .unwrap_or_else(|error| panic!("{}: {error}", path.display()))
-        .to_rgba8();
-    Frame {
-        index: 0,
-        time_secs: 0.0,
-        size_px: [picture.width(), picture.height()],
-        rgba: picture.into_raw(),
-    }
 }

@@ -1,11 +1,21 @@
-//! The jobs: replay, track, check, chart; their clock, files and progress.
+//! The jobs: replay, record, track, board, calibrate, markers, check, chart; their clock, files and progress.
 
+mod anchor_block;
+pub mod board;
+pub mod calibrate;
+mod calibration_file;
+pub mod cameras;
+mod capture_talk;
 pub mod chart;
 pub mod check;
 pub mod contact_sheet;
 pub mod detections_file;
 pub mod first_look;
 pub mod layer_files;
+pub mod live_capture;
+pub mod live_input;
+pub mod mailbox;
+pub mod markers;
 mod mirror_watch;
 pub mod output;
 mod output_error;
@@ -13,9 +23,13 @@ mod partial_files;
 pub mod picture_files;
 pub mod poses_file;
 mod progress;
+pub mod record;
 mod recording;
 pub mod replay;
 pub mod report;
+mod scene_copy;
+pub mod session_recorder;
+pub mod session_writer;
 pub mod stats;
 pub mod stopwatch;
 mod tally;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 pub use super::output_error::OutputError;
 use super::picture_files;
-use super::video_writer::{Codec, VideoWriter};
+use super::video_writer::{Codec, Naming, VideoWriter};
 
 /// Takes frames one by one.
 pub enum FrameSink {
@@ -20,7 +20,8 @@ impl FrameSink {
     /// Opens `path`: by its extension a video, else a folder of PNGs. Folders on the way are made.
     pub fn create(path: &Path, size_px: [u32; 2], fps: f64) -> Result<Self, OutputError> {
         if let Some(codec) = Codec::of_path(path) {
-            return Ok(Self::Video(VideoWriter::create(path, codec, size_px, fps)?));
+            let video = VideoWriter::create(path, codec, size_px, fps, Naming::Finished)?;
+            return Ok(Self::Video(video));
         }
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         if FOREIGN_FILES.iter().any(|foreign| extension == *foreign) && !path.is_dir() {

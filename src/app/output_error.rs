@@ -49,4 +49,12 @@ pub enum OutputError {
         /// The name.
         path: PathBuf,
     },
+    /// A folder for a recording that holds other things, or frames that do not fit into it.
+    #[error("{}: {message}", path.display())]
+    Session {
+        /// The folder.
+        path: PathBuf,
+        /// What is wrong.
+        message: String,
+    },
 }

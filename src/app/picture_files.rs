@@ -71,6 +71,15 @@ pub fn write_float_exr(path: &Path, size_px: [u32; 2], values: &[f32]) -> Result
     })
 }
 
+/// Writes bytes that are a whole file (PDF).
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    write_whole(path, |writer| {
+        writer
+            .write_all(bytes)
+            .map_err(|error| io_error(path, error))
+    })
+}
+
 /// Writes text (poses, statistics).
 pub fn write_text(path: &Path, text: &str) -> Result<(), OutputError> {
     write_whole(path, |writer| {

@@ -70,6 +70,11 @@ impl PosesText {
     pub fn as_str(&self) -> &str {
         &self.text
     }
+
+    /// What was added since this was asked last; for a file that grows on the disk.
+    pub fn take(&mut self) -> String {
+        std::mem::take(&mut self.text)
+    }
 }
 
 impl Default for PosesText {

@@ -10,7 +10,7 @@ use std::thread;
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::capture::{Frame, FrameSource, Notice};
+use crate::capture::{Frame, FrameSource};
 use crate::geometry::camera::Intrinsics;
 use crate::render::{Gpu, Layers, Renderer, Shown};
 use crate::scene::{Scene, Technique};
@@ -28,7 +28,7 @@ use super::report::Report;
 use super::stats::{Stats, detector_in_words, peak_memory_mib};
 use super::stopwatch::Stopwatch;
 use super::tally::Tally;
-use super::tracked::{Ended, Poser, QUEUE, TrackedFrame, each_tracked_frame, join};
+use super::tracked::{Ended, Frames, Poser, QUEUE, TrackedFrame, each_tracked_frame, join};
 use super::video_writer::Codec;
 
 /// What a replay is asked for.
@@ -119,9 +119,8 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
     if let Some(path) = &request.poses {
         write_text(path, run.poses.as_str())?;
     }
-    let dropped = ended.notices.iter().map(Notice::lost_frames).sum();
     if let Some(path) = &request.stats {
-        let stats = run.stats(size_px, dropped, adapter, watch.elapsed_ms() * 1e-3);
+        let stats = run.stats(size_px, ended.dropped, adapter, watch.elapsed_ms() * 1e-3);
         let text = serde_json::to_string_pretty(&stats)?;
         write_text(path, &format!("{text}\n"))?;
     }
@@ -214,9 +213,10 @@ impl Run<'_> {
             };
             let request = self.request;
             let writing = scope.spawn(move || write_stage(request, files, &from_renderer));
-            let ended = each_tracked_frame(source, poser, last, stop, |tracked| {
-                self.one_frame(tracked, renderer.as_mut(), &to_files)
-            });
+            let ended =
+                each_tracked_frame(Frames::Recorded(source), poser, last, stop, |tracked| {
+                    self.one_frame(tracked, renderer.as_mut(), &to_files)
+                });
             // Closing the end lets the writer finish. Rendering knows of a failed writer only that it is gone.
             drop(to_files);
             for (stage, times) in join(writing)? {

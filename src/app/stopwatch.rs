@@ -17,6 +17,12 @@ impl Stopwatch {
         self.0.elapsed().as_secs_f64() * 1e3
     }
 
+    /// A clock that shows seconds since now.
+    pub fn clock() -> impl Fn() -> f64 + Send + Sync + 'static {
+        let watch = Self::start();
+        move || watch.0.elapsed().as_secs_f64()
+    }
+
     /// What `work` gives, and the milliseconds it took.
     pub fn time<T>(work: impl FnOnce() -> T) -> (T, f64) {
         let watch = Self::start();

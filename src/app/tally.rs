@@ -37,7 +37,9 @@ impl Tally {
     pub(super) fn add(&mut self, tracked: &TrackedFrame) {
         self.frames += 1;
         self.last_read = Some(tracked.frame.index);
-        self.log.add("decode", tracked.decode_ms);
+        if let Some(ms) = tracked.decode_ms {
+            self.log.add("decode", ms);
+        }
         if let Some(ms) = tracked.track_ms {
             self.log.add("track", ms);
             let seen = tracked

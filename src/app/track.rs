@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Result, bail};
-use glam::DVec2;
 
 use super::detections_file::DetectionsText;
+use super::live_capture::LiveCapture;
+use super::live_input::LiveInput;
 use super::mirror_watch::MirrorWatch;
 use super::picture_files::write_text;
 use super::poses_file::PosesText;
@@ -16,9 +18,10 @@ use super::report::Report;
 use super::stats::{Stats, detector_in_words, peak_memory_mib};
 use super::stopwatch::Stopwatch;
 use super::tally::Tally;
-use super::tracked::{Ended, Poser, TrackedFrame, each_tracked_frame};
-use crate::capture::Notice;
-use crate::scene::{Anchor, CameraSettings, DetectorKind, Family, Marker, Scene, TrackingSettings};
+use super::tracked::{Ended, Frames, Poser, TrackedFrame, each_tracked_frame};
+use crate::capture::live::is_live;
+use crate::geometry::camera::Intrinsics;
+use crate::scene::{Anchor, CameraSettings, DetectorKind, Family, Scene, TrackingSettings};
 use crate::tracking::{AnchorPose, Detector, Tracker, grey_from_rgba};
 
 /// What tracking is asked for.
@@ -72,10 +75,7 @@ pub fn track(request: &Request, stop: &AtomicBool) -> Result<Report> {
         anchors,
         lists_found_alone,
     } = Plan::of(&request.input)?;
-    let (source, intrinsics) = recording::open(&camera)?;
-    for written in [&request.poses, &request.markers, &request.stats] {
-        refuse_to_overwrite(&source, written.as_deref())?;
-    }
+    let (frames_in, intrinsics) = open(&camera, request)?;
     let poser = Poser::Tracker(
         Box::new(Tracker::new(&settings, &anchors, intrinsics)?),
         MirrorWatch::new(&settings, &anchors),
@@ -87,9 +87,10 @@ pub fn track(request: &Request, stop: &AtomicBool) -> Result<Report> {
         .transpose()?;
     let mut frames = Vec::new();
     let mut tally = Tally::new(anchors.len());
-    let size_px = source.size_px();
+    // A camera is tracked until somebody says stop.
+    let interrupts = matches!(frames_in, Frames::Recorded(_));
     // What was done before a failure is kept: the files are finished either way.
-    let ended = each_tracked_frame(source, poser, None, stop, |tracked| {
+    let ended = each_tracked_frame(frames_in, poser, None, stop, |tracked| {
         tally.add(&tracked);
         if let Some(raw) = &mut raw {
             raw.add(&tracked)?;
@@ -114,10 +115,10 @@ pub fn track(request: &Request, stop: &AtomicBool) -> Result<Report> {
     if let Some(path) = &request.stats {
         let stats = Stats {
             source: camera.source.clone(),
-            size_px,
+            size_px: intrinsics.size_px,
             frames: tally.frames,
             drawn: 0,
-            drops: ended.notices.iter().map(Notice::lost_frames).sum(),
+            drops: ended.dropped,
             lost: listed.iter().map(lost).collect(),
             detector: detector_in_words(&settings),
             technique: None,
@@ -151,8 +152,29 @@ pub fn track(request: &Request, stop: &AtomicBool) -> Result<Report> {
         &anchors,
         (&ended, &mut tally),
         camera.mirror,
-        stop.load(Ordering::Relaxed),
+        interrupts && stop.load(Ordering::Relaxed),
     ))
+}
+
+/// Opens a recording or begins to open a camera, with its calibration.
+fn open(camera: &CameraSettings, request: &Request) -> Result<(Frames, Intrinsics)> {
+    if !is_live(&camera.source) {
+        let (source, intrinsics) = recording::open(camera)?;
+        for written in [&request.poses, &request.markers, &request.stats] {
+            refuse_to_overwrite(&source, written.as_deref())?;
+        }
+        return Ok((Frames::Recorded(source), intrinsics));
+    }
+    let input = LiveInput::of(camera)?;
+    let Some(intrinsics) = input.calibration else {
+        bail!(
+            "{} carries no calibration: give one (--calibration FILE; in a scene, [camera] calibration)",
+            camera.source
+        );
+    };
+    let now = Arc::new(Stopwatch::clock());
+    let capture = LiveCapture::start(&camera.source, &input.options(false), now, None);
+    Ok((Frames::Live(capture, intrinsics), intrinsics))
 }
 
 /// What an [`Input`] comes to.
@@ -215,17 +237,9 @@ pub(super) fn settings_for(family: Family, decimation: f64) -> TrackingSettings 
 
 /// An anchor for each marker of a family, by the name of its number.
 fn lone_anchors(family: Family, size_m: f64) -> Vec<Anchor> {
-    let anchor = |id: u32| Anchor {
-        name: id.to_string(),
-        markers: vec![Marker {
-            family,
-            id,
-            size_m,
-            center_m: DVec2::ZERO,
-            rotation_rad: 0.0,
-        }],
-    };
-    (0..family.id_count()).map(anchor).collect()
+    (0..family.id_count())
+        .map(|id| Anchor::lone(id.to_string(), family, id, size_m))
+        .collect()
 }
 
 /// What is kept of a frame until all anchors are known.

@@ -1,21 +1,37 @@
-//! The first two stages of every job on a recording, a thread each: frames are read, and poses found in them. No frame
-//! is dropped.
+//! The first two stages of every job, a thread each: frames are read, and poses found in them. No frame of a recording
+//! is dropped; of a live source the newest is taken.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
+use std::time::Duration;
 
 use anyhow::{Context as _, Result};
 
+use super::capture_talk::say;
+use super::live_capture::{CaptureEvent, LiveCapture};
+use super::mailbox::Taken;
 use super::mirror_watch::MirrorWatch;
 use super::poses_file::GivenPoses;
 use super::progress::Progress;
 use super::stopwatch::Stopwatch;
-use crate::capture::{Frame, FrameSource, Notice};
+use crate::capture::{Frame, FrameSource, Notice, check_frame_size};
+use crate::geometry::camera::Intrinsics;
 use crate::tracking::{AnchorPose, Tracker};
 
 /// Frames that may wait between two stages: enough to even out their times, few enough to stay small.
 pub(super) const QUEUE: usize = 3;
+/// How soon a stop is seen while no frame comes.
+const LIVE_PATIENCE: Duration = Duration::from_millis(50);
+
+/// Where frames come from.
+pub(super) enum Frames {
+    /// A recording: all of them.
+    Recorded(FrameSource),
+    /// A camera, calibrated: as they come.
+    Live(LiveCapture, Intrinsics),
+}
 
 /// Where poses come from.
 pub(super) enum Poser {
@@ -30,7 +46,8 @@ pub(super) struct TrackedFrame {
     pub frame: Frame,
     /// In the anchors' order.
     pub poses: Vec<AnchorPose>,
-    pub decode_ms: f64,
+    /// `None` where frames come by themselves.
+    pub decode_ms: Option<f64>,
     /// `None` where poses were given.
     pub track_ms: Option<f64>,
 }
@@ -40,32 +57,40 @@ pub(super) struct TrackedFrame {
 pub(super) struct Ended {
     /// What was wrong with the recording.
     pub notices: Vec<Notice>,
+    /// Frames that were not tracked: broken ones, and those of a live source that came too fast.
+    pub dropped: u32,
     /// Tells whether it is mirrored; `None` where poses were given.
     pub mirror_watch: Option<MirrorWatch>,
     /// Per anchor by what part of their size its markers are larger than the scene says, where that is known.
     pub size_errors: Vec<Option<f64>>,
 }
 
-/// Calls `each` with the frames of a recording in their order: all, or those up to `last`, or until `stop`.
+/// Calls `each` with the frames in their order: all, or those up to `last`, or until `stop`.
 ///
 /// # Errors
 /// What kept a frame from being read or tracked, or the first error of `each`, which ends it.
 pub(super) fn each_tracked_frame(
-    source: FrameSource,
+    frames: Frames,
     poser: Poser,
     last: Option<u32>,
     stop: &AtomicBool,
     mut each: impl FnMut(TrackedFrame) -> Result<()>,
 ) -> Result<Ended> {
-    let expected = match last {
-        Some(last) => Some(last + 1),
-        None => source.frame_count(),
+    let expected = match (last, &frames) {
+        (Some(last), _) => Some(last + 1),
+        (None, Frames::Recorded(source)) => source.frame_count(),
+        (None, Frames::Live(..)) => None,
     };
     let progress = Progress::new(expected);
     thread::scope(|scope| {
         let (to_tracker, from_camera) = sync_channel(QUEUE);
         let (to_caller, from_tracker) = sync_channel(QUEUE);
-        let capture = scope.spawn(move || capture_stage(source, &to_tracker, last, stop));
+        let capture = scope.spawn(move || match frames {
+            Frames::Recorded(source) => capture_stage(source, &to_tracker, last, stop),
+            Frames::Live(capture, intrinsics) => {
+                live_stage(&capture, &intrinsics, &to_tracker, stop)
+            }
+        });
         let tracking = scope.spawn(move || track_stage(poser, &from_camera, &to_caller));
         let mut outcome = Ok(());
         for tracked in &from_tracker {
@@ -83,8 +108,10 @@ pub(super) fn each_tracked_frame(
         // A stage that fails stops those before it: the last one knows why.
         outcome?;
         let (mirror_watch, size_errors) = tracked?;
+        let Captured { notices, dropped } = captured?;
         Ok(Ended {
-            notices: captured?,
+            notices,
+            dropped,
             mirror_watch,
             size_errors,
         })
@@ -98,28 +125,76 @@ pub(super) fn join<T>(handle: thread::ScopedJoinHandle<'_, Result<T>>) -> Result
         .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }
 
-/// Reads frames until the end, the last one wanted, or a stop; gives what was wrong with the recording.
+/// What the first stage leaves behind.
+struct Captured {
+    notices: Vec<Notice>,
+    dropped: u32,
+}
+
+/// A frame, and what it took to decode it where that is known.
+type Decoded = (Frame, Option<f64>);
+
+/// Reads frames until the end, the last one wanted, or a stop.
 fn capture_stage(
     mut source: FrameSource,
-    to_tracker: &SyncSender<(Frame, f64)>,
+    to_tracker: &SyncSender<Decoded>,
     last: Option<u32>,
     stop: &AtomicBool,
-) -> Result<Vec<Notice>> {
+) -> Result<Captured> {
     while !stop.load(Ordering::Relaxed) {
         let (frame, decode_ms) = Stopwatch::time(|| source.next_frame());
         let Some(frame) = frame? else { break };
         let index = frame.index;
-        let receiver_gone = to_tracker.send((frame, decode_ms)).is_err();
+        let receiver_gone = to_tracker.send((frame, Some(decode_ms))).is_err();
         if receiver_gone || last.is_some_and(|last| index >= last) {
             break;
         }
     }
-    Ok(source.notices().to_vec())
+    let notices = source.notices().to_vec();
+    Ok(Captured {
+        dropped: notices.iter().map(Notice::lost_frames).sum(),
+        notices,
+    })
+}
+
+/// Takes the newest frame whenever the tracker is ready for one, until the source ends or a stop.
+fn live_stage(
+    capture: &LiveCapture,
+    intrinsics: &Intrinsics,
+    to_tracker: &SyncSender<Decoded>,
+    stop: &AtomicBool,
+) -> Result<Captured> {
+    let frames = capture.frames();
+    while !stop.load(Ordering::Relaxed) {
+        let taken = frames.take_within(LIVE_PATIENCE);
+        while let Some(event) = capture.next_event() {
+            say(&event);
+            if let CaptureEvent::Failed(error) = event {
+                return Err(error.into());
+            }
+        }
+        match taken {
+            Taken::New(frame) => {
+                check_frame_size(intrinsics, frame.size_px, "the camera")?;
+                let frame = Arc::unwrap_or_clone(frame);
+                if to_tracker.send((frame, None)).is_err() {
+                    break;
+                }
+            }
+            Taken::Nothing => {}
+            Taken::Closed => break,
+        }
+    }
+    let dropped = frames.dropped() + capture.broken_pictures();
+    Ok(Captured {
+        notices: Vec::new(),
+        dropped: u32::try_from(dropped).unwrap_or(u32::MAX),
+    })
 }
 
 fn track_stage(
     mut poser: Poser,
-    from_camera: &Receiver<(Frame, f64)>,
+    from_camera: &Receiver<Decoded>,
     to_caller: &SyncSender<TrackedFrame>,
 ) -> Result<(Option<MirrorWatch>, Vec<Option<f64>>)> {
     for (frame, decode_ms) in from_camera {

@@ -55,9 +55,19 @@ impl Codec {
     }
 }
 
-/// A video that is being written. It gets its name when it is finished; dropped before, it is removed.
+/// When a video gets its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Naming {
+    /// When it is finished; dropped before, it is removed.
+    Finished,
+    /// At once: what there is of it can be played at any moment, also after a kill. FFV1 in Matroska alone.
+    AtOnce,
+}
+
+/// A video that is being written.
 pub struct VideoWriter {
     path: PathBuf,
+    naming: Naming,
     size_px: [u32; 2],
     frames: u32,
     encoder: Option<Encoder>,
@@ -76,6 +86,7 @@ impl VideoWriter {
         codec: Codec,
         size_px: [u32; 2],
         fps: f64,
+        naming: Naming,
     ) -> Result<Self, OutputError> {
         make_parent(path)?;
         let mut command = Command::new("ffmpeg");
@@ -90,7 +101,8 @@ impl VideoWriter {
             ])
             .args(["-i", "pipe:0"])
             .args(codec.arguments())
-            .arg(file_url(&partial_path(path)))
+            .args(naming.arguments())
+            .arg(file_url(&naming.working_path(path)))
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::piped());
@@ -123,6 +135,7 @@ impl VideoWriter {
         });
         Ok(Self {
             path: path.to_owned(),
+            naming,
             size_px,
             frames: 0,
             encoder,
@@ -166,6 +179,9 @@ impl VideoWriter {
             return Ok(());
         }
         self.close()?;
+        if self.naming == Naming::AtOnce {
+            return Ok(());
+        }
         std::fs::rename(partial_path(&self.path), &self.path).map_err(|error| OutputError::Io {
             path: self.path.clone(),
             error,
@@ -207,8 +223,30 @@ impl VideoWriter {
     }
 }
 
+impl Naming {
+    /// Matroska keeps a cluster back until it is complete; short ones lose little.
+    fn arguments(self) -> &'static [&'static str] {
+        match self {
+            Self::Finished => &[],
+            Self::AtOnce => &["-cluster_time_limit", "300", "-flush_packets", "1"],
+        }
+    }
+
+    fn working_path(self, path: &Path) -> PathBuf {
+        match self {
+            Self::Finished => partial_path(path),
+            Self::AtOnce => path.to_owned(),
+        }
+    }
+}
+
 impl Drop for VideoWriter {
     fn drop(&mut self) {
+        if self.naming == Naming::AtOnce {
+            // Closing fails where the encoder has failed; what it wrote until then stays.
+            _ = self.encoder.is_some().then(|| self.close());
+            return;
+        }
         if let Some(Encoder {
             mut child,
             frames_in,

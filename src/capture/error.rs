@@ -10,8 +10,8 @@ use super::calibration::CalibrationError;
 pub enum CaptureError {
     /// The scene names a camera or a stream.
     #[error(
-        "{source_name}: live sources (webcams, streams) come with `gnomon live`, which this version does not have; \
-         name a session folder, a video file or a folder of images"
+        "{source_name}: a live source, of which no frame comes twice; record it first (gnomon record {source_name} --out \
+         DIR), or name a session folder, a video file or a folder of images"
     )]
     Live {
         /// As the scene says.

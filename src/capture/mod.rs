@@ -1,9 +1,10 @@
-//! Frames from sessions, videos and folders of images, and the calibration of the camera that took them.
+//! Frames from sessions, videos, folders of images and live cameras, and the calibration of the camera that took them.
 //! OpenCV's types stay inside.
 
 pub mod calibration;
 mod error;
 mod images;
+pub mod live;
 mod pixels;
 mod times;
 mod video;
@@ -76,7 +77,7 @@ const VIDEO_EXTENSIONS: [&str; 8] = ["mp4", "mkv", "avi", "mov", "webm", "m4v", 
 impl FrameSource {
     /// Opens a session folder (`video.*` with `camera.toml`, perhaps `times.csv`), a video file or a folder of images.
     pub fn open(source: &str) -> Result<Self, CaptureError> {
-        if source.starts_with("webcam") || source.contains("://") {
+        if live::is_live(source) {
             return Err(CaptureError::Live {
                 source_name: source.to_owned(),
             });

@@ -273,8 +273,8 @@ fn what_is_no_recording_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |source: &str| FrameSource::open(source).err().unwrap().to_string();
     let inside = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    assert!(refused("webcam:0").contains("gnomon live"));
-    assert!(refused("http://camera.local/stream").contains("gnomon live"));
+    assert!(refused("webcam:0").contains("gnomon record webcam:0"));
+    assert!(refused("http://camera.local/stream").contains("gnomon record http://"));
     assert!(refused(&inside("nothing.mp4")).contains("nothing.mp4: no such file or folder"));
     assert!(refused(&inside("")).contains("neither a video"));
     fs::write(folder.path().join("a.png"), "no picture").unwrap();

@@ -19,6 +19,12 @@ pub struct PixelRect {
 }
 
 impl PixelRect {
+    /// No pixel.
+    pub const NONE: Self = Self {
+        low: [0; 2],
+        high: [0; 2],
+    };
+
     /// The whole picture.
     pub fn whole(size_px: [u32; 2]) -> Self {
         Self {
@@ -41,6 +47,23 @@ impl PixelRect {
             low: [0, 1].map(|axis| self.low[axis].min(other.low[axis])),
             high: [0, 1].map(|axis| self.high[axis].max(other.high[axis])),
         }
+    }
+
+    /// The pixels that are not in `hole`, in rectangles beside each other, some of which may be empty.
+    pub fn without(self, hole: Self) -> [Self; 4] {
+        let hole = self.intersection(hole);
+        if hole.is_empty() {
+            return [self, Self::NONE, Self::NONE, Self::NONE];
+        }
+        let ([left, top], [right, bottom]) = (self.low, self.high);
+        let ([hole_left, hole_top], [hole_right, hole_bottom]) = (hole.low, hole.high);
+        let rect = |low, high| Self { low, high };
+        [
+            rect([left, top], [right, hole_top]),
+            rect([left, hole_top], [hole_left, hole_bottom]),
+            rect([hole_right, hole_top], [right, hole_bottom]),
+            rect([left, hole_bottom], [right, bottom]),
+        ]
     }
 
     /// The pixels in both.
@@ -73,10 +96,7 @@ pub fn covered(
         );
     }
     let Some(bounds) = Bounds::around(pixels) else {
-        return PixelRect {
-            low: [0; 2],
-            high: [0; 2],
-        };
+        return PixelRect::NONE;
     };
     // Casts saturate: what lies outside the picture becomes its edge.
     let [left, top] = [bounds.low.x, bounds.low.y].map(|low| (low - MARGIN_PX).floor() as u32);
@@ -243,6 +263,33 @@ mod tests {
                     inside || !inside_picture,
                     "{light:?} {shadow} {pixel} {rect:?}"
                 );
+            }
+        }
+    }
+
+    #[test]
+    fn a_rectangle_without_another_has_each_other_pixel_once() {
+        let whole = PixelRect {
+            low: [2, 1],
+            high: [9, 7],
+        };
+        let has = |rect: &PixelRect, x: u32, y: u32| {
+            (rect.low[0]..rect.high[0]).contains(&x) && (rect.low[1]..rect.high[1]).contains(&y)
+        };
+        for (low, high) in [
+            ([4, 3], [6, 5]),
+            ([0, 0], [3, 20]),
+            ([2, 1], [9, 7]),
+            ([5, 5], [12, 12]),
+            ([20, 2], [30, 4]),
+            ([4, 4], [4, 6]),
+        ] {
+            let hole = PixelRect { low, high };
+            let rest = whole.without(hole);
+            for (x, y) in (0..32).flat_map(|x| (0..24).map(move |y| (x, y))) {
+                let wanted = has(&whole, x, y) && !has(&hole, x, y);
+                let found = rest.iter().filter(|rect| has(rect, x, y)).count();
+                assert_eq!(found, usize::from(wanted), "{hole:?} {x} {y}");
             }
         }
     }

@@ -45,6 +45,10 @@ pub enum Casting {
 /// Closer than this to edge-on, as the sine of the angle, a triangle hides nothing that a pixel could show.
 const EDGE_ON: f64 = 1e-6;
 
+/// Closer than this to edge-on as an eye sees it, as the sine of the angle, rounding to parts of a pixel may turn a
+/// triangle over.
+pub const EDGE_ON_TO_EYE: f64 = 0.1;
+
 /// A mesh prepared for casting shadows: welded triangles, their planes, and which triangles meet at each edge.
 #[derive(Debug, Clone)]
 pub struct Caster {
@@ -304,44 +308,52 @@ impl Caster {
                 side * normal.dot(light_point - place * light_weight) > 0.0
             })
         };
-        // What is seen from inside mostly lies behind the rest: drawn after it, it need not be shaded.
         let mut sorted = LitTriangles::default();
-        let mut from_inside = LitTriangles::default();
         for (triangle, height) in self.light_heights(light).enumerate() {
             let (normal, offset) = self.planes[triangle];
+            let seen_from_inside = eye.is_some_and(|eye| {
+                let corner = self.positions[self.triangles[triangle][0] as usize].as_dvec3();
+                (normal.dot(eye) - offset) < -EDGE_ON_TO_EYE * (eye - corner).length()
+            });
             let side = match eye {
                 Some(eye) if normal.dot(eye) < offset => -1.0,
                 _ => 1.0,
             };
-            let sorted = match side > 0.0 {
-                true => &mut sorted,
-                false => &mut from_inside,
-            };
-            if side * height > 0.0 {
-                sorted.facing.push(triangle);
+            let sides = if side * height > 0.0 {
+                &mut sorted.facing
             } else if smoothly_lit(triangle, side as f32) {
-                sorted.terminator.push(triangle);
+                &mut sorted.terminator
             } else {
-                sorted.averted.push(triangle);
+                &mut sorted.averted
+            };
+            match seen_from_inside {
+                true => sides.inner.push(triangle),
+                false => sides.outer.push(triangle),
             }
         }
-        sorted.facing.extend(from_inside.facing);
-        sorted.terminator.extend(from_inside.terminator);
-        sorted.averted.extend(from_inside.averted);
         sorted
     }
+}
+
+/// Triangles by the side of them that an eye sees.
+#[derive(Debug, Clone, Default)]
+pub struct SeenTriangles {
+    /// Those that it may see from outside.
+    pub outer: Vec<usize>,
+    /// Those that it surely sees from inside.
+    pub inner: Vec<usize>,
 }
 
 /// The triangles of a mesh, by what a light can give to their visible side.
 #[derive(Debug, Clone, Default)]
 pub struct LitTriangles {
     /// They face it: lit where nothing hides it.
-    pub facing: Vec<usize>,
+    pub facing: SeenTriangles,
     /// They are turned away, so that they lie in their own shadow, but some of their corners' normals face it: smooth
     /// shading lights them up to the line where the normals turn away.
-    pub terminator: Vec<usize>,
+    pub terminator: SeenTriangles,
     /// All others: never lit.
-    pub averted: Vec<usize>,
+    pub averted: SeenTriangles,
 }
 
 impl Silhouette {
@@ -836,14 +848,21 @@ mod tests {
         };
         let sorted = caster.lit_triangles(light, None, Some(&normals));
         assert_eq!(
-            sorted.terminator,
+            sorted.terminator.outer,
             (0..12).filter(is_side).collect::<Vec<_>>()
         );
-        assert_eq!((sorted.facing.len(), sorted.averted.len()), (2, 2));
+        let counts = |sides: &SeenTriangles| (sides.outer.len(), sides.inner.len());
+        assert_eq!(
+            (counts(&sorted.facing), counts(&sorted.averted)),
+            ((2, 0), (2, 0))
+        );
         // An eye below sees the bottom from outside, and from inside the top, which the light sees from the other side, and
         // the walls, which it sees from the same.
         let below = Some(DVec3::new(0.5, 0.5, -3.0));
         let sorted = caster.lit_triangles(light, below, None);
-        assert_eq!((sorted.facing.len(), sorted.averted.len()), (8, 4));
+        assert_eq!(
+            (counts(&sorted.facing), counts(&sorted.averted)),
+            ((0, 8), (2, 2))
+        );
     }
 }

@@ -1,41 +1,92 @@
 //! Whether a mesh bounds a solid: closed, its triangles turned outwards, and no part of it cut by itself. From outside
-//! only the outside of such a mesh is seen (Jordan & Brouwer: each part has an inside and an outside).
+//! only the outside of such a mesh is seen (Jordan & Brouwer: each part has an inside and an outside). If fans of triangles
+//! over its holes would close it so, its inside is seen through them alone.
+
+use std::collections::HashMap;
 
 use glam::DVec3;
 
 use super::mesh::Mesh;
-use super::soup::Sets;
+use super::soup::{Sets, by_edge, edge_uses};
 
-/// Whether each part of a mesh bounds a solid; parts may cut or hold one another. In doubt it does not.
-pub fn is_solid(mesh: &Mesh) -> bool {
-    if !mesh.closed_and_consistent() {
-        return false;
+/// The holes of a mesh, as triangles, wound as its own are, with which each of its parts bounds a solid; none if it does
+/// so by itself. Parts may cut or hold one another. `None` if there is no such solid, and in doubt.
+pub fn holes(mesh: &Mesh) -> Option<Vec<[DVec3; 3]>> {
+    let mut positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.as_dvec3()).collect();
+    let mut triangles = mesh.triangles.clone();
+    for rim in rims(&triangles)? {
+        let sum: DVec3 = rim.iter().map(|&index| positions[index as usize]).sum();
+        let middle = positions.len() as u32;
+        positions.push(sum / rim.len() as f64);
+        let next = rim.iter().cycle().skip(1);
+        triangles.extend(
+            rim.iter()
+                .zip(next)
+                .map(|(&one, &next)| [one, next, middle]),
+        );
     }
-    let part_of = parts(mesh);
-    let corners: Vec<[DVec3; 3]> = mesh
-        .triangles
-        .iter()
-        .map(|triangle| triangle.map(|index| mesh.positions[index as usize].as_dvec3()))
-        .collect();
-    let mut volumes_m3 = vec![0.0; mesh.triangles.len()];
+    let place = |triangle: &[u32; 3]| triangle.map(|index| positions[index as usize]);
+    let corners: Vec<[DVec3; 3]> = triangles.iter().map(place).collect();
+    let part_of = parts(&triangles, positions.len());
+    let mut volumes_m3 = vec![0.0; triangles.len()];
     for ([a, b, c], &part) in corners.iter().zip(&part_of) {
         volumes_m3[part] += a.dot(b.cross(*c)) / 6.0;
     }
     // An inward part is a cavity, or has no solid to be one of.
-    part_of.iter().all(|&part| volumes_m3[part] > 0.0) && !cuts_itself(mesh, &corners, &part_of)
+    let outward = !triangles.is_empty() && part_of.iter().all(|&part| volumes_m3[part] > 0.0);
+    (outward && !cuts_itself(&triangles, &corners, &part_of))
+        .then(|| corners[mesh.triangles.len()..].to_vec())
+}
+
+/// The closed lines of open edges, in the direction in which a triangle beyond them would pass them; `None` where an edge
+/// is not passed as often one way as the other, but for these, or where such lines touch.
+fn rims(triangles: &[[u32; 3]]) -> Option<Vec<Vec<u32>>> {
+    let uses = edge_uses(triangles.iter().copied());
+    let mut next_of = HashMap::new();
+    let mut starts = Vec::new();
+    for around in by_edge(&uses) {
+        let balance: i64 = around.iter().map(|used| used.sign()).sum();
+        let [low, high] = around[0].ends();
+        let (from, to) = match balance {
+            0 => continue,
+            1 => (high, low),
+            -1 => (low, high),
+            _ => return None,
+        };
+        if next_of.insert(from, to).is_some() {
+            return None;
+        }
+        starts.push(from);
+    }
+    let mut rims = Vec::new();
+    for start in starts {
+        let mut rim = Vec::new();
+        let mut at = start;
+        while let Some(next) = next_of.remove(&at) {
+            rim.push(at);
+            at = next;
+        }
+        if at != start {
+            return None;
+        }
+        if !rim.is_empty() {
+            rims.push(rim);
+        }
+    }
+    Some(rims)
 }
 
 /// For each triangle the number of the first of those that it is joined to.
-fn parts(mesh: &Mesh) -> Vec<usize> {
+fn parts(triangles: &[[u32; 3]], position_count: usize) -> Vec<usize> {
     // Triangles that share a vertex without an edge are rare, and to take them for one part is to doubt more.
-    let mut joined = Sets::new(mesh.positions.len());
-    for &[a, b, c] in &mesh.triangles {
+    let mut joined = Sets::new(position_count);
+    for &[a, b, c] in triangles {
         joined.join(a, b);
         joined.join(a, c);
     }
-    let mut number_of = vec![usize::MAX; mesh.positions.len()];
-    let triangles = mesh.triangles.iter().enumerate();
-    triangles
+    let mut number_of = vec![usize::MAX; position_count];
+    let numbered = triangles.iter().enumerate();
+    numbered
         .map(|(triangle, [a, _, _])| {
             let number = &mut number_of[joined.least(*a) as usize];
             *number = (*number).min(triangle);
@@ -45,7 +96,7 @@ fn parts(mesh: &Mesh) -> Vec<usize> {
 }
 
 /// Whether two triangles of one part meet elsewhere than at vertices that they share.
-fn cuts_itself(mesh: &Mesh, corners: &[[DVec3; 3]], part_of: &[usize]) -> bool {
+fn cuts_itself(triangles: &[[u32; 3]], corners: &[[DVec3; 3]], part_of: &[usize]) -> bool {
     let low = |triangle: usize| {
         corners[triangle]
             .iter()
@@ -73,7 +124,7 @@ fn cuts_itself(mesh: &Mesh, corners: &[[DVec3; 3]], part_of: &[usize]) -> bool {
                 || other_low.z > high.z
                 || other_high.z < low.z;
             if !apart && part_of[triangle] == part_of[other] {
-                let indices = [mesh.triangles[triangle], mesh.triangles[other]];
+                let indices = [triangles[triangle], triangles[other]];
                 if meet(indices, [&corners[triangle], &corners[other]]) {
                     return true;
                 }
@@ -142,6 +193,10 @@ mod tests {
         Mesh::weld(positions, &raw.collect::<Vec<_>>(), 0.0).0
     }
 
+    fn is_solid(mesh: &Mesh) -> bool {
+        holes(mesh).is_some_and(|holes| holes.is_empty())
+    }
+
     /// A prism over a closed line of points (x, y), counter-clockwise where it bounds a solid.
     fn prism(outline: &[[f32; 2]], low_z: f32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
         let count = outline.len() as u32;
@@ -187,6 +242,25 @@ mod tests {
         let (positions, triangles) = prism(&eight, 0.0);
         assert!(!is_solid(&mesh(&positions, &triangles)));
         assert!(!is_solid(&Mesh::default()));
+    }
+
+    #[test]
+    fn a_box_with_open_ends_is_solid_but_for_them() {
+        let (positions, triangles) = prism(&SQUARE, 0.0);
+        // Without the bottom and the top: two rims of four edges.
+        let open = |index: &usize| index % 4 < 2;
+        let sides = (0..triangles.len())
+            .filter(open)
+            .map(|index| triangles[index]);
+        let found = holes(&mesh(&positions, &sides.collect::<Vec<_>>())).expect("holes");
+        assert_eq!(found.len(), 8);
+        for [a, b, c] in found {
+            let outward = (b - a).cross(c - a).normalize();
+            let up = if a.z > 0.5 { 1.0 } else { -1.0 };
+            assert!((outward - DVec3::Z * up).length() < 1e-12, "{a} {b} {c}");
+        }
+        // A lid that no solid lies under.
+        assert!(holes(&mesh(&positions, &triangles[2..3])).is_none());
     }
 
     #[test]

@@ -15,11 +15,9 @@ use crate::geometry::levels::levels;
 use crate::geometry::mesh::Mesh;
 use crate::geometry::outline_scale::largest_stretch;
 use crate::geometry::shadow_volume::Caster;
-use crate::geometry::solid::is_solid;
+use crate::geometry::solid::holes;
 use crate::light::bounce::Reflector;
 use crate::scene::{Object, Scene};
-
-use super::uniforms::NEAR_M;
 
 /// What kind of thing a surface belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,19 +75,6 @@ pub(super) struct Thing {
     pub receivers: Vec<[DVec3; 3]>,
 }
 
-impl Thing {
-    /// Whether an eye in the anchor's space may see the inside of this level.
-    pub fn shows_inside(&self, level: usize, eye: DVec3) -> bool {
-        // The near plane may cut what the eye is just out of.
-        let reach = DVec3::splat(2.0 * f64::from(NEAR_M));
-        let around = Bounds {
-            low: self.bounds.low - reach,
-            high: self.bounds.high + reach,
-        };
-        !self.levels[level].is_solid || around.contains(eye)
-    }
-}
-
 /// A thing in one level of detail.
 pub(super) struct ThingLevel {
     /// Its triangles among the batch's indices.
@@ -99,8 +84,9 @@ pub(super) struct ThingLevel {
     pub mean_error_m: f64,
     /// Of the triangles that bend smoothly into one another, metres in the anchor's space; 0 for the mesh itself.
     pub largest_facet_m: f64,
-    /// Whether it bounds a solid, so that only its outside is seen from outside.
-    pub is_solid: bool,
+    /// Triangles in the anchor's space over the holes through which alone its inside is seen from outside; `None` if it
+    /// bounds no solid even so.
+    pub holes: Option<Vec<[DVec3; 3]>>,
     pub caster: Option<LevelCaster>,
 }
 
@@ -180,6 +166,8 @@ fn thing(
         let lengths_m = [level.max_error_m, level.mean_error_m, level.largest_facet_m];
         (Cow::Owned(level.mesh), lengths_m)
     });
+    let in_anchor =
+        |corners: [DVec3; 3]| corners.map(|p| object.anchor_from_object.transform_point3(p));
     let mut receivers = Vec::new();
     let levels = std::iter::once(itself)
         .chain(coarser)
@@ -206,7 +194,7 @@ fn thing(
                 }
             };
             ThingLevel {
-                is_solid: is_solid(&mesh),
+                holes: holes(&mesh).map(|holes| holes.into_iter().map(in_anchor).collect()),
                 caster: object.casts.then(of_casting),
                 range: 3 * first as u32..3 * shared.triangles.len() as u32,
                 max_error_m,

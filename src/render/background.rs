@@ -3,11 +3,13 @@
 
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
+use crate::geometry::reach::PixelRect;
 
 use super::gpu::{Gpu, RenderError};
 use super::gpu_clock::{GpuClock, Stretch};
 use super::shader;
 use super::uniforms::{Lens, UniformRow, uniform_entry};
+use super::volumes::set_scissor;
 
 /// Format of the pictures: sRGB-encoded bytes, encoded by the shaders so that untouched pixels pass as they came.
 pub(super) const PICTURE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
@@ -91,7 +93,8 @@ impl Background {
                 &pipeline_layout,
                 &module,
                 "background",
-                PICTURE_FORMAT,
+                &[Some(PICTURE_FORMAT.into())],
+                None,
                 &[("DISTORTS", f64::from(distorts))],
             ),
             recorded,
@@ -126,18 +129,31 @@ impl Background {
         gpu.check()
     }
 
-    /// Fills the picture with the video. A perfect lens needs no shader. Returns whether a pass was drawn.
+    /// Fills the picture with the video where it is not yet (`stale`). A perfect lens needs no shader. Returns whether a
+    /// pass was drawn.
     pub fn draw(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         picture: &wgpu::Texture,
+        stale: PixelRect,
         clock: Option<&GpuClock>,
     ) -> bool {
+        if stale.is_empty() {
+            return false;
+        }
         if !self.distorts {
+            let [x, y] = stale.low;
+            let origin = wgpu::Origin3d { x, y, z: 0 };
             encoder.copy_texture_to_texture(
-                self.recorded.as_image_copy(),
-                picture.as_image_copy(),
-                picture.size(),
+                wgpu::TexelCopyTextureInfo {
+                    origin,
+                    ..self.recorded.as_image_copy()
+                },
+                wgpu::TexelCopyTextureInfo {
+                    origin,
+                    ..picture.as_image_copy()
+                },
+                extent([stale.high[0] - x, stale.high[1] - y]),
             );
             return false;
         }
@@ -149,13 +165,14 @@ impl Background {
                 depth_slice: None,
                 resolve_target: None,
                 ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    load: wgpu::LoadOp::Load,
                     store: wgpu::StoreOp::Store,
                 },
             })],
             timestamp_writes: clock.and_then(|clock| clock.pass(Stretch::Background, true, true)),
             ..Default::default()
         });
+        set_scissor(&mut pass, stale);
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(2, &self.group, &[]);
         pass.draw(0..3, 0..1);

@@ -12,6 +12,7 @@ use crate::scene;
 
 use super::anchor_geometry::{LevelCaster, Role, Thing};
 use super::gpu::Gpu;
+use super::insides::Insides;
 use super::touched::{Touched, light_place};
 use super::uniforms::{CastingLight, NEAR_M, UniformRow};
 use super::volumes::{Counted, IndexBuffer, MadeFor, Volume};
@@ -33,7 +34,6 @@ struct Shadow {
     /// Of the thing that casts it.
     level: usize,
     counting: Option<Counting>,
-    shows_inside: bool,
     scissor: Option<PixelRect>,
     /// A virtual caster's own surface, and what it is sorted for.
     lit: Lit,
@@ -45,9 +45,28 @@ struct Shadow {
 /// [`LitTriangles`]: crate::geometry::shadow_volume::LitTriangles
 #[derive(Default)]
 pub(super) struct Lit {
-    pub facing: IndexBuffer,
-    pub terminator: IndexBuffer,
-    pub averted: IndexBuffer,
+    pub facing: LitSides,
+    pub terminator: LitSides,
+    pub averted: LitSides,
+}
+
+/// Triangles that may be seen from outside, then those that are seen from inside.
+#[derive(Default)]
+pub(super) struct LitSides {
+    indices: IndexBuffer,
+    outer: u32,
+}
+
+impl LitSides {
+    /// Draws what may be seen from outside.
+    pub fn draw_outer(&self, pass: &mut wgpu::RenderPass<'_>) {
+        self.indices.draw(pass, 0..self.outer);
+    }
+
+    /// Draws what is seen from inside.
+    pub fn draw_inner(&self, pass: &mut wgpu::RenderPass<'_>) {
+        self.indices.draw(pass, self.outer..self.indices.count());
+    }
 }
 
 impl Casters {
@@ -146,7 +165,6 @@ impl Casters {
                     _ => Counting::DepthFail,
                 };
                 shadow.counting = Some(counting);
-                shadow.shows_inside = thing.shows_inside(level, placed.eye);
                 let made_for = MadeFor {
                     level,
                     light,
@@ -170,6 +188,7 @@ impl Casters {
         things: &'a [Thing],
         role: Role,
         light: usize,
+        insides: &'a [Insides],
         views: &'a UniformRow,
     ) -> impl Iterator<Item = Counted<'a>> {
         let shadows = things.iter().zip(&self.shadows[light]).enumerate();
@@ -180,7 +199,7 @@ impl Casters {
                 Some(Counted {
                     volume: &shadow.volume,
                     counting: shadow.counting?,
-                    shows_inside: shadow.shows_inside,
+                    insides: insides[number],
                     scissor: shadow.scissor?,
                     offsets: [views.offset(thing.anchor), self.lights.offset(slot)],
                     vertices: &thing.levels[shadow.level].caster.as_ref()?.vertices,
@@ -214,15 +233,16 @@ impl Shadow {
         let (_, light, eye) = lit_for;
         let normals = caster.smooth_normals.as_deref();
         let sorted = caster.caster.lit_triangles(light, eye, normals);
-        for (buffer, triangles) in [
+        for (sides, seen) in [
             (&mut self.lit.facing, sorted.facing),
             (&mut self.lit.terminator, sorted.terminator),
             (&mut self.lit.averted, sorted.averted),
         ] {
-            let corners = triangles
-                .into_iter()
-                .flat_map(|triangle| caster.surface_triangles[triangle]);
-            buffer.write(&gpu.device, &gpu.queue, &corners.collect::<Vec<u32>>());
+            let triangles = seen.outer.iter().chain(&seen.inner);
+            let corners = triangles.flat_map(|&triangle| caster.surface_triangles[triangle]);
+            let corners: Vec<u32> = corners.collect();
+            sides.indices.write(&gpu.device, &gpu.queue, &corners);
+            sides.outer = 3 * seen.outer.len() as u32;
         }
         self.lit_for = Some(lit_for);
     }

@@ -61,13 +61,14 @@ impl Composite {
             ("SAMPLES", f64::from(samples)),
             ("DISTORTS", f64::from(background.distorts)),
         ];
-        let build = |entry_point, format| {
+        let build = |entry_point, format: wgpu::TextureFormat| {
             shader::whole_picture(
                 device,
                 &pipeline_layout,
                 &module,
                 entry_point,
-                format,
+                &[Some(format.into())],
+                None,
                 &constants,
             )
         };

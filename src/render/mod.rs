@@ -14,6 +14,7 @@ mod fade;
 mod gpu;
 mod gpu_clock;
 mod indirect;
+mod insides;
 mod layers;
 mod readback;
 mod renderer;

@@ -56,6 +56,8 @@ pub struct Renderer {
     shown: Shown,
     /// What virtual things and their shadows could reach in that frame.
     touched: Option<Touched>,
+    /// Where the picture is not that of the video.
+    stale: PixelRect,
 }
 
 impl Renderer {
@@ -75,29 +77,14 @@ impl Renderer {
                 limit,
             });
         }
-        let texture = |label, format, usage| {
-            device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: extent(size_px),
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
-                view_formats: &[],
-            })
-        };
         let stage = Stage::new(&gpu, scene, intrinsics);
         let background = Background::new(&gpu, &intrinsics);
-        let layout = |label, groups: &[Option<&wgpu::BindGroupLayout>]| {
-            device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some(label),
-                bind_group_layouts: groups,
-                immediate_size: 0,
-            })
-        };
         let [view, light] = &stage.layouts;
-        let geometry_layout = layout("geometry", &[Some(view), Some(light)]);
+        let geometry_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("geometry"),
+            bind_group_layouts: &[Some(view), Some(light)],
+            immediate_size: 0,
+        });
         let samples = scene.shadows.samples;
         let glossy = scene.virtuals.iter().any(|object| {
             let mut materials = object.materials.iter();
@@ -105,32 +92,22 @@ impl Renderer {
         });
         let is_direct = samples == 1 && scene.lights.len() == 1;
         Ok(Self {
-            direct: is_direct.then(|| {
-                let layout = layout(
-                    "geometry over video",
-                    &[Some(view), Some(light), Some(&background.layout)],
-                );
-                let depth_stencil = texture(
-                    "depth and stencil",
-                    gpu.depth_format,
-                    wgpu::TextureUsages::empty(),
-                );
-                Direct::new(
-                    device,
-                    &layout,
-                    &depth_stencil,
-                    [glossy, background.distorts],
-                )
-            }),
+            direct: is_direct.then(|| Direct::new(&gpu, &stage.layouts, &background, glossy)),
             accumulation: (!is_direct)
                 .then(|| Accumulation::new(&gpu, &geometry_layout, &background, samples, glossy)),
-            picture: texture(
-                "picture",
-                PICTURE_FORMAT,
-                wgpu::TextureUsages::COPY_SRC
+            picture: device.create_texture(&wgpu::TextureDescriptor {
+                label: Some("picture"),
+                size: extent(size_px),
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: PICTURE_FORMAT,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT
+                    | wgpu::TextureUsages::COPY_SRC
                     | wgpu::TextureUsages::COPY_DST
                     | wgpu::TextureUsages::TEXTURE_BINDING,
-            ),
+                view_formats: &[],
+            }),
             picture_readback: Readback::new(device, size_px, 4),
             clock: gpu
                 .timestamp_period_ns
@@ -139,6 +116,7 @@ impl Renderer {
             layer_passes: None,
             shown: Shown::Bare,
             touched: None,
+            stale: PixelRect::whole(size_px),
             size_px,
             samples,
             glossy,
@@ -154,6 +132,7 @@ impl Renderer {
     /// # Errors
     /// A frame of another size than the camera's calibration.
     pub fn upload(&mut self, frame: &Frame) -> Result<(), RenderError> {
+        self.stale = PixelRect::whole(self.size_px);
         self.background.upload(&self.gpu, frame)
     }
 
@@ -183,6 +162,7 @@ impl Renderer {
             fade.keep(&self.gpu, &self.picture);
             self.draw(&seen_at_least(part), shown);
             fade.mix(&self.gpu, &self.picture, part);
+            self.stale = PixelRect::whole(self.size_px);
             self.fade = Some(fade);
         }
     }
@@ -201,14 +181,16 @@ impl Renderer {
         let mut drawn = Vec::new();
         if self
             .background
-            .draw(&mut encoder, &self.picture, self.clock.as_ref())
+            .draw(&mut encoder, &self.picture, self.stale, self.clock.as_ref())
         {
             drawn.push(Stretch::Background);
         }
+        self.stale = PixelRect::NONE;
         if let Some(touched) = &self.touched {
+            self.stale = touched.pixels;
             drawn.push(Stretch::Light);
             if let Some(direct) = &self.direct {
-                self.draw_direct(&mut encoder, direct, touched.pixels);
+                self.draw_direct(&mut encoder, direct, touched);
             } else if let Some(accumulation) = &self.accumulation {
                 self.accumulate(&mut encoder, accumulation, touched.pixels);
                 self.composite(&mut encoder, accumulation, touched.pixels);
@@ -265,21 +247,21 @@ impl Renderer {
         };
         // The other layers cover the whole picture, not only what virtual things touch.
         self.stage.cast_everywhere(&self.gpu);
-        let (gpu, stage) = (&self.gpu, &self.stage);
+        let (gpu, stage, size_px) = (&self.gpu, &self.stage, self.size_px);
         let passes = self
             .layer_passes
             .get_or_insert_with(|| LayerPasses::new(gpu, &self.geometry_layout, self.size_px));
         let shown = |role: Role| role == Role::Real || self.shown == Shown::Composite;
         let (role, depth_m) = passes.role_and_depth(gpu, &|pass, pipeline, role| {
             if shown(role) {
-                stage.draw_surfaces(pass, pipeline, role, 0);
+                stage.draw_surfaces(pass, pipeline, role, 0, PixelRect::whole(size_px));
             }
         })?;
         let mut shadow = Vec::new();
         for light in 0..stage.light_count() {
             let mut bits = passes.shadow(gpu, &|pass, volumes, role| {
                 if shown(role) {
-                    let whole = PixelRect::whole(self.size_px);
+                    let whole = PixelRect::whole(size_px);
                     stage.count_volumes(pass, volumes, Among::All, role, light, whole);
                 }
             })?;
@@ -299,35 +281,73 @@ impl Renderer {
 
     /// Haller et al. 2003, section 3.2, for one light and one sample: phantoms and lit virtual things into depth; *real
     /// onto real* is counted; *virtual onto real* is counted where the light arrives, and what is counted loses it;
-    /// *all onto virtual* is what both have counted there.
-    fn draw_direct(&self, encoder: &mut wgpu::CommandEncoder, direct: &Direct, touched: PixelRect) {
+    /// *all onto virtual* is what both have counted there, and leaves what was set aside.
+    fn draw_direct(&self, encoder: &mut wgpu::CommandEncoder, direct: &Direct, touched: &Touched) {
+        let stage = &self.stage;
         let picture = self.picture.create_view(&Default::default());
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("direct"),
-            color_attachments: &[Some(loaded(&picture, wgpu::LoadOp::Load))],
-            depth_stencil_attachment: Some(depth_stencil(&direct.depth_stencil, true, true)),
-            timestamp_writes: self
-                .clock
-                .as_ref()
-                .and_then(|clock| clock.pass(Stretch::Light, true, true)),
+        let clock = |first, last| {
+            let clock = self.clock.as_ref();
+            clock.and_then(|clock| clock.pass(Stretch::Light, first, last))
+        };
+        let keep = wgpu::LoadOp::Load;
+        let mut surfaces = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("surfaces"),
+            color_attachments: &[
+                Some(loaded(&picture, keep)),
+                Some(loaded(&direct.ambient, keep)),
+            ],
+            depth_stencil_attachment: Some(kept(&direct.depth_stencil)),
+            timestamp_writes: clock(true, false),
             ..Default::default()
         });
-        set_scissor(&mut pass, touched);
-        pass.set_bind_group(2, &self.background.group, &[]);
-        let stage = &self.stage;
-        stage.draw_surfaces(&mut pass, &direct.depth_of_real, Role::Real, 0);
-        let shading = [&direct.light_on_virtual, &direct.ambient_on_virtual];
-        stage.draw_virtuals(&mut pass, shading, 0);
+        set_scissor(&mut surfaces, touched.pixels);
+        surfaces.set_pipeline(&direct.nothing);
+        surfaces.draw(0..3, 0..1);
+        surfaces.set_bind_group(2, &self.background.group, &[]);
+        stage.draw_surfaces(
+            &mut surfaces,
+            &direct.depth_of_real,
+            Role::Real,
+            0,
+            touched.pixels,
+        );
+        let shading = [
+            &direct.light_on_virtual,
+            &direct.light_at_terminator,
+            &direct.ambient_on_virtual,
+        ];
+        stage.draw_virtuals(&mut surfaces, shading, 0, touched.pixels);
+        drop(surfaces);
 
+        let mut shadows = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("shadows"),
+            color_attachments: &[Some(loaded(&picture, keep))],
+            depth_stencil_attachment: Some(kept(&direct.depth_stencil)),
+            timestamp_writes: clock(false, true),
+            ..Default::default()
+        });
+        let pass = &mut shadows;
+        set_scissor(pass, touched.pixels);
+        pass.set_bind_group(2, &self.background.group, &[]);
         let volumes = &direct.volumes;
-        if stage.count_volumes(&mut pass, volumes, Among::All, Role::Real, 0, touched) {
-            volumes.keep(&mut pass, Role::Real, touched);
+        let by_real = stage.count_volumes(pass, volumes, Among::All, Role::Real, 0, touched.pixels);
+        if by_real {
+            volumes.keep(pass, Role::Real, touched.pixels);
         }
         let lit = Among::LitByReal;
-        if stage.count_volumes(&mut pass, volumes, lit, Role::Virtual, 0, touched) {
-            stage.draw_surfaces(&mut pass, &direct.hidden_on_real, Role::Real, 0);
+        let by_virtual = stage.count_volumes(pass, volumes, lit, Role::Virtual, 0, touched.pixels);
+        if by_virtual {
+            stage.draw_surfaces(pass, &direct.hidden_on_real, Role::Real, 0, touched.pixels);
         }
-        stage.draw_virtuals_facing(&mut pass, &direct.shadow_on_virtual, 0);
+        if (by_real || by_virtual) && !touched.virtuals.is_empty() {
+            set_scissor(pass, touched.virtuals);
+            pass.set_bind_group(3, &direct.ambient_group, &[]);
+            for (own, pipeline) in (0..).zip(&direct.shadow_on_virtual) {
+                pass.set_pipeline(pipeline);
+                pass.set_stencil_reference(own);
+                pass.draw(0..3, 0..1);
+            }
+        }
     }
 
     /// The same light by light and sample by sample: what arrives in the video is added up on real surfaces, and what
@@ -366,12 +386,19 @@ impl Renderer {
             });
             set_scissor(&mut pass, touched);
             if first {
-                stage.draw_surfaces(&mut pass, &surfaces.ambient_on_real, Role::Real, light);
+                stage.draw_surfaces(
+                    &mut pass,
+                    &surfaces.ambient_on_real,
+                    Role::Real,
+                    light,
+                    touched,
+                );
                 stage.draw_surfaces(
                     &mut pass,
                     &surfaces.ambient_on_virtual,
                     Role::Virtual,
                     light,
+                    touched,
                 );
             }
             if stage.light_count() == 0 {
@@ -380,7 +407,13 @@ impl Renderer {
             if stage.count_volumes(&mut pass, volumes, Among::All, Role::Real, light, touched) {
                 volumes.keep(&mut pass, Role::Real, touched);
             }
-            stage.draw_surfaces(&mut pass, &surfaces.light_reaching_real, Role::Real, light);
+            stage.draw_surfaces(
+                &mut pass,
+                &surfaces.light_reaching_real,
+                Role::Real,
+                light,
+                touched,
+            );
             let lit = Among::LitByReal;
             if stage.count_volumes(&mut pass, volumes, lit, Role::Virtual, light, touched) {
                 stage.draw_surfaces(
@@ -388,9 +421,10 @@ impl Renderer {
                     &surfaces.light_hidden_from_real,
                     Role::Real,
                     light,
+                    touched,
                 );
             }
-            stage.draw_virtuals_facing(&mut pass, &surfaces.light_on_virtual, light);
+            stage.draw_virtuals_facing(&mut pass, &surfaces.light_on_virtual, light, touched);
         }
     }
 
@@ -478,6 +512,21 @@ fn loaded(
             load,
             store: wgpu::StoreOp::Store,
         },
+    }
+}
+
+/// Depth and stencil as the last pass left them, for the next.
+fn kept(view: &wgpu::TextureView) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    wgpu::RenderPassDepthStencilAttachment {
+        view,
+        depth_ops: Some(wgpu::Operations {
+            load: wgpu::LoadOp::Load,
+            store: wgpu::StoreOp::Store,
+        }),
+        stencil_ops: Some(wgpu::Operations {
+            load: wgpu::LoadOp::Load,
+            store: wgpu::StoreOp::Store,
+        }),
     }
 }
 

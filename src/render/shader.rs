@@ -44,13 +44,14 @@ pub(super) fn no_bindings(device: &wgpu::Device) -> wgpu::PipelineLayout {
     })
 }
 
-/// A pipeline that draws one triangle over the whole of a target.
+/// A pipeline that draws one triangle over the whole of its targets, one sample per pixel.
 pub(super) fn whole_picture(
     device: &wgpu::Device,
     layout: &wgpu::PipelineLayout,
     module: &wgpu::ShaderModule,
     entry_point: &str,
-    format: wgpu::TextureFormat,
+    targets: &[Option<wgpu::ColorTargetState>],
+    depth_stencil: Option<wgpu::DepthStencilState>,
     constants: &[(&str, f64)],
 ) -> wgpu::RenderPipeline {
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
@@ -63,7 +64,7 @@ pub(super) fn whole_picture(
             buffers: &[],
         },
         primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: None,
+        depth_stencil,
         multisample: wgpu::MultisampleState::default(),
         fragment: Some(wgpu::FragmentState {
             module,
@@ -72,7 +73,7 @@ pub(super) fn whole_picture(
                 constants,
                 ..Default::default()
             },
-            targets: &[Some(format.into())],
+            targets,
         }),
         multiview_mask: None,
         cache: None,

@@ -1,7 +1,5 @@
 //! What stands where in a frame: the scene's surfaces, casters and lights on the GPU, and how passes draw them.
 
-use std::ops::Range;
-
 use glam::DAffine3;
 
 use crate::geometry::camera::Intrinsics;
@@ -10,14 +8,15 @@ use crate::light::Light;
 use crate::scene::Scene;
 
 use super::anchor_geometry::{AnchorGeometry, Role, SurfaceBatch, Thing};
-use super::casters::Casters;
+use super::casters::{Casters, LitSides};
 use super::detail::chosen_levels;
 use super::gpu::Gpu;
 use super::indirect::Indirect;
+use super::insides::{Insides, insides};
 use super::surfaces::Sided;
 use super::touched::{Touched, everywhere, touched_by_virtual};
 use super::uniforms::{LightSource, UniformRow, View, uniform_entry};
-use super::volumes::{Among, Volumes};
+use super::volumes::{Among, Volumes, set_scissor};
 
 /// The scene as the present frame has it.
 pub(super) struct Stage {
@@ -28,6 +27,9 @@ pub(super) struct Stage {
     /// For each thing the level that is drawn.
     levels: Vec<usize>,
     max_silhouette_error_px: f64,
+    samples: u32,
+    /// For each thing where its inside can be seen.
+    insides: Vec<Insides>,
     casters: Casters,
     indirect: Option<Indirect>,
     views: UniformRow,
@@ -75,7 +77,9 @@ impl Stage {
             ),
             indirect: Indirect::new(scene, &world_virtuals),
             max_silhouette_error_px: scene.shadows.max_silhouette_error_px,
+            samples: scene.shadows.samples,
             levels: vec![0; things.len()],
+            insides: vec![Insides::Anywhere; things.len()],
             batches,
             things,
             view_group: group(&layouts[0], &views),
@@ -130,6 +134,19 @@ impl Stage {
             &self.intrinsics,
             self.max_silhouette_error_px,
         );
+        let placed = self.things.iter().zip(&self.levels);
+        self.insides = placed
+            .map(|(thing, &level)| {
+                let Some(camera_from_anchor) = camera_from_anchor[thing.anchor] else {
+                    return Insides::Unseen;
+                };
+                match insides(thing, level, &camera_from_anchor, &self.intrinsics) {
+                    // Mesa's software driver cuts rectangles between the samples of a pixel.
+                    Insides::Within(_) if self.samples > 1 => Insides::Anywhere,
+                    insides => insides,
+                }
+            })
+            .collect();
     }
 
     /// Makes the shadow volumes that matter to the picture. Returns what virtual things touch in it, if anything.
@@ -174,38 +191,40 @@ impl Stage {
         pipelines: &Sided,
         role: Role,
         light: usize,
+        within: PixelRect,
     ) {
         self.set_light(pass, light);
         for batch in self.placed(role) {
             self.set_batch(pass, batch);
             for (number, thing) in self.of_batch(batch) {
-                pass.set_pipeline(pipelines.pipeline(self.shows_inside(number, thing)));
-                pass.draw_indexed(self.whole(number, thing), 0, 0..1);
+                self.draw_whole(pass, pipelines, number, thing, within);
             }
         }
     }
 
-    /// Draws virtual surfaces for the first time: by `lit` what the light may reach, by `unlit` all else.
+    /// Draws virtual surfaces by what a light can give them: in the open, at the terminator, and turned away.
     pub fn draw_virtuals(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        [lit, unlit]: [&Sided; 2],
+        [open, terminator, averted]: [&Sided; 3],
         light: usize,
+        within: PixelRect,
     ) {
         self.set_light(pass, light);
         for batch in self.placed(Role::Virtual) {
             for (number, thing) in self.of_batch(batch) {
                 self.set_batch(pass, batch);
-                let shows_inside = self.shows_inside(number, thing);
-                pass.set_pipeline(lit.pipeline(shows_inside));
                 let Some(surface) = self.casters.lit(number, light) else {
-                    pass.draw_indexed(self.whole(number, thing), 0, 0..1);
+                    self.draw_whole(pass, open, number, thing, within);
                     continue;
                 };
-                surface.facing.draw_all(pass);
-                surface.terminator.draw_all(pass);
-                pass.set_pipeline(unlit.pipeline(shows_inside));
-                surface.averted.draw_all(pass);
+                for (pipelines, sides) in [
+                    (open, &surface.facing),
+                    (terminator, &surface.terminator),
+                    (averted, &surface.averted),
+                ] {
+                    self.draw_sides(pass, pipelines, number, sides, within);
+                }
             }
         }
     }
@@ -218,24 +237,67 @@ impl Stage {
         pass: &mut wgpu::RenderPass<'_>,
         pipelines: &Sided,
         light: usize,
+        within: PixelRect,
     ) {
         self.set_light(pass, light);
         for batch in self.placed(Role::Virtual) {
             for (number, thing) in self.of_batch(batch) {
                 self.set_batch(pass, batch);
-                pass.set_pipeline(pipelines.pipeline(self.shows_inside(number, thing)));
                 match self.casters.lit(number, light) {
                     Some(surface) => {
-                        surface.facing.draw_all(pass);
+                        self.draw_sides(pass, pipelines, number, &surface.facing, within);
                         pass.set_stencil_reference(1);
-                        surface.terminator.draw_all(pass);
+                        self.draw_sides(pass, pipelines, number, &surface.terminator, within);
                         pass.set_stencil_reference(0);
                     }
                     None if thing.casts => {}
-                    None => pass.draw_indexed(self.whole(number, thing), 0, 0..1),
+                    None => self.draw_whole(pass, pipelines, number, thing, within),
                 }
             }
         }
+    }
+
+    /// Draws a thing's triangles from the sides that can be seen.
+    fn draw_whole(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        pipelines: &Sided,
+        number: usize,
+        thing: &Thing,
+        within: PixelRect,
+    ) {
+        let range = || thing.levels[self.levels[number]].range.clone();
+        let insides = self.insides[number];
+        pass.set_pipeline(match insides {
+            Insides::Anywhere => &pipelines.both,
+            Insides::Unseen | Insides::Within(_) => &pipelines.outside,
+        });
+        pass.draw_indexed(range(), 0, 0..1);
+        scissored(pass, insides, within, |pass| {
+            pass.set_pipeline(&pipelines.inside);
+            pass.draw_indexed(range(), 0, 0..1);
+        });
+    }
+
+    /// Draws some of a thing's triangles, sorted by the sides that can be seen.
+    fn draw_sides(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        pipelines: &Sided,
+        number: usize,
+        sides: &LitSides,
+        within: PixelRect,
+    ) {
+        let insides = self.insides[number];
+        pass.set_pipeline(match insides {
+            Insides::Unseen => &pipelines.outside,
+            Insides::Anywhere | Insides::Within(_) => &pipelines.both,
+        });
+        sides.draw_outer(pass);
+        if insides == Insides::Anywhere {
+            sides.draw_inner(pass);
+        }
+        scissored(pass, insides, within, |pass| sides.draw_inner(pass));
     }
 
     /// Counts a role's shadow volumes. Returns whether there are any.
@@ -249,7 +311,10 @@ impl Stage {
         within: PixelRect,
     ) -> bool {
         let groups = [&self.view_group, self.casters.light_group()];
-        let counted = self.casters.counted(&self.things, role, light, &self.views);
+        let (things, insides) = (&self.things, &self.insides);
+        let counted = self
+            .casters
+            .counted(things, role, light, insides, &self.views);
         volumes.count(pass, among, role, groups, within, counted)
     }
 
@@ -260,26 +325,11 @@ impl Stage {
         batches.filter(move |b| b.role == role && has_pose(0) && has_pose(b.anchor))
     }
 
-    /// Whether the camera may see the inside of a thing of a batch that has a pose.
-    fn shows_inside(&self, number: usize, thing: &Thing) -> bool {
-        self.camera_from_anchor[thing.anchor].is_none_or(|camera_from_anchor| {
-            thing.shows_inside(
-                self.levels[number],
-                camera_from_anchor.inverse().translation,
-            )
-        })
-    }
-
     /// The things of a batch, with their numbers.
     fn of_batch(&self, batch: &SurfaceBatch) -> impl Iterator<Item = (usize, &Thing)> {
         let kind = (batch.role, batch.anchor);
         let things = self.things.iter().enumerate();
         things.filter(move |(_, thing)| (thing.role, thing.anchor) == kind)
-    }
-
-    /// A thing's triangles, in its level, among its batch's indices.
-    fn whole(&self, number: usize, thing: &Thing) -> Range<u32> {
-        thing.levels[self.levels[number]].range.clone()
     }
 
     fn set_light(&self, pass: &mut wgpu::RenderPass<'_>, light: usize) {
@@ -292,5 +342,22 @@ impl Stage {
         pass.set_vertex_buffer(0, batch.corners.slice(..));
         pass.set_vertex_buffer(1, batch.indirect.slice(..));
         pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
+    }
+}
+
+/// Draws only where an inside can be seen through holes.
+fn scissored(
+    pass: &mut wgpu::RenderPass<'_>,
+    insides: Insides,
+    within: PixelRect,
+    draw: impl FnOnce(&mut wgpu::RenderPass<'_>),
+) {
+    if let Insides::Within(pixels) = insides {
+        let pixels = pixels.intersection(within);
+        if !pixels.is_empty() {
+            set_scissor(pass, pixels);
+            draw(pass);
+            set_scissor(pass, within);
+        }
     }
 }

@@ -23,10 +23,11 @@ pub(super) struct Surfaces {
     pub light_on_virtual: Sided,
 }
 
-/// A pipeline for both sides of triangles, and one for outsides alone.
+/// Pipelines for both sides of triangles, for outsides alone and for insides alone.
 pub(super) struct Sided {
-    both: wgpu::RenderPipeline,
-    outside: wgpu::RenderPipeline,
+    pub both: wgpu::RenderPipeline,
+    pub outside: wgpu::RenderPipeline,
+    pub inside: wgpu::RenderPipeline,
 }
 
 impl Sided {
@@ -34,15 +35,8 @@ impl Sided {
     pub fn both(pipeline: wgpu::RenderPipeline) -> Self {
         Self {
             outside: pipeline.clone(),
+            inside: pipeline.clone(),
             both: pipeline,
-        }
-    }
-
-    /// The pipeline for a surface whose insides can be seen, or cannot.
-    pub fn pipeline(&self, shows_inside: bool) -> &wgpu::RenderPipeline {
-        match shows_inside {
-            true => &self.both,
-            false => &self.outside,
         }
     }
 }
@@ -126,6 +120,7 @@ impl Use<'_> {
         Sided {
             both: build(None),
             outside: build(Some(wgpu::Face::Back)),
+            inside: build(Some(wgpu::Face::Front)),
         }
     }
 }

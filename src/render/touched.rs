@@ -10,13 +10,8 @@ use crate::light::Light;
 
 use super::anchor_geometry::{Role, Thing};
 
-const NOWHERE: PixelRect = PixelRect {
-    low: [0; 2],
-    high: [0; 2],
-};
-
 const UNSEEN: ShadowReach = ShadowReach {
-    pixels: NOWHERE,
+    pixels: PixelRect::NONE,
     end: None,
 };
 
@@ -25,6 +20,8 @@ const UNSEEN: ShadowReach = ShadowReach {
 pub(super) struct Touched {
     /// All of it.
     pub pixels: PixelRect,
+    /// Where virtual things can be.
+    pub virtuals: PixelRect,
     /// For each light and each thing; empty for those that cast none.
     pub shadows: Vec<Vec<ShadowReach>>,
 }
@@ -64,10 +61,11 @@ pub(super) fn touched_by_virtual(
     let receivers = Bounds::around(placed.iter().flat_map(|(_, _, corners)| *corners))?;
 
     let mut shadows = vec![vec![UNSEEN; things.len()]; lights.len()];
-    let mut pixels = NOWHERE;
+    let mut virtuals = PixelRect::NONE;
+    let mut pixels = PixelRect::NONE;
     for (index, thing, corners) in &placed {
         if thing.role == Role::Virtual {
-            pixels = pixels.union(reach::covered(corners, &camera_from_world, intrinsics));
+            virtuals = virtuals.union(reach::covered(corners, &camera_from_world, intrinsics));
         }
         for (light, shadows) in lights.iter().zip(&mut shadows).filter(|_| thing.casts) {
             let light = light_place(light, &DAffine3::IDENTITY);
@@ -81,10 +79,15 @@ pub(super) fn touched_by_virtual(
             shadows[*index] = shadow;
         }
     }
+    let pixels = pixels.union(virtuals);
     for shadow in shadows.iter_mut().flatten() {
         shadow.pixels = shadow.pixels.intersection(pixels);
     }
-    (!pixels.is_empty()).then_some(Touched { pixels, shadows })
+    (!pixels.is_empty()).then_some(Touched {
+        pixels,
+        virtuals,
+        shadows,
+    })
 }
 
 /// The whole picture, as far as things have poses.
@@ -102,7 +105,11 @@ pub(super) fn everywhere(
         false => UNSEEN,
     };
     let shadows = vec![things.iter().map(of_thing).collect(); lights.len()];
-    Touched { pixels, shadows }
+    Touched {
+        pixels,
+        virtuals: pixels,
+        shadows,
+    }
 }
 
 /// A light as its shadow volumes see it from an anchor.

@@ -12,6 +12,7 @@ use crate::geometry::shadow_volume::{Caster, Casting, LightPlace, Silhouette};
 
 use super::anchor_geometry::Role;
 use super::gpu::Gpu;
+use super::insides::Insides;
 use super::shader;
 use super::stencil::{self, COUNT, MOST_LAYERS, REAL_HIDES};
 
@@ -49,6 +50,8 @@ struct Caps {
     /// and those that do not. They lie behind what is seen, whatever rounding makes of their depth along the rim, where
     /// the surface draws its outside alone.
     averted: wgpu::RenderPipeline,
+    /// These where holes may show them.
+    averted_seen: wgpu::RenderPipeline,
 }
 
 impl Counters {
@@ -76,16 +79,42 @@ impl Counters {
                 part.indices.draw(pass, 0..sides);
                 let ranges = [sides..outward, outward..turned];
                 for (caps, range) in self.caps.iter().zip(ranges) {
-                    if counted.shows_inside {
-                        pass.set_pipeline(&caps.seen);
-                        part.indices.draw(pass, range);
-                    } else {
-                        pass.set_pipeline(&caps.facing);
-                        part.indices.draw(pass, range.clone());
-                        pass.set_pipeline(&caps.averted);
-                        part.indices.draw(pass, range);
-                    }
+                    caps.draw(pass, counted, &part.indices, range);
                 }
+            }
+        }
+    }
+}
+
+impl Caps {
+    fn draw(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        counted: &Counted<'_>,
+        indices: &IndexBuffer,
+        range: Range<u32>,
+    ) {
+        let mut draw = |pipeline, pixels: PixelRect| {
+            if !pixels.is_empty() {
+                set_scissor(pass, pixels);
+                pass.set_pipeline(pipeline);
+                indices.draw(pass, range.clone());
+            }
+        };
+        let all = counted.scissor;
+        match counted.insides {
+            Insides::Anywhere => draw(&self.seen, all),
+            Insides::Unseen => {
+                draw(&self.facing, all);
+                draw(&self.averted, all);
+            }
+            Insides::Within(pixels) => {
+                draw(&self.facing, all);
+                draw(&self.averted_seen, all.intersection(pixels));
+                for beside in all.without(pixels) {
+                    draw(&self.averted, beside);
+                }
+                set_scissor(pass, all);
             }
         }
     }
@@ -95,8 +124,8 @@ impl Counters {
 pub(super) struct Counted<'a> {
     pub volume: &'a Volume,
     pub counting: Counting,
-    /// Whether the camera may see the caster's inside.
-    pub shows_inside: bool,
+    /// Where the camera may see the caster's inside.
+    pub insides: Insides,
     /// Pixels outside which it cannot matter.
     pub scissor: PixelRect,
     /// Dynamic offsets of its anchor's view and of the light in its anchor.
@@ -218,6 +247,7 @@ impl Volumes {
                     seen: caps(turned, in_front, None),
                     facing: caps(turned, in_front, back),
                     averted: caps(turned, wgpu::CompareFunction::Never, front),
+                    averted_seen: caps(turned, in_front, front),
                 }),
             }
         };
@@ -386,9 +416,9 @@ pub(super) struct IndexBuffer {
 }
 
 impl IndexBuffer {
-    /// Draws all indices with whatever pipeline, view and vertices are set.
-    pub fn draw_all(&self, pass: &mut wgpu::RenderPass<'_>) {
-        self.draw(pass, 0..self.count);
+    /// How many there are.
+    pub fn count(&self) -> u32 {
+        self.count
     }
 
     pub fn write(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, indices: &[u32]) {

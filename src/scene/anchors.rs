@@ -73,16 +73,7 @@ impl AnchorReader {
         let family = self.family(marker)?;
         let id = self.id(marker, family, &name)?;
         let size_m = size(marker)?;
-        Ok(Anchor {
-            name,
-            markers: vec![Marker {
-                family,
-                id,
-                size_m,
-                center_m: DVec2::ZERO,
-                rotation_rad: 0.0,
-            }],
-        })
+        Ok(Anchor::lone(name, family, id, size_m))
     }
 
     fn name(&mut self, table: &Table) -> Result<String, SceneError> {

@@ -20,6 +20,7 @@ mod settings;
 
 pub use error::{Place, SceneError};
 pub use family::{Codes, Family};
+pub use reader::{NAMES, is_name};
 
 /// What one scene file says, checked.
 #[derive(Debug, Clone, Default)]
@@ -51,6 +52,56 @@ pub struct CameraSettings {
     pub calibration: Option<PathBuf>,
     /// Whether the pictures come mirrored and are turned back first.
     pub mirror: bool,
+    /// What a webcam is asked for.
+    pub wanted: WantedFormat,
+}
+
+/// What a webcam is asked for; what is `None` is chosen by itself.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct WantedFormat {
+    /// Width and height, pixels.
+    pub size_px: Option<[u32; 2]>,
+    /// Pictures per second.
+    pub fps: Option<u32>,
+    /// How the pixels come.
+    pub pixels: Option<PixelFormat>,
+}
+
+/// How a webcam sends its pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PixelFormat {
+    /// A JPEG each.
+    Mjpeg,
+    /// 4:2:2, brightness and colour in turn.
+    Yuyv,
+    /// 4:2:0, a plane of brightness and one of colour.
+    Nv12,
+    /// Brightness alone.
+    Grey,
+    /// 8-bit red, green, blue.
+    Rgb,
+    /// 8-bit blue, green, red.
+    Bgr,
+}
+
+impl PixelFormat {
+    /// All of them, by the names that files and the command line use.
+    pub const BY_NAME: [(&str, Self); 6] = [
+        ("MJPEG", Self::Mjpeg),
+        ("YUYV", Self::Yuyv),
+        ("NV12", Self::Nv12),
+        ("GREY", Self::Grey),
+        ("RGB", Self::Rgb),
+        ("BGR", Self::Bgr),
+    ];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        Self::BY_NAME
+            .iter()
+            .find(|(_, format)| *format == self)
+            .map_or("", |(name, _)| name)
+    }
 }
 
 /// Which library finds the markers.
@@ -154,6 +205,22 @@ pub struct Anchor {
     pub name: String,
     /// Its markers; a lone one lies at the origin.
     pub markers: Vec<Marker>,
+}
+
+impl Anchor {
+    /// A marker alone, in a frame of its own.
+    pub fn lone(name: String, family: Family, id: u32, size_m: f64) -> Self {
+        Self {
+            name,
+            markers: vec![Marker {
+                family,
+                id,
+                size_m,
+                center_m: DVec2::ZERO,
+                rotation_rad: 0.0,
+            }],
+        }
+    }
 }
 
 /// A phantom or a virtual thing.

@@ -155,6 +155,16 @@ impl<'a> Table<'a> {
     }
 }
 
+/// What [`is_name`] allows.
+pub const NAMES: &str =
+    "a text without commas, semicolons, quotes and line breaks, and without spaces at its ends";
+
+/// Whether a text can be the name of an anchor or a thing.
+pub fn is_name(text: &str) -> bool {
+    let unfit = |c: char| c.is_control() || matches!(c, ',' | ';' | '"');
+    !text.is_empty() && text.trim() == text && !text.contains(unfit)
+}
+
 /// Which numbers a key takes.
 pub struct Numbers {
     pub least: f64,
@@ -297,10 +307,8 @@ impl<'a> Value<'a> {
     /// A name: a text that can stand in a message and in a column of a CSV file.
     pub fn name(&self) -> Result<String, SceneError> {
         let name = self.text()?;
-        let unfit = |c: char| c.is_control() || matches!(c, ',' | ';' | '"');
-        if name.trim().is_empty() || name.trim() != name || name.contains(unfit) {
-            let allowed = "a text without commas, semicolons, quotes and line breaks, and without spaces at its ends";
-            return Err(self.error(format!("not a name; allowed: {allowed}")));
+        if !is_name(name) {
+            return Err(self.error(format!("not a name; allowed: {NAMES}")));
         }
         Ok(name.to_owned())
     }

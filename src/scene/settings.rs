@@ -3,16 +3,21 @@
 use super::error::SceneError;
 use super::reader::{Numbers, Table, Value};
 use super::{
-    ArucoRefinement, CameraSettings, Counting, DetectorKind, Search, ShadowSettings, Technique,
-    TrackingSettings,
+    ArucoRefinement, CameraSettings, Counting, DetectorKind, PixelFormat, Search, ShadowSettings,
+    Technique, TrackingSettings, WantedFormat,
 };
 use crate::geometry::outline_scale::LARGEST_MOVE_PX;
 
 pub fn camera(root: &Table) -> Result<CameraSettings, SceneError> {
     let what = "a scene needs [camera] with a source";
-    let camera = root
-        .required("camera", what)?
-        .table(&["source", "calibration", "mirror"])?;
+    let camera = root.required("camera", what)?.table(&[
+        "source",
+        "calibration",
+        "mirror",
+        "size_px",
+        "fps",
+        "format",
+    ])?;
     let what = "a session, a video, a folder of images, \"webcam:0\" or an address is expected";
     Ok(CameraSettings {
         source: source(&camera.required("source", what)?)?,
@@ -21,18 +26,44 @@ pub fn camera(root: &Table) -> Result<CameraSettings, SceneError> {
             .map(|path| path.existing_path())
             .transpose()?,
         mirror: camera.flag_or("mirror", false)?,
+        wanted: wanted_format(&camera)?,
+    })
+}
+
+fn wanted_format(camera: &Table) -> Result<WantedFormat, SceneError> {
+    let side = Numbers::between(1.0, 32768.0, "px");
+    let size_px = |value: Value| {
+        let sides: [f64; 2] = value.numbers(&side)?;
+        if sides.iter().any(|side| side.fract() != 0.0) {
+            return Err(value.error("two whole numbers are expected: [width, height]"));
+        }
+        Ok(sides.map(|side| side as u32))
+    };
+    Ok(WantedFormat {
+        size_px: camera.optional("size_px").map(size_px).transpose()?,
+        fps: camera
+            .optional("fps")
+            .map(|value| value.integer(1..=1000))
+            .transpose()?,
+        pixels: camera
+            .optional("format")
+            .map(|value| value.one_of("format", &PixelFormat::BY_NAME))
+            .transpose()?,
     })
 }
 
 fn source(value: &Value) -> Result<String, SceneError> {
     let written = value.text()?;
-    if let Some(number) = written.strip_prefix("webcam:") {
-        number
-            .parse::<u16>()
-            .map_err(|_| value.error("no such webcam; allowed: webcam:0, webcam:1, …"))?;
+    if let Some(camera) = written.strip_prefix("webcam:") {
+        if camera.trim().is_empty() {
+            return Err(value.error(
+                "which webcam? allowed: webcam:0, webcam:1, …, or webcam: and a part of its name (gnomon cameras lists \
+                 them)",
+            ));
+        }
         return Ok(written.to_owned());
     }
-    if ["http://", "https://", "rtsp://"]
+    if ["http://", "https://", "rtsp://", "/dev/video"]
         .iter()
         .any(|scheme| written.starts_with(scheme))
     {

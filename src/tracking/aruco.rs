@@ -84,7 +84,7 @@ impl ArucoDetector {
 
 /// The cells of a marker as printed, rows from the top, true for white; black border included, white rim not. `None`
 /// where the family has no such marker.
-pub(super) fn printed_cells(family: Family, id: u32) -> Result<Option<Vec<bool>>, TrackingError> {
+pub fn printed_cells(family: Family, id: u32) -> Result<Option<Vec<bool>>, TrackingError> {
     if family.is_april_tag() {
         return Ok(apriltag::printed_cells(family, id));
     }

@@ -3,8 +3,8 @@
 
 use glam::DVec2;
 
+use super::edge_fit::BlurError;
 use super::least_squares::{accumulate, solve_positive_definite};
-use super::pixel_pose::Edge;
 
 /// The variance of the blur that a lens in focus leaves, the pixel's own square included, pixels².
 const SHARP_VARIANCE: f64 = 0.25;
@@ -49,15 +49,18 @@ impl Condition {
         variance.clamp(BLUR_VARIANCES[0], BLUR_VARIANCES[1])
     }
 
-    /// Moves the blur toward what the edges of a picture say.
-    pub(super) fn correct_blur(&mut self, edges: &[Edge]) {
+    /// Moves the blur toward what the edges of a picture say: each by the unit vector across it, how much it counts (0 to
+    /// 1), and what it lacks. Returns by what part of itself its variance changed.
+    pub(super) fn correct_blur(
+        &mut self,
+        edges: impl Iterator<Item = (DVec2, f64, BlurError)>,
+    ) -> f64 {
         let mut normal = [[0.0; 3]; 3];
         let mut right = [0.0; 3];
-        for edge in edges {
-            let DVec2 { x, y } = edge.normal;
-            let (error, certainty) = edge.blur_error;
-            let weight = edge.weight * certainty / (1.0 + BLUR_FLOOR * BLUR_FLOOR * certainty);
-            let scale = weight.sqrt();
+        for (DVec2 { x, y }, weight, missing) in edges {
+            let BlurError { error, certainty } = missing;
+            let known = certainty / (1.0 + BLUR_FLOOR * BLUR_FLOOR * certainty);
+            let scale = (weight * known).sqrt();
             let row = [x * x, 2.0 * x * y, y * y].map(|entry| entry * scale);
             let error = error.clamp(-MOST_BLUR_CHANGE, MOST_BLUR_CHANGE);
             accumulate(&mut normal, &mut right, &row, error * scale);
@@ -65,14 +68,17 @@ impl Condition {
         for (k, row) in normal.iter_mut().enumerate() {
             row[k] += 1.0 / (BLUR_CHANGE * BLUR_CHANGE);
         }
-        if let Some(change) = solve_positive_definite(&normal, &right) {
-            let [least, most] = BLUR_VARIANCES;
-            let [xx, xy, yy] = &mut self.blur;
-            *xx = (*xx + change[0]).clamp(least, most);
-            *yy = (*yy + change[2]).clamp(least, most);
-            let most_mixed = (*xx * *yy).sqrt() - least;
-            *xy = (*xy + change[1]).clamp(-most_mixed, most_mixed);
-        }
+        let Some(change) = solve_positive_definite(&normal, &right) else {
+            return 0.0;
+        };
+        let [least, most] = BLUR_VARIANCES;
+        let before = self.blur[0] + self.blur[2];
+        let [xx, xy, yy] = &mut self.blur;
+        *xx = (*xx + change[0]).clamp(least, most);
+        *yy = (*yy + change[2]).clamp(least, most);
+        let most_mixed = (*xx * *yy).sqrt() - least;
+        *xy = (*xy + change[1]).clamp(-most_mixed, most_mixed);
+        (*xx + *yy - before).abs() / before
     }
 
     /// The size error as it is believed, and the inverse of its variance.

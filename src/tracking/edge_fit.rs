@@ -35,14 +35,22 @@ pub(super) enum EdgeView {
     Blank,
 }
 
+/// What the variance of the blur across an edge is short of.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct BlurError {
+    /// Pixels².
+    pub error: f64,
+    /// Inverse of the error's own variance.
+    pub certainty: f64,
+}
+
 /// An edge as the picture shows it.
 pub(super) struct EdgeFit {
     /// How far across the edge it lies from where it was expected, cells.
     pub offset_cells: f64,
     /// Variance of the offset, cells².
     pub variance_cells: f64,
-    /// What the blur's variance is short of, pixels², and how sure that is: the inverse of its own variance.
-    pub blur_error: (f64, f64),
+    pub blur_error: BlurError,
 }
 
 /// Fits one edge. `middle_px` is where its middle is expected, the columns of `pixels_from_cells` are one cell across
@@ -233,16 +241,183 @@ impl Sums {
             blur_information * contrast * contrast / noise,
         );
         let blur_error = match blur_information > 1e-9 {
-            true => (
-                unit * blur_left / (blur_information * contrast),
-                certainty / (unit * unit),
-            ),
-            false => (0.0, 0.0),
+            true => BlurError {
+                error: unit * blur_left / (blur_information * contrast),
+                certainty: certainty / (unit * unit),
+            },
+            false => BlurError {
+                error: 0.0,
+                certainty: 0.0,
+            },
         };
         Some(EdgeView::Seen(EdgeFit {
             offset_cells: shift / contrast,
             variance_cells: inverse[2][2] * noise / (contrast * contrast),
             blur_error,
         }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Family, Marker};
+    use crate::tracking::print::Print;
+
+    const SIDE: u32 = 64;
+
+    /// A picture of one vertical edge, black to the left of `at` and white to the right, blurred by a Gaussian of a
+    /// standard deviation in pixels, sRGB-encoded; `light` falls on it from row to row.
+    fn picture(at: f64, deviation_px: f64, light: impl Fn(u32) -> f64) -> Vec<u8> {
+        let encoded = |x: u32, y: u32| {
+            // The mean over the pixel of the blurred edge, by many places in it.
+            let places = 64;
+            let sum: f64 = (0..places)
+                .map(|k| {
+                    let place = f64::from(x) - 0.5 + (f64::from(k) + 0.5) / f64::from(places);
+                    integral((place - at) / deviation_px)
+                })
+                .sum();
+            let level = light(y) * (0.03 + 0.6 * sum / f64::from(places));
+            (255.0 * (1.055 * level.powf(1.0 / 2.4) - 0.055)).round() as u8
+        };
+        (0..SIDE * SIDE)
+            .map(|k| encoded(k % SIDE, k / SIDE))
+            .collect()
+    }
+
+    /// Light that differs a little from row to row, so that rounding to levels does not err alike in all of them.
+    fn dithered(y: u32) -> f64 {
+        1.0 - 0.004 * f64::from(y)
+    }
+
+    /// The Gaussian's integral, by a sum that is nothing like the table's.
+    fn integral(place: f64) -> f64 {
+        let steps = 400;
+        let (low, high) = (-6.0, place.clamp(-6.0, 6.0));
+        let width = (high - low) / f64::from(steps);
+        (0..steps)
+            .map(|k| {
+                let x: f64 = low + (f64::from(k) + 0.5) * width;
+                (-0.5 * x * x).exp() * width / std::f64::consts::TAU.sqrt()
+            })
+            .sum()
+    }
+
+    /// An edge between large cells, which goes from black to white.
+    fn edge() -> Edge {
+        let marker = Marker {
+            family: Family::TAG16H5,
+            id: 0,
+            size_m: 1.0,
+            center_m: DVec2::ZERO,
+            rotation_rad: 0.0,
+        };
+        // Black, two columns of it, then white.
+        let white = (0..16).map(|k| k % 4 > 1).collect();
+        let print = Print::new(&marker, white);
+        print
+            .edges
+            .into_iter()
+            .find(|edge| edge.brightens && edge.around == [[0.0, 0.0, 1.0, 1.0]; ROWS])
+            .expect("such an edge")
+    }
+
+    fn view(levels: &[u8], at: DVec2, cell_px: f64, blur_variance: f64) -> EdgeView {
+        let picture = Grey {
+            levels,
+            size_px: [SIDE, SIDE],
+        };
+        fit_edge(
+            picture,
+            &edge(),
+            at,
+            DMat2::from_diagonal(DVec2::splat(cell_px)),
+            blur_variance,
+        )
+    }
+
+    #[test]
+    fn an_edge_is_found_to_a_hundredth_of_a_pixel() {
+        for deviation_px in [0.5, 1.0] {
+            for at in [31.0, 31.3, 31.5, 31.77] {
+                let levels = picture(at, deviation_px, dithered);
+                let variance = deviation_px * deviation_px + 1.0 / 12.0;
+                // From where a prediction may put it: the step is a first one, not the last.
+                for expected in [at, at + 0.1] {
+                    let EdgeView::Seen(fit) =
+                        view(&levels, DVec2::new(expected, 32.0), 10.0, variance)
+                    else {
+                        panic!("not seen")
+                    };
+                    let found = expected + fit.offset_cells * 10.0;
+                    assert!(
+                        (found - at).abs() < 0.01,
+                        "{found} for {at}, blur {deviation_px}, from {expected}"
+                    );
+                    assert!(fit.variance_cells.sqrt() * 10.0 < 0.02);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_the_blur_lacks_is_told() {
+        let levels = picture(31.4, 1.0, dithered);
+        let right = 1.0 + 1.0 / 12.0;
+        for wrong in [0.8, 1.4] {
+            let EdgeView::Seen(fit) = view(&levels, DVec2::new(31.4, 32.0), 10.0, wrong) else {
+                panic!("not seen")
+            };
+            let told = wrong + fit.blur_error.error;
+            assert!(
+                (told - right).abs() < 0.12,
+                "{told} for {right}, from {wrong}"
+            );
+            assert!(
+                (fit.offset_cells * 10.0).abs() < 0.02,
+                "an edge does not move by blur"
+            );
+        }
+    }
+
+    #[test]
+    fn a_shade_along_the_edge_moves_it_little() {
+        // Half as bright below the middle.
+        let levels = picture(31.4, 0.6, |y| if y < 32 { 1.0 } else { 0.5 });
+        let EdgeView::Seen(fit) = view(&levels, DVec2::new(31.4, 32.0), 10.0, 0.36 + 1.0 / 12.0)
+        else {
+            panic!("not seen")
+        };
+        assert!(
+            (fit.offset_cells * 10.0).abs() < 0.03,
+            "{}",
+            fit.offset_cells
+        );
+    }
+
+    #[test]
+    fn what_is_no_edge_is_none() {
+        let blank = vec![120; (SIDE * SIDE) as usize];
+        assert!(matches!(
+            view(&blank, DVec2::splat(32.0), 10.0, 0.4),
+            EdgeView::Blank
+        ));
+        let mut turned = picture(31.4, 0.6, |_| 1.0);
+        for row in turned.chunks_exact_mut(SIDE as usize) {
+            row.reverse();
+        }
+        assert!(matches!(
+            view(&turned, DVec2::new(31.6, 32.0), 10.0, 0.4),
+            EdgeView::Reversed
+        ));
+        // At the picture's rim, and nowhere at all.
+        for at in [DVec2::new(1.0, 32.0), DVec2::new(-500.0, 32.0), DVec2::NAN] {
+            assert!(matches!(view(&blank, at, 10.0, 0.4), EdgeView::Blank));
+        }
+        assert!(matches!(
+            view(&blank, DVec2::splat(32.0), 0.0, 0.4),
+            EdgeView::Blank
+        ));
     }
 }

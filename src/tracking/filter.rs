@@ -18,7 +18,7 @@ use super::pixel_pose::{difference, moved};
 /// the distance.
 const TURN_ACCELERATION: f64 = 5.0;
 /// The variance of the acceleration that is expected, as a part of the above: at rest, and at most.
-const CALM: f64 = 1e-7;
+const CALM: f64 = 1e-10;
 const WILD: f64 = 100.0;
 /// Squared innovation over what is expected of it, per degree of freedom: above this the anchor accelerates,
 const SURPRISE: f64 = 2.5;
@@ -163,4 +163,123 @@ fn product_with(matrix: &Matrix6, vector: &[f64; 6]) -> [f64; 6] {
 /// Rounding must not make a covariance lopsided.
 fn symmetric(matrix: &Matrix6) -> Matrix6 {
     times(&sum(matrix, &transposed(matrix)), 0.5)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DQuat, DVec3};
+
+    use super::*;
+    use crate::tracking::pose::rotation_between;
+
+    const FRAME_SECS: f64 = 1.0 / 30.0;
+    /// Standard deviations of a lone marker's pose: of its turn, rad, and its shift, m.
+    const NOISE: [f64; 2] = [2e-3, 3e-4];
+
+    fn covariance() -> Matrix6 {
+        let mut matrix = [[0.0; 6]; 6];
+        for (k, row) in matrix.iter_mut().enumerate() {
+            row[k] = NOISE[k / 3] * NOISE[k / 3];
+        }
+        matrix
+    }
+
+    fn start() -> DAffine3 {
+        DAffine3::from_rotation_translation(
+            DQuat::from_rotation_x(2.5),
+            DVec3::new(0.02, -0.01, 0.5),
+        )
+    }
+
+    /// Gaussian noise on a pose, the same each time.
+    fn noisy(pose: &DAffine3, state: &mut u64) -> DAffine3 {
+        let mut uniform = || {
+            *state ^= *state << 13;
+            *state ^= *state >> 7;
+            *state ^= *state << 17;
+            (*state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let mut gaussian = || (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
+        moved(pose, std::array::from_fn(|k| NOISE[k / 3] * gaussian()))
+    }
+
+    #[test]
+    fn what_rests_comes_to_rest() {
+        let mut seed = 7;
+        let mut filter = Filter::new(0.0, noisy(&start(), &mut seed), &covariance());
+        let mut steps = Vec::new();
+        for frame in 1..=300 {
+            let before = filter.pose().translation;
+            filter.add(
+                f64::from(frame) * FRAME_SECS,
+                &noisy(&start(), &mut seed),
+                &covariance(),
+            );
+            steps.push(before.distance(filter.pose().translation));
+        }
+        let mean = |steps: &[f64]| steps.iter().sum::<f64>() / steps.len() as f64;
+        assert!(
+            mean(&steps[..5]) > 0.2 * NOISE[1],
+            "it begins as it is told"
+        );
+        assert!(
+            mean(&steps[250..]) < 0.05 * NOISE[1],
+            "{:?}",
+            mean(&steps[250..])
+        );
+        assert!(rotation_between(filter.pose(), &start()) < 0.5 * NOISE[0]);
+        assert!(filter.pose().translation.distance(start().translation) < 0.5 * NOISE[1]);
+    }
+
+    #[test]
+    fn a_step_is_shown_in_the_frame_that_sees_it() {
+        let mut filter = Filter::new(0.0, start(), &covariance());
+        for frame in 1..100 {
+            filter.add(f64::from(frame) * FRAME_SECS, &start(), &covariance());
+        }
+        // Two to a thousand times what noise does.
+        for factor in [8.0, 30.0, 300.0, 3000.0] {
+            let mut stepped = filter.clone();
+            let there = moved(&start(), std::array::from_fn(|k| factor * NOISE[k / 3]));
+            stepped.add(100.0 * FRAME_SECS, &there, &covariance());
+            let left = stepped.pose().translation.distance(there.translation)
+                / start().translation.distance(there.translation);
+            assert!(left < 0.25, "factor {factor}: {left} of the step is left");
+            stepped.add(101.0 * FRAME_SECS, &there, &covariance());
+            let left = stepped.pose().translation.distance(there.translation)
+                / start().translation.distance(there.translation);
+            assert!(
+                left.abs() < 0.25,
+                "factor {factor}: {left} of the step is left after it"
+            );
+        }
+    }
+
+    #[test]
+    fn a_steady_motion_is_not_held_back() {
+        let mut filter = Filter::new(0.0, start(), &covariance());
+        let speed = [0.5, -0.2, 0.1, 0.1, 0.05, -0.02];
+        for frame in 1..60 {
+            let time_secs = f64::from(frame) * FRAME_SECS;
+            let there = moved(&start(), speed.map(|speed| speed * time_secs));
+            filter.add(time_secs, &there, &covariance());
+            let lag_m = filter.pose().translation.distance(there.translation);
+            assert!(
+                frame < 10 || lag_m < 0.1 * NOISE[1],
+                "frame {frame}: {lag_m} m behind"
+            );
+        }
+        let [.., z] = filter.velocity();
+        assert!((z + 0.02).abs() < 1e-3, "{z} m/s");
+    }
+
+    #[test]
+    fn odd_times_start_it_anew() {
+        for time_secs in [0.0, -1.0, 10.0, f64::NAN] {
+            let mut filter = Filter::new(0.0, start(), &covariance());
+            let there = moved(&start(), [0.3, 0.0, 0.0, 0.0, 0.1, 0.0]);
+            filter.add(time_secs, &there, &covariance());
+            assert_eq!(*filter.pose(), there, "{time_secs} s");
+        }
+    }
 }

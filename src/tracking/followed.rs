@@ -33,6 +33,8 @@ const INVISIBLE_PX: f64 = 0.02;
 const BELIEVED: f64 = 4.6;
 /// and below which it is doubted again: between the two it stays what it was.
 const DOUBTED: f64 = 2.3;
+/// What a hand turns a thing beside what it did before, from one frame to the next, radians (standard deviation).
+const UNFORESEEN_TURN: f64 = 0.02;
 /// The most that earlier frames can say for a pose.
 const MOST_ODDS: f64 = 20.0;
 /// What of the earlier frames' odds counts in the next one,
@@ -61,6 +63,10 @@ struct Sight {
     time_secs: f64,
     camera_from_anchor: DAffine3,
     motion: Motion,
+    /// Variance of its turn, rad².
+    turn_variance: f64,
+    /// The other pose that it might have had.
+    twin: Option<DAffine3>,
     /// Logarithm of the odds for this pose against its twin, from all frames.
     odds: f64,
     believed: bool,
@@ -205,15 +211,15 @@ impl Followed {
     ) -> AnchorPose {
         let mut twin = twin_of(&fitted, intrinsics, &self.layout.prints);
         let mut odds = twin.map_or(MOST_ODDS, |twin| twin.odds);
+        let turn_variance = turn_variance(&fitted.covariance);
         let (mut believed, mut turns_below) = (false, 0.0);
         if let (Some(last), Some(twin)) = (&self.last, &twin) {
-            // The earlier frames speak for whichever of the two is their pose, and it takes something to turn it over.
+            // The earlier frames speak for the pose that theirs became, and it takes something to turn it over.
             let (here, there) = (&fitted.camera_from_anchor, &twin.camera_from_anchor);
-            let off = |pose| rotation_between(pose, &last.camera_from_anchor);
-            let nearer = (off(there) - off(here)) / rotation_between(here, there);
-            odds = NEW_SHARE * odds + nearer.clamp(-1.0, 1.0) * REMEMBERED * last.odds;
+            odds = NEW_SHARE * odds + last.odds_of(here, there, turn_variance);
             believed = last.believed;
-            turns_below = -DOUBTED * nearer.signum();
+            let off = |pose| rotation_between(pose, &last.camera_from_anchor);
+            turns_below = DOUBTED * (off(here) - off(there)).signum();
         }
         let turned = odds < turns_below;
         if let (true, Some(other)) = (turned, twin)
@@ -233,6 +239,8 @@ impl Followed {
             time_secs: now_secs,
             camera_from_anchor: fitted.camera_from_anchor,
             motion: self.motion_to(&fitted.camera_from_anchor, now_secs),
+            turn_variance,
+            twin: twin.map(|twin| twin.camera_from_anchor),
             odds,
             believed,
         };
@@ -285,6 +293,8 @@ impl Followed {
             time_secs: now_secs,
             camera_from_anchor: chosen.camera_from_anchor,
             motion: self.motion_to(&chosen.camera_from_anchor, now_secs),
+            turn_variance: turn_variance(&located.covariance),
+            twin: other.map(|other| other.camera_from_anchor),
             odds: 0.0,
             believed: !solutions.ambiguous,
         });
@@ -359,6 +369,24 @@ impl Followed {
 }
 
 impl Sight {
+    /// Logarithm of the odds for one of two poses that the anchor may have by now against the other: either was reached
+    /// from this pose, or, where this one was the wrong one, from its twin. Where the two have come together, as they do
+    /// when the anchor faces the camera, nobody can tell which of those that part again is which.
+    fn odds_of(&self, here: &DAffine3, there: &DAffine3, turn_variance: f64) -> f64 {
+        let variance = self.turn_variance + turn_variance + UNFORESEEN_TURN * UNFORESEEN_TURN;
+        // Student's distribution of three degrees of freedom: hands jerk.
+        let reached = |from: &DAffine3, to| {
+            -2.0 * (rotation_between(from, to).powi(2) / (3.0 * variance)).ln_1p()
+        };
+        let doubt = REMEMBERED * self.odds;
+        let likely = |pose| {
+            let same = reached(&self.camera_from_anchor, pose);
+            let twin = self.twin.as_ref();
+            twin.map_or(same, |twin| log_of_sum(same, reached(twin, pose) - doubt))
+        };
+        likely(here) - likely(there)
+    }
+
     /// Where the anchor is by now.
     fn predicted(&self, now_secs: f64) -> DAffine3 {
         let moving_secs = coasting_secs(now_secs - self.time_secs);
@@ -367,6 +395,17 @@ impl Sight {
             self.motion.map(|speed| speed * moving_secs),
         )
     }
+}
+
+/// Of a turn, whatever its direction, rad².
+fn turn_variance(covariance: &Matrix6) -> f64 {
+    (0..3).map(|k| covariance[k][k]).sum()
+}
+
+/// ln(eᵃ + eᵇ)
+fn log_of_sum(a: f64, b: f64) -> f64 {
+    let (more, less) = (a.max(b), a.min(b));
+    more + (less - more).exp().ln_1p()
 }
 
 /// A motion goes on from frame to frame, and dies down where none shows it: for how long it goes on as it was.

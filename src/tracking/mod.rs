@@ -9,6 +9,7 @@
 )]
 mod apriltag;
 mod aruco;
+pub mod calibrating;
 mod condition;
 mod conventions;
 mod detector;
@@ -19,6 +20,7 @@ mod followed;
 mod layout;
 mod least_squares;
 mod light;
+pub mod mapping;
 mod pixel_pose;
 mod pose;
 mod print;
@@ -29,6 +31,7 @@ mod undistort;
 
 use glam::DAffine3;
 
+pub use aruco::printed_cells;
 pub use detector::{Detection, Detector};
 pub use tracker::{Tracker, grey_from_rgba};
 

@@ -9,7 +9,7 @@
 use glam::{DAffine3, DMat2, DMat3, DQuat, DVec2, DVec3};
 
 use super::condition::Condition;
-use super::edge_fit::{EdgeView, fit_edge};
+use super::edge_fit::{BlurError, EdgeView, fit_edge};
 use super::least_squares::{accumulate, inverse, solve_positive_definite};
 use super::light::Grey;
 use super::print::Print;
@@ -32,6 +32,9 @@ const FLOOR_PX: f64 = 0.02;
 const TUKEY: f64 = 4.685;
 /// Once a step moves no edge by more than this (root mean square), the pose is found, pixels.
 const SETTLED_PX: f64 = 0.05;
+/// and once the blur is known: with too small a one, whole prints are taken for something else. Change of its variance,
+/// as a part of it.
+const SETTLED_BLUR: f64 = 0.3;
 /// Weight from which on an edge counts as being where it should be.
 const FITTING: f64 = 0.3;
 /// A marker is seen when so large a part of its edges fits, and so many of them,
@@ -69,8 +72,7 @@ pub(super) struct Edge {
     pub(super) variance: f64,
     /// Derivative of the offset that a step explains.
     row: [f64; PARAMETERS],
-    /// As [`EdgeFit::blur_error`](super::edge_fit::EdgeFit::blur_error).
-    pub(super) blur_error: (f64, f64),
+    blur_error: BlurError,
     /// Tukey's, 0 to 1.
     pub(super) weight: f64,
 }
@@ -172,7 +174,11 @@ pub(super) fn fit_pose(
 ) -> Option<PixelPose> {
     const ROUNDS: usize = 5;
     let mut learned = *condition;
-    let mut pose = start;
+    let (size_error, _) = condition.size();
+    let mut guess = Guess {
+        camera_from_anchor: start,
+        size_error,
+    };
     let mut edges = Vec::new();
     let mut solution = None;
     for _ in 0..ROUNDS {
@@ -182,7 +188,7 @@ pub(super) fn fit_pose(
                 picture,
                 intrinsics,
                 (index, print),
-                &pose,
+                &guess,
                 &learned,
                 &mut edges,
             );
@@ -190,9 +196,15 @@ pub(super) fn fit_pose(
         if edges.is_empty() {
             return None;
         }
-        let solved = solve(&mut edges, condition)?;
-        pose = moved(&pose, pose_part(&solved.step));
-        learned.correct_blur(&edges);
+        let solved = solve(&mut edges, condition, &guess)?;
+        guess = Guess {
+            camera_from_anchor: moved(&guess.camera_from_anchor, pose_part(&solved.step)),
+            size_error: guess.size_error + solved.step[SIZE],
+        };
+        let blurs = edges
+            .iter()
+            .map(|edge| (edge.normal, edge.weight, edge.blur_error));
+        let blur_change = learned.correct_blur(blurs);
         let explained: f64 = edges
             .iter()
             .map(|edge| {
@@ -204,14 +216,14 @@ pub(super) fn fit_pose(
             .sum();
         let used: f64 = edges.iter().map(|edge| edge.weight).sum();
         solution = Some(solved);
-        if (explained / used).sqrt() < SETTLED_PX {
+        if (explained / used).sqrt() < SETTLED_PX && blur_change < SETTLED_BLUR {
             break;
         }
     }
     let solution = solution?;
-    let fitted = fitted(prints, pose, edges, &solution)?;
+    let fitted = fitted(prints, &guess, edges, &solution)?;
     if fitted.seen.iter().filter(|&&seen| seen).count() > 1 {
-        learned.learn_size(solution.step[SIZE], solution.size_certainty / fitted.excess);
+        learned.learn_size(guess.size_error, solution.size_certainty / fitted.excess);
     }
     *condition = learned;
     Some(fitted)
@@ -221,23 +233,32 @@ fn pose_part(step: &[f64; PARAMETERS]) -> [f64; POSE_PARAMETERS] {
     std::array::from_fn(|k| step[k])
 }
 
-/// Adds the edges of one print that the picture shows near where the pose puts them; none of a print that is not there.
+/// Where the prints are expected, and by what part of its size each is larger than the scene says.
+struct Guess {
+    camera_from_anchor: DAffine3,
+    size_error: f64,
+}
+
+/// Adds the edges of one print that the picture shows near where they are expected; none of a print that is not there.
 fn measure(
     picture: Grey<'_>,
     intrinsics: &Intrinsics,
     (index, print): (usize, &Print),
-    pose: &DAffine3,
+    guess: &Guess,
     condition: &Condition,
     edges: &mut Vec<Edge>,
 ) {
     let (known, mut reversed) = (edges.len(), 0);
+    let (pose, scale) = (&guess.camera_from_anchor, 1.0 + guess.size_error);
     for edge in &print.edges {
-        let Some(projected) = project(intrinsics, pose, edge.point_m) else {
+        let outward_m = edge.point_m - print.center_m();
+        let point_m = print.center_m() + scale * outward_m;
+        let Some(projected) = project(intrinsics, pose, point_m) else {
             continue;
         };
         let in_picture = |step_m: DVec2| projected.step_px(pose.matrix3 * step_m.extend(0.0));
         let pixels_from_cells =
-            DMat2::from_cols(in_picture(edge.across_m), in_picture(edge.along_m));
+            scale * DMat2::from_cols(in_picture(edge.across_m), in_picture(edge.along_m));
         // The gradient of the place across.
         let gradient = pixels_from_cells.inverse().row(0);
         let length = gradient.length();
@@ -262,7 +283,6 @@ fn measure(
         };
         let offset_px = fit.offset_cells / length;
         let [rx, ry, rz, tx, ty, tz] = projected.row(normal);
-        let outward_m = edge.point_m - print.center_m();
         let by_size = normal.dot(in_picture(outward_m));
         let toward_black = if edge.brightens { -1.0 } else { 1.0 };
         edges.push(Edge {
@@ -290,7 +310,7 @@ struct Solved {
 }
 
 /// The step that explains the offsets, robustly. Leaves each edge its weight.
-fn solve(edges: &mut [Edge], condition: &Condition) -> Option<Solved> {
+fn solve(edges: &mut [Edge], condition: &Condition, guess: &Guess) -> Option<Solved> {
     const ROUNDS: usize = 5;
     let mut found = None;
     let mut scale = f64::INFINITY;
@@ -305,7 +325,7 @@ fn solve(edges: &mut [Edge], condition: &Condition) -> Option<Solved> {
         let (size_error, size_certainty) = condition.size();
         normal[SPILL][SPILL] += 1.0 / (SPILL_PX * SPILL_PX);
         normal[SIZE][SIZE] += size_certainty;
-        right[SIZE] += size_certainty * size_error;
+        right[SIZE] += size_certainty * (size_error - guess.size_error);
         let step = solve_positive_definite(&normal, &right)?;
 
         let left = |edge: &Edge| edge.left_px(&step) / edge.variance.sqrt();
@@ -334,12 +354,12 @@ fn deviation(distances: impl Iterator<Item = f64>) -> f64 {
 
 fn fitted(
     prints: &[Print],
-    pose: DAffine3,
+    guess: &Guess,
     mut edges: Vec<Edge>,
     solved: &Solved,
 ) -> Option<PixelPose> {
     let not_by_pose_px =
-        |edge: &Edge| edge.row[SPILL] * solved.step[SPILL] + edge.row[SIZE] * solved.step[SIZE];
+        |edge: &Edge| edge.row[SPILL] * solved.step[SPILL] + edge.row[SIZE] * guess.size_error;
     let (mut squares_px, mut counted) = (0.0, 0.0);
     for edge in edges.iter().filter(|edge| edge.weight > 0.0) {
         squares_px += (edge.left_px(&solved.step) + not_by_pose_px(edge)).powi(2);
@@ -376,7 +396,7 @@ fn fitted(
     let excess = (squares / (used - PARAMETERS as f64).max(1.0)).max(1.0);
     let covariance = inverse(&normal)?.map(|row| row.map(|entry| entry * excess));
     Some(PixelPose {
-        camera_from_anchor: pose,
+        camera_from_anchor: guess.camera_from_anchor,
         covariance,
         seen,
         rms_px: (squares_px / f64::max(counted, 1.0)).sqrt(),

@@ -114,3 +114,52 @@ impl Print {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Family;
+
+    /// Three by three cells, the middle one white.
+    fn ring(rotation_rad: f64) -> Print {
+        let marker = Marker {
+            family: Family::TAG16H5,
+            id: 0,
+            size_m: 0.3,
+            center_m: DVec2::new(1.0, 2.0),
+            rotation_rad,
+        };
+        Print::new(&marker, (0..9).map(|k| k == 4).collect())
+    }
+
+    #[test]
+    fn every_boundary_between_unlike_cells_is_an_edge_once() {
+        let print = ring(0.0);
+        // Twelve around the square, four around the white cell.
+        assert_eq!(print.edges.len(), 16);
+        for edge in &print.edges {
+            let step = 0.25 * edge.across_m;
+            let white = |point_m: DVec2| {
+                let cell = ((point_m - print.corner_m) * DVec2::new(10.0, -10.0)).floor();
+                print.is_white(cell.x as i32, cell.y as i32)
+            };
+            assert_eq!(white(edge.point_m + step), edge.brightens);
+            assert_eq!(white(edge.point_m - step), !edge.brightens);
+            let [_, [_, before, after, _], _] = edge.around;
+            assert_eq!(
+                (before > 0.5, after > 0.5),
+                (!edge.brightens, edge.brightens)
+            );
+        }
+    }
+
+    #[test]
+    fn corners_turn_with_the_print() {
+        let [top_left, _, bottom_right, _] = ring(0.0).corners_m();
+        assert!(top_left.distance(DVec2::new(0.85, 2.15)) < 1e-12);
+        assert!(bottom_right.distance(DVec2::new(1.15, 1.85)) < 1e-12);
+        let [turned, ..] = ring(std::f64::consts::FRAC_PI_2).corners_m();
+        assert!(turned.distance(DVec2::new(0.85, 1.85)) < 1e-12, "{turned}");
+        assert!(ring(0.3).center_m().distance(DVec2::new(1.0, 2.0)) < 1e-12);
+    }
+}

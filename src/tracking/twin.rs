@@ -14,6 +14,9 @@ use crate::geometry::camera::Intrinsics;
 /// Poses nearer to each other are one, radians.
 const SAME: f64 = 0.01;
 
+/// Smaller steps, radians and metres, change nothing that counts.
+const SETTLED: f64 = 1e-7;
+
 /// The other pose, and how much less likely it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Twin {
@@ -38,11 +41,17 @@ pub(super) fn twin_of(pose: &PixelPose, intrinsics: &Intrinsics, prints: &[Print
     let start = ippe_starts(intrinsics, &sightings)?
         .into_iter()
         .max_by(|a, b| rotation_between(a, here).total_cmp(&rotation_between(b, here)))?;
-    let other = refined(pose, intrinsics, start)?;
-    if rotation_between(&other, here) < SAME {
+    if rotation_between(&start, here) < SAME {
         return None;
     }
-    let here = distances(pose, intrinsics, here)?;
+    // Both are held against the same edges where they explain them best.
+    let here = refined(pose, intrinsics, *here)?;
+    let is_other = |other: &DAffine3| rotation_between(other, &here) >= SAME;
+    // Where the error has one minimum, the other pose is no worse than the edges say of it.
+    let other = refined(pose, intrinsics, start)
+        .filter(is_other)
+        .unwrap_or(start);
+    let here = distances(pose, intrinsics, &here)?;
     let there = distances(pose, intrinsics, &other)?;
     let error = |distances_px: &[f64]| -> f64 {
         let edges = pose.edges.iter().zip(distances_px);
@@ -71,7 +80,11 @@ fn refined(pose: &PixelPose, intrinsics: &Intrinsics, start: DAffine3) -> Option
             let distance_px = edge.normal.dot(edge.seen_px - projected.pixel);
             accumulate(&mut normal, &mut right, &row, distance_px * certainty);
         }
-        place = moved(&place, solve_positive_definite(&normal, &right)?);
+        let step = solve_positive_definite(&normal, &right)?;
+        place = moved(&place, step);
+        if step.iter().all(|entry| entry.abs() < SETTLED) {
+            break;
+        }
     }
     let faces = place.matrix3.z_axis.dot(place.translation) < 0.0;
     (place.is_finite() && faces).then_some(place)

@@ -2,9 +2,11 @@
 #![allow(dead_code)] // Each test binary uses its own part.
 
 pub mod judge;
+pub mod photographs;
 pub mod random;
 pub mod ray_cast;
 pub mod shapes;
+pub mod sheets;
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};

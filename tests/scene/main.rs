@@ -407,7 +407,7 @@ fn the_scenes_of_this_project_load() {
 
     let text = summary(&hand);
     for part in [
-        "tracked      table  6 markers  tag36h11  id 0-5  45 mm  the world\n",
+        "tracked      table  6 markers  tag36h11  id 0-5  44 mm  the world\n",
         "             card   1 marker   tag36h11  id 17   36 mm\n",
         "casts no shadow",
         "technique    volumes: the scene has no probe\n",

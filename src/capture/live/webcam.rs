@@ -1,0 +1,444 @@
+//! Webcams, through nokhwa.
+
+use nokhwa::Camera;
+use nokhwa::error::NokhwaError;
+use nokhwa::utils::{
+    ApiBackend, CameraFormat, CameraIndex, CameraInfo, FrameFormat, RequestedFormat,
+    RequestedFormatType, Resolution, frame_formats,
+};
+
+use super::decode::{Tolerance, rgba_of};
+use super::error::LiveError;
+use super::feed::{Feed, Link, Opened, Opener, Picture};
+use super::format::{self, Offer};
+use crate::scene::{PixelFormat, WantedFormat};
+
+/// Broken pictures in a row after which a camera's JPEGs are read less strictly, or else it is opened anew.
+const BROKEN_IN_A_ROW: u32 = 30;
+/// Cameras open their eyes slowly, and slow down to a few pictures per second in the dark.
+const PATIENCE_SECS: f64 = 3.0;
+
+/// A camera that the system knows.
+#[derive(Debug)]
+pub struct ListedCamera {
+    /// What `webcam:N` calls it.
+    pub number: u32,
+    /// Its own name.
+    pub name: String,
+    /// Its formats, or why they cannot be told.
+    pub offers: Result<Vec<Offer>, LiveError>,
+}
+
+/// All cameras, by their numbers.
+///
+/// # Errors
+/// There is none.
+pub fn list_cameras() -> Result<Vec<ListedCamera>, LiveError> {
+    Ok(known("cameras")?
+        .into_iter()
+        .map(|Known { number, name }| {
+            let label = label_of(number, &name);
+            let offers =
+                open_any(number, &label).and_then(|mut camera| offers_of(&mut camera, &label));
+            ListedCamera {
+                number,
+                name,
+                offers,
+            }
+        })
+        .collect())
+}
+
+/// Opens a webcam by its number or a part of its name.
+pub(super) struct WebcamOpener {
+    /// As the user names it.
+    pub source_name: String,
+    /// What follows `webcam:` or `/dev/video`.
+    pub wanted_camera: String,
+    pub wanted: WantedFormat,
+}
+
+impl Opener for WebcamOpener {
+    fn source_name(&self) -> &str {
+        &self.source_name
+    }
+
+    fn patience_secs(&self) -> Option<f64> {
+        Some(PATIENCE_SECS)
+    }
+
+    fn open(&self, again: Option<&str>, link: &Link) -> Result<Box<dyn Feed>, LiveError> {
+        let mut refusal = None;
+        for Known { number, name } in self.candidates(again)? {
+            match WebcamFeed::open(number, &name, &self.wanted, link) {
+                Ok(feed) => return Ok(Box::new(feed)),
+                // Many cameras have a second device, of the same name, that gives no pictures.
+                Err(error) => refusal = refusal.or(Some(error)),
+            }
+        }
+        Err(refusal.unwrap_or_else(|| LiveError::ReaderGone {
+            source_name: self.source_name.clone(),
+        }))
+    }
+}
+
+impl WebcamOpener {
+    /// The cameras that are meant, the likeliest first; at least one.
+    fn candidates(&self, again: Option<&str>) -> Result<Vec<Known>, LiveError> {
+        let known = known(&self.source_name)?;
+        pick(&known, &self.wanted_camera, again)
+            .map(|picked| picked.into_iter().cloned().collect())
+            .map_err(|ambiguous| {
+                let found = |known: &Known| label_of(known.number, &known.name);
+                let wanted = self.source_name.clone();
+                if ambiguous.is_empty() {
+                    let found = known.iter().map(found).collect();
+                    LiveError::NotThisCamera { wanted, found }
+                } else {
+                    let found = ambiguous.into_iter().map(found).collect();
+                    LiveError::Ambiguous { wanted, found }
+                }
+            })
+    }
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Known {
+    number: u32,
+    name: String,
+}
+
+/// Those of the known cameras that are meant by a number or a part of a name; all of one name. Again, a camera is known
+/// by its name: it comes back under another number where its own is still taken.
+///
+/// # Errors
+/// None, or those of several names.
+fn pick<'a>(
+    known: &'a [Known],
+    wanted: &str,
+    again: Option<&str>,
+) -> Result<Vec<&'a Known>, Vec<&'a Known>> {
+    let number: Option<u32> = wanted.parse().ok();
+    if let Some(name) = again {
+        let mut same: Vec<&Known> = known.iter().filter(|known| known.name == name).collect();
+        same.sort_by_key(|known| (Some(known.number) != number, known.number));
+        return if same.is_empty() { Err(same) } else { Ok(same) };
+    }
+    if number.is_some() {
+        let one: Vec<&Known> = known
+            .iter()
+            .filter(|known| Some(known.number) == number)
+            .collect();
+        return if one.is_empty() { Err(one) } else { Ok(one) };
+    }
+    let part = wanted.trim().to_lowercase();
+    let mut named: Vec<&Known> = known
+        .iter()
+        .filter(|known| known.name.to_lowercase().contains(&part))
+        .collect();
+    if let Some(whole) = named.iter().find(|known| known.name.to_lowercase() == part) {
+        let name = whole.name.clone();
+        named.retain(|known| known.name == name);
+    }
+    let one_name = named.windows(2).all(|pair| pair[0].name == pair[1].name);
+    if named.is_empty() || !one_name {
+        Err(named)
+    } else {
+        Ok(named)
+    }
+}
+
+fn label_of(number: u32, name: &str) -> String {
+    format!("webcam:{number} ({name})")
+}
+
+/// What the system lists; `wanted` is for the message.
+fn known(wanted: &str) -> Result<Vec<Known>, LiveError> {
+    let listed = nokhwa::query(ApiBackend::Auto).map_err(|error| LiveError::Camera {
+        camera: wanted.to_owned(),
+        message: error.to_string(),
+    })?;
+    let known = |info: &CameraInfo| {
+        let number = info.index().as_index().ok()?;
+        let name = info.human_name();
+        Some(Known { number, name })
+    };
+    let mut known: Vec<Known> = listed.iter().filter_map(known).collect();
+    known.sort_by_key(|known| known.number);
+    if known.is_empty() {
+        let reason = if cfg!(target_os = "linux") {
+            "the system has no /dev/video*; plug one in, or on a virtual machine or in a container pass it on (dmesg tells \
+             what happens as it is plugged in)"
+        } else {
+            "the system lists none; plug one in, and allow programs to use it in the system's privacy settings"
+        };
+        return Err(LiveError::NoCamera {
+            wanted: wanted.to_owned(),
+            reason,
+        });
+    }
+    Ok(known)
+}
+
+/// A camera that sends pictures.
+struct WebcamFeed {
+    camera: Camera,
+    name: String,
+    label: String,
+    offer: Offer,
+    tolerance: Tolerance,
+    broken_in_a_row: u32,
+    link: Link,
+}
+
+impl WebcamFeed {
+    fn open(
+        number: u32,
+        name: &str,
+        wanted: &WantedFormat,
+        link: &Link,
+    ) -> Result<Self, LiveError> {
+        let label = label_of(number, name);
+        let mut camera = open_any(number, &label)?;
+        let offers = offers_of(&mut camera, &label)?;
+        let offer = format::choose(&offers, wanted).ok_or_else(|| LiveError::NoFormat {
+            camera: label.clone(),
+            wanted: format::in_words(wanted),
+            offers,
+        })?;
+        let [width, height] = offer.size_px;
+        let chosen = CameraFormat::new(
+            Resolution::new(width, height),
+            frame_format_of(offer.pixels),
+            offer.fps,
+        );
+        let refused = |error| refusal(&label, &error);
+        if camera.camera_format() != chosen {
+            let exactly = RequestedFormatType::Exact(chosen);
+            camera
+                .set_camera_requset(RequestedFormat::with_formats(exactly, frame_formats()))
+                .map_err(refused)?;
+        }
+        camera.open_stream().map_err(refused)?;
+        Ok(Self {
+            camera,
+            name: name.to_owned(),
+            label,
+            offer,
+            tolerance: Tolerance::Strict,
+            broken_in_a_row: 0,
+            link: link.clone(),
+        })
+    }
+
+    /// Counts a picture that cannot be decoded.
+    fn bear_broken(&mut self) -> Result<(), LiveError> {
+        self.link.count_broken_picture();
+        self.broken_in_a_row += 1;
+        if self.broken_in_a_row < BROKEN_IN_A_ROW {
+            return Ok(());
+        }
+        if self.tolerance == Tolerance::Strict && self.offer.pixels == PixelFormat::Mjpeg {
+            self.tolerance = Tolerance::Lenient;
+            self.broken_in_a_row = 0;
+            return Ok(());
+        }
+        Err(LiveError::Unreadable {
+            camera: self.label.clone(),
+            count: self.broken_in_a_row,
+        })
+    }
+}
+
+impl Feed for WebcamFeed {
+    fn opened(&self) -> Opened {
+        Opened {
+            name: self.name.clone(),
+            format: self.offer.to_string(),
+            fps: Some(f64::from(self.offer.fps)),
+        }
+    }
+
+    fn next_picture(&mut self) -> Result<Option<Picture>, LiveError> {
+        loop {
+            let Offer {
+                size_px, pixels, ..
+            } = self.offer;
+            let bytes = self
+                .camera
+                .frame_raw()
+                .map_err(|error| refusal(&self.label, &error))?;
+            let time_secs = self.link.now_secs();
+            if let Some((size_px, rgba)) = rgba_of(&bytes, pixels, size_px, self.tolerance) {
+                drop(bytes);
+                self.broken_in_a_row = 0;
+                return Ok(Some(Picture {
+                    index: None,
+                    time_secs,
+                    size_px,
+                    rgba,
+                }));
+            }
+            drop(bytes);
+            self.bear_broken()?;
+        }
+    }
+}
+
+/// Opens a camera in whatever format, so that it can be asked for those it has.
+fn open_any(number: u32, label: &str) -> Result<Camera, LiveError> {
+    look_at_device(number, label)?;
+    let any = RequestedFormat::with_formats(RequestedFormatType::None, frame_formats());
+    Camera::new(CameraIndex::Index(number), any).map_err(|error| match error {
+        // There was no format to take.
+        NokhwaError::GetPropertyError { property, .. } if property == "CameraFormat" => {
+            LiveError::NoFormat {
+                camera: label.to_owned(),
+                wanted: format::in_words(&WantedFormat::default()),
+                offers: Vec::new(),
+            }
+        }
+        error => refusal(label, &error),
+    })
+}
+
+/// Asks the system itself where it can tell more than nokhwa, which has texts alone.
+#[cfg(target_os = "linux")]
+fn look_at_device(number: u32, label: &str) -> Result<(), LiveError> {
+    let device = format!("/dev/video{number}");
+    let opened = std::fs::OpenOptions::new()
+        .read(true)
+        .write(true)
+        .open(&device);
+    match opened {
+        Err(error) if error.kind() == std::io::ErrorKind::PermissionDenied => {
+            Err(LiveError::Denied {
+                camera: format!("{label}, {device}"),
+            })
+        }
+        Err(error) if error.kind() == std::io::ErrorKind::ResourceBusy => Err(LiveError::Busy {
+            camera: label.to_owned(),
+        }),
+        Err(error) => Err(LiveError::Camera {
+            camera: label.to_owned(),
+            message: format!("{device}: {error}"),
+        }),
+        Ok(_) => Ok(()),
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+fn look_at_device(_: u32, _: &str) -> Result<(), LiveError> {
+    Ok(())
+}
+
+/// What nokhwa says, as one of our errors.
+fn refusal(label: &str, error: &NokhwaError) -> LiveError {
+    let message = error.to_string();
+    let camera = label.to_owned();
+    // EBUSY: another program has the camera's buffers or its format.
+    if message.contains("os error 16") {
+        LiveError::Busy { camera }
+    } else {
+        LiveError::Camera { camera, message }
+    }
+}
+
+fn offers_of(camera: &mut Camera, label: &str) -> Result<Vec<Offer>, LiveError> {
+    let formats = camera
+        .compatible_camera_formats()
+        .map_err(|error| refusal(label, &error))?;
+    let mut offers: Vec<Offer> = formats
+        .iter()
+        .map(|format| Offer {
+            size_px: [format.width(), format.height()],
+            fps: format.frame_rate(),
+            pixels: pixels_of(format.format()),
+        })
+        .collect();
+    offers.sort_by_key(|offer| (offer.pixels.name(), offer.size_px, offer.fps));
+    offers.dedup();
+    Ok(offers)
+}
+
+fn pixels_of(format: FrameFormat) -> PixelFormat {
+    match format {
+        FrameFormat::MJPEG => PixelFormat::Mjpeg,
+        FrameFormat::YUYV => PixelFormat::Yuyv,
+        FrameFormat::NV12 => PixelFormat::Nv12,
+        FrameFormat::GRAY => PixelFormat::Grey,
+        FrameFormat::RAWRGB => PixelFormat::Rgb,
+        FrameFormat::RAWBGR => PixelFormat::Bgr,
+    }
+}
+
+fn frame_format_of(pixels: PixelFormat) -> FrameFormat {
+    match pixels {
+        PixelFormat::Mjpeg => FrameFormat::MJPEG,
+        PixelFormat::Yuyv => FrameFormat::YUYV,
+        PixelFormat::Nv12 => FrameFormat::NV12,
+        PixelFormat::Grey => FrameFormat::GRAY,
+        PixelFormat::Rgb => FrameFormat::RAWRGB,
+        PixelFormat::Bgr => FrameFormat::RAWBGR,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cameras(names: &[(u32, &str)]) -> Vec<Known> {
+        names
+            .iter()
+            .map(|&(number, name)| Known {
+                number,
+                name: name.to_owned(),
+            })
+            .collect()
+    }
+
+    fn numbers(picked: Vec<&Known>) -> Vec<u32> {
+        picked.into_iter().map(|known| known.number).collect()
+    }
+
+    #[test]
+    fn a_camera_is_picked_by_number_or_name() {
+        let known = cameras(&[
+            (0, "Integrated Camera"),
+            (1, "Integrated Camera"),
+            (2, "HD Pro Webcam C920"),
+            (4, "HD Pro Webcam C920 II"),
+        ]);
+        let by = |wanted: &str| pick(&known, wanted, None).map(numbers).map_err(numbers);
+        assert_eq!(by("2"), Ok(vec![2]));
+        assert_eq!(by("3"), Err(vec![]));
+        assert_eq!(by("integrated"), Ok(vec![0, 1]));
+        assert_eq!(by("hd pro webcam c920"), Ok(vec![2]), "the whole name");
+        assert_eq!(by("C920"), Err(vec![2, 4]), "two cameras");
+        assert_eq!(by("front"), Err(vec![]));
+    }
+
+    #[test]
+    fn a_camera_that_comes_back_is_known_by_its_name() {
+        let known = cameras(&[(0, "Other"), (1, "Mine"), (2, "Mine")]);
+        let again = |wanted: &str| pick(&known, wanted, Some("Mine")).map(numbers);
+        assert_eq!(again("0"), Ok(vec![1, 2]), "its number is another's now");
+        assert_eq!(again("2"), Ok(vec![2, 1]));
+        assert!(pick(&known, "0", Some("Gone")).is_err());
+    }
+
+    #[test]
+    fn a_busy_camera_is_told_as_one() {
+        let error =
+            NokhwaError::OpenStreamError("Device or resource busy (os error 16)".to_owned());
+        assert!(matches!(
+            refusal("webcam:0", &error),
+            LiveError::Busy { .. }
+        ));
+        let error = NokhwaError::ReadFrameError("No such device (os error 19)".to_owned());
+        assert!(matches!(
+            refusal("webcam:0", &error),
+            LiveError::Camera { .. }
+        ));
+    }
+}

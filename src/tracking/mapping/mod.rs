@@ -1,0 +1,457 @@
+//! Learns the layout of markers in a plane from pictures of them: places at first (`placing.rs`), bundle adjustment in
+//! space (`bundle.rs`), the plane that they lie in (`plane.rs`), and bundle adjustment in it.
+
+use std::collections::BTreeMap;
+
+use glam::{DAffine3, DVec2, DVec3};
+
+use super::Detection;
+use super::undistort::undistorted_pixel;
+use crate::geometry::camera::Intrinsics;
+use crate::scene::{Family, Marker};
+use bundle::{Bundle, Certainty, Freedom, MARKER_UNKNOWNS, Placed, Seen, View};
+
+mod bundle;
+mod dense;
+mod keyframes;
+mod placing;
+mod plane;
+
+/// A marker in one picture alone is not believed.
+const LEAST_PICTURES: usize = 2;
+/// A marker whose corners are so many standard deviations off in a picture (root mean square) is dropped there,
+const OUTLIER: f64 = 5.0;
+/// but never for less than this, pixels.
+const LEAST_OUTLIER_PX: f64 = 0.5;
+/// Rounds of dropping.
+const ROUNDS: usize = 4;
+
+/// What is known beforehand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MapSettings {
+    /// Side of the gauge's black square, and of all where sizes are not to be learnt; metres.
+    pub size_m: f64,
+    /// Id of the marker whose centre is the board's origin and whose x axis is the board's; without one, the lowest.
+    pub gauge: Option<u32>,
+    /// Whether the other markers' sizes are to be learnt.
+    pub learns_sizes: bool,
+    /// What a corner may be off the common plane, beside what the pictures leave open; metres.
+    pub plane_tolerance_m: f64,
+}
+
+/// A layout, and how sure it is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LearntBoard {
+    /// By id.
+    pub markers: Vec<LearntMarker>,
+    /// Pictures that it rests on.
+    pub pictures: usize,
+    /// Standard deviation of a corner's coordinate around where the layout puts it, pixels.
+    pub noise_px: f64,
+    /// Ids that only one picture shows together with others: they are left out.
+    pub left_out: Vec<u32>,
+}
+
+/// A marker of a [`LearntBoard`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LearntMarker {
+    /// Where it is.
+    pub marker: Marker,
+    /// Standard deviation of its centre's coordinates, metres; 0 for the gauge.
+    pub center_deviation_m: DVec2,
+    /// Standard deviation of its turn, radians; 0 for the gauge.
+    pub rotation_deviation_rad: f64,
+    /// Standard deviation of its size, metres; 0 where it was given.
+    pub size_deviation_m: f64,
+    /// Pictures that it was learnt from.
+    pub sightings: usize,
+    /// Pictures in which it did not fit and was dropped.
+    pub dropped: usize,
+    /// Root mean square distance of its corners from where the layout puts them, pixels.
+    pub rms_px: f64,
+    /// Its farthest corner's height above or depth below the plane, if it were not held in it, metres.
+    pub off_plane_m: f64,
+}
+
+/// Why no layout was learnt.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum MapError {
+    /// Nothing to learn.
+    #[error(
+        "no two markers are in {LEAST_PICTURES} pictures together; film them so that each picture shows several"
+    )]
+    TooFewMarkers,
+    /// The gauge is not among the markers.
+    #[error(
+        "no picture shows the gauge, marker {gauge}, together with others; seen are {}",
+        list(seen)
+    )]
+    NoGauge {
+        /// Its id.
+        gauge: u32,
+        /// Ids that can be.
+        seen: Vec<u32>,
+    },
+    /// Groups that no picture joins.
+    #[error(
+        "the markers do not hang together: no picture shows one of {{{}}} with one of the others; film them together",
+        groups.iter().map(|group| list(group)).collect::<Vec<_>>().join("}, {")
+    )]
+    NotConnected {
+        /// Ids, the gauge's group first.
+        groups: Vec<Vec<u32>>,
+    },
+    /// A marker that no pose explains.
+    #[error(
+        "no place explains where the pictures show {}; did they move, or is the calibration another camera's?",
+        list(ids)
+    )]
+    NoPlace {
+        /// Ids.
+        ids: Vec<u32>,
+    },
+    /// The equations do not settle.
+    #[error(
+        "the pictures do not determine the layout: film the markers from more sides and nearer"
+    )]
+    NotDetermined,
+    /// Markers off the common plane.
+    #[error(
+        "a board is flat, but these markers do not lie in the plane of the others: {}",
+        off.iter().map(|(id, off_m)| format!("{id} by {:.1} mm", off_m * 1e3)).collect::<Vec<_>>().join(", ")
+    )]
+    NotPlanar {
+        /// Ids, and by how much their farthest corner is off, metres.
+        off: Vec<(u32, f64)>,
+    },
+}
+
+fn list(ids: &[u32]) -> String {
+    ids.iter()
+        .map(u32::to_string)
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+/// Learns the layout of the markers of one family. `pictures` holds what a detector saw in each; a marker that is there
+/// twice is passed over.
+///
+/// # Errors
+/// What the pictures lack, or that the markers do not lie in a plane.
+pub fn learn_board(
+    intrinsics: &Intrinsics,
+    family: Family,
+    pictures: &[Vec<Detection>],
+    settings: &MapSettings,
+) -> Result<LearntBoard, MapError> {
+    let seen = Sightings::of(intrinsics, family, pictures);
+    let Sightings {
+        ids,
+        pictures,
+        left_out,
+    } = seen;
+    if ids.len() < 2 {
+        return Err(MapError::TooFewMarkers);
+    }
+    let gauge = match settings.gauge {
+        None => 0,
+        Some(id) => ids.binary_search(&id).map_err(|_| MapError::NoGauge {
+            gauge: id,
+            seen: ids.clone(),
+        })?,
+    };
+    connected(&ids, &pictures, gauge)?;
+    let width_px = f64::from(intrinsics.size_px[0]);
+    let pictures: Vec<Vec<Seen>> = keyframes::choose(&pictures, width_px)
+        .into_iter()
+        .map(|index| pictures[index].clone())
+        .collect();
+    let (placed, views) = placing::place(
+        intrinsics,
+        &pictures,
+        ids.len(),
+        gauge,
+        settings.size_m,
+        settings.learns_sizes,
+    );
+    let lost: Vec<u32> = (0..ids.len())
+        .filter(|&marker| placed[marker].is_none())
+        .map(|marker| ids[marker])
+        .collect();
+    if !lost.is_empty() {
+        return Err(MapError::NoPlace { ids: lost });
+    }
+    let mut bundle = Bundle {
+        intrinsics: *intrinsics,
+        markers: placed.into_iter().flatten().collect(),
+        views: views.into_iter().flatten().collect(),
+        gauge,
+        freedom: Freedom::Space,
+        sizes_are_free: settings.learns_sizes,
+    };
+    let mut dropped = vec![0; ids.len()];
+    let in_space = adjust_without_outliers(&mut bundle, &mut dropped, &ids)?;
+    let off_plane_m = into_plane(&mut bundle, &in_space, settings.plane_tolerance_m, &ids)?;
+    bundle.freedom = Freedom::Plane;
+    let certainty = adjust_without_outliers(&mut bundle, &mut dropped, &ids)?;
+    let markers = (0..ids.len())
+        .map(|marker| {
+            let [_, _, turn, x, y, _, size] = certainty.deviations[marker];
+            let placed = &bundle.markers[marker];
+            let rms = bundle.rms_px(marker);
+            LearntMarker {
+                marker: Marker {
+                    family,
+                    id: ids[marker],
+                    size_m: placed.size_m,
+                    center_m: placed.world_from_marker.translation.truncate(),
+                    rotation_rad: rotation_rad(&placed.world_from_marker),
+                },
+                center_deviation_m: DVec2::new(x, y),
+                rotation_deviation_rad: turn,
+                size_deviation_m: size * placed.size_m,
+                sightings: rms.1,
+                dropped: dropped[marker],
+                rms_px: rms.0,
+                off_plane_m: off_plane_m[marker],
+            }
+        })
+        .collect();
+    Ok(LearntBoard {
+        markers,
+        pictures: bundle.views.len(),
+        noise_px: certainty.noise_px,
+        left_out,
+    })
+}
+
+impl LearntBoard {
+    /// The same layout, larger by a factor: for a scale that is known better than from a marker's size.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        let mut scaled = self.clone();
+        for learnt in &mut scaled.markers {
+            learnt.marker.size_m *= factor;
+            learnt.marker.center_m *= factor;
+            learnt.center_deviation_m *= factor;
+            learnt.size_deviation_m *= factor;
+            learnt.off_plane_m *= factor;
+        }
+        scaled
+    }
+}
+
+/// What the detections come to.
+struct Sightings {
+    /// Sorted.
+    ids: Vec<u32>,
+    /// Markers by their index in `ids`, sorted.
+    pictures: Vec<Vec<Seen>>,
+    left_out: Vec<u32>,
+}
+
+impl Sightings {
+    fn of(intrinsics: &Intrinsics, family: Family, pictures: &[Vec<Detection>]) -> Self {
+        let mut by_picture: Vec<BTreeMap<u32, [DVec2; 4]>> = pictures
+            .iter()
+            .map(|picture| once_seen(intrinsics, family, picture))
+            .collect();
+        let mut counts: BTreeMap<u32, usize> = BTreeMap::new();
+        for picture in by_picture.iter().filter(|picture| picture.len() > 1) {
+            for id in picture.keys() {
+                *counts.entry(*id).or_default() += 1;
+            }
+        }
+        let left_out: Vec<u32> = counts
+            .iter()
+            .filter(|&(_, &count)| count < LEAST_PICTURES)
+            .map(|(&id, _)| id)
+            .collect();
+        let ids: Vec<u32> = counts
+            .into_keys()
+            .filter(|id| left_out.binary_search(id).is_err())
+            .collect();
+        let pictures = by_picture
+            .iter_mut()
+            .map(|picture| {
+                let seen = picture.iter().filter_map(|(id, corners_px)| {
+                    Some(Seen {
+                        marker: ids.binary_search(id).ok()?,
+                        corners_px: *corners_px,
+                    })
+                });
+                seen.collect()
+            })
+            .collect();
+        Self {
+            ids,
+            pictures,
+            left_out,
+        }
+    }
+}
+
+/// Undistorted corners of the family's markers that a picture shows just once.
+fn once_seen(
+    intrinsics: &Intrinsics,
+    family: Family,
+    picture: &[Detection],
+) -> BTreeMap<u32, [DVec2; 4]> {
+    let mut times: BTreeMap<u32, usize> = BTreeMap::new();
+    for detection in picture {
+        *times.entry(detection.id).or_default() += 1;
+    }
+    picture
+        .iter()
+        .filter(|detection| detection.family == family && times[&detection.id] == 1)
+        .filter_map(|detection| {
+            let corners = detection
+                .corners_px
+                .map(|corner| undistorted_pixel(intrinsics, corner));
+            let [Some(a), Some(b), Some(c), Some(d)] = corners else {
+                return None;
+            };
+            Some((detection.id, [a, b, c, d]))
+        })
+        .collect()
+}
+
+/// Refuses groups of markers that no picture joins.
+fn connected(ids: &[u32], pictures: &[Vec<Seen>], gauge: usize) -> Result<(), MapError> {
+    // Each marker's group, by the lowest index in it.
+    let mut group: Vec<usize> = (0..ids.len()).collect();
+    for picture in pictures {
+        for pair in picture.windows(2) {
+            let (a, b) = (group[pair[0].marker], group[pair[1].marker]);
+            let (low, high) = (a.min(b), a.max(b));
+            group
+                .iter_mut()
+                .filter(|group| **group == high)
+                .for_each(|group| *group = low);
+        }
+    }
+    let mut groups: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
+    for (marker, id) in ids.iter().enumerate() {
+        groups.entry(group[marker]).or_default().push(*id);
+    }
+    if groups.len() == 1 {
+        return Ok(());
+    }
+    let first = groups.remove(&group[gauge]).unwrap_or_default();
+    Err(MapError::NotConnected {
+        groups: std::iter::once(first).chain(groups.into_values()).collect(),
+    })
+}
+
+/// Adjusts, drops markers from pictures in which they do not fit, and adjusts again.
+fn adjust_without_outliers(
+    bundle: &mut Bundle,
+    dropped: &mut [usize],
+    ids: &[u32],
+) -> Result<Certainty, MapError> {
+    for _ in 0..ROUNDS {
+        let certainty = bundle.adjust().ok_or(MapError::NotDetermined)?;
+        let limit_px = (OUTLIER * certainty.noise_px).max(LEAST_OUTLIER_PX);
+        let whole = bundle.clone();
+        let mut any = false;
+        for (view, before) in bundle.views.iter_mut().zip(&whole.views) {
+            view.seen.retain(|seen| {
+                let fits = rms(&whole.distances_px(before, seen)) <= limit_px;
+                dropped[seen.marker] += usize::from(!fits);
+                any |= !fits;
+                fits
+            });
+        }
+        if !any {
+            return Ok(certainty);
+        }
+        // A lone marker tells where its camera is, and nothing else.
+        bundle.views.retain(|view| view.seen.len() > 1);
+        let lost: Vec<u32> = (0..ids.len())
+            .filter(|&marker| bundle.rms_px(marker).1 == 0)
+            .map(|marker| ids[marker])
+            .collect();
+        if !lost.is_empty() {
+            return Err(MapError::NoPlace { ids: lost });
+        }
+        let pictures: Vec<Vec<Seen>> = bundle.views.iter().map(|view| view.seen.clone()).collect();
+        connected(ids, &pictures, bundle.gauge)?;
+    }
+    bundle.adjust().ok_or(MapError::NotDetermined)
+}
+
+/// Turns the world so that its plane z = 0 is the markers', and lays them into it; how far each was off.
+fn into_plane(
+    bundle: &mut Bundle,
+    certainty: &Certainty,
+    tolerance_m: f64,
+    ids: &[u32],
+) -> Result<Vec<f64>, MapError> {
+    // Three standard deviations of a height are what the pictures leave open.
+    let may_be_off_m: Vec<f64> = (certainty.deviations.iter().zip(&bundle.markers))
+        .map(|(deviations, placed)| tolerance_m + 3.0 * height_deviation_m(deviations, placed))
+        .collect();
+    let plane_from_world = plane::plane_from_world(&bundle.markers, bundle.gauge, &may_be_off_m)
+        .ok_or(MapError::NotDetermined)?;
+    let off_m: Vec<f64> = bundle
+        .markers
+        .iter()
+        .map(|marker| plane::farthest_m(marker, &plane_from_world))
+        .collect();
+    let off: Vec<(u32, f64)> = (0..ids.len())
+        .filter(|&marker| off_m[marker] > may_be_off_m[marker])
+        .map(|marker| (ids[marker], off_m[marker]))
+        .collect();
+    if !off.is_empty() {
+        return Err(MapError::NotPlanar { off });
+    }
+    let world_from_plane = plane_from_world.inverse();
+    for view in &mut bundle.views {
+        view.camera_from_world *= world_from_plane;
+    }
+    for placed in &mut bundle.markers {
+        let in_plane = plane_from_world * placed.world_from_marker;
+        let center_m = DVec3::new(in_plane.translation.x, in_plane.translation.y, 0.0);
+        placed.world_from_marker = DAffine3::from_translation(center_m)
+            * DAffine3::from_rotation_z(rotation_rad(&in_plane));
+    }
+    Ok(off_m)
+}
+
+/// Of a corner: of the centre's height, and of the tilt over half a side.
+fn height_deviation_m(deviations: &[f64; MARKER_UNKNOWNS], placed: &Placed) -> f64 {
+    let [rx, ry, _, _, _, z_m, _] = *deviations;
+    let half_m = 0.5 * placed.size_m;
+    (z_m * z_m + (rx * half_m).powi(2) + (ry * half_m).powi(2)).sqrt()
+}
+
+/// Turn about z.
+fn rotation_rad(plane_from_marker: &DAffine3) -> f64 {
+    let x = plane_from_marker.matrix3.x_axis;
+    x.y.atan2(x.x)
+}
+
+fn rms(distances_px: &[f64]) -> f64 {
+    let squares: f64 = distances_px
+        .iter()
+        .map(|distance| distance * distance)
+        .sum();
+    (squares / distances_px.len() as f64).sqrt()
+}
+
+impl Bundle {
+    /// Of a marker's corners, pixels, and the views that see it.
+    fn rms_px(&self, marker: usize) -> (f64, usize) {
+        let seeing = |view: &View| view.seen.iter().find(|seen| seen.marker == marker).copied();
+        let distances_px: Vec<f64> = self
+            .views
+            .iter()
+            .filter_map(|view| Some(self.distances_px(view, &seeing(view)?)))
+            .flatten()
+            .collect();
+        match distances_px.len() {
+            0 => (0.0, 0),
+            count => (rms(&distances_px), count / 4),
+        }
+    }
+}

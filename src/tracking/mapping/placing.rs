@@ -1,0 +1,356 @@
+//! First places of markers and cameras, from the gauge marker outwards: what bundle adjustment starts from.
+//!
+//! A lone square has two poses that explain its picture about equally well; the wrong one of them differs from picture
+//! to picture, the right one does not. So each new marker is put where one picture says, and the other pictures vote.
+
+use glam::{DAffine3, DVec2, DVec3};
+
+use super::super::least_squares::{accumulate, solve_positive_definite};
+use super::super::pose::{self, Sighting};
+use super::bundle::{Placed, Seen, UNIT_CORNERS, View, project, turned};
+use crate::geometry::camera::Intrinsics;
+
+/// Pictures that say where a new marker may be, and those that vote.
+const SAYING: usize = 6;
+const VOTING: usize = 12;
+/// A picture that does not agree at all has no more to say than this, pixels (root mean square).
+const DISAGREES_PX: f64 = 8.0;
+/// Of so many placed markers in a picture both poses are tried.
+const STARTS: usize = 2;
+/// So many placed markers settle a picture's camera; one more does not move it.
+const SETTLED: usize = 3;
+
+/// A picture with both poses of each lone marker in it.
+struct Picture<'a> {
+    seen: &'a [Seen],
+    /// camera_from_marker of each, the better one first.
+    lone: Vec<Vec<DAffine3>>,
+}
+
+/// Markers and the views that see at least one of them, with the gauge at the origin. A marker that cannot be placed is
+/// `None`. Without `sizes_are_free` all have the size of the gauge; with it, the size that they would have if they lay in
+/// its plane.
+pub(super) fn place(
+    intrinsics: &Intrinsics,
+    pictures: &[Vec<Seen>],
+    markers: usize,
+    gauge: usize,
+    size_m: f64,
+    sizes_are_free: bool,
+) -> (Vec<Option<Placed>>, Vec<Option<View>>) {
+    let pictures: Vec<Picture> = pictures
+        .iter()
+        .map(|seen| Picture {
+            seen,
+            lone: seen
+                .iter()
+                .map(|seen| lone_poses(intrinsics, seen, size_m))
+                .collect(),
+        })
+        .collect();
+    let mut placing = Placing {
+        intrinsics,
+        pictures,
+        size_m,
+        placed: vec![None; markers],
+    };
+    placing.placed[gauge] = Some(Placed {
+        world_from_marker: DAffine3::IDENTITY,
+        size_m,
+    });
+    let mut given_up = vec![false; markers];
+    while let Some(marker) = placing.next(&given_up) {
+        placing.placed[marker] = placing.place_next(marker, sizes_are_free);
+        given_up[marker] = placing.placed[marker].is_none();
+    }
+    let views = placing
+        .pictures
+        .iter()
+        .map(|picture| {
+            let (camera_from_world, _) = placing.camera(picture, None)?;
+            Some(View {
+                camera_from_world,
+                seen: picture.seen.to_vec(),
+            })
+        })
+        .collect();
+    (placing.placed, views)
+}
+
+fn lone_poses(intrinsics: &Intrinsics, seen: &Seen, size_m: f64) -> Vec<DAffine3> {
+    let sightings: [Sighting; 4] = std::array::from_fn(|corner| Sighting {
+        point_m: UNIT_CORNERS[corner].truncate() * size_m,
+        pixel: seen.corners_px[corner],
+    });
+    let Some(solutions) = pose::solve(intrinsics, &sightings) else {
+        return Vec::new();
+    };
+    let both = std::iter::once(solutions.best).chain(solutions.alternative);
+    both.map(|solution| solution.camera_from_anchor).collect()
+}
+
+/// A picture that judges where a marker may be.
+struct Voter<'a> {
+    picture: &'a Picture<'a>,
+    /// Of the marker in it.
+    at: usize,
+    /// Where the markers that are placed settle it.
+    camera_from_world: Option<DAffine3>,
+}
+
+struct Placing<'a> {
+    intrinsics: &'a Intrinsics,
+    pictures: Vec<Picture<'a>>,
+    /// Of the lone poses.
+    size_m: f64,
+    placed: Vec<Option<Placed>>,
+}
+
+impl Placing<'_> {
+    /// The marker that most pictures show together with placed ones.
+    fn next(&self, given_up: &[bool]) -> Option<usize> {
+        let mut together = vec![0; self.placed.len()];
+        for picture in &self.pictures {
+            let known = picture
+                .seen
+                .iter()
+                .filter(|seen| self.placed[seen.marker].is_some())
+                .count();
+            for seen in picture.seen {
+                together[seen.marker] += known;
+            }
+        }
+        (0..self.placed.len())
+            .filter(|&marker| self.placed[marker].is_none() && !given_up[marker])
+            .filter(|&marker| together[marker] > 0)
+            .max_by_key(|&marker| (together[marker], std::cmp::Reverse(marker)))
+    }
+
+    fn place_next(&self, marker: usize, sizes_are_free: bool) -> Option<Placed> {
+        let mut showing: Vec<(&Picture, usize)> = self
+            .pictures
+            .iter()
+            .filter(|picture| {
+                picture
+                    .seen
+                    .iter()
+                    .any(|seen| self.placed[seen.marker].is_some())
+            })
+            .filter_map(|picture| {
+                let at = picture.seen.iter().position(|seen| seen.marker == marker)?;
+                Some((picture, at))
+            })
+            .collect();
+        // Large in the picture, so seen well; equally large ones stay in the pictures' order.
+        showing.sort_by(|a, b| area_px(b.0, b.1).total_cmp(&area_px(a.0, a.1)));
+        let voting: Vec<(&Picture, usize)> = showing
+            .iter()
+            .step_by(1 + showing.len() / VOTING)
+            .copied()
+            .collect();
+        let size_m = match sizes_are_free {
+            true => self.size_in_plane(&voting)?,
+            false => self.size_m,
+        };
+        let grown = size_m / self.size_m;
+        let voters: Vec<Voter> = voting
+            .iter()
+            .map(|&(picture, at)| {
+                let known = picture
+                    .seen
+                    .iter()
+                    .filter(|seen| self.placed[seen.marker].is_some());
+                let settled = known.count() >= SETTLED;
+                Voter {
+                    picture,
+                    at,
+                    camera_from_world: settled
+                        .then(|| Some(self.camera(picture, None)?.0))
+                        .flatten(),
+                }
+            })
+            .collect();
+        let mut best: Option<(f64, Placed)> = None;
+        for (picture, at) in showing.iter().take(SAYING) {
+            let Some((camera_from_world, _)) = self.camera(picture, None) else {
+                continue;
+            };
+            for lone in &picture.lone[*at] {
+                let camera_from_marker =
+                    DAffine3::from_mat3_translation(lone.matrix3, lone.translation * grown);
+                let candidates = self
+                    .starts(picture)
+                    .into_iter()
+                    .chain([camera_from_world])
+                    .map(|camera_from_world| camera_from_world.inverse() * camera_from_marker);
+                for world_from_marker in candidates {
+                    let hypothesis = Placed {
+                        world_from_marker,
+                        size_m,
+                    };
+                    let against: f64 = voters
+                        .iter()
+                        .map(|voter| self.against(voter, marker, &hypothesis).powi(2))
+                        .sum();
+                    if best.as_ref().is_none_or(|(least, _)| against < *least) {
+                        best = Some((against, hypothesis));
+                    }
+                }
+            }
+        }
+        best.map(|(_, placed)| placed)
+    }
+
+    /// How far a picture shows a marker from where it is thought to be, pixels (root mean square).
+    fn against(&self, voter: &Voter, marker: usize, hypothesis: &Placed) -> f64 {
+        let rms_px = match &voter.camera_from_world {
+            Some(camera_from_world) => {
+                let squares = (hypothesis.corners_m().into_iter())
+                    .zip(voter.picture.seen[voter.at].corners_px)
+                    .map(|(point_m, pixel)| {
+                        Some(
+                            project(self.intrinsics, camera_from_world, point_m)?
+                                .distance_squared(pixel),
+                        )
+                    });
+                squares
+                    .sum::<Option<f64>>()
+                    .map(|squares| (squares / 4.0).sqrt())
+            }
+            None => self
+                .camera(voter.picture, Some((marker, hypothesis)))
+                .map(|(_, rms_px)| rms_px),
+        };
+        rms_px.map_or(DISAGREES_PX, |rms_px| rms_px.min(DISAGREES_PX))
+    }
+
+    /// The side that a marker has if it lies in the plane of the gauge: the median over its pictures.
+    fn size_in_plane(&self, showing: &[(&Picture, usize)]) -> Option<f64> {
+        let mut sizes_m: Vec<f64> = showing
+            .iter()
+            .filter_map(|(picture, at)| {
+                let (camera_from_world, _) = self.camera(picture, None)?;
+                let world_from_camera = camera_from_world.inverse();
+                let eye_m = world_from_camera.translation;
+                let corners_m = picture.seen[*at].corners_px.map(|pixel| {
+                    let ray = self.intrinsics.plane_from_pixel(pixel).extend(1.0);
+                    let ray = world_from_camera.transform_vector3(ray);
+                    eye_m - ray * (eye_m.z / ray.z)
+                });
+                let around_m: f64 = (0..4)
+                    .map(|corner| corners_m[corner].distance(corners_m[(corner + 1) % 4]))
+                    .sum();
+                (around_m.is_finite() && around_m > 0.0).then_some(around_m / 4.0)
+            })
+            .collect();
+        sizes_m.sort_by(f64::total_cmp);
+        sizes_m.get(sizes_m.len() / 2).copied()
+    }
+
+    /// Poses of the camera that the largest placed markers in a picture say.
+    fn starts(&self, picture: &Picture) -> Vec<DAffine3> {
+        let mut known: Vec<usize> = (0..picture.seen.len())
+            .filter(|&at| self.placed[picture.seen[at].marker].is_some())
+            .collect();
+        known.sort_by(|&a, &b| area_px(picture, b).total_cmp(&area_px(picture, a)));
+        let mut starts = Vec::new();
+        for at in known.into_iter().take(STARTS) {
+            let Some(placed) = &self.placed[picture.seen[at].marker] else {
+                continue;
+            };
+            let marker_from_world = placed.world_from_marker.inverse();
+            let grown = placed.size_m / self.size_m;
+            starts.extend(picture.lone[at].iter().map(|lone| {
+                DAffine3::from_mat3_translation(lone.matrix3, lone.translation * grown)
+                    * marker_from_world
+            }));
+        }
+        starts
+    }
+
+    /// The camera that explains the placed markers in a picture best, with one more marker where it is thought to be,
+    /// and the root mean square of what is left, pixels.
+    fn camera(&self, picture: &Picture, more: Option<(usize, &Placed)>) -> Option<(DAffine3, f64)> {
+        let mut points = Vec::new();
+        for seen in picture.seen {
+            let placed = match more {
+                Some((marker, placed)) if marker == seen.marker => Some(placed),
+                _ => self.placed[seen.marker].as_ref(),
+            };
+            if let Some(placed) = placed {
+                points.extend(placed.corners_m().into_iter().zip(seen.corners_px));
+            }
+        }
+        self.starts(picture)
+            .into_iter()
+            .filter_map(|start| resected(self.intrinsics, &points, start))
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(camera_from_world, squares_px)| {
+                (camera_from_world, (squares_px / points.len() as f64).sqrt())
+            })
+    }
+}
+
+fn area_px(picture: &Picture, at: usize) -> f64 {
+    let [a, b, c, d] = picture.seen[at].corners_px;
+    0.5 * (c - a).perp_dot(d - b).abs()
+}
+
+/// The camera that sees points where they were seen, by Levenberg-Marquardt from a start, and the sum of its squared
+/// errors, pixels; `None` when a point falls behind it.
+fn resected(
+    intrinsics: &Intrinsics,
+    points: &[(DVec3, DVec2)],
+    start: DAffine3,
+) -> Option<(DAffine3, f64)> {
+    const ROUNDS: usize = 15;
+    let squares_px = |camera: &DAffine3| {
+        let squares = points.iter().map(|&(point_m, pixel)| {
+            Some(project(intrinsics, camera, point_m)?.distance_squared(pixel))
+        });
+        squares.sum::<Option<f64>>()
+    };
+    let mut camera = start;
+    let mut error = squares_px(&camera)?;
+    let mut damping = 1e-3;
+    for _ in 0..ROUNDS {
+        let (mut normal, mut right) = ([[0.0; 6]; 6], [0.0; 6]);
+        for &(point_m, pixel) in points {
+            let turned_m = camera.matrix3 * point_m;
+            let in_camera_m = turned_m + camera.translation;
+            let image = in_camera_m.truncate() / in_camera_m.z;
+            let missing_px = pixel - intrinsics.pixel_from_plane(image);
+            let gradients = [
+                DVec3::new(1.0, 0.0, -image.x) * (intrinsics.focal_px.x / in_camera_m.z),
+                DVec3::new(0.0, 1.0, -image.y) * (intrinsics.focal_px.y / in_camera_m.z),
+            ];
+            for (gradient, value) in gradients.into_iter().zip(missing_px.to_array()) {
+                let by_turn = turned_m.cross(gradient);
+                let row = [
+                    by_turn.x, by_turn.y, by_turn.z, gradient.x, gradient.y, gradient.z,
+                ];
+                accumulate(&mut normal, &mut right, &row, value);
+            }
+        }
+        for (k, row) in normal.iter_mut().enumerate() {
+            row[k] *= 1.0 + damping;
+        }
+        let [rx, ry, rz, tx, ty, tz] = solve_positive_definite(&normal, &right)?;
+        let candidate = DAffine3::from_rotation_translation(
+            turned(&camera, DVec3::new(rx, ry, rz)),
+            camera.translation + DVec3::new(tx, ty, tz),
+        );
+        match squares_px(&candidate) {
+            Some(lower) if lower < error => {
+                let settled = error - lower < 1e-6 * error;
+                (camera, error) = (candidate, lower);
+                damping = (damping / 10.0).max(1e-9);
+                if settled {
+                    break;
+                }
+            }
+            _ => damping *= 10.0,
+        }
+    }
+    Some((camera, error))
+}
