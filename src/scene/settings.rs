@@ -3,8 +3,8 @@
 use super::error::SceneError;
 use super::reader::{Numbers, Table, Value};
 use super::{
-    ArucoRefinement, CameraSettings, Counting, DetectorKind, PixelFormat, Search, ShadowSettings,
-    Technique, TrackingSettings, WantedFormat,
+    ArucoRefinement, CameraSettings, Counting, DetectorKind, PixelFormat, Quality, Search,
+    ShadowSettings, Technique, TrackingSettings, WantedFormat,
 };
 use crate::geometry::outline_scale::LARGEST_MOVE_PX;
 
@@ -154,8 +154,8 @@ pub fn shadows(root: &Table) -> Result<ShadowSettings, SceneError> {
             "this version renders `volumes`, which takes [[light]] and [ambient] and no probe; allowed: no [probe]",
         ));
     }
-    let default = ShadowSettings::default();
-    const KEYS: [&str; 5] = [
+    const KEYS: [&str; 6] = [
+        "quality",
         "technique",
         "samples",
         "counting",
@@ -163,8 +163,14 @@ pub fn shadows(root: &Table) -> Result<ShadowSettings, SceneError> {
         "frame_budget_ms",
     ];
     let Some(shadows) = root.table("shadows", &KEYS)? else {
-        return Ok(default);
+        return Ok(ShadowSettings::default());
     };
+    let quality = |value: Value| value.one_of("quality", &Quality::BY_NAME);
+    let default = shadows
+        .optional("quality")
+        .map(quality)
+        .transpose()?
+        .map_or_else(ShadowSettings::default, Quality::shadows);
     let technique = |value: Value| match value.text()? {
         "shafts" | "environment" => {
             Err(value.error("this version renders `volumes`; allowed: auto, volumes"))
@@ -178,6 +184,7 @@ pub fn shadows(root: &Table) -> Result<ShadowSettings, SceneError> {
     let counting = |value: Value| value.one_of("way of counting", &COUNTINGS);
     let budget = |value: Value| value.number(&Numbers::above(0.0, 1e6, "ms"));
     Ok(ShadowSettings {
+        quality: default.quality,
         technique: shadows
             .optional("technique")
             .map(technique)

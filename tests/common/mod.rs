@@ -4,7 +4,6 @@
 pub mod judge;
 pub mod photographs;
 pub mod random;
-pub mod ray_cast;
 pub mod shapes;
 pub mod sheets;
 
@@ -13,14 +12,14 @@ use std::sync::{Arc, OnceLock};
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use gnomon::app::chart::known_scene::{AMBIENT, KnownScene, Placed};
+use gnomon::app::truth::ray_cast::{Triangle, View, World};
 use gnomon::capture::Frame;
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::geometry::mesh::{Mesh, MeshReport};
 use gnomon::light::{Light, Material};
-use gnomon::render::{Gpu, Layers, Renderer, Shown};
+use gnomon::render::{Gpu, Layers, REAL, Renderer, Shown, VIRTUAL};
 use gnomon::scene::{Anchor, Object, Scene, ShadowSettings, Technique};
 
-use ray_cast::{REAL, Triangle, VIRTUAL, View, World};
 use shapes::Soup;
 
 /// One device for all tests of a binary.

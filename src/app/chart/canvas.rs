@@ -10,7 +10,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color as _, FontStyle, FontTransform, IntoFont, register_font};
 
 /// Drawn larger than its unit, for fine screens and printers.
-const PIXELS_PER_UNIT: f64 = 2.0;
+pub const PIXELS_PER_UNIT: f64 = 2.0;
 const FONT: &str = "sans-serif";
 
 /// Dark enough for text and axes.

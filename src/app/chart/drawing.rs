@@ -87,6 +87,10 @@ impl Taken {
         side(0) * side(1)
     }
 
+    fn middle(&self) -> [f64; 2] {
+        [0, 1].map(|axis| (self.low[axis] + self.high[axis]) / 2.0)
+    }
+
     fn area(&self) -> f64 {
         (self.high[0] - self.low[0]) * (self.high[1] - self.low[1])
     }
@@ -140,9 +144,15 @@ fn draw_panel<B: DrawingBackend>(
         ]
     };
 
+    let mut free_from = f64::NEG_INFINITY;
     for (value, name) in x.ticks() {
         let [at, _] = place([value, 0.0]);
         canvas.line(&[[at, frame.low[1]], [at, frame.high[1]]], FAINT, 0.8)?;
+        let half = canvas.text_width(&name, LABEL_SIZE)? / 2.0;
+        if at - half < free_from {
+            continue;
+        }
+        free_from = at + half + TICK_GAP;
         let below = [at, frame.high[1] + TICK_GAP + 6.0];
         canvas.text(&name, below, LABEL_SIZE, INK, Anchor::Middle)?;
     }
@@ -164,40 +174,35 @@ fn draw_panel<B: DrawingBackend>(
         canvas.upright_text(&panel.y.label, beside, TEXT_SIZE)?;
     }
 
-    let mut taken: Vec<Taken> = Vec::new();
+    let mut taken: Vec<Taken> = points().map(|point| beside_mark(place(point.at))).collect();
     for rule in &panel.rules {
-        let (ends, beside, anchor) = if rule.upright {
+        let width = canvas.text_width(&rule.label, LABEL_SIZE)?;
+        let middles = if rule.upright {
             let [at, _] = place([rule.at, 0.0]);
-            let ends = [[at, low[1]], [at, high[1]]];
-            (ends, [at + 5.0, high[1] - 10.0], Anchor::Start)
+            canvas.dashed(&[[at, low[1]], [at, high[1]]], GREY, 1.4, &[6.0, 4.0])?;
+            let across = width / 2.0 + 6.0;
+            let ends = [high[1] - 12.0, low[1] + 12.0];
+            ends.map(|y| [[at + across, y], [at - across, y]])
         } else {
             let at = place([f64::NAN, rule.at])[1];
-            let ends = [[low[0], at], [high[0], at]];
-            (ends, [high[0] - 4.0, at - 9.0], Anchor::End)
+            canvas.dashed(&[[low[0], at], [high[0], at]], GREY, 1.4, &[6.0, 4.0])?;
+            let ends = [high[0] - width / 2.0 - 6.0, low[0] + width / 2.0 + 6.0];
+            ends.map(|x| [[x, at - 11.0], [x, at + 11.0]])
         };
-        canvas.dashed(&ends, GREY, 1.4, &[6.0, 4.0])?;
-        canvas.text(&rule.label, beside, LABEL_SIZE, GREY, anchor)?;
-        let width = canvas.text_width(&rule.label, LABEL_SIZE)?;
-        let start = if anchor == Anchor::End {
-            beside[0] - width
-        } else {
-            beside[0]
-        };
-        taken.push(Taken {
-            low: [start, beside[1] - 8.0],
-            high: [start + width, beside[1] + 8.0],
-        });
+        let spots = middles.into_iter().flatten();
+        let spot = least_covered(spots.map(|at| around(at, width)), &frame, &taken);
+        canvas.text(&rule.label, spot.middle(), LABEL_SIZE, GREY, Anchor::Middle)?;
+        taken.push(spot);
     }
-    if panel.front.len() > 1 {
+    if let (Some(first), Some(last)) = (panel.front.first(), panel.front.last()) {
         // Between two of its points nothing is known to be better than the dearer one's time at the other's error.
-        let mut steps: Vec<[f64; 2]> = Vec::new();
-        for &[at_x, at_y] in &panel.front {
-            if let Some(&[_, before]) = steps.last() {
-                steps.push([at_x, before]);
-            }
+        let mut steps = vec![[place(*first)[0], low[1]]];
+        for &point in &panel.front {
+            let [at_x, at_y] = place(point);
+            steps.extend(steps.last().map(|&[_, before]| [at_x, before]));
             steps.push([at_x, at_y]);
         }
-        let steps: Vec<[f64; 2]> = steps.into_iter().map(place).collect();
+        steps.push([high[0], place(*last)[1]]);
         canvas.line(&steps, GREY, 1.2)?;
     }
     for series in &panel.series {
@@ -206,12 +211,8 @@ fn draw_panel<B: DrawingBackend>(
         if series.joined {
             canvas.dashed(&places, look.0, 2.0, look.2)?;
         }
-        for &[at_x, at_y] in &places {
-            canvas.mark([at_x, at_y], look)?;
-            taken.push(Taken {
-                low: [at_x - 5.0, at_y - 5.0],
-                high: [at_x + 5.0, at_y + 5.0],
-            });
+        for &at in &places {
+            canvas.mark(at, look)?;
         }
     }
     for series in &panel.series {
@@ -220,22 +221,42 @@ fn draw_panel<B: DrawingBackend>(
             let width = canvas.text_width(&point.label, LABEL_SIZE)?;
             let own = place(point.at);
             let spot = free_spot(own, width, &frame, &taken);
-            let middle = [
-                (spot.low[0] + spot.high[0]) / 2.0,
-                (spot.low[1] + spot.high[1]) / 2.0,
-            ];
-            canvas.text(&point.label, middle, LABEL_SIZE, look.0, Anchor::Middle)?;
+            canvas.text(
+                &point.label,
+                spot.middle(),
+                LABEL_SIZE,
+                look.0,
+                Anchor::Middle,
+            )?;
             taken.push(spot);
         }
     }
     Ok(())
 }
 
-/// Where a label beside a mark covers least of what is there already.
+const LABEL_HEIGHT: f64 = 14.0;
+
+/// What a mark covers.
+fn beside_mark(at: [f64; 2]) -> Taken {
+    Taken {
+        low: at.map(|part| part - 5.0),
+        high: at.map(|part| part + 5.0),
+    }
+}
+
+/// What a label of a width covers about its middle.
+fn around(middle: [f64; 2], width: f64) -> Taken {
+    let half = [width / 2.0, LABEL_HEIGHT / 2.0];
+    Taken {
+        low: [middle[0] - half[0], middle[1] - half[1]],
+        high: [middle[0] + half[0], middle[1] + half[1]],
+    }
+}
+
+/// Where a label beside a mark covers least of what is there already; the first of equals is the nearest.
 fn free_spot(mark: [f64; 2], width: f64, frame: &Taken, taken: &[Taken]) -> Taken {
-    const HEIGHT: f64 = 14.0;
     let spots = [8.0, 16.0, 26.0].into_iter().flat_map(|gap| {
-        let (across, down) = (gap + width / 2.0, gap + HEIGHT / 2.0);
+        let (across, down) = (gap + width / 2.0, gap + LABEL_HEIGHT / 2.0);
         [
             [across, 0.0],
             [0.0, -down],
@@ -247,22 +268,21 @@ fn free_spot(mark: [f64; 2], width: f64, frame: &Taken, taken: &[Taken]) -> Take
             [-across, down],
         ]
     });
-    let boxes = spots.map(|[x, y]| Taken {
-        low: [mark[0] + x - width / 2.0, mark[1] + y - HEIGHT / 2.0],
-        high: [mark[0] + x + width / 2.0, mark[1] + y + HEIGHT / 2.0],
-    });
+    let boxes = spots.map(|[x, y]| around([mark[0] + x, mark[1] + y], width));
+    least_covered(boxes, frame, taken)
+}
+
+/// The first of the boxes that cover least of what is there already, and lie in the frame.
+fn least_covered(spots: impl Iterator<Item = Taken>, frame: &Taken, taken: &[Taken]) -> Taken {
     let cost = |spot: &Taken| {
         let covered: f64 = taken.iter().map(|other| spot.shared(other)).sum();
         covered + 3.0 * (spot.area() - spot.shared(frame))
     };
-    // The first of equals is the nearest.
-    let best = boxes.map(|spot| (cost(&spot), spot));
-    let first = Taken {
-        low: mark,
-        high: mark,
-    };
-    best.fold((f64::INFINITY, first), |best, spot| {
-        if spot.0 < best.0 { spot } else { best }
-    })
-    .1
+    let nowhere = (f64::INFINITY, around([0.0; 2], 0.0));
+    let costs = spots.map(|spot| (cost(&spot), spot));
+    let least = costs.fold(
+        nowhere,
+        |least, spot| if spot.0 < least.0 { spot } else { least },
+    );
+    least.1
 }

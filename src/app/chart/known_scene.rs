@@ -9,9 +9,11 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use crate::app::truth::affine;
+use crate::app::truth::ray_cast::{Triangle, View, World};
 use crate::geometry::camera::Intrinsics;
 use crate::light::Light;
-use crate::scene::Scene;
+use crate::render::{REAL, VIRTUAL};
+use crate::scene::{Object, Scene};
 
 /// A scene and its exact mask.
 pub struct KnownScene {
@@ -141,4 +143,35 @@ impl KnownScene {
         scene.ambient_radiance = DVec3::splat(AMBIENT);
         Ok(scene)
     }
+
+    /// Its camera.
+    pub fn view(&self) -> View {
+        View {
+            intrinsics: self.intrinsics,
+            camera_from_world: self.camera_from_world,
+        }
+    }
+}
+
+/// The triangles of a scene whose things all stand in the world, for rays. Corners are single precision, as what is drawn.
+pub fn world_of(scene: &Scene) -> World {
+    let triangles_of = |object: &Object, role| {
+        let corner = |index: u32| {
+            let position = object.mesh.positions[index as usize].as_dvec3();
+            let in_world = object.anchor_from_object.transform_point3(position);
+            in_world.as_vec3().as_dvec3()
+        };
+        let triangle = |vertices: &[u32; 3]| Triangle {
+            role,
+            casts: object.casts,
+            corners: vertices.map(corner),
+        };
+        object.mesh.triangles.iter().map(triangle).collect()
+    };
+    let real = scene.phantoms.iter().map(|object| (object, REAL));
+    let seeming = scene.virtuals.iter().map(|object| (object, VIRTUAL));
+    let triangles = real
+        .chain(seeming)
+        .flat_map(|(object, role)| -> Vec<Triangle> { triangles_of(object, role) });
+    World::new(triangles.collect())
 }

@@ -94,6 +94,26 @@ impl<'a> Lab<'a> {
         Ok(found)
     }
 
+    /// Their names.
+    ///
+    /// # Errors
+    /// As [`Lab::recordings`].
+    pub fn recording_names(&self) -> Result<Vec<String>> {
+        let recordings = self.recordings()?.into_iter();
+        Ok(recordings.map(|recording| recording.name).collect())
+    }
+
+    /// Folders and scene files of all of them.
+    ///
+    /// # Errors
+    /// As [`Lab::recordings`].
+    pub fn recording_inputs(&self) -> Result<Vec<PathBuf>> {
+        let recordings = self.recordings()?.into_iter();
+        Ok(recordings
+            .flat_map(|recording| [recording.folder, recording.scene])
+            .collect())
+    }
+
     /// The recording of a name.
     ///
     /// # Errors

@@ -8,8 +8,11 @@ mod family;
 mod figure;
 pub mod known_scene;
 mod lab;
+mod left_out;
+mod marker_view;
 mod measured;
 pub mod peers_table;
+mod pictures;
 mod scaling;
 mod shadows;
 mod shots;
@@ -58,14 +61,17 @@ trait AnyChart {
 }
 
 /// All charts, in the order in which they are made and read.
-fn all() -> [Box<dyn AnyChart>; 6] {
+fn all() -> [Box<dyn AnyChart>; 9] {
     [
         Box::new(tracking::Tracking),
         Box::new(shadows::Shadows),
+        Box::new(pictures::Pictures),
+        Box::new(left_out::LeftOut),
         Box::new(scaling::Scaling),
         Box::new(stability::Stability),
         Box::new(displacement::Displacement),
         Box::new(wrong_pose::WrongPose),
+        Box::new(marker_view::MarkerView),
     ]
 }
 
@@ -191,14 +197,16 @@ fn readme(out: &Path) -> String {
     );
     for chart in all() {
         let name = chart.name();
-        if !out.join(format!("{name}.csv")).is_file() {
+        if !out.join(format!("{name}.png")).is_file() {
             continue;
         }
-        text += &format!(
-            "\n## {name}\n![{name}]({name}.png)\n\n{}\n\nFigures: [{name}.csv]({name}.csv), also as \
-             [{name}.svg]({name}.svg). Made by `gnomon chart --only {name}`.\n",
-            chart.shows()
-        );
+        let shows = chart.shows();
+        text += &format!("\n## {name}\n![{name}]({name}.png)\n\n{shows}\n\n");
+        if out.join(format!("{name}.csv")).is_file() {
+            text +=
+                &format!("Figures: [{name}.csv]({name}.csv), also as [{name}.svg]({name}.svg). ");
+        }
+        text += &format!("Made by `gnomon chart --only {name}`.\n");
     }
     text
 }

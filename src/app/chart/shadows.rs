@@ -16,7 +16,7 @@ use crate::app::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
 use crate::app::truth::{Drawn, Picture};
 use crate::render::{Renderer, Shown};
-use crate::scene::{Counting, Scene, Technique};
+use crate::scene::{Counting, Quality, Scene, ShadowSettings, Technique};
 
 /// The chart.
 pub struct Shadows;
@@ -34,37 +34,70 @@ pub struct Row {
     change_real: f64,
     factor_rms: f64,
     wrong_shadow_pct: f64,
+    outline_levels: f64,
 }
 
-const VOLUMES: &str = "volumes";
+const VOLUMES_4: &str = "volumes, 4 samples";
+const VOLUMES_1: &str = "volumes, 1 sample";
+/// A series each, in the order of their colours.
+const TECHNIQUES: [&str; 2] = [VOLUMES_4, VOLUMES_1];
 const TRUTH: &str = "truth on the video";
 const BARE: &str = "bare video";
 
-/// A setting and what it does to a scene.
+/// A way to make shadows and the scene that asks for it.
 struct Way {
+    technique: &'static str,
     setting: String,
     scene: Scene,
 }
 
+/// What each technique has to set. Another one adds its ways here.
 fn ways(scene: &Scene) -> Vec<Way> {
-    let way = |setting: String, samples, max_silhouette_error_px, counting| {
-        let mut scene = scene.clone();
-        scene.shadows.technique = Technique::Volumes;
-        scene.shadows.samples = samples;
-        scene.shadows.max_silhouette_error_px = max_silhouette_error_px;
-        scene.shadows.counting = counting;
-        Way { setting, scene }
-    };
     let mut ways = Vec::new();
-    for samples in [1, 4] {
-        for error_px in [0.0, 0.5, 2.0, 8.0] {
-            let setting = format!("{samples}x, {error_px} px");
-            ways.push(way(setting, samples, error_px, Counting::Auto));
-        }
-        let setting = format!("{samples}x, depth-fail");
-        ways.push(way(setting, samples, 0.5, Counting::DepthFail));
+    let mut add = |technique, setting: String, shadows: ShadowSettings| {
+        let mut scene = scene.clone();
+        scene.shadows = shadows;
+        ways.push(Way {
+            technique,
+            setting,
+            scene,
+        });
+    };
+    for (name, quality) in Quality::BY_NAME {
+        let shadows = ShadowSettings {
+            technique: Technique::Volumes,
+            ..quality.shadows()
+        };
+        add(series(shadows.samples), name.to_owned(), shadows);
+    }
+    for (samples, max_silhouette_error_px, counting) in [
+        (1, 0.0, Counting::Auto),
+        (1, 0.0, Counting::DepthFail),
+        (1, 8.0, Counting::Auto),
+        (4, 0.0, Counting::DepthFail),
+        (4, 8.0, Counting::Auto),
+    ] {
+        let setting = match counting {
+            Counting::Auto => format!("{max_silhouette_error_px} px"),
+            Counting::DepthFail => format!("{max_silhouette_error_px} px, depth-fail"),
+        };
+        let shadows = ShadowSettings {
+            technique: Technique::Volumes,
+            samples,
+            max_silhouette_error_px,
+            counting,
+            ..ShadowSettings::default()
+        };
+        add(series(samples), setting, shadows);
     }
     ways
+}
+
+fn series(samples: u32) -> &'static str {
+    match samples {
+        1 => VOLUMES_1,
+        _ => VOLUMES_4,
+    }
 }
 
 impl Chart for Shadows {
@@ -79,17 +112,11 @@ impl Chart for Shadows {
     type Row = Row;
 
     fn inputs(&self, lab: &Lab<'_>) -> Result<Vec<PathBuf>> {
-        let mut inputs = vec![PathBuf::from("models")];
-        for name in self.units(lab)? {
-            let recording = lab.recording(&name)?;
-            inputs.extend([recording.folder, recording.scene]);
-        }
-        Ok(inputs)
+        lab.recording_inputs()
     }
 
     fn units(&self, lab: &Lab<'_>) -> Result<Vec<String>> {
-        let recordings = lab.recordings()?.into_iter();
-        Ok(recordings.map(|recording| recording.name).collect())
+        lab.recording_names()
     }
 
     fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
@@ -105,7 +132,7 @@ impl Chart for Shadows {
                 return Ok(None);
             }
             let drawn = shots.draw(&gpu, &way.scene)?;
-            rows.push(row(unit, VOLUMES, &way.setting, &shots, &drawn)?);
+            rows.push(row(unit, way.technique, &way.setting, &shots, &drawn)?);
         }
         let mut renderers = ways
             .iter()
@@ -143,9 +170,10 @@ impl Chart for Shadows {
         let mut recordings: Vec<&str> = rows.iter().map(|row| row.recording.as_str()).collect();
         recordings.dedup();
         type Metric = (&'static str, fn(&Row) -> f64);
-        let metrics: [Metric; 2] = [
+        let metrics: [Metric; 3] = [
             ("residual on real pixels", |row| row.residual_real),
             ("error of the factor, rms", |row| row.factor_rms),
+            ("outlines' error, levels of 255", |row| row.outline_levels),
         ];
         let mut panels = Vec::new();
         for &recording in &recordings {
@@ -154,17 +182,14 @@ impl Chart for Shadows {
                 let measured = || {
                     here().filter_map(move |row| Some((row, [row.frame_median_ms?, value(row)])))
                 };
-                let series = [("4 samples", "4x, "), ("1 sample", "1x, ")];
-                let series = series.into_iter().enumerate();
-                let series = series.map(|(look, (kind, prefix))| Series {
-                    name: format!("{VOLUMES}, {kind}"),
+                let series = TECHNIQUES.into_iter().enumerate();
+                let series = series.map(|(look, technique)| Series {
+                    name: technique.to_owned(),
                     look,
                     joined: false,
                     points: measured()
-                        .filter_map(|(row, [x, y])| {
-                            let rest = row.setting.strip_prefix(prefix)?;
-                            Some(Point::named(x, y, rest))
-                        })
+                        .filter(|(row, _)| row.technique == technique)
+                        .map(|(row, [x, y])| Point::named(x, y, &row.setting))
                         .collect(),
                 });
                 let rule = |technique: &str| {
@@ -187,9 +212,9 @@ impl Chart for Shadows {
         }
         Figure {
             title: "Shadows: what a frame costs and how far it is from the truth".to_owned(),
-            reading: "The lower and the farther left the better; a label is how far silhouettes may move.".to_owned(),
+            reading: "The lower and the farther left the better. Labels: the qualities, or how far silhouettes may move.".to_owned(),
             columns: metrics.len(),
-            panel_size: [600.0, 380.0],
+            panel_size: [520.0, 380.0],
             panels,
         }
     }
@@ -214,6 +239,7 @@ fn row(
         change_real: of(|e| e.change_real),
         factor_rms: of(|e| e.factor),
         wrong_shadow_pct: of(|e| e.wrong_pct),
+        outline_levels: of(|e| e.outline_levels),
     })
 }
 

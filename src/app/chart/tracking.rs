@@ -52,15 +52,20 @@ const APRILTAG: &str = "libapriltag, by decimation";
 const ARUCO: &str = "OpenCV's ArUco, by corner refinement";
 const OURS: &str = "gnomon";
 
-fn ways() -> Vec<Way> {
-    let bare = TrackingSettings {
+/// What a program does that only calls a library: its corners, found anew in each picture, and a pose from them.
+pub fn bare_library() -> TrackingSettings {
+    TrackingSettings {
         search: Search::Full,
         pose_from_pixels: false,
         filter: false,
         refine_edges: false,
         library_edges: true,
         ..TrackingSettings::default()
-    };
+    }
+}
+
+fn ways() -> Vec<Way> {
+    let bare = bare_library();
     let april = |setting, decimation| Way {
         library: APRILTAG,
         setting,
@@ -112,15 +117,11 @@ impl Chart for Tracking {
     type Row = Row;
 
     fn inputs(&self, lab: &Lab<'_>) -> Result<Vec<PathBuf>> {
-        let recordings = lab.recordings()?.into_iter();
-        Ok(recordings
-            .flat_map(|recording| [recording.folder, recording.scene])
-            .collect())
+        lab.recording_inputs()
     }
 
     fn units(&self, lab: &Lab<'_>) -> Result<Vec<String>> {
-        let recordings = lab.recordings()?.into_iter();
-        Ok(recordings.map(|recording| recording.name).collect())
+        lab.recording_names()
     }
 
     fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {

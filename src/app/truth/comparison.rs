@@ -40,6 +40,9 @@ pub struct Errors {
     pub residual_virtual: f64,
     /// Root mean square error of the gain where the truth darkens.
     pub factor: f64,
+    /// Root mean square error of what the virtual things change along the outlines of things, unfiltered, in levels of
+    /// 255: jagged outlines show here.
+    pub outline_levels: f64,
     /// Pixels that no virtual thing touches, percent of all.
     pub untouched_pct: f64,
     /// How many of them changed.
@@ -209,7 +212,10 @@ pub fn compare(frame: u32, truth: &Truth, drawn: &Drawn) -> Result<Errors> {
         anyhow::Ok(error / change)
     };
     let error = out.minus(&truth.with).blurred();
-    let change_error = out.minus(&bare).minus(&change).blurred();
+    let change_error = out.minus(&bare).minus(&change);
+    let outlines = edges(&truth.ids, width);
+    let outline_levels = change_error.rms(&outlines);
+    let change_error = change_error.blurred();
 
     let gain_picture = Picture {
         width,
@@ -242,6 +248,8 @@ pub fn compare(frame: u32, truth: &Truth, drawn: &Drawn) -> Result<Errors> {
         factor: factor_error
             .rms(&both(&inner_real, &darkened))
             .with_context(|| format!("frame {frame}: the truth darkens nothing"))?,
+        outline_levels: outline_levels
+            .with_context(|| format!("frame {frame}: the truth shows no virtual thing"))?,
         untouched_pct: 100.0 * untouched.len() as f64 / count as f64,
         untouched_wrong: untouched.iter().filter(has_changed).count(),
     })

@@ -5,6 +5,8 @@ mod comparison;
 mod picture;
 mod pose_error;
 mod poses;
+pub mod ray_cast;
+pub mod sheets;
 
 pub use comparison::{
     Drawn, Errors, FACES_AWAY, Truth, around, changed_by, compare, draw, edges, key_frames,
