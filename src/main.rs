@@ -81,7 +81,7 @@ enum Command {
     },
     /// Measures speed against accuracy on this machine, and draws it.
     #[command(
-        after_help = "Example:\n  gnomon chart --quick --only tracking --out out/charts\n\nIt runs in the project's folder. \
+        after_help = "Example:\n  gnomon chart --quick --only tracking\n\nIt runs in the project's folder. \
                       What has been measured is not measured again by the same program from the same recordings: after \
                       an interrupt it goes on where it was."
     )]
@@ -90,9 +90,9 @@ enum Command {
 
 #[derive(Args)]
 struct ChartArgs {
-    /// Folder for the charts
-    #[arg(long, value_name = "DIR", default_value = "charts")]
-    out: PathBuf,
+    /// Folder for the charts; charts without this, charts/quick with --quick
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', help = format!("Make these alone: {}", chart::names().join(", ")))]
     only: Vec<String>,
     /// Fewer rounds: rougher times in a tenth of the time
@@ -401,8 +401,12 @@ fn run_replay(args: ReplayArgs) -> Result<()> {
 
 fn run_chart(args: ChartArgs) -> Result<()> {
     let stop = interrupts()?;
+    let out = match args.quick {
+        true => "charts/quick",
+        false => "charts",
+    };
     let request = chart::Request {
-        out: args.out,
+        out: args.out.unwrap_or_else(|| out.into()),
         only: args.only,
         quick: args.quick,
         sessions: args.sessions,

@@ -207,6 +207,7 @@ fn rows(
             return Ok(None);
         }
         let mut all = Vec::new();
+        let changes = changes.into_iter().take(lab.directions());
         for change in changes {
             all.extend(errors(change)?);
         }

@@ -180,12 +180,14 @@ fn draw_panel<B: DrawingBackend>(
         let middles = if rule.upright {
             let [at, _] = place([rule.at, 0.0]);
             canvas.dashed(&[[at, low[1]], [at, high[1]]], GREY, 1.4, &[6.0, 4.0])?;
+            taken.push(along([at, low[1]], [at, high[1]]));
             let across = width / 2.0 + 6.0;
             let ends = [high[1] - 12.0, low[1] + 12.0];
             ends.map(|y| [[at + across, y], [at - across, y]])
         } else {
             let at = place([f64::NAN, rule.at])[1];
             canvas.dashed(&[[low[0], at], [high[0], at]], GREY, 1.4, &[6.0, 4.0])?;
+            taken.push(along([low[0], at], [high[0], at]));
             let ends = [high[0] - width / 2.0 - 6.0, low[0] + width / 2.0 + 6.0];
             ends.map(|x| [[x, at - 11.0], [x, at + 11.0]])
         };
@@ -204,6 +206,7 @@ fn draw_panel<B: DrawingBackend>(
         }
         steps.push([high[0], place(*last)[1]]);
         canvas.line(&steps, GREY, 1.2)?;
+        taken.extend(steps.windows(2).map(|ends| along(ends[0], ends[1])));
     }
     for series in &panel.series {
         let look = LOOKS[series.look % LOOKS.len()];
@@ -241,6 +244,14 @@ fn beside_mark(at: [f64; 2]) -> Taken {
     Taken {
         low: at.map(|part| part - 5.0),
         high: at.map(|part| part + 5.0),
+    }
+}
+
+/// What a line along an axis covers.
+fn along(from: [f64; 2], to: [f64; 2]) -> Taken {
+    Taken {
+        low: [0, 1].map(|axis| from[axis].min(to[axis]) - 1.0),
+        high: [0, 1].map(|axis| from[axis].max(to[axis]) + 1.0),
     }
 }
 

@@ -72,6 +72,11 @@ impl<'a> Lab<'a> {
         if self.quick { 1 } else { 5 }
     }
 
+    /// How many directions of an error are averaged at most.
+    pub fn directions(&self) -> usize {
+        if self.quick { 1 } else { usize::MAX }
+    }
+
     /// The recordings that ship, then those of `sessions`, each of which a scene file of `config/` plays.
     ///
     /// # Errors

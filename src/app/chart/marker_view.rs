@@ -139,7 +139,7 @@ impl Chart for MarkerView {
     }
 
     fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
-        let pictures = if lab.quick { 4 } else { 40 };
+        let pictures = if lab.quick { 2 } else { 40 };
         let mut rows = Vec::new();
         for [side_px, tilt_deg] in steps(unit) {
             for (layout, markers) in layouts() {

@@ -12,6 +12,7 @@ use super::shots::{Shot, Shots};
 use crate::app::picture_files::write_rgb_png;
 use crate::app::progress::Progress;
 use crate::app::truth::{Drawn, Picture};
+use crate::render::VIRTUAL;
 use crate::scene::{Quality, ShadowSettings};
 
 const NAME: &str = "shadow-pictures";
@@ -54,8 +55,8 @@ impl AnyChart for Pictures {
 
     fn shows(&self) -> &'static str {
         "The qualities beside the truth, in the middle key frame of each recording (the part that the virtual things change, \
-         enlarged twice). Below each its error: what the virtual things change against what they change in truth, four times \
-         stronger about a middle grey."
+         enlarged twice). Below each its error, four times stronger about a middle grey: of virtual surfaces as they are, of real ones by \
+         what changes on them."
     }
 
     fn unit_count(&self, lab: &Lab<'_>) -> Result<usize> {
@@ -115,14 +116,25 @@ fn two_rows(
     let mut errors = vec![part.cut(String::new(), &change, |level| 128.0 - STRONGER * level)];
     for (name, drawn) in drawn {
         let out = Picture::from_rgba(width, &drawn.out);
-        let error = out.minus(&bare).minus(&change);
+        let error = error(&out, &bare, shot);
         pictures.push(part.cut(format!("volumes, {name}"), &out, |level| level));
         errors.push(part.cut(String::new(), &error, |level| 128.0 + STRONGER * level));
     }
     pictures.push(part.cut("truth, path-traced".to_owned(), &shot.truth.with, |l| l));
-    let none = change.minus(&change);
-    errors.push(part.cut(String::new(), &none, |_| 128.0));
     Some([pictures, errors])
+}
+
+/// On virtual surfaces of the picture itself, on real ones of what the virtual things change: the video's noise is none.
+fn error(out: &Picture, bare: &Picture, shot: &Shot) -> Picture {
+    let change = shot.truth.with.minus(&shot.truth.without);
+    let mut error = out.minus(bare).minus(&change);
+    let whole = out.minus(&shot.truth.with);
+    for (index, pixel) in error.pixels.iter_mut().enumerate() {
+        if shot.truth.ids[index] == VIRTUAL {
+            *pixel = whole.pixels[index];
+        }
+    }
+    error
 }
 
 /// A rectangle of pixels: from, to (exclusive).

@@ -97,18 +97,25 @@ impl Chart for Scaling {
 
     fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
         let gpu = lab.gpu()?;
-        let frames = if lab.quick { 8 } else { 40 };
+        let (warm_up, frames) = if lab.quick {
+            (2, 5)
+        } else {
+            (WARM_UP_FRAMES, 40)
+        };
         let mut rows = Vec::new();
         for samples in [1, 4] {
             let stages = sweep(unit, samples, lab.quick);
             let benches = stages.iter().map(|(_, stage)| Bench::new(&gpu, stage));
             let mut benches = benches.collect::<Result<Vec<_>>>()?;
-            for frame in 0..WARM_UP_FRAMES + frames {
+            for frame in 0..warm_up + frames {
                 if lab.is_stopped() {
                     return Ok(None);
                 }
                 for (bench, (_, stage)) in benches.iter_mut().zip(&stages) {
-                    bench.draw(stage, frame)?;
+                    let ms = bench.draw(stage, frame)?;
+                    if frame >= warm_up {
+                        bench.frames_ms.push(ms);
+                    }
                 }
             }
             for (bench, (value, _)) in benches.iter().zip(&stages) {
@@ -198,16 +205,14 @@ impl Bench {
         })
     }
 
-    fn draw(&mut self, stage: &Stage, frame: usize) -> Result<()> {
+    /// Milliseconds of a frame.
+    fn draw(&mut self, stage: &Stage, frame: usize) -> Result<f64> {
         let poses = stage.poses(frame);
         let (waited, ms) = Stopwatch::time(|| {
             self.renderer.draw(&poses, Shown::Composite);
             self.renderer.wait()
         });
         waited?;
-        if frame >= WARM_UP_FRAMES {
-            self.frames_ms.push(ms);
-        }
-        Ok(())
+        Ok(ms)
     }
 }

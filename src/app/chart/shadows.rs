@@ -79,7 +79,7 @@ fn ways(scene: &Scene) -> Vec<Way> {
     ] {
         let setting = match counting {
             Counting::Auto => format!("{max_silhouette_error_px} px"),
-            Counting::DepthFail => format!("{max_silhouette_error_px} px, depth-fail"),
+            Counting::DepthFail => "depth-fail".to_owned(),
         };
         let shadows = ShadowSettings {
             technique: Technique::Volumes,
@@ -120,7 +120,7 @@ impl Chart for Shadows {
     }
 
     fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
-        const DRAWS: usize = 12;
+        const DRAWS: usize = 4;
         let recording = lab.recording(unit)?;
         let scene = recording.load_scene()?;
         let shots = Shots::of(&recording, &scene)?;
@@ -140,7 +140,7 @@ impl Chart for Shadows {
             .collect::<Result<Vec<_>, _>>()?;
         // Of each frame the least of all draws: nothing takes less than it needs.
         let mut least_ms = vec![vec![f64::INFINITY; shots.shots.len()]; ways.len()];
-        for _ in 0..DRAWS * lab.rounds() {
+        for _ in 0..DRAWS * lab.rounds().pow(2) {
             for (index, shot) in shots.shots.iter().enumerate() {
                 if lab.is_stopped() {
                     return Ok(None);
@@ -203,7 +203,7 @@ impl Chart for Shadows {
                 panels.push(Panel {
                     title: format!("{recording}: {name}"),
                     x: Axis::log("time per frame, ms"),
-                    y: Axis::from_zero(name),
+                    y: Axis::log(name),
                     series: series.collect(),
                     rules: [rule(TRUTH), rule(BARE)].into_iter().flatten().collect(),
                     front: pareto_front(measured().map(|(_, at)| at)),

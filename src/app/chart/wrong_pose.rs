@@ -92,7 +92,10 @@ impl Chart for WrongPose {
                 return Ok(None);
             }
             // Nothing is off in no direction.
-            let ways = if amount_px == 0.0 { &ways[..1] } else { ways };
+            let ways = match amount_px {
+                0.0 => &ways[..1],
+                _ => &ways[..ways.len().min(lab.directions())],
+            };
             let (mut errors, mut shift_px) = (Vec::new(), 0.0);
             for &way in ways {
                 for shot in &shots.shots {
