@@ -87,10 +87,10 @@ impl Ruler {
             }
             Scale::Log => {
                 let decades = (self.high / self.low).log10();
-                let factors: &[f64] = if decades < 2.5 {
-                    &[1.0, 2.0, 5.0]
-                } else {
-                    &[1.0]
+                let factors: &[f64] = match decades {
+                    few if few < 0.8 => &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0],
+                    some if some < 2.5 => &[1.0, 2.0, 5.0],
+                    _ => &[1.0],
                 };
                 let first = self.low.log10().floor() as i32;
                 let last = self.high.log10().ceil() as i32;
