@@ -2,7 +2,7 @@
 # Mesa's layer that asks the desktop for its favourite card complains on machines without a desktop; gnomon chooses itself.
 export NODEVICE_SELECT = 1
 
-.PHONY: demo test test-camera charts bench bench-volumes bench-tracking setup
+.PHONY: demo test test-camera charts reference bench bench-volumes bench-tracking setup
 
 demo: setup
 	cargo build --release
@@ -29,6 +29,13 @@ test-camera: setup
 charts: setup
 	cargo build --release
 	target/release/gnomon chart
+
+# What a camera would have seen of a scene of your own, path-traced: make reference SCENE=config/lamp.toml ARGS="--frames 30".
+# Nothing else needs it. tools/reference/README.md tells more.
+SCENE = config/lamp.toml
+reference:
+	tools/reference/setup
+	tools/reference/venv/bin/python tools/reference/render_session.py $(SCENE) --out out/reference/$(basename $(notdir $(SCENE))) $(ARGS)
 
 # What a frame with shadow volumes costs, and whether silhouettes belong on the CPU: figures in out/.
 bench: setup
