@@ -37,8 +37,9 @@ fn hold(folder: &Path, name: &str) {
     assert!(found.len() >= 2, "{} has key frames", folder.display());
     for e in &found {
         assert!(e.role_pct <= 0.5, "{name}: roles: {e:?}");
+        let shadow = e.shadow.expect("the lamp's mask");
         assert!(
-            e.wrong_pct <= 0.05 && e.far == 0,
+            shadow.wrong_pct <= 0.05 && shadow.far == 0,
             "{name}: shadow mask: {e:?}"
         );
         assert!(e.change_real <= 0.15, "{name}: shadow: {e:?}");

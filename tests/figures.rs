@@ -13,7 +13,9 @@ fn project_file(path: &str) -> PathBuf {
 
 fn files_in(folder: &str, extension: &str) -> Vec<PathBuf> {
     let entries = fs::read_dir(project_file(folder)).expect("a folder");
-    let mut files: Vec<PathBuf> = entries.map(|entry| entry.expect("an entry").path()).collect();
+    let mut files: Vec<PathBuf> = entries
+        .map(|entry| entry.expect("an entry").path())
+        .collect();
     files.retain(|file| file.extension().is_some_and(|found| found == extension));
     files.sort();
     files
@@ -149,7 +151,10 @@ fn mistakes(name: &str, text: &str) -> Vec<String> {
         for Quoted { value, slack } in quoted(rest) {
             let is_quoted = |known: &f64| (known.abs() - value).abs() <= slack * 1.000_001;
             if !known.iter().any(is_quoted) {
-                mistakes.push(format!("{name}:{number}: {value} is not in {}", files.trim()));
+                mistakes.push(format!(
+                    "{name}:{number}: {value} is not in {}",
+                    files.trim()
+                ));
             }
         }
     }

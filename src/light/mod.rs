@@ -1,6 +1,8 @@
 //! Lights and reflection as plain values; radiance is linear RGB, 1 = display white at the camera's exposure.
 
 pub mod bounce;
+pub(crate) mod cores;
+pub mod probe;
 
 use std::f64::consts::PI;
 

@@ -1,10 +1,14 @@
 //! The WGSL sources, built into the program; a line `//!include "NAME.wgsl"` stands for that file.
 
 /// What others include, each after those that it is included by.
-const INCLUDED: [(&str, &str); 4] = [
+const INCLUDED: [(&str, &str); 5] = [
     (
         "//!include \"shading.wgsl\"",
         include_str!("../../shaders/shading.wgsl"),
+    ),
+    (
+        "//!include \"source.wgsl\"",
+        include_str!("../../shaders/source.wgsl"),
     ),
     (
         "//!include \"video.wgsl\"",

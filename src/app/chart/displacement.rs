@@ -130,7 +130,8 @@ impl Chart for Displacement {
                         .map(|(((drawn, exact), rim), shot)| {
                             let truth = compare(shot.frame.index, &shot.truth, drawn)?;
                             let rim_px = rim_px(rim, &drawn.layers, &exact.layers);
-                            let errors = [truth.wrong_pct, truth.factor, rim_px];
+                            let shadow = truth.shadow.context("a lamp's shadow")?;
+                            let errors = [shadow.wrong_pct, truth.factor, rim_px];
                             Ok((errors, Some(truth.residual_real)))
                         })
                         .collect()

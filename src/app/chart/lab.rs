@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context as _, Result, ensure};
 
+use super::measured::program_number;
 use crate::render::Gpu;
 use crate::scene::Scene;
 
@@ -18,6 +19,8 @@ pub struct Lab<'a> {
     pub sessions: Option<PathBuf>,
     /// Part of the graphics adapter's name.
     pub adapter: Option<String>,
+    /// Another one for another build of the program.
+    pub program: u64,
     gpu: OnceCell<Arc<Gpu>>,
     stop: &'a AtomicBool,
 }
@@ -35,19 +38,23 @@ pub struct Recording {
 
 impl<'a> Lab<'a> {
     /// A lab in the project's folder, which is the current one.
+    ///
+    /// # Errors
+    /// The program's file cannot be read.
     pub fn new(
         quick: bool,
         sessions: Option<PathBuf>,
         adapter: Option<String>,
         stop: &'a AtomicBool,
-    ) -> Self {
-        Self {
+    ) -> Result<Self> {
+        Ok(Self {
             quick,
             sessions,
             adapter,
+            program: program_number()?,
             gpu: OnceCell::new(),
             stop,
-        }
+        })
     }
 
     /// The graphics adapter, opened by the first measurement that needs one.

@@ -115,18 +115,26 @@ pub fn from_csv<R: DeserializeOwned>(text: &str, named: bool) -> Result<Vec<R>> 
     Ok(reader.deserialize().collect::<Result<_, _>>()?)
 }
 
-/// A number that is another as soon as the program or any of the inputs is: files, and all that lies in folders.
+/// A number that is another as soon as the settings or any of the inputs are: files, and all that lies in folders.
 ///
 /// # Errors
 /// An input that cannot be read.
 pub fn made_from(settings: &impl Hash, inputs: &[PathBuf]) -> Result<u64> {
     let mut hasher = DefaultHasher::new();
     settings.hash(&mut hasher);
-    let program = std::env::current_exe().context("where is this program?")?;
-    for input in std::iter::once(&program).chain(inputs) {
+    for input in inputs {
         hash_path(input, &mut hasher).with_context(|| input.display().to_string())?;
     }
     Ok(hasher.finish())
+}
+
+/// The same of this program. To be asked at its start: later another build may lie in its place.
+///
+/// # Errors
+/// The program's file cannot be read.
+pub fn program_number() -> Result<u64> {
+    let program = std::env::current_exe().context("where is this program?")?;
+    made_from(&(), &[program])
 }
 
 fn hash_path(path: &Path, hasher: &mut DefaultHasher) -> std::io::Result<()> {

@@ -117,7 +117,7 @@ pub fn chart(request: &Request, stop: &AtomicBool) -> Result<String> {
         request.sessions.clone(),
         request.adapter.clone(),
         stop,
-    );
+    )?;
     let charts = all();
     let charts: Vec<_> = charts
         .iter()
@@ -161,7 +161,7 @@ impl<C: Chart> AnyChart for C {
     }
 
     fn make(&self, lab: &Lab<'_>, out: &Path, progress: &Progress) -> Result<bool> {
-        let settings = (lab.quick, &lab.adapter);
+        let settings = (lab.program, lab.quick, &lab.adapter);
         let from = made_from(&settings, &self.inputs(lab)?)?;
         let file = out.join(MEASURED).join(format!("{}.csv", C::NAME));
         let mut measured = Measured::open(&file, from)?;

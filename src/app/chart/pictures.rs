@@ -74,6 +74,7 @@ impl AnyChart for Pictures {
             let mut shots = Shots::of(&recording, &scene)?;
             let middle = shots.shots.len() / 2;
             shots.shots = shots.shots.drain(middle..).take(1).collect();
+            let technique = scene.chosen_technique().0.name();
             let mut drawn = Vec::new();
             for (name, quality) in Quality::BY_NAME {
                 let mut scene = scene.clone();
@@ -82,7 +83,7 @@ impl AnyChart for Pictures {
                     ..quality.shadows()
                 };
                 for picture in shots.draw(&lab.gpu()?, &scene)? {
-                    drawn.push((name, picture));
+                    drawn.push((format!("{technique}, {name}"), picture));
                 }
             }
             if let Some(shot) = shots.shots.first() {
@@ -105,7 +106,7 @@ impl AnyChart for Pictures {
 fn two_rows(
     recording: &str,
     shot: &Shot,
-    drawn: &[(&str, Drawn)],
+    drawn: &[(String, Drawn)],
     width: usize,
 ) -> Option<[Vec<Cell>; 2]> {
     let change = shot.truth.with.minus(&shot.truth.without);
@@ -117,7 +118,7 @@ fn two_rows(
     for (name, drawn) in drawn {
         let out = Picture::from_rgba(width, &drawn.out);
         let error = error(&out, &bare, shot);
-        pictures.push(part.cut(format!("volumes, {name}"), &out, |level| level));
+        pictures.push(part.cut(name.clone(), &out, |level| level));
         errors.push(part.cut(String::new(), &error, |level| 128.0 + STRONGER * level));
     }
     pictures.push(part.cut("truth, path-traced".to_owned(), &shot.truth.with, |l| l));

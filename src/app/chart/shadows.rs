@@ -11,12 +11,12 @@ use super::family::Chart;
 use super::figure::{Axis, Figure, Panel, Point, Rule, Series, pareto_front};
 use super::lab::Lab;
 use super::measured::rounded;
-use super::shots::{Shots, mean};
+use super::shots::{Shots, mean, mean_wrong_pct};
 use crate::app::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
 use crate::app::truth::{Drawn, Picture};
 use crate::render::{Renderer, Shown};
-use crate::scene::{Counting, Quality, Scene, ShadowSettings, Technique};
+use crate::scene::{Counting, Quality, Scene, ShadowSettings, ShaftSettings, Technique};
 
 /// The chart.
 pub struct Shadows;
@@ -33,14 +33,18 @@ pub struct Row {
     residual_virtual: f64,
     change_real: f64,
     factor_rms: f64,
-    wrong_shadow_pct: f64,
+    /// None where no light is a point or a direction.
+    wrong_shadow_pct: Option<f64>,
     outline_levels: f64,
 }
 
 const VOLUMES_4: &str = "volumes, 4 samples";
+const SHAFTS: &str = "shafts, by sources";
 const VOLUMES_1: &str = "volumes, 1 sample";
 /// A series each, in the order of their colours.
-const TECHNIQUES: [&str; 2] = [VOLUMES_4, VOLUMES_1];
+const TECHNIQUES: [&str; 3] = [VOLUMES_4, VOLUMES_1, SHAFTS];
+/// How many sources get a shadow each; `None`: all that are hidden.
+const SHAFT_SOURCES: [Option<u32>; 6] = [Some(5), Some(10), Some(20), Some(50), Some(100), None];
 const TRUTH: &str = "truth on the video";
 const BARE: &str = "bare video";
 
@@ -63,6 +67,23 @@ fn ways(scene: &Scene) -> Vec<Way> {
             scene,
         });
     };
+    if scene.probe.is_some() {
+        for sources in SHAFT_SOURCES {
+            let setting = sources.map_or("all".to_owned(), |count| count.to_string());
+            let shadows = ShadowSettings {
+                technique: Technique::Shafts,
+                shafts: ShaftSettings {
+                    sources,
+                    ..ShaftSettings::default()
+                },
+                ..ShadowSettings::default()
+            };
+            add(SHAFTS, setting, shadows);
+        }
+    }
+    if scene.lights.is_empty() {
+        return ways;
+    }
     for (name, quality) in Quality::BY_NAME {
         let shadows = ShadowSettings {
             technique: Technique::Volumes,
@@ -182,8 +203,11 @@ impl Chart for Shadows {
                 let measured = || {
                     here().filter_map(move |row| Some((row, [row.frame_median_ms?, value(row)])))
                 };
-                let series = TECHNIQUES.into_iter().enumerate();
-                let series = series.map(|(look, technique)| Series {
+                let measured_somewhere =
+                    |technique: &&str| rows.iter().any(|row| row.technique == **technique);
+                let series = TECHNIQUES.iter().enumerate();
+                let series = series.filter(|(_, technique)| measured_somewhere(technique));
+                let series = series.map(|(look, &technique)| Series {
                     name: technique.to_owned(),
                     look,
                     joined: false,
@@ -238,7 +262,7 @@ fn row(
         residual_virtual: of(|e| e.residual_virtual),
         change_real: of(|e| e.change_real),
         factor_rms: of(|e| e.factor),
-        wrong_shadow_pct: of(|e| e.wrong_pct),
+        wrong_shadow_pct: mean_wrong_pct(&errors).map(rounded),
         outline_levels: of(|e| e.outline_levels),
     })
 }
@@ -259,7 +283,10 @@ fn with_truth(shots: &Shots, drawn: &[Drawn]) -> Vec<Drawn> {
                 .collect();
             let factor = &shot.truth.factor.pixels;
             with_truth.layers.gain = factor.iter().map(|f| f.map(|part| part as f32)).collect();
-            with_truth.layers.shadow[0].clone_from(&shot.truth.mask);
+            let shadows = with_truth.layers.shadow.iter_mut();
+            for (bits, mask) in shadows.zip(&shot.truth.mask) {
+                bits.clone_from(mask);
+            }
             with_truth
         })
         .collect()

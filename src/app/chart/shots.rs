@@ -87,6 +87,16 @@ pub fn mean(errors: &[Errors], of: fn(&Errors) -> f64) -> f64 {
     errors.iter().map(of).sum::<f64>() / errors.len().max(1) as f64
 }
 
+/// The mean of the pixels with a wrong shadow, percent; `None` where no light has a shadow of its own.
+pub fn mean_wrong_pct(errors: &[Errors]) -> Option<f64> {
+    let shadows: Option<Vec<f64>> = errors
+        .iter()
+        .map(|error| Some(error.shadow?.wrong_pct))
+        .collect();
+    let shadows = shadows.filter(|shadows| !shadows.is_empty())?;
+    Some(shadows.iter().sum::<f64>() / shadows.len() as f64)
+}
+
 /// A frame without any picture.
 pub fn grey_frame(size_px: [u32; 2]) -> Frame {
     Frame {

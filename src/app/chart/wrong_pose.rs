@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use anyhow::Result;
+use anyhow::{Context as _, Result};
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +11,7 @@ use super::family::Chart;
 use super::figure::{Axis, Figure, Panel, Point, Series};
 use super::lab::Lab;
 use super::measured::rounded;
-use super::shots::{Shot, Shots, mean};
+use super::shots::{Shot, Shots, mean, mean_wrong_pct};
 use crate::app::truth::{compare, draw, shifts_px};
 use crate::render::Renderer;
 
@@ -112,7 +112,7 @@ impl Chart for WrongPose {
             rows.push(Row {
                 pose: unit.to_owned(),
                 shift_px: rounded(shift_px / errors.len().max(1) as f64),
-                wrong_shadow_pct: rounded(mean(&errors, |e| e.wrong_pct)),
+                wrong_shadow_pct: rounded(mean_wrong_pct(&errors).context("a lamp's shadow")?),
                 factor_rms: rounded(mean(&errors, |e| e.factor)),
                 residual_real: rounded(mean(&errors, |e| e.residual_real)),
                 change_real: rounded(mean(&errors, |e| e.change_real)),

@@ -25,12 +25,8 @@ pub struct Errors {
     pub frame: u32,
     /// Pixels whose role is not the truth's, percent of those that are virtual in either.
     pub role_pct: f64,
-    /// Pixels whose bit *a virtual thing hides the light* is wrong, percent of the real ones that face it.
-    pub wrong_pct: f64,
-    /// How many of them have no edge of the truth within a pixel.
-    pub far: usize,
-    /// The shadow's intersection with the true one over their union.
-    pub iou: f64,
+    /// Of the first light's shadow; `None` where no light is a point or a direction.
+    pub shadow: Option<ShadowErrors>,
     /// As `residual_real`, of what the virtual things change alone, without the video's own noise.
     pub change_real: f64,
     /// Root mean square error of the picture over that of the bare video, where the truth changes, on real pixels: 0 is
@@ -49,6 +45,17 @@ pub struct Errors {
     pub untouched_wrong: usize,
 }
 
+/// The errors of one light's shadow.
+#[derive(Debug, Clone, Copy)]
+pub struct ShadowErrors {
+    /// Pixels whose bit *a virtual thing hides the light* is wrong, percent of the real ones that face it.
+    pub wrong_pct: f64,
+    /// How many of them have no edge of the truth within a pixel.
+    pub far: usize,
+    /// The shadow's intersection with the true one over their union.
+    pub iou: f64,
+}
+
 /// What the truth says of one frame.
 pub struct Truth {
     /// What the camera would have seen with the virtual things.
@@ -59,8 +66,8 @@ pub struct Truth {
     pub factor: Picture,
     /// Roles.
     pub ids: Vec<u8>,
-    /// Bits of the first light's shadow, and [`FACES_AWAY`].
-    pub mask: Vec<u8>,
+    /// Bits of the first light's shadow, and [`FACES_AWAY`]; `None` where it is no light of a scene file.
+    pub mask: Option<Vec<u8>>,
 }
 
 impl Truth {
@@ -80,7 +87,10 @@ impl Truth {
             without: Picture::open(&file("without"))?,
             factor: Picture::open(&file("factor"))?,
             ids: grey("ids")?,
-            mask: grey("mask_0")?,
+            mask: match file("mask_0").is_file() {
+                true => Some(grey("mask_0")?),
+                false => None,
+            },
         })
     }
 }
@@ -167,32 +177,6 @@ pub fn compare(frame: u32, truth: &Truth, drawn: &Drawn) -> Result<Errors> {
     let role_wrong = (0..count).filter(|&i| seeming[i] != (role[i] == VIRTUAL));
     let role_wrong = role_wrong.count();
 
-    let bits = &drawn.layers.shadow[0];
-    let lit: Vec<usize> = (0..count)
-        .filter(|&i| real[i] && truth.mask[i] & FACES_AWAY == 0)
-        .collect();
-    let shadows = |i: usize| {
-        (
-            truth.mask[i] & VIRTUAL_HIDES != 0,
-            bits[i] & VIRTUAL_HIDES != 0,
-        )
-    };
-    let differs = |&i: &usize| shadows(i).0 != shadows(i).1;
-    let wrong: Vec<usize> = lit.iter().copied().filter(differs).collect();
-    let [hides, away] =
-        [VIRTUAL_HIDES, FACES_AWAY].map(|bit| truth.mask.iter().map(|m| m & bit).collect());
-    let edge: Vec<bool> = {
-        let parts: [Vec<bool>; 3] = [&hides, &truth.ids, &away].map(|v: &Vec<u8>| edges(v, width));
-        (0..count)
-            .map(|i| parts.iter().any(|part| part[i]))
-            .collect()
-    };
-    let is_far = |i: usize| !around(i, 1, width, count).any(|near| edge[near]);
-    let far = wrong.iter().filter(|&&i| is_far(i)).count();
-    let shadowed = |of: fn((bool, bool)) -> bool| lit.iter().filter(|&&i| of(shadows(i))).count();
-    let shared = shadowed(|(truly, found)| truly && found);
-    let all = shadowed(|(truly, found)| truly || found);
-
     let out = Picture::from_rgba(width, &drawn.out);
     let bare = Picture::from_rgba(width, &drawn.bare);
     let change = truth.with.minus(&truth.without);
@@ -239,9 +223,7 @@ pub fn compare(frame: u32, truth: &Truth, drawn: &Drawn) -> Result<Errors> {
     Ok(Errors {
         frame,
         role_pct: 100.0 * role_wrong as f64 / either.max(1) as f64,
-        wrong_pct: 100.0 * wrong.len() as f64 / lit.len().max(1) as f64,
-        far,
-        iou: shared as f64 / all.max(1) as f64,
+        shadow: shadow_errors(truth, drawn),
         change_real: ratio(&change_error, &on_real)?,
         residual_real: ratio(&error, &on_real)?,
         residual_virtual: ratio(&error, &on_virtual)?,
@@ -252,6 +234,36 @@ pub fn compare(frame: u32, truth: &Truth, drawn: &Drawn) -> Result<Errors> {
             .with_context(|| format!("frame {frame}: the truth shows no virtual thing"))?,
         untouched_pct: 100.0 * untouched.len() as f64 / count as f64,
         untouched_wrong: untouched.iter().filter(has_changed).count(),
+    })
+}
+
+/// The first light's shadow against its true mask, where there are both.
+fn shadow_errors(truth: &Truth, drawn: &Drawn) -> Option<ShadowErrors> {
+    let (mask, bits) = (truth.mask.as_ref()?, drawn.layers.shadow.first()?);
+    let (width, count) = (truth.with.width, truth.ids.len());
+    let lit: Vec<usize> = (0..count)
+        .filter(|&i| truth.ids[i] == REAL && mask[i] & FACES_AWAY == 0)
+        .collect();
+    let shadows = |i: usize| (mask[i] & VIRTUAL_HIDES != 0, bits[i] & VIRTUAL_HIDES != 0);
+    let differs = |&i: &usize| shadows(i).0 != shadows(i).1;
+    let wrong: Vec<usize> = lit.iter().copied().filter(differs).collect();
+    let [hides, away] =
+        [VIRTUAL_HIDES, FACES_AWAY].map(|bit| mask.iter().map(|m| m & bit).collect());
+    let edge: Vec<bool> = {
+        let parts: [Vec<bool>; 3] = [&hides, &truth.ids, &away].map(|v: &Vec<u8>| edges(v, width));
+        (0..count)
+            .map(|i| parts.iter().any(|part| part[i]))
+            .collect()
+    };
+    let is_far = |i: usize| !around(i, 1, width, count).any(|near| edge[near]);
+    let far = wrong.iter().filter(|&&i| is_far(i)).count();
+    let shadowed = |of: fn((bool, bool)) -> bool| lit.iter().filter(|&&i| of(shadows(i))).count();
+    let shared = shadowed(|(truly, found)| truly && found);
+    let all = shadowed(|(truly, found)| truly || found);
+    Some(ShadowErrors {
+        wrong_pct: 100.0 * wrong.len() as f64 / lit.len().max(1) as f64,
+        far,
+        iou: shared as f64 / all.max(1) as f64,
     })
 }
 

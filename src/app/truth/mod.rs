@@ -9,7 +9,8 @@ pub mod ray_cast;
 pub mod sheets;
 
 pub use comparison::{
-    Drawn, Errors, FACES_AWAY, Truth, around, changed_by, compare, draw, edges, key_frames,
+    Drawn, Errors, FACES_AWAY, ShadowErrors, Truth, around, changed_by, compare, draw, edges,
+    key_frames,
 };
 pub use picture::Picture;
 pub use pose_error::{PoseErrors, shifts_px};

@@ -1,0 +1,375 @@
+//! Soft shadows by shafts: what virtual things hide of a room's light, what they throw back, and the light on them.
+//! Reads the room as it was worked out, and poses. Writes `reaching` and `change` (see shafts.wgsl).
+//!
+//! What depends on where things are in the world is worked out when they move, not when the camera does.
+
+mod casters;
+mod data;
+mod maps;
+mod pipelines;
+pub mod room;
+
+use std::sync::Arc;
+
+use glam::{DAffine3, Vec3};
+use wgpu::util::DeviceExt as _;
+
+use crate::geometry::camera::Intrinsics;
+use crate::geometry::reach::{self, PixelRect};
+use crate::light::cores::on_all_cores;
+use crate::scene::{Scene, ShaftSettings};
+use crate::shafts::prepared::Prepared;
+use crate::shafts::selection::{Representative, representatives};
+use crate::shafts::source_tree::BoxM;
+
+use super::anchor_geometry::Role;
+use super::gpu::Gpu;
+use super::stage::Stage;
+use casters::{PlacedCasters, ShaftCasters};
+use data::{Frame, GpuSurfel, PatchCorner, Source, Vertex, packed};
+use maps::{Maps, Tiling, source};
+use pipelines::Pipelines;
+
+/// Nodes of sources that give receivers less than this part of their light on the average are not cut: less than a level
+/// of 255.
+const LEAST_WEIGHT: f32 = 1.0 / 2048.0;
+/// Penumbras are given room in the maps up to this many radii behind the casters.
+const REACH: f32 = 4.0;
+
+/// What shafts need from frame to frame.
+pub(super) struct Shafts {
+    room: Arc<Prepared>,
+    settings: ShaftSettings,
+    casters: ShaftCasters,
+    pipelines: Pipelines,
+    maps: Maps,
+    /// Places of all patches' corners, three each.
+    places: wgpu::Buffer,
+    place_count: u32,
+    frame: wgpu::Buffer,
+    sampler: wgpu::Sampler,
+    /// Where the casters' anchors were when `hidden` was worked out.
+    world_from_anchor: Vec<Option<DAffine3>>,
+    hidden: Option<Hidden>,
+}
+
+/// What the casters hide where they are.
+struct Hidden {
+    sources: wgpu::Buffer,
+    source_count: u32,
+    surfel_count: u32,
+    casters: wgpu::Buffer,
+    caster_vertices: u32,
+    /// Corners of the patches that may notice.
+    corners: wgpu::Buffer,
+    corner_count: u32,
+    group: wgpu::BindGroup,
+    /// Around the casters, and around all that may notice.
+    boxes: Vec<BoxM>,
+    noticing: BoxM,
+    /// Whether the maps show it.
+    is_drawn: bool,
+}
+
+impl Shafts {
+    pub fn new(gpu: &Gpu, scene: &Scene, room: Arc<Prepared>, stage: &Stage) -> Self {
+        let device = &gpu.device;
+        let buffer = |label, contents: &[u8], usage| {
+            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(label),
+                contents,
+                usage,
+            })
+        };
+        let places: Vec<Vec3> = room
+            .patches
+            .patches
+            .iter()
+            .flat_map(|patch| room.patches.corners(patch))
+            .collect();
+        let settings = scene.shadows.shafts;
+        let tiling = Tiling::new(1, settings.map_px, device.limits().max_texture_dimension_2d);
+        let glossy = scene.virtuals.iter().any(|object| {
+            let mut materials = object.materials.iter();
+            materials.any(|material| material.roughness.is_some())
+        });
+        Self {
+            pipelines: Pipelines::new(gpu, &stage.layouts, scene.shadows.samples, glossy),
+            maps: Maps::new(device, tiling),
+            casters: ShaftCasters::new(scene),
+            places: buffer(
+                "patches",
+                bytemuck::cast_slice(&places),
+                wgpu::BufferUsages::VERTEX,
+            ),
+            place_count: places.len() as u32,
+            frame: device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("shafts"),
+                size: size_of::<Frame>() as u64,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }),
+            sampler: device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("shaft maps"),
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                mipmap_filter: wgpu::MipmapFilterMode::Linear,
+                ..Default::default()
+            }),
+            world_from_anchor: Vec::new(),
+            hidden: None,
+            settings,
+            room,
+        }
+    }
+
+    /// Works out what is hidden where things are now. Returns the pixels that it can change, `None` if none.
+    pub fn update(
+        &mut self,
+        gpu: &Gpu,
+        stage: &Stage,
+        camera_from_anchor: &[Option<DAffine3>],
+        intrinsics: &Intrinsics,
+    ) -> Option<PixelRect> {
+        let camera_from_world = (*camera_from_anchor.first()?)?;
+        let world_from_camera = camera_from_world.inverse();
+        let mut world_from_anchor: Vec<Option<DAffine3>> = camera_from_anchor
+            .iter()
+            .map(|pose| pose.map(|camera_from_anchor| world_from_camera * camera_from_anchor))
+            .collect();
+        world_from_anchor[0] = Some(DAffine3::IDENTITY);
+        if self.world_from_anchor != world_from_anchor {
+            self.hidden = self
+                .casters
+                .place(&world_from_anchor)
+                .map(|placed| self.hide(gpu, &placed));
+            let volume = &self.room.volume;
+            stage.set_indirect(&gpu.queue, &world_from_anchor, |place, normal| {
+                volume.radiance(place).irradiance(normal)
+            });
+            self.world_from_anchor = world_from_anchor;
+        }
+        let hidden = self.hidden.as_ref()?;
+        let frame = Frame {
+            world_from_camera: glam::DMat4::from(world_from_camera).as_mat4(),
+            source_count: hidden.source_count,
+            surfel_count: hidden.surfel_count,
+            padding: [0; 2],
+        };
+        gpu.queue
+            .write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
+        let covered = |bounds: &BoxM| {
+            let corners = [0, 1, 2, 3, 4, 5, 6, 7].map(|index: usize| {
+                let pick = |axis: usize| match index >> axis & 1 {
+                    0 => bounds.min[axis],
+                    _ => bounds.max[axis],
+                };
+                Vec3::new(pick(0), pick(1), pick(2)).as_dvec3()
+            });
+            reach::covered(&corners, &camera_from_world, intrinsics)
+        };
+        let all = hidden.boxes.iter().chain([&hidden.noticing]);
+        let pixels = all.map(covered).fold(PixelRect::NONE, PixelRect::union);
+        (!pixels.is_empty()).then_some(pixels)
+    }
+
+    /// Gibson et al. 2003, sections 6.1 and 8: sources that may be hidden, receivers that may notice, n representatives and
+    /// what each gives to each receiver.
+    fn hide(&mut self, gpu: &Gpu, placed: &PlacedCasters) -> Hidden {
+        let room = &self.room;
+        let marks = room.mark(&placed.boxes);
+        let may_be_hidden = marks.sources(&room.sources);
+        let may_notice = marks.receivers(&room.receivers);
+        let noticing: Vec<usize> = (0..may_notice.len())
+            .filter(|&patch| may_notice[patch])
+            .collect();
+        let mut vertices: Vec<u32> = noticing
+            .iter()
+            .flat_map(|&patch| room.patches.patches[patch].vertices)
+            .collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        let weighed = room.weighed(&may_be_hidden, &vertices);
+        let count = self
+            .settings
+            .sources
+            .map_or(usize::MAX, |count| count as usize);
+        let mut chosen = representatives(&room.sources, &weighed, count, LEAST_WEIGHT);
+        let limit = gpu.device.limits().max_texture_dimension_2d;
+        let tiling = Tiling::new(chosen.len(), self.settings.map_px, limit);
+        let reach_m = REACH * placed.ball.radius;
+        let mut sources: Vec<Source> = Vec::new();
+        chosen.retain(|one| {
+            let intensity = room.intensity(one, &may_be_hidden, placed.ball.center);
+            let index = sources.len() as u32;
+            let source = source(one, &placed.ball, reach_m, intensity, &tiling, index);
+            sources.extend(source);
+            source.is_some()
+        });
+        self.maps.resize(&gpu.device, tiling);
+
+        let transfers = transfers(room, &vertices, &chosen, &may_be_hidden);
+        let rows: Vec<Vertex> = vertices
+            .iter()
+            .map(|&vertex| Vertex {
+                normal: room.patches.vertices[vertex as usize].normal,
+                normal_padding: 0.0,
+                irradiance: room.irradiance[vertex as usize],
+                irradiance_padding: 0.0,
+            })
+            .collect();
+        let row_of = |vertex: u32| vertices.binary_search(&vertex).unwrap_or(0) as u32;
+        let corners: Vec<PatchCorner> = noticing
+            .iter()
+            .flat_map(|&patch| {
+                let patch = &room.patches.patches[patch];
+                let rows = patch.vertices.map(row_of);
+                let places = room.patches.corners(patch);
+                places.map(|position| PatchCorner { position, rows })
+            })
+            .collect();
+        let surfels = placed.lit_surfels(room, &chosen);
+
+        let device = &gpu.device;
+        // A binding cannot be empty.
+        let buffer = |label, contents: &[u8], usage| {
+            let contents = if contents.is_empty() {
+                &[0; 256]
+            } else {
+                contents
+            };
+            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(label),
+                contents,
+                usage,
+            })
+        };
+        let storage = wgpu::BufferUsages::STORAGE;
+        let source_buffer = buffer("sources", bytemuck::cast_slice(&sources), storage);
+        let rows = buffer("vertices", bytemuck::cast_slice(&rows), storage);
+        let transfers = buffer("transfers", bytemuck::cast_slice(&transfers), storage);
+        let surfel_buffer = buffer(
+            "surfels",
+            bytemuck::cast_slice::<GpuSurfel, u8>(&surfels),
+            storage,
+        );
+        let bound = |binding, buffer: &'_ wgpu::Buffer| (binding, buffer.clone());
+        let buffers = [
+            bound(0, &self.frame),
+            bound(1, &source_buffer),
+            bound(2, &rows),
+            bound(3, &transfers),
+            bound(4, &surfel_buffer),
+        ];
+        let mut entries: Vec<wgpu::BindGroupEntry> = buffers
+            .iter()
+            .map(|(binding, buffer)| wgpu::BindGroupEntry {
+                binding: *binding,
+                resource: buffer.as_entire_binding(),
+            })
+            .collect();
+        entries.push(wgpu::BindGroupEntry {
+            binding: 5,
+            resource: wgpu::BindingResource::TextureView(&self.maps.view),
+        });
+        entries.push(wgpu::BindGroupEntry {
+            binding: 6,
+            resource: wgpu::BindingResource::Sampler(&self.sampler),
+        });
+        Hidden {
+            group: device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("shafts"),
+                layout: &self.pipelines.layout,
+                entries: &entries,
+            }),
+            source_count: sources.len() as u32,
+            surfel_count: surfels.len() as u32,
+            casters: buffer(
+                "shaft casters",
+                bytemuck::cast_slice(&placed.triangles),
+                wgpu::BufferUsages::VERTEX,
+            ),
+            caster_vertices: 3 * placed.triangles.len() as u32,
+            corners: buffer(
+                "noticing patches",
+                bytemuck::cast_slice(&corners),
+                wgpu::BufferUsages::VERTEX,
+            ),
+            corner_count: corners.len() as u32,
+            noticing: BoxM::around(corners.iter().map(|corner| corner.position)),
+            boxes: placed.boxes.clone(),
+            sources: source_buffer,
+            is_drawn: false,
+        }
+    }
+
+    /// Draws the sources' maps where they are not drawn yet.
+    pub fn draw_maps(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder) {
+        let Some(hidden) = self.hidden.as_mut().filter(|hidden| !hidden.is_drawn) else {
+            return;
+        };
+        self.maps.draw(
+            &gpu.device,
+            encoder,
+            &hidden.sources,
+            hidden.source_count,
+            (&hidden.casters, hidden.caster_vertices),
+        );
+        hidden.is_drawn = true;
+    }
+
+    /// Draws what is real into depth, what is virtual over it, and the light on both.
+    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, stage: &Stage, within: PixelRect) {
+        let Some(hidden) = &self.hidden else {
+            return;
+        };
+        pass.set_bind_group(2, &hidden.group, &[]);
+        stage.set_world(pass);
+        pass.set_pipeline(&self.pipelines.depth_of_room);
+        pass.set_vertex_buffer(0, self.places.slice(..));
+        pass.draw(0..self.place_count, 0..1);
+        stage.draw_moving_real(pass, &self.pipelines.depth_of_real, within);
+        stage.draw_surfaces(
+            pass,
+            &self.pipelines.light_on_virtual,
+            Role::Virtual,
+            0,
+            within,
+        );
+        stage.set_world(pass);
+        pass.set_pipeline(&self.pipelines.light_on_patch);
+        pass.set_vertex_buffer(0, hidden.corners.slice(..));
+        pass.draw(0..hidden.corner_count, 0..1);
+    }
+}
+
+/// For each vertex and each representative the irradiance that hidden sources would take, packed.
+fn transfers(
+    room: &Prepared,
+    vertices: &[u32],
+    chosen: &[Representative],
+    may_be_hidden: &[bool],
+) -> Vec<[u32; 2]> {
+    let radiance: Vec<Vec3> = room
+        .source_radiance
+        .iter()
+        .zip(may_be_hidden)
+        .map(|(&radiance, &hidden)| match hidden {
+            true => radiance * std::f32::consts::PI,
+            false => Vec3::ZERO,
+        })
+        .collect();
+    let shares = on_all_cores(vertices.len(), |range| {
+        let mut packed_rows = Vec::with_capacity(range.len() * chosen.len());
+        for &vertex in &vertices[range] {
+            let row = room.transfers.row(vertex as usize);
+            packed_rows.extend(chosen.iter().map(|one| {
+                let sources = one.first as usize..one.last as usize;
+                let arriving = row[sources.clone()].iter().zip(&radiance[sources]);
+                packed(arriving.map(|(&part, &radiance)| radiance * part).sum())
+            }));
+        }
+        packed_rows
+    });
+    shares.concat()
+}

@@ -1,0 +1,287 @@
+//! All that is worked out about a room before the first frame: its patches, their light, and who lights whom.
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+
+use crate::geometry::bounds::Bounds;
+use crate::geometry::ray_caster::RayCaster;
+
+use super::hierarchy::{Arriving, Hierarchy, Marks};
+use super::irradiance_volume::IrradianceVolume;
+pub use super::light_of_room::{PatchLight, PlacedProbe};
+use super::light_of_room::{hemisphere, light_of_room};
+use super::luminance;
+use super::patches::{Patches, RoomTriangle};
+use super::receiver_tree::ReceiverTree;
+use super::selection::{Representative, WeighedSource, triangle_spread};
+use super::source_tree::{BoxM, Source, SourceTree};
+use super::surfels::Surfel;
+use super::transfer::{Transfers, irradiance};
+
+/// How finely a room is worked out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Patches, about.
+    pub patches: usize,
+    /// Part of all power that the sources send out, the brightest first, in (0, 1].
+    pub source_power: f64,
+    /// Patches in a leaf of the receivers' octree.
+    pub receivers_per_leaf: usize,
+    /// Shafts that bring every vertex less than this part of its light are cut no further.
+    pub least_part: f64,
+}
+
+/// What is known of a room.
+pub struct Prepared {
+    /// The room, the table and the phantoms.
+    pub patches: Patches,
+    /// Light of each patch.
+    pub light: Vec<PatchLight>,
+    /// The sources.
+    pub sources: SourceTree,
+    /// Radiance of each source in the tree's order.
+    pub source_radiance: Vec<Vec3>,
+    /// Form factors of each vertex: the sources in the tree's order, then all other patches.
+    pub transfers: Transfers,
+    /// All light of each vertex: irradiance.
+    pub irradiance: Vec<Vec3>,
+    /// The receivers.
+    pub receivers: ReceiverTree,
+    /// Who may hide what from whom.
+    pub hierarchy: Hierarchy,
+    /// The light where virtual things may be.
+    pub volume: IrradianceVolume,
+    /// The patches' triangles.
+    pub caster: RayCaster,
+}
+
+/// Spacing of the irradiance volume's grid, metres.
+const VOLUME_SPACING_M: f32 = 0.06;
+/// How far it reaches beyond where things stand.
+const VOLUME_MARGIN_M: f64 = 0.15;
+
+impl Prepared {
+    /// Works a room out. `things` is around all phantoms but the table, and all virtual things where they first stand.
+    pub fn new(
+        triangles: &[RoomTriangle],
+        probe: PlacedProbe<'_>,
+        things: &[Bounds],
+        options: &Options,
+    ) -> Self {
+        let brightness = |place: Vec3| luminance(probe.radiance_of(place));
+        let mut focuses = things.to_vec();
+        focuses.extend(Bounds::around([probe.position_m]));
+        let patches = Patches::new(triangles, options.patches, &focuses, brightness);
+        let corners: Vec<[Vec3; 3]> = patches.patches.iter().map(|p| patches.corners(p)).collect();
+        let caster = RayCaster::new(&corners);
+        let light = light_of_room(&patches, &caster, probe);
+
+        let power =
+            |patch: usize| luminance(light[patch].radiance) * patches.area(&patches.patches[patch]);
+        let (brightest, others) = source_set(&light, power, options.source_power);
+        let sources = SourceTree::new(
+            brightest
+                .into_iter()
+                .map(|patch| Source {
+                    patch: patch as u32,
+                    corners: corners[patch],
+                    power: power(patch),
+                })
+                .collect(),
+        );
+        let mut senders = sources.patches.clone();
+        senders.extend(others.iter().map(|&patch| patch as u32));
+        let sender_radiance: Vec<Vec3> = senders
+            .iter()
+            .map(|&patch| light[patch as usize].radiance)
+            .collect();
+        let transfers = Transfers::new(&patches, &senders, &caster);
+        let rows = || (0..patches.vertices.len()).map(|vertex| transfers.row(vertex));
+        let irradiance: Vec<Vec3> = rows()
+            .map(|row| irradiance(row, &sender_radiance))
+            .collect();
+
+        let source_count = sources.patches.len();
+        let luminances: Vec<f32> = sender_radiance[..source_count]
+            .iter()
+            .map(|&radiance| luminance(radiance) * PI)
+            .collect();
+        let arriving = Arriving::new(
+            rows().map(|row| row.iter().zip(&luminances).map(|(f, l)| f * l).collect()),
+            irradiance.iter().map(|&light| luminance(light)).collect(),
+        );
+        let receivers = ReceiverTree::new(&patches, options.receivers_per_leaf);
+        let hierarchy = Hierarchy::new(&sources, &receivers, &arriving, options.least_part as f32);
+        let radiance: Vec<Vec3> = light.iter().map(|light| light.radiance).collect();
+        let volume = IrradianceVolume::new(
+            around(things, VOLUME_MARGIN_M),
+            VOLUME_SPACING_M,
+            &patches,
+            &caster,
+            &radiance,
+        );
+        Self {
+            source_radiance: sender_radiance[..source_count].to_vec(),
+            patches,
+            light,
+            sources,
+            transfers,
+            irradiance,
+            receivers,
+            hierarchy,
+            volume,
+            caster,
+        }
+    }
+
+    /// Marks what things in boxes may hide, and who may notice.
+    pub fn mark(&self, boxes: &[BoxM]) -> Marks {
+        let mut marks = Marks::new(&self.sources, &self.receivers);
+        for bounds in boxes {
+            self.hierarchy.mark(bounds, &mut marks);
+        }
+        marks
+    }
+
+    /// The sources as they weigh for some vertices; those that are not marked weigh nothing.
+    pub fn weighed(&self, is_marked: &[bool], vertices: &[u32]) -> Vec<WeighedSource> {
+        let mut weights = vec![0.0_f32; is_marked.len()];
+        for &vertex in vertices {
+            let total = luminance(self.irradiance[vertex as usize]).max(1e-9);
+            let row = self.transfers.row(vertex as usize);
+            for (weight, form_factor) in weights.iter_mut().zip(row) {
+                *weight += form_factor / total;
+            }
+        }
+        let count = vertices.len().max(1) as f32;
+        let sources = self.sources.patches.iter().zip(is_marked);
+        sources
+            .zip(weights.iter().zip(&self.source_radiance))
+            .map(|((&patch, &is_marked), (&weight, &radiance))| {
+                let corners = self.patches.corners(&self.patches.patches[patch as usize]);
+                WeighedSource {
+                    center: corners.iter().sum::<Vec3>() / 3.0,
+                    spread: triangle_spread(corners),
+                    weight: match is_marked {
+                        true => weight * luminance(radiance) * PI / count,
+                        false => 0.0,
+                    },
+                }
+            })
+            .collect()
+    }
+
+    /// Radiant intensity of a representative's marked sources towards a place, as far as the room lets it through.
+    pub fn intensity(&self, one: &Representative, is_marked: &[bool], place: Vec3) -> Vec3 {
+        let range = one.first as usize..one.last as usize;
+        range
+            .filter(|&source| is_marked[source])
+            .map(|source| {
+                let patch = &self.patches.patches[self.sources.patches[source] as usize];
+                let center = self.patches.center(patch);
+                let way = place - center;
+                let facing = self.patches.normal(patch).dot(way) / way.length().max(1e-9);
+                let start = center + self.patches.normal(patch) * SURFEL_OFFSET_M;
+                if facing <= 0.0 || self.caster.is_hidden(start, place - start, 1.0) {
+                    return Vec3::ZERO;
+                }
+                self.source_radiance[source] * (self.patches.area(patch) * facing)
+            })
+            .sum()
+    }
+
+    /// Radiance along a ray; none from backs, or where there is no room.
+    pub fn radiance_along(&self, origin: Vec3, direction: Vec3) -> Option<(Vec3, usize, f32)> {
+        let hit = self.caster.first_hit(origin, direction, f32::INFINITY)?;
+        let patch = &self.patches.patches[hit.triangle];
+        let is_front = self.patches.normal(patch).dot(direction) < 0.0;
+        is_front.then_some((
+            self.light[hit.triangle].radiance,
+            hit.triangle,
+            hit.distance,
+        ))
+    }
+}
+
+impl Prepared {
+    /// Irradiance of a surfel past what `caster` hides. The room within `near` is seen with the casters' shadows on it:
+    /// a part of its light is gone, as representatives of its sources tell that `caster` hides.
+    pub fn light_on_surfel(
+        &self,
+        surfel: &Surfel,
+        rays: usize,
+        caster: &RayCaster,
+        sources: &[Representative],
+        near: &BoxM,
+    ) -> Vec3 {
+        let weight: f32 = sources.iter().map(|source| source.weight).sum();
+        let start = surfel.position + surfel.normal * SURFEL_OFFSET_M;
+        let mut sum = Vec3::ZERO;
+        for (index, direction) in hemisphere(surfel.normal, rays).enumerate() {
+            if caster.is_hidden(start, direction, f32::INFINITY) {
+                continue;
+            }
+            let Some((radiance, patch, distance)) = self.radiance_along(start, direction) else {
+                continue;
+            };
+            let place = start + direction * distance;
+            let mut left = 1.0;
+            if near.touches(&BoxM::around([place])) && weight > 0.0 {
+                let at = (index as f32 * 0.618_034 + 0.5).fract() * weight;
+                let source = at_weight(sources, at);
+                let patch = &self.patches.patches[patch];
+                let place = place + self.patches.normal(patch) * SURFEL_OFFSET_M;
+                let hidden = caster.is_hidden(place, source - place, 1.0);
+                left = f32::from(!hidden);
+            }
+            sum += radiance * left;
+        }
+        sum * (PI / rays as f32)
+    }
+}
+
+/// The place of the representative at a part of all weight.
+fn at_weight(sources: &[Representative], mut at: f32) -> Vec3 {
+    for source in sources {
+        at -= source.weight;
+        if at <= 0.0 {
+            return source.position;
+        }
+    }
+    sources.last().map_or(Vec3::ZERO, |source| source.position)
+}
+
+/// How far off a surfel rays start, metres: past the rounding of a simplified thing.
+const SURFEL_OFFSET_M: f32 = 1e-4;
+
+/// Patches by falling radiance until they have a part of all power, and the others (Gibson et al. 2003, section 4).
+fn source_set(
+    light: &[PatchLight],
+    power: impl Fn(usize) -> f32,
+    part: f64,
+) -> (Vec<usize>, Vec<usize>) {
+    let mut order: Vec<usize> = (0..light.len()).collect();
+    let brightness = |&patch: &usize| luminance(light[patch].radiance);
+    order.sort_by(|one, other| brightness(other).total_cmp(&brightness(one)));
+    let all: f64 = order.iter().map(|&patch| f64::from(power(patch))).sum();
+    let mut sum = 0.0;
+    let enough = order.iter().take_while(|&&patch| {
+        let before = sum;
+        sum += f64::from(power(patch));
+        before < part * all && power(patch) > 0.0
+    });
+    let others = order.split_off(enough.count());
+    (order, others)
+}
+
+fn around(things: &[Bounds], margin_m: f64) -> BoxM {
+    let corners = things.iter().flat_map(|bounds| {
+        [bounds.low - margin_m, bounds.high + margin_m].map(|corner| corner.as_vec3())
+    });
+    let bounds = BoxM::around(corners);
+    match bounds.min.cmple(bounds.max).all() {
+        true => bounds,
+        false => BoxM::around([Vec3::splat(-0.5), Vec3::splat(0.5)]),
+    }
+}
