@@ -1,6 +1,7 @@
 //! Sheets of markers as printed, seen by known cameras, and how far poses found in their pictures are off.
 
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
+#[allow(unused_imports)] // Each test uses its own part.
 pub use gnomon::app::truth::sheets::{Light, camera_above, photograph, with_noise};
 use gnomon::capture::Frame;
 use gnomon::geometry::camera::Intrinsics;

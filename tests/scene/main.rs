@@ -138,7 +138,8 @@ fn a_small_scene_has_the_defaults() {
             samples: 4,
             counting: Counting::Auto,
             max_silhouette_error_px: 0.5,
-            frame_budget_ms: None
+            frame_budget_ms: None,
+            shafts: Default::default(),
         }
     );
     assert_eq!(scene.chosen_technique().0, Technique::Volumes);
@@ -302,7 +303,8 @@ frame_budget_ms = 16
             samples: 1,
             counting: Counting::DepthFail,
             max_silhouette_error_px: 0.0,
-            frame_budget_ms: Some(16.0)
+            frame_budget_ms: Some(16.0),
+            shafts: Default::default(),
         }
     );
 }

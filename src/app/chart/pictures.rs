@@ -158,10 +158,8 @@ fn changed_part(change: &Picture) -> Option<Part> {
             from: place,
             to: place,
         });
-        for axis in 0..2 {
-            part.from[axis] = part.from[axis].min(place[axis]);
-            part.to[axis] = part.to[axis].max(place[axis]);
-        }
+        part.from = [0, 1].map(|axis| part.from[axis].min(place[axis]));
+        part.to = [0, 1].map(|axis| part.to[axis].max(place[axis]));
         Some(part)
     })?;
     Some(Part {
