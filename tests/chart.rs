@@ -72,13 +72,16 @@ fn an_interrupt_leaves_what_was_measured_and_a_rerun_goes_on() {
 
     // What is known is taken as it stands, here with a value that nobody measures.
     let known = fs::read_to_string(&kept).unwrap();
-    let marked = known.replacen("plain,gnomon,", "plain,gnomon,0.000777", 1);
+    let head = "\n\n# plain\nplain,gnomon,";
+    let end = known.find(head).expect("the first unit") + head.len();
+    let rest = known[end..].find('\n').expect("its row") + end;
+    let marked = format!("{}0.0007,0.000777,{}", &known[..end], &known[rest..]);
     assert_ne!(known, marked);
     fs::write(&kept, marked).unwrap();
     let again = measure().output().unwrap();
     assert!(again.status.success(), "{}", said(&again));
     let csv = fs::read_to_string(folder.path().join("stability.csv")).unwrap();
-    assert!(csv.contains("plain,gnomon,0.000777"), "{csv}");
+    assert!(csv.contains("plain,gnomon,0.0007,0.000777,"), "{csv}");
     assert!(
         csv.contains("virtual shadow on a real one,gnomon,"),
         "{csv}"
