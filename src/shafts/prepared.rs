@@ -16,7 +16,7 @@ use super::patches::{Patches, RoomTriangle};
 use super::receiver_tree::ReceiverTree;
 use super::selection::{Representative, WeighedSource, triangle_spread};
 use super::source_tree::{BoxM, Source, SourceTree};
-use super::surfels::Surfel;
+use super::surfels::{LitSurfel, Surfel};
 use super::transfer::{Transfers, irradiance};
 
 /// How finely a room is worked out.
@@ -172,6 +172,38 @@ impl Prepared {
             .collect()
     }
 
+    /// The sources, in the tree's order, whose middle lies within a ball.
+    pub fn sources_within(&self, center: Vec3, radius: f32) -> Vec<usize> {
+        let middle = |patch: u32| self.patches.center(&self.patches.patches[patch as usize]);
+        let sources = self.sources.patches.iter().enumerate();
+        sources
+            .filter(|(_, patch)| middle(**patch).distance(center) < radius)
+            .map(|(source, _)| source)
+            .collect()
+    }
+
+    /// Irradiance of a place from marked patches that surfels cover.
+    pub fn hidden_among(
+        &self,
+        place: Vec3,
+        normal: Vec3,
+        surfels: &[LitSurfel],
+        is_marked: &[bool],
+    ) -> Vec3 {
+        let start = place + normal * SURFEL_OFFSET_M;
+        let covered = |surfel: &LitSurfel| {
+            let part = surfel.irradiance_part(place, normal);
+            if part < LEAST_COVERED {
+                return Vec3::ZERO;
+            }
+            match self.radiance_along(start, (surfel.surfel.position - start).normalize()) {
+                Some((radiance, patch, _)) if is_marked[patch] => radiance * part,
+                _ => Vec3::ZERO,
+            }
+        };
+        surfels.iter().map(covered).sum()
+    }
+
     /// Radiant intensity of a representative's marked sources towards a place, as far as the room lets it through.
     pub fn intensity(&self, one: &Representative, is_marked: &[bool], place: Vec3) -> Vec3 {
         let range = one.first as usize..one.last as usize;
@@ -252,6 +284,8 @@ fn at_weight(sources: &[Representative], mut at: f32) -> Vec3 {
     sources.last().map_or(Vec3::ZERO, |source| source.position)
 }
 
+/// Surfels that cover less of a place's hemisphere (over π) hide nothing that shows.
+const LEAST_COVERED: f32 = 1e-4;
 /// How far off a surfel rays start, metres: past the rounding of a simplified thing.
 const SURFEL_OFFSET_M: f32 = 1e-4;
 

@@ -1,11 +1,11 @@
-//! n sources that stand for all that may be hidden (Gibson et al. 2003, section 8): nodes of the source tree, the one with
-//! the largest transfer cut first. The light of all is kept.
+//! n sources that stand for all that may be hidden (Gibson et al. 2003, section 8): nodes of the source tree. The light of
+//! all is kept.
 
 use std::collections::BinaryHeap;
 
-use glam::{Mat3, Vec3};
+use glam::{DMat3, DVec3, Mat3, Vec3};
 
-use super::source_tree::SourceTree;
+use super::source_tree::{SourceNode, SourceTree};
 
 /// A source as it weighs in the present frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,32 +54,77 @@ impl PartialOrd for Candidate {
     }
 }
 
-/// Up to `count` representatives for the sources, which come in the tree's order. Nodes whose sources weigh less than
-/// `least_weight` together are not cut: no eye could tell.
+/// Sums over the first sources of the tree, none to all: any node's moments are a difference.
+struct Sums(Vec<Moments>);
+
+#[derive(Clone, Copy)]
+struct Moments {
+    weight: f64,
+    first: DVec3,
+    second: DMat3,
+}
+
+impl Sums {
+    fn new(sources: &[WeighedSource]) -> Self {
+        let mut sum = Moments {
+            weight: 0.0,
+            first: DVec3::ZERO,
+            second: DMat3::ZERO,
+        };
+        let mut sums = vec![sum];
+        for source in sources {
+            let (weight, center) = (f64::from(source.weight), source.center.as_dvec3());
+            sum.weight += weight;
+            sum.first += center * weight;
+            sum.second += (source.spread.as_dmat3() + outer(center)) * weight;
+            sums.push(sum);
+        }
+        Self(sums)
+    }
+
+    fn representative(&self, node: &SourceNode) -> Representative {
+        let (low, high) = (self.0[node.first as usize], self.0[node.last as usize]);
+        let weight = high.weight - low.weight;
+        let share = weight.max(f64::MIN_POSITIVE).recip();
+        let position = (high.first - low.first) * share;
+        let spread = (high.second - low.second) * share - outer(position);
+        Representative {
+            first: node.first,
+            last: node.last,
+            position: position.as_vec3(),
+            spread: spread.as_mat3(),
+            weight: weight as f32,
+        }
+    }
+}
+
+fn outer(vector: DVec3) -> DMat3 {
+    DMat3::from_cols(vector * vector.x, vector * vector.y, vector * vector.z)
+}
+
+/// Up to `count` representatives for the sources, which come in the tree's order, as they are seen from `casters`. A node
+/// is cut by what one shadow for all of it does wrong: its weight times how wide it is seen, for the shadow of a narrow node
+/// is right however bright it is. Nodes below `least` there are not cut: no eye could tell.
 pub fn representatives(
     tree: &SourceTree,
     sources: &[WeighedSource],
     count: usize,
-    least_weight: f32,
+    least: f32,
+    casters: Vec3,
 ) -> Vec<Representative> {
-    let Some(root) = tree.nodes.first() else {
-        return Vec::new();
-    };
-    let mut sums = vec![0.0_f64];
-    for source in sources {
-        sums.push(sums[sums.len() - 1] + f64::from(source.weight));
-    }
-    let weight = |node: u32| {
-        let node = &tree.nodes[node as usize];
-        (sums[node.last as usize] - sums[node.first as usize]) as f32
-    };
-    if count == 0 || sums[root.last as usize] <= 0.0 {
+    let sums = Sums::new(sources);
+    let all = sums.0[sources.len()].weight;
+    if count == 0 || tree.nodes.is_empty() || all <= 0.0 {
         return Vec::new();
     }
-    let candidate = |node: u32| Candidate {
-        priority: weight(node),
-        node,
+    let candidate = |node: u32| {
+        let one = sums.representative(&tree.nodes[node as usize]);
+        let distance = one.position.distance_squared(casters).max(1e-9);
+        let width = (one.spread_trace() / (2.0 * distance)).sqrt();
+        let priority = one.weight * width;
+        Candidate { priority, node }
     };
+    let weight = |node: u32| sums.representative(&tree.nodes[node as usize]).weight;
     let mut open = BinaryHeap::from([candidate(0)]);
     let mut closed = Vec::new();
     while open.len() + closed.len() < count {
@@ -87,8 +132,11 @@ pub fn representatives(
             break;
         };
         match tree.nodes[node as usize].children {
-            Some(children) if priority > least_weight => {
-                let lit = children.into_iter().filter(|&child| weight(child) > 0.0);
+            Some(children) if priority > least => {
+                // What differences of sums leave of nothing is nothing.
+                let lit = children
+                    .into_iter()
+                    .filter(|&child| f64::from(weight(child)) > 1e-12 * all);
                 open.extend(lit.map(candidate));
             }
             _ => closed.push(node),
@@ -100,32 +148,16 @@ pub fn representatives(
         .chain(closed)
         .collect();
     nodes.sort_unstable_by_key(|&node| tree.nodes[node as usize].first);
-    let represent = |node: u32| {
-        let node = &tree.nodes[node as usize];
-        let range = node.first as usize..node.last as usize;
-        represent(&sources[range], node.first, node.last)
-    };
-    nodes.into_iter().map(represent).collect()
+    nodes
+        .into_iter()
+        .map(|node| sums.representative(&tree.nodes[node as usize]))
+        .collect()
 }
 
-fn represent(sources: &[WeighedSource], first: u32, last: u32) -> Representative {
-    let weight: f32 = sources.iter().map(|source| source.weight).sum();
-    let share = weight.max(f32::MIN_POSITIVE).recip();
-    let middle = sources
-        .iter()
-        .map(|source| source.center * (source.weight * share));
-    let position: Vec3 = middle.sum();
-    let spread = sources.iter().fold(Mat3::ZERO, |sum, source| {
-        let off = source.center - position;
-        let about = Mat3::from_cols(off * off.x, off * off.y, off * off.z);
-        sum + (source.spread + about) * (source.weight * share)
-    });
-    Representative {
-        first,
-        last,
-        position,
-        spread,
-        weight,
+impl Representative {
+    /// Sum of its variances along all axes, square metres.
+    fn spread_trace(&self) -> f32 {
+        (self.spread.x_axis.x + self.spread.y_axis.y + self.spread.z_axis.z).max(0.0)
     }
 }
 
@@ -142,6 +174,8 @@ pub fn triangle_spread(corners: [Vec3; 3]) -> Mat3 {
 mod tests {
     use super::*;
     use crate::shafts::source_tree::Source;
+
+    const CASTERS: Vec3 = Vec3::new(5.0, 6.0, -1.0);
 
     fn scene() -> (SourceTree, Vec<WeighedSource>) {
         let corners = |index: u32| {
@@ -172,7 +206,7 @@ mod tests {
         let (tree, sources) = scene();
         let all: f32 = sources.iter().map(|source| source.weight).sum();
         for count in [1, 2, 7, 20, 45, 1000] {
-            let chosen = representatives(&tree, &sources, count, 0.0);
+            let chosen = representatives(&tree, &sources, count, 0.0, CASTERS);
             let sum: f32 = chosen.iter().map(|one| one.weight).sum();
             assert!((sum / all - 1.0).abs() < 1e-5, "{count}");
             // 45 of them are lit.
@@ -187,28 +221,49 @@ mod tests {
                 .iter()
                 .map(|one| one.position * (one.weight / all))
                 .sum();
-            let root = representatives(&tree, &sources, 1, 0.0)[0];
+            let root = representatives(&tree, &sources, 1, 0.0, CASTERS)[0];
             assert!(middle.distance(root.position) < 1e-3);
         }
-        assert!(representatives(&tree, &sources, 0, 0.0).is_empty());
+        assert!(representatives(&tree, &sources, 0, 0.0, CASTERS).is_empty());
     }
 
     #[test]
-    fn the_largest_transfer_is_cut_first_and_what_nobody_sees_never() {
+    fn what_one_shadow_does_most_wrong_is_cut_first_and_what_nobody_sees_never() {
         let (tree, sources) = scene();
-        let few = representatives(&tree, &sources, 12, 0.0);
-        let many = representatives(&tree, &sources, 13, 0.0);
-        let cut = few.iter().filter(|one| !many.contains(one));
-        let cut: Vec<_> = cut.collect();
+        let few = representatives(&tree, &sources, 12, 0.0, CASTERS);
+        let many = representatives(&tree, &sources, 13, 0.0, CASTERS);
+        let cut: Vec<_> = few.iter().filter(|one| !many.contains(one)).collect();
         assert_eq!(cut.len(), 1);
-        let largest = few
+        let wrong = |one: &Representative| {
+            let members = &sources[one.first as usize..one.last as usize];
+            let spread: f32 = members
+                .iter()
+                .map(|source| source.weight * source.center.distance_squared(one.position))
+                .sum();
+            (one.weight * spread / 2.0).sqrt() / one.position.distance(CASTERS)
+        };
+        let largest = few.iter().map(wrong).fold(0.0, f32::max);
+        assert!(
+            wrong(cut[0]) > 0.95 * largest,
+            "{} {largest}",
+            wrong(cut[0])
+        );
+        let coarse = representatives(&tree, &sources, 1000, 20.0, CASTERS);
+        assert!((2..40).contains(&coarse.len()), "{}", coarse.len());
+    }
+
+    #[test]
+    fn moments_are_those_of_the_marked_sources() {
+        let (tree, sources) = scene();
+        let one = representatives(&tree, &sources, 1, 0.0, CASTERS)[0];
+        let all: f32 = sources.iter().map(|source| source.weight).sum();
+        let mean: Vec3 = sources.iter().map(|s| s.center * (s.weight / all)).sum();
+        let variance: f32 = sources
             .iter()
-            .filter(|one| one.last - one.first > 1)
-            .map(|one| one.weight)
-            .fold(0.0, f32::max);
-        assert_eq!(cut[0].weight, largest);
-        let coarse = representatives(&tree, &sources, 1000, 200.0);
-        assert!(coarse.len() < 20 && coarse.iter().all(|one| one.weight <= 200.0));
+            .map(|s| (s.spread.x_axis.x + (s.center.x - mean.x).powi(2)) * s.weight / all)
+            .sum();
+        assert!(one.position.distance(mean) < 1e-4);
+        assert!((one.spread.x_axis.x / variance - 1.0).abs() < 1e-4);
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Virtual things as they hide light: simplified, in the world.
 
+use std::f32::consts::FRAC_1_PI;
+
 use glam::{DAffine3, Vec3};
 
 use crate::geometry::levels::levels;
@@ -9,9 +11,8 @@ use crate::scene::{Object, Scene};
 use crate::shafts::prepared::Prepared;
 use crate::shafts::selection::Representative;
 use crate::shafts::source_tree::BoxM;
-use crate::shafts::surfels::{Surfel, open_directions, surfels};
+use crate::shafts::surfels::{LitSurfel, Surfel, open_directions, surfels};
 
-use super::data::GpuSurfel;
 use super::maps::Ball;
 
 /// How far outlines may move for fewer triangles, in parts of a thing's size.
@@ -20,6 +21,11 @@ const COARSE_PART: f64 = 0.004;
 const SURFELS: usize = 128;
 /// Rays that gather the light of a surfel.
 const RAYS: usize = 48;
+
+/// Patches are cut into parts of this size by a caster, metres, and of this part of the distance farther off.
+const SMALLEST_PART_M: f32 = 0.004;
+const PART_OF_DISTANCE: f32 = 0.3;
+const MOST_PARTS: u32 = 10;
 
 /// A virtual thing that hides light.
 struct Caster {
@@ -130,37 +136,42 @@ fn caster(object: &Object, surfel_count: usize) -> Caster {
 impl PlacedCasters {
     /// The light that the casters throw back (one bounce): for each surfel what arrives past all casters, from the room as
     /// their shadows leave it.
-    pub fn lit_surfels(&self, room: &Prepared, sources: &[Representative]) -> Vec<GpuSurfel> {
+    pub fn lit_surfels(&self, room: &Prepared, sources: &[Representative]) -> Vec<LitSurfel> {
         let caster = RayCaster::new(&self.triangles);
-        let shares = on_all_cores(self.surfels.len(), |range| {
-            self.surfels[range]
-                .iter()
-                .map(|surfel| {
-                    room.light_on_surfel(surfel, RAYS, &caster, sources, &self.ball_reach())
-                })
-                .collect::<Vec<_>>()
-        });
-        let irradiances: Vec<Vec3> = shares.into_iter().flatten().collect();
         let hides = |start, direction| caster.is_hidden(start, direction, f32::INFINITY);
-        self.surfels
-            .iter()
-            .zip(irradiances)
-            .map(|(surfel, irradiance)| {
-                let open = open_directions(surfel, hides);
-                GpuSurfel {
-                    position: surfel.position,
-                    area: surfel.area,
-                    normal: surfel.normal,
-                    open_low: open as u32,
-                    radiance: surfel.albedo * irradiance * std::f32::consts::FRAC_1_PI,
-                    open_high: (open >> 32) as u32,
+        let near = self.shadowed_room();
+        let shares = on_all_cores(self.surfels.len(), |range| {
+            let lit = |surfel: &Surfel| {
+                let irradiance = room.light_on_surfel(surfel, RAYS, &caster, sources, &near);
+                LitSurfel {
+                    surfel: *surfel,
+                    open: open_directions(surfel, hides),
+                    radiance: surfel.albedo * irradiance * FRAC_1_PI,
                 }
-            })
-            .collect()
+            };
+            self.surfels[range].iter().map(lit).collect::<Vec<_>>()
+        });
+        shares.into_iter().flatten().collect()
+    }
+
+    /// Into how many parts a patch's edges are to be cut, so that what the casters throw on it is smooth within each part.
+    pub fn parts(&self, corners: [Vec3; 3]) -> u32 {
+        let patch = BoxM::around(corners);
+        let distance = |bounds: &BoxM| {
+            let apart = (bounds.min - patch.max).max(patch.min - bounds.max);
+            apart.max(Vec3::ZERO).length()
+        };
+        let nearest = self
+            .boxes
+            .iter()
+            .map(distance)
+            .fold(f32::INFINITY, f32::min);
+        let part = (PART_OF_DISTANCE * nearest).max(SMALLEST_PART_M);
+        ((patch.diagonal() / part).ceil() as u32).clamp(1, MOST_PARTS)
     }
 
     /// Where the casters' own shadows matter to the light that they get.
-    fn ball_reach(&self) -> BoxM {
+    fn shadowed_room(&self) -> BoxM {
         let reach = Vec3::splat(3.0 * self.ball.radius);
         BoxM {
             min: self.ball.center - reach,

@@ -21,36 +21,32 @@ pub(super) struct Source {
     pub padding: f32,
 }
 
+impl Source {
+    /// Whether casters may hide the source from a triangle: whether it meets what the map shows.
+    pub fn may_shade(&self, corners: [Vec3; 3]) -> bool {
+        let placed = corners.map(|corner| self.map_from_world * corner.extend(1.0));
+        if placed.iter().all(|corner| corner.w <= self.near_m) {
+            return false;
+        }
+        // A triangle that reaches behind the source has no bounds in the map.
+        if placed.iter().any(|corner| corner.w <= 1e-6) {
+            return true;
+        }
+        let in_tile = placed.map(|corner| Vec2::new(corner.x, corner.y) / corner.w);
+        let low = in_tile.into_iter().fold(Vec2::MAX, Vec2::min);
+        let high = in_tile.into_iter().fold(Vec2::MIN, Vec2::max);
+        low.cmple(Vec2::ONE).all() && high.cmpge(Vec2::ZERO).all()
+    }
+}
+
 /// Twin of `Frame` in shafts.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(super) struct Frame {
     pub world_from_camera: Mat4,
     pub source_count: u32,
-    pub surfel_count: u32,
-    pub padding: [u32; 2],
-}
-
-/// Twin of `Vertex` in shafts.wgsl.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(super) struct Vertex {
-    pub normal: Vec3,
-    pub normal_padding: f32,
-    pub irradiance: Vec3,
-    pub irradiance_padding: f32,
-}
-
-/// Twin of `Surfel` in shafts.wgsl.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(super) struct GpuSurfel {
-    pub position: Vec3,
-    pub area: f32,
-    pub normal: Vec3,
-    pub open_low: u32,
-    pub radiance: Vec3,
-    pub open_high: u32,
+    pub padding: [u32; 3],
+    pub end: [u32; 4],
 }
 
 /// Twin of `PatchCorner` in shafts.wgsl.
@@ -59,6 +55,9 @@ pub(super) struct GpuSurfel {
 pub(super) struct PatchCorner {
     pub position: Vec3,
     pub rows: [u32; 3],
+    pub weights: [f32; 2],
+    pub list: [u32; 2],
+    pub thrown_back: Vec3,
 }
 
 /// Vertex layout of [`PatchCorner`].
@@ -66,7 +65,9 @@ pub(super) const PATCH_CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> =
     wgpu::VertexBufferLayout {
         array_stride: size_of::<PatchCorner>() as u64,
         step_mode: wgpu::VertexStepMode::Vertex,
-        attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Uint32x3],
+        attributes: &wgpu::vertex_attr_array![
+            0 => Float32x3, 1 => Uint32x3, 2 => Float32x2, 3 => Uint32x2, 4 => Float32x3
+        ],
     };
 
 /// Vertex layout of places alone.

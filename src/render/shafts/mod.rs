@@ -11,22 +11,24 @@ pub mod room;
 
 use std::sync::Arc;
 
-use glam::{DAffine3, Vec3};
+use glam::{DAffine3, Vec3, Vec4};
 use wgpu::util::DeviceExt as _;
 
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::{self, PixelRect};
 use crate::light::cores::on_all_cores;
 use crate::scene::{Scene, ShaftSettings};
+use crate::shafts::patches::PatchVertex;
 use crate::shafts::prepared::Prepared;
 use crate::shafts::selection::{Representative, representatives};
 use crate::shafts::source_tree::BoxM;
+use crate::shafts::surfels::{LitSurfel, thrown_back};
 
 use super::anchor_geometry::Role;
 use super::gpu::Gpu;
 use super::stage::Stage;
 use casters::{PlacedCasters, ShaftCasters};
-use data::{Frame, GpuSurfel, PatchCorner, Source, Vertex, packed};
+use data::{Frame, PatchCorner, Source, packed};
 use maps::{Maps, Tiling, source};
 use pipelines::Pipelines;
 
@@ -35,6 +37,9 @@ use pipelines::Pipelines;
 const LEAST_WEIGHT: f32 = 1.0 / 2048.0;
 /// Penumbras are given room in the maps up to this many radii behind the casters.
 const REACH: f32 = 4.0;
+
+/// Sources nearer to the casters' middle than so many of their radii are among them.
+const NEAREST_SOURCE: f32 = 1.2;
 
 /// What shafts need from frame to frame.
 pub(super) struct Shafts {
@@ -57,7 +62,6 @@ pub(super) struct Shafts {
 struct Hidden {
     sources: wgpu::Buffer,
     source_count: u32,
-    surfel_count: u32,
     casters: wgpu::Buffer,
     caster_vertices: u32,
     /// Corners of the patches that may notice.
@@ -67,6 +71,8 @@ struct Hidden {
     /// Around the casters, and around all that may notice.
     boxes: Vec<BoxM>,
     noticing: BoxM,
+    /// What the casters throw back.
+    surfels: Vec<LitSurfel>,
     /// Whether the maps show it.
     is_drawn: bool,
 }
@@ -145,7 +151,8 @@ impl Shafts {
                 .map(|placed| self.hide(gpu, &placed));
             let volume = &self.room.volume;
             stage.set_indirect(&gpu.queue, &world_from_anchor, |place, normal| {
-                volume.radiance(place).irradiance(normal)
+                let surfels = self.hidden.iter().flat_map(|hidden| &hidden.surfels[..]);
+                volume.radiance(place).irradiance(normal) + thrown_back(place, normal, surfels)
             });
             self.world_from_anchor = world_from_anchor;
         }
@@ -153,8 +160,8 @@ impl Shafts {
         let frame = Frame {
             world_from_camera: glam::DMat4::from(world_from_camera).as_mat4(),
             source_count: hidden.source_count,
-            surfel_count: hidden.surfel_count,
-            padding: [0; 2],
+            padding: [0; 3],
+            end: [0; 4],
         };
         gpu.queue
             .write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
@@ -178,7 +185,14 @@ impl Shafts {
     fn hide(&mut self, gpu: &Gpu, placed: &PlacedCasters) -> Hidden {
         let room = &self.room;
         let marks = room.mark(&placed.boxes);
-        let may_be_hidden = marks.sources(&room.sources);
+        let mut may_be_hidden = marks.sources(&room.sources);
+        // Sources among the casters have no shadow map that could show them.
+        let among = room.sources_within(placed.ball.center, NEAREST_SOURCE * placed.ball.radius);
+        let mut is_among = vec![false; room.patches.patches.len()];
+        for &source in &among {
+            may_be_hidden[source] = false;
+            is_among[room.sources.patches[source] as usize] = true;
+        }
         let may_notice = marks.receivers(&room.receivers);
         let noticing: Vec<usize> = (0..may_notice.len())
             .filter(|&patch| may_notice[patch])
@@ -194,7 +208,13 @@ impl Shafts {
             .settings
             .sources
             .map_or(usize::MAX, |count| count as usize);
-        let mut chosen = representatives(&room.sources, &weighed, count, LEAST_WEIGHT);
+        let mut chosen = representatives(
+            &room.sources,
+            &weighed,
+            count,
+            LEAST_WEIGHT,
+            placed.ball.center,
+        );
         let limit = gpu.device.limits().max_texture_dimension_2d;
         let tiling = Tiling::new(chosen.len(), self.settings.map_px, limit);
         let reach_m = REACH * placed.ball.radius;
@@ -209,26 +229,50 @@ impl Shafts {
         self.maps.resize(&gpu.device, tiling);
 
         let transfers = transfers(room, &vertices, &chosen, &may_be_hidden);
-        let rows: Vec<Vertex> = vertices
-            .iter()
-            .map(|&vertex| Vertex {
-                normal: room.patches.vertices[vertex as usize].normal,
-                normal_padding: 0.0,
-                irradiance: room.irradiance[vertex as usize],
-                irradiance_padding: 0.0,
-            })
-            .collect();
-        let row_of = |vertex: u32| vertices.binary_search(&vertex).unwrap_or(0) as u32;
-        let corners: Vec<PatchCorner> = noticing
-            .iter()
-            .flat_map(|&patch| {
-                let patch = &room.patches.patches[patch];
-                let rows = patch.vertices.map(row_of);
-                let places = room.patches.corners(patch);
-                places.map(|position| PatchCorner { position, rows })
-            })
-            .collect();
         let surfels = placed.lit_surfels(room, &chosen);
+        let row_of = |vertex: u32| vertices.binary_search(&vertex).unwrap_or(0) as u32;
+        let irradiances: Vec<Vec4> = vertices
+            .iter()
+            .map(|&vertex| room.irradiance[vertex as usize].extend(0.0))
+            .collect();
+        let hidden_among = hidden_among(room, &vertices, &surfels, &is_among);
+        let mut lists: Vec<u32> = Vec::new();
+        let mut corners: Vec<PatchCorner> = Vec::new();
+        for &patch in &noticing {
+            let patch = &room.patches.patches[patch];
+            let rows = patch.vertices.map(row_of);
+            let places = room.patches.corners(patch);
+            let normal = room.patches.normal(patch);
+            let first = lists.len();
+            lists.extend((0..sources.len()).filter_map(|index| {
+                let arrives =
+                    |&row: &u32| transfers[row as usize * sources.len() + index] != [0, 0];
+                let may_fall = rows.iter().any(arrives) && sources[index].may_shade(places);
+                may_fall.then_some(index as u32)
+            }));
+            let list = [first as u32, (lists.len() - first) as u32];
+            let before = corners.len();
+            corners.extend(parts(placed.parts(places)).map(|weights| {
+                let [a, b] = weights;
+                let c = 1.0 - a - b;
+                let position = places[0] * a + places[1] * b + places[2] * c;
+                let [at_a, at_b, at_c] = rows.map(|row| hidden_among[row as usize]);
+                let hidden = at_a * a + at_b * b + at_c * c;
+                PatchCorner {
+                    position,
+                    rows,
+                    weights,
+                    list,
+                    thrown_back: thrown_back(position, normal, &surfels) - hidden,
+                }
+            }));
+            let least = rows.map(|row| irradiances[row as usize].truncate() * LEAST_WEIGHT);
+            let least = least.into_iter().fold(Vec3::MAX, Vec3::min);
+            let gains = |corner: &PatchCorner| corner.thrown_back.abs().cmpgt(least).any();
+            if list[1] == 0 && !corners[before..].iter().any(gains) {
+                corners.truncate(before);
+            }
+        }
 
         let device = &gpu.device;
         // A binding cannot be empty.
@@ -246,20 +290,16 @@ impl Shafts {
         };
         let storage = wgpu::BufferUsages::STORAGE;
         let source_buffer = buffer("sources", bytemuck::cast_slice(&sources), storage);
-        let rows = buffer("vertices", bytemuck::cast_slice(&rows), storage);
+        let list_buffer = buffer("shadowed by", bytemuck::cast_slice(&lists), storage);
+        let irradiances = buffer("irradiances", bytemuck::cast_slice(&irradiances), storage);
         let transfers = buffer("transfers", bytemuck::cast_slice(&transfers), storage);
-        let surfel_buffer = buffer(
-            "surfels",
-            bytemuck::cast_slice::<GpuSurfel, u8>(&surfels),
-            storage,
-        );
         let bound = |binding, buffer: &'_ wgpu::Buffer| (binding, buffer.clone());
         let buffers = [
             bound(0, &self.frame),
             bound(1, &source_buffer),
-            bound(2, &rows),
+            bound(2, &irradiances),
             bound(3, &transfers),
-            bound(4, &surfel_buffer),
+            bound(4, &list_buffer),
         ];
         let mut entries: Vec<wgpu::BindGroupEntry> = buffers
             .iter()
@@ -283,7 +323,6 @@ impl Shafts {
                 entries: &entries,
             }),
             source_count: sources.len() as u32,
-            surfel_count: surfels.len() as u32,
             casters: buffer(
                 "shaft casters",
                 bytemuck::cast_slice(&placed.triangles),
@@ -298,6 +337,7 @@ impl Shafts {
             corner_count: corners.len() as u32,
             noticing: BoxM::around(corners.iter().map(|corner| corner.position)),
             boxes: placed.boxes.clone(),
+            surfels,
             sources: source_buffer,
             is_drawn: false,
         }
@@ -341,6 +381,39 @@ impl Shafts {
         pass.set_vertex_buffer(0, hidden.corners.slice(..));
         pass.draw(0..hidden.corner_count, 0..1);
     }
+}
+
+/// For each vertex the irradiance from patches among the casters that the casters hide from it: what their surfels cover.
+fn hidden_among(
+    room: &Prepared,
+    vertices: &[u32],
+    surfels: &[LitSurfel],
+    is_among: &[bool],
+) -> Vec<Vec3> {
+    let shares = on_all_cores(vertices.len(), |range| {
+        let hidden = |&vertex: &u32| {
+            let PatchVertex { position, normal } = room.patches.vertices[vertex as usize];
+            room.hidden_among(position, normal, surfels, is_among)
+        };
+        vertices[range].iter().map(hidden).collect::<Vec<_>>()
+    });
+    shares.concat()
+}
+
+/// Cuts a triangle's edges into parts and returns the corners of all small triangles, three each, as the weights of its
+/// first two corners.
+fn parts(count: u32) -> impl Iterator<Item = [f32; 2]> {
+    let corner = move |column: u32, row: u32| [column, row].map(|at| at as f32 / count as f32);
+    let cell = move |row: u32, column: u32| {
+        let upright = [[column, row], [column + 1, row], [column, row + 1]];
+        let turned = [[column + 1, row], [column + 1, row + 1], [column, row + 1]];
+        let fits = column + row + 1 < count;
+        let corners = upright
+            .into_iter()
+            .chain(turned.into_iter().filter(move |_| fits));
+        corners.map(move |[column, row]| corner(column, row))
+    };
+    (0..count).flat_map(move |row| (0..count - row).flat_map(move |column| cell(row, column)))
 }
 
 /// For each vertex and each representative the irradiance that hidden sources would take, packed.

@@ -74,7 +74,8 @@ impl Pipelines {
         let build = |vertex: &str,
                      buffers: &[Option<wgpu::VertexBufferLayout<'static>>],
                      fragment: Option<&str>,
-                     writes_depth: bool| {
+                     writes_depth: bool,
+                     bias: wgpu::DepthBiasState| {
             let targets = [LIGHT_FORMAT; 2].map(|format| {
                 Some(wgpu::ColorTargetState {
                     format,
@@ -101,10 +102,10 @@ impl Pipelines {
                     depth_write_enabled: Some(writes_depth),
                     depth_compare: Some(match writes_depth {
                         true => wgpu::CompareFunction::Greater,
-                        false => wgpu::CompareFunction::Equal,
+                        false => wgpu::CompareFunction::GreaterEqual,
                     }),
                     stencil: wgpu::StencilState::default(),
-                    bias: wgpu::DepthBiasState::default(),
+                    bias,
                 }),
                 multisample: wgpu::MultisampleState {
                     count: samples,
@@ -123,16 +124,30 @@ impl Pipelines {
                 cache: None,
             })
         };
+        // Patches are cut finer than where their depth comes from, and land on it but for rounding.
+        let flush = wgpu::DepthBiasState::default();
+        let nearer = wgpu::DepthBiasState {
+            constant: 16,
+            slope_scale: 0.01,
+            clamp: 0.0,
+        };
         let corners = [Some(CORNER_LAYOUT), Some(INDIRECT_LAYOUT)];
         Self {
-            depth_of_room: build("place_depth", &[Some(PLACE_LAYOUT)], None, true),
-            depth_of_real: Sided::both(build("place", &corners, None, true)),
-            light_on_virtual: Sided::both(build("place", &corners, Some("light_on_virtual"), true)),
+            depth_of_room: build("place_depth", &[Some(PLACE_LAYOUT)], None, true, flush),
+            depth_of_real: Sided::both(build("place", &corners, None, true, flush)),
+            light_on_virtual: Sided::both(build(
+                "place",
+                &corners,
+                Some("light_on_virtual"),
+                true,
+                flush,
+            )),
             light_on_patch: build(
                 "place_patch",
                 &[Some(PATCH_CORNER_LAYOUT)],
                 Some("light_on_patch"),
                 false,
+                nearer,
             ),
             layout,
         }
