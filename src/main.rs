@@ -12,6 +12,7 @@ use clap::{Args, Parser, Subcommand};
 use gnomon::app::board::{self, Distance, board};
 use gnomon::app::calibrate;
 use gnomon::app::cameras;
+use gnomon::app::chart::{self, chart};
 use gnomon::app::check;
 use gnomon::app::first_look::first_look;
 use gnomon::app::layer_files::Layer;
@@ -80,6 +81,31 @@ enum Command {
         /// Scene file (TOML)
         scene: PathBuf,
     },
+    /// Measures speed against accuracy on this machine, and draws it.
+    #[command(
+        after_help = "Example:\n  gnomon chart --quick --only tracking\n\nIt runs in the project's folder. \
+                      What has been measured is not measured again by the same program from the same recordings: after \
+                      an interrupt it goes on where it was."
+    )]
+    Chart(ChartArgs),
+}
+
+#[derive(Args)]
+struct ChartArgs {
+    /// Folder for the charts; charts without this, charts/quick with --quick
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', help = format!("Make these alone: {}", chart::names().join(", ")))]
+    only: Vec<String>,
+    /// Fewer rounds: rougher times in a tenth of the time
+    #[arg(long)]
+    quick: bool,
+    /// Track the sessions of this folder too
+    #[arg(long, value_name = "DIR")]
+    sessions: Option<PathBuf>,
+    /// Graphics adapter, by a part of its name; the fastest kind without this
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
 }
 
 #[derive(Args)]
@@ -351,6 +377,7 @@ fn run(cli: Cli) -> Result<()> {
             print!("{}", cameras::cameras()?);
             Ok(())
         }
+        Command::Chart(args) => run_chart(args),
         Command::Check { scene } => {
             let scene = Scene::load(&scene)?;
             print!("{}", check::summary(&scene));
@@ -377,6 +404,23 @@ fn run_replay(args: ReplayArgs) -> Result<()> {
         adapter: args.adapter,
     };
     conclude(&replay(&request, &stop)?)
+}
+
+fn run_chart(args: ChartArgs) -> Result<()> {
+    let stop = interrupts()?;
+    let out = match args.quick {
+        true => "charts/quick",
+        false => "charts",
+    };
+    let request = chart::Request {
+        out: args.out.unwrap_or_else(|| out.into()),
+        only: args.only,
+        quick: args.quick,
+        sessions: args.sessions,
+        adapter: args.adapter,
+    };
+    eprintln!("{}", chart(&request, &stop)?);
+    Ok(())
 }
 
 fn run_track(args: TrackArgs) -> Result<()> {

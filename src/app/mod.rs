@@ -1,4 +1,4 @@
-//! The jobs: replay, record, track, board, calibrate, markers, check; their clock, files and progress.
+//! The jobs: replay, record, track, board, calibrate, markers, check, chart; their clock, files and progress.
 
 mod anchor_block;
 pub mod board;
@@ -6,6 +6,7 @@ pub mod calibrate;
 mod calibration_file;
 pub mod cameras;
 mod capture_talk;
+pub mod chart;
 pub mod check;
 pub mod contact_sheet;
 pub mod detections_file;
@@ -34,4 +35,5 @@ pub mod stopwatch;
 mod tally;
 pub mod track;
 mod tracked;
+pub mod truth;
 pub mod video_writer;
