@@ -2,6 +2,8 @@
 
 pub mod bounce;
 pub mod probe;
+pub mod probe_maps;
+pub mod radiance_picture;
 
 use std::f64::consts::PI;
 

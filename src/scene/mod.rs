@@ -15,6 +15,7 @@ mod load;
 mod mesh_file;
 mod obj_scan;
 mod objects;
+pub mod probe_file;
 mod reader;
 mod settings;
 
