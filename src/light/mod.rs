@@ -1,9 +1,11 @@
 //! Lights and reflection as plain values; radiance is linear RGB, 1 = display white at the camera's exposure.
 
 pub mod bounce;
+pub mod brightest;
 pub mod probe;
 pub mod probe_maps;
 pub mod radiance_picture;
+pub mod response;
 
 use std::f64::consts::PI;
 

@@ -1,0 +1,266 @@
+//! Bracketed pictures: read, moved on to each other, and the camera's response from them (OpenCV's `photo`).
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use exif::{In, Tag, Value};
+use opencv::core::{Mat, MatTraitConst, Vec3b, Vec3f, Vector};
+use opencv::photo::{AlignMTBTrait, CalibrateCRFTrait};
+use opencv::{imgcodecs, imgproc, photo};
+
+use super::pixels;
+use crate::light::response::Response;
+
+/// The curve is solved for from so many places a side: a square of them, for its matrix grows with their number.
+const PLACES_A_SIDE: usize = 11;
+/// Weight of the curve's smoothness.
+const SMOOTHNESS: f32 = 10.0;
+/// Exposures whose places are moved by more are another view: 2^6 px.
+const MOST_SHIFT_BITS: i32 = 6;
+
+/// Pictures of one view.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bracket {
+    /// Width and height of all.
+    pub size_px: [usize; 2],
+    /// 8-bit RGBA of each, rows from the top.
+    pub pictures: Vec<Vec<u8>>,
+}
+
+/// What can go wrong with bracketed pictures.
+#[derive(Debug, thiserror::Error)]
+pub enum ExposureError {
+    /// Not there, or OpenCV cannot decode it.
+    #[error("{}: {}", path.display(), if path.exists() { "not a picture that can be read" } else { "no such file" })]
+    Unreadable {
+        /// The picture.
+        path: PathBuf,
+    },
+    /// Not the first one's size.
+    #[error(
+        "{}: {} x {} pixels, but {} has {} x {}; all exposures show the same view",
+        path.display(), size_px[0], size_px[1], first.display(), first_px[0], first_px[1]
+    )]
+    OtherSize {
+        /// The picture.
+        path: PathBuf,
+        /// Its size.
+        size_px: [u32; 2],
+        /// The first picture.
+        first: PathBuf,
+        /// That one's size.
+        first_px: [u32; 2],
+    },
+    /// Nothing to solve the curve from.
+    #[error(
+        "the camera's response cannot be estimated: {reason}; take at least two exposures of one view, two stops apart, or \
+         give a response (--response)"
+    )]
+    NoResponse {
+        /// What is missing.
+        reason: &'static str,
+    },
+    /// OpenCV failed where it has no reason to.
+    #[error("OpenCV: {0}")]
+    OpenCv(#[from] opencv::Error),
+}
+
+impl Bracket {
+    /// Reads pictures of one size.
+    ///
+    /// # Errors
+    /// The first picture that cannot be read, or has not the size of the first.
+    pub fn read(paths: &[PathBuf]) -> Result<Self, ExposureError> {
+        let mut size_px = [0; 2];
+        let mut pictures = Vec::new();
+        for path in paths {
+            let picture = imgcodecs::imread(path, imgcodecs::IMREAD_COLOR)
+                .ok()
+                .filter(|picture| !picture.empty())
+                .ok_or_else(|| ExposureError::Unreadable { path: path.clone() })?;
+            let found_px = pixels::size_of(&picture);
+            if pictures.is_empty() {
+                size_px = found_px;
+            } else if found_px != size_px {
+                return Err(ExposureError::OtherSize {
+                    path: path.clone(),
+                    size_px: found_px,
+                    first: paths[0].clone(),
+                    first_px: size_px,
+                });
+            }
+            pictures.push(pixels::rgba_from_bgr(&picture)?);
+        }
+        Ok(Self {
+            size_px: size_px.map(|side| side as usize),
+            pictures,
+        })
+    }
+
+    /// Moves the pictures by whole pixels on to the one in the middle of the list (Ward's threshold bitmaps); what comes
+    /// in from outside is black. Returns each one's movement, right and down.
+    ///
+    /// # Errors
+    /// OpenCV's.
+    pub fn align(&mut self) -> Result<Vec<[i32; 2]>, ExposureError> {
+        let greys: Vec<Mat> = (self.pictures.iter())
+            .map(|rgba| {
+                let rgba = self.mat(rgba)?;
+                let mut grey = Mat::default();
+                imgproc::cvt_color_def(&rgba, &mut grey, imgproc::COLOR_RGBA2GRAY)?;
+                Ok(grey)
+            })
+            .collect::<opencv::Result<_>>()?;
+        let mut aligner = photo::create_align_mtb(MOST_SHIFT_BITS, 4, false)?;
+        let fixed = greys.len() / 2;
+        let [width, height] = self.size_px.map(|side| side as i32);
+        let mut shifts_px = Vec::new();
+        for (index, grey) in greys.iter().enumerate() {
+            let shift = match index == fixed {
+                true => opencv::core::Point::default(),
+                false => aligner.calculate_shift(&greys[fixed], grey)?,
+            };
+            shifts_px.push([shift.x, shift.y]);
+            let picture = &mut self.pictures[index];
+            let was: Vec<u8> = std::mem::replace(picture, vec![0; picture.len()]);
+            for row in 0..height {
+                for column in 0..width {
+                    let from = [column - shift.x, row - shift.y];
+                    let to = 4 * (row * width + column) as usize;
+                    if (0..width).contains(&from[0]) && (0..height).contains(&from[1]) {
+                        let from = 4 * (from[1] * width + from[0]) as usize;
+                        picture[to..to + 4].copy_from_slice(&was[from..from + 4]);
+                    }
+                }
+            }
+        }
+        Ok(shifts_px)
+    }
+
+    /// The camera's response, from even places inside a rectangle (left, top, width, height), by Debevec's method.
+    ///
+    /// # Errors
+    /// [`ExposureError::NoResponse`], or OpenCV's.
+    pub fn response(
+        &self,
+        exposures: &[f64],
+        rectangle_px: [usize; 4],
+    ) -> Result<Response, ExposureError> {
+        if self.pictures.len() < 2 {
+            return Err(ExposureError::NoResponse {
+                reason: "there is one exposure only",
+            });
+        }
+        let places = self.even_places(rectangle_px);
+        if places.len() < PLACES_A_SIDE * PLACES_A_SIDE {
+            return Err(ExposureError::NoResponse {
+                reason: "the pictures show too little that is neither black nor white",
+            });
+        }
+        let side = PLACES_A_SIDE as i32;
+        let mut samples = Vector::<Mat>::new();
+        for rgba in &self.pictures {
+            let bgr: Vec<Vec3b> = places
+                .iter()
+                .map(|&index| {
+                    Vec3b::from([rgba[4 * index + 2], rgba[4 * index + 1], rgba[4 * index]])
+                })
+                .collect();
+            samples.push(Mat::new_rows_cols_with_data(side, side, &bgr)?.try_clone()?);
+        }
+        let times: Vector<f32> = exposures.iter().map(|&exposure| exposure as f32).collect();
+        let mut calibration = photo::create_calibrate_debevec(side * side, SMOOTHNESS, false)?;
+        let mut solved = Mat::default();
+        calibration.process(&samples, &mut solved, &times)?;
+        let mut exposure_of_level = [[0.0; 3]; 256];
+        for (level, exposure) in exposure_of_level.iter_mut().enumerate() {
+            let bgr = solved.at::<Vec3f>(level as i32)?;
+            *exposure = [bgr[2], bgr[1], bgr[0]].map(f64::from);
+        }
+        Response::estimated(exposure_of_level).ok_or(ExposureError::NoResponse {
+            reason: "the pictures contradict their exposure times (are they in the same order?)",
+        })
+    }
+
+    /// Places of all brightnesses, of each the one with the least detail: noise and a hand that moved matter least there.
+    fn even_places(&self, [left, top, width, height]: [usize; 4]) -> Vec<usize> {
+        let columns = self.size_px[0];
+        let wanted = PLACES_A_SIDE * PLACES_A_SIDE;
+        let mut places: Vec<(u32, u32, usize)> = Vec::new();
+        for row in top + 1..(top + height).saturating_sub(1) {
+            for column in left + 1..(left + width).saturating_sub(1) {
+                let index = row * columns + column;
+                let level = |rgba: &[u8], index: usize| {
+                    u32::from(rgba[4 * index])
+                        + u32::from(rgba[4 * index + 1])
+                        + u32::from(rgba[4 * index + 2])
+                };
+                let (mut brightness, mut detail, mut tells) = (0, 0, 0);
+                for rgba in &self.pictures {
+                    let here = level(rgba, index);
+                    brightness += here;
+                    tells += u32::from((24..741).contains(&here));
+                    for next in [index - 1, index + 1, index - columns, index + columns] {
+                        detail += here.abs_diff(level(rgba, next));
+                    }
+                }
+                if tells > 0 {
+                    places.push((brightness, detail, index));
+                }
+            }
+        }
+        places.sort_unstable();
+        (0..wanted)
+            .filter_map(|bin| {
+                let bin = bin * places.len() / wanted..(bin + 1) * places.len() / wanted;
+                let flattest = places[bin].iter().min_by_key(|(_, detail, _)| *detail)?;
+                Some(flattest.2)
+            })
+            .collect()
+    }
+
+    /// The mean of all exposures, grey.
+    pub(super) fn mean_grey(&self) -> opencv::Result<Mat> {
+        let [width, height] = self.size_px;
+        let count = self.pictures.len() as u32;
+        let grey: Vec<u8> = (0..width * height)
+            .map(|index| {
+                let sum: u32 = (self.pictures.iter())
+                    .flat_map(|rgba| &rgba[4 * index..4 * index + 3])
+                    .map(|&level| u32::from(level))
+                    .sum();
+                (sum / (3 * count)) as u8
+            })
+            .collect();
+        Mat::from_slice(&grey)?
+            .reshape(1, height as i32)?
+            .try_clone()
+    }
+
+    fn mat(&self, rgba: &[u8]) -> opencv::Result<Mat> {
+        Mat::from_slice(rgba)?
+            .reshape(4, self.size_px[1] as i32)?
+            .try_clone()
+    }
+}
+
+/// How much light a photograph let in, from its EXIF: time, times sensitivity over ISO 100, over the f-number squared;
+/// what it does not tell counts as 1. `None` without an exposure time.
+pub fn exif_exposure(path: &Path) -> Option<f64> {
+    let file = File::open(path).ok()?;
+    let exif = exif::Reader::new()
+        .read_from_container(&mut BufReader::new(file))
+        .ok()?;
+    let number = |tag| {
+        let field = exif.get_field(tag, In::PRIMARY)?;
+        let value = match &field.value {
+            Value::Rational(values) => values.first()?.to_f64(),
+            value => f64::from(value.get_uint(0)?),
+        };
+        (value.is_finite() && value > 0.0).then_some(value)
+    };
+    let iso = number(Tag::PhotographicSensitivity).unwrap_or(100.0);
+    let f_number = number(Tag::FNumber).unwrap_or(1.0);
+    Some(number(Tag::ExposureTime)? * iso / 100.0 / (f_number * f_number))
+}
