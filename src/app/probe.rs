@@ -236,8 +236,10 @@ impl Source {
         check_shape(request, bracket.size_px)?;
         check_steps(&amounts, remarks);
         if request.align {
+            let mut order: Vec<usize> = (0..amounts.len()).collect();
+            order.sort_by(|&a, &b| amounts[a].total_cmp(&amounts[b]));
             let shifts: Vec<String> = bracket
-                .align()?
+                .align(order[order.len() / 2])
                 .iter()
                 .map(|[right, down]| format!("{right},{down}"))
                 .collect();

@@ -1,7 +1,9 @@
 //! The outline of a ball in a picture.
 
+use std::f64::consts::TAU;
+
 use glam::DVec2;
-use opencv::core::{Mat, MatTraitConst, MatTraitConstManual, Size, Vec3f, Vector};
+use opencv::core::{CV_8U, Mat, MatTraitConst, MatTraitConstManual, Size, Vec3f, Vector};
 use opencv::imgproc;
 
 use super::exposures::{Bracket, ExposureError};
@@ -9,12 +11,17 @@ use crate::light::probe_maps::Circle;
 
 /// Circles are first looked for in a picture of this size.
 const SEARCHED_PX: f64 = 480.0;
-const CANDIDATES: usize = 40;
-/// Rays from the middle along which the outline is looked for.
+/// Steps that Canny's edges begin with: a mirror's limb shows nearly what is behind it, so it may be a faint one.
+const EDGE_STEPS: [f64; 3] = [100.0, 40.0, 15.0];
+/// Circles of each of them that are looked at.
+const CANDIDATES: usize = 12;
+/// Rays from the middle along which the outline is looked at.
 const RAYS: usize = 360;
-/// An outline is a step of at least so many levels.
-const LEAST_STEP: f64 = 4.0;
-/// Part of the rays that must meet it.
+/// An outline is a step of at least so many levels,
+const LEAST_STEP: f64 = 2.0;
+/// and more levels do not make it more of one: what a ball mirrors has steps that are higher than its outline.
+const MOST_STEP: f64 = 12.0;
+/// Part of the rays on which it must be one.
 const LEAST_SUPPORT: f64 = 0.6;
 
 /// Finds the ball: of the circles in the mean of the exposures the one whose outline is longest in pixels and seen nearly
@@ -35,159 +42,154 @@ pub fn find(bracket: &Bracket) -> Result<Option<Circle>, ExposureError> {
         scale,
         imgproc::INTER_AREA,
     )?;
-    let small = blurred(&small, 1.5)?;
-    let shortest = f64::from(small.cols().min(small.rows()));
-    let mut circles = Vector::<Vec3f>::new();
-    imgproc::hough_circles(
-        &small,
-        &mut circles,
-        imgproc::HOUGH_GRADIENT,
-        1.5,
-        4.0,
-        60.0,
-        20.0,
-        (0.04 * shortest) as i32,
-        (0.6 * shortest) as i32,
-    )?;
-    let sharp = blurred(&grey, 1.0)?;
+    let soft = Levels::blurred(&small, 2.0)?;
+    let sharp = Levels::blurred(&grey, 0.6)?;
     let mut best: Option<(f64, Circle)> = None;
-    for found in circles.iter().take(CANDIDATES) {
-        let [x, y, radius] = found.0.map(f64::from);
-        // OpenCV's pixels have their centres at integers.
-        let coarse = Circle {
-            center_px: DVec2::new(x, y) + 0.5,
-            radius_px: radius,
-        };
-        let Some((_, coarse)) = fitted(&small, coarse, &[0.12, 0.06])? else {
-            continue;
-        };
-        let coarse = Circle {
+    for coarse in candidates(&small)? {
+        let coarse = soft.fitted(coarse, 4.0);
+        let fine = Circle {
             center_px: coarse.center_px / scale,
             radius_px: coarse.radius_px / scale,
         };
-        let Some((support, circle)) = fitted(&sharp, coarse, &[0.03, 0.015])? else {
-            continue;
-        };
-        let worth = support * circle.radius_px;
+        let fine = sharp.fitted(fine, 1.5 / scale);
+        let support = sharp.support(fine);
+        let worth = support * fine.radius_px;
         if support >= LEAST_SUPPORT && best.is_none_or(|(other, _)| worth > other) {
-            best = Some((worth, circle));
+            best = Some((worth, fine));
         }
     }
     Ok(best.map(|(_, circle)| circle))
 }
 
-fn blurred(picture: &Mat, deviation_px: f64) -> opencv::Result<Mat> {
-    let mut blurred = Mat::default();
-    imgproc::gaussian_blur_def(picture, &mut blurred, Size::default(), deviation_px)?;
-    Ok(blurred)
+/// Circles by Hough's transform.
+fn candidates(grey: &Mat) -> opencv::Result<Vec<Circle>> {
+    let mut levels = Mat::default();
+    grey.convert_to_def(&mut levels, CV_8U)?;
+    let mut soft = Mat::default();
+    imgproc::gaussian_blur_def(&levels, &mut soft, Size::default(), 1.2)?;
+    let shortest = f64::from(grey.cols().min(grey.rows()));
+    let mut found = Vec::new();
+    for step in EDGE_STEPS {
+        let mut circles = Vector::<Vec3f>::new();
+        imgproc::hough_circles(
+            &soft,
+            &mut circles,
+            imgproc::HOUGH_GRADIENT,
+            2.0,
+            6.0,
+            step,
+            20.0,
+            (0.04 * shortest) as i32,
+            (0.6 * shortest) as i32,
+        )?;
+        found.extend(circles.iter().take(CANDIDATES).map(|circle| {
+            let [x, y, radius] = circle.0.map(f64::from);
+            // OpenCV's pixels have their centres at integers.
+            Circle {
+                center_px: DVec2::new(x, y) + 0.5,
+                radius_px: radius,
+            }
+        }));
+    }
+    Ok(found)
 }
 
-/// Moves a circle on to the steepest places within parts of its radius, narrower from round to round; with the part of
-/// the rays that agree with it in the end.
-fn fitted(
-    grey: &Mat,
-    mut circle: Circle,
-    reaches: &[f64],
-) -> opencv::Result<Option<(f64, Circle)>> {
-    let levels = grey.data_bytes()?;
-    let size = [grey.cols() as usize, grey.rows() as usize];
-    let mut support = 0.0;
-    for reach in reaches {
-        let reach_px = (reach * circle.radius_px).max(2.5);
-        let mut steps_px: Vec<DVec2> = (0..RAYS)
-            .filter_map(|ray| {
-                let angle = ray as f64 * std::f64::consts::TAU / RAYS as f64;
-                steepest(levels, size, &circle, DVec2::from_angle(angle), reach_px)
-            })
-            .collect();
-        // Twice around: what is far from the first circle is no outline.
-        for round in 0..3 {
-            if steps_px.len() < RAYS / 4 {
-                return Ok(None);
-            }
-            let Some(better) = circle_through(&steps_px) else {
-                return Ok(None);
-            };
-            circle = better;
-            let off = |place: &DVec2| (place.distance(circle.center_px) - circle.radius_px).abs();
-            let mut offs: Vec<f64> = steps_px.iter().map(off).collect();
-            offs.sort_by(f64::total_cmp);
-            let near_px = (3.0 * offs[offs.len() / 2]).clamp(0.7, 0.02 * circle.radius_px + 1.0);
-            if round < 2 {
-                steps_px.retain(|place| off(place) <= near_px);
-            } else {
-                support = offs.iter().filter(|off| **off <= near_px).count() as f64 / RAYS as f64;
+/// A grey picture.
+struct Levels {
+    size_px: [usize; 2],
+    levels: Vec<f32>,
+}
+
+impl Levels {
+    fn blurred(picture: &Mat, deviation_px: f64) -> opencv::Result<Self> {
+        let mut blurred = Mat::default();
+        imgproc::gaussian_blur_def(picture, &mut blurred, Size::default(), deviation_px)?;
+        Ok(Self {
+            size_px: [blurred.cols() as usize, blurred.rows() as usize],
+            levels: blurred.data_typed::<f32>()?.to_vec(),
+        })
+    }
+
+    /// Moves and scales a circle, in ever smaller steps, to where the mean step across it is highest (Daugman's operator
+    /// for the iris, 1993).
+    fn fitted(&self, mut circle: Circle, first_step_px: f64) -> Circle {
+        let mut step_px = first_step_px;
+        let mut height = self.mean_step(circle);
+        while step_px > 0.02 {
+            let tried = [
+                (step_px, 0.0, 0.0),
+                (-step_px, 0.0, 0.0),
+                (0.0, step_px, 0.0),
+                (0.0, -step_px, 0.0),
+                (0.0, 0.0, step_px),
+                (0.0, 0.0, -step_px),
+            ]
+            .map(|(right, down, wider)| Circle {
+                center_px: circle.center_px + DVec2::new(right, down),
+                radius_px: circle.radius_px + wider,
+            });
+            let highest = tried
+                .map(|circle| (self.mean_step(circle), circle))
+                .into_iter()
+                .max_by(|a, b| a.0.total_cmp(&b.0));
+            match highest {
+                Some((higher, better)) if higher > height => (height, circle) = (higher, better),
+                _ => step_px *= 0.5,
             }
         }
+        circle
     }
-    Ok(Some((support, circle)))
-}
 
-/// Where along a ray the levels change most, within reach of the circle; to a part of a pixel.
-fn steepest(
-    levels: &[u8],
-    size: [usize; 2],
-    circle: &Circle,
-    ray: DVec2,
-    reach_px: f64,
-) -> Option<DVec2> {
-    const STEP_PX: f64 = 0.5;
-    let count = (reach_px / STEP_PX).ceil() as i32;
-    let at = |step: i32| circle.center_px + ray * (circle.radius_px + f64::from(step) * STEP_PX);
-    let slope = |step: i32| {
-        let across = |side: f64| level(levels, size, at(step) + side * ray);
-        Some((across(1.0)? - across(-1.0)?).abs())
-    };
-    let (step, highest) = (-count..=count)
-        .filter_map(|step| Some((step, slope(step)?)))
-        .max_by(|a, b| a.1.total_cmp(&b.1))?;
-    if highest < LEAST_STEP {
-        return None;
+    fn mean_step(&self, circle: Circle) -> f64 {
+        let steps = (0..RAYS).map(|ray| self.step(circle, ray).min(MOST_STEP));
+        steps.sum::<f64>() / RAYS as f64
     }
-    let (before, after) = (slope(step - 1)?, slope(step + 1)?);
-    let bend = before - 2.0 * highest + after;
-    let top = if bend < 0.0 {
-        (0.5 * (before - after) / bend).clamp(-0.5, 0.5)
-    } else {
-        0.0
-    };
-    Some(at(step) + ray * (top * STEP_PX))
-}
 
-fn level(levels: &[u8], [width, height]: [usize; 2], place_px: DVec2) -> Option<f64> {
-    let place = place_px - 0.5;
-    let corner = place.floor();
-    if corner.min_element() < 0.0
-        || corner.x + 1.0 >= width as f64
-        || corner.y + 1.0 >= height as f64
-    {
-        return None;
+    /// Part of the rays on which the circle's step is higher than those beside it.
+    fn support(&self, circle: Circle) -> f64 {
+        let stands_out = |ray: &usize| {
+            let beside = [-8.0, -6.0, -4.0, 4.0, 6.0, 8.0].map(|off_px| {
+                let radius_px = circle.radius_px + off_px;
+                self.step(
+                    Circle {
+                        radius_px,
+                        ..circle
+                    },
+                    *ray,
+                )
+            });
+            let here = self.step(circle, *ray);
+            here >= LEAST_STEP && here > beside.iter().sum::<f64>() / 6.0
+        };
+        (0..RAYS).filter(stands_out).count() as f64 / RAYS as f64
     }
-    let part = place - corner;
-    let index = corner.y as usize * width + corner.x as usize;
-    let at = |index: usize| f64::from(levels[index]);
-    let row = |index: usize| at(index) * (1.0 - part.x) + at(index + 1) * part.x;
-    Some(row(index) * (1.0 - part.y) + row(index + width) * part.y)
-}
 
-/// The circle with the least algebraic distance (Kåsa), from normal equations around the mean.
-fn circle_through(places_px: &[DVec2]) -> Option<Circle> {
-    let mean = places_px.iter().sum::<DVec2>() / places_px.len() as f64;
-    let (mut xx, mut xy, mut yy, mut right, mut square) = (0.0, 0.0, 0.0, DVec2::ZERO, 0.0);
-    for place in places_px {
-        let place = *place - mean;
-        let length_squared = place.length_squared();
-        xx += place.x * place.x;
-        xy += place.x * place.y;
-        yy += place.y * place.y;
-        right += 0.5 * length_squared * place;
-        square += length_squared;
+    /// Levels between a pixel outside and a pixel inside, across the circle; 0 out of the picture.
+    fn step(&self, circle: Circle, ray: usize) -> f64 {
+        let ray = DVec2::from_angle(ray as f64 * TAU / RAYS as f64);
+        let at = |off_px: f64| self.level(circle.center_px + ray * (circle.radius_px + off_px));
+        match (at(1.0), at(-1.0)) {
+            (Some(outside), Some(inside)) => (outside - inside).abs(),
+            _ => 0.0,
+        }
     }
-    let determinant = xx * yy - xy * xy;
-    let center = DVec2::new(yy * right.x - xy * right.y, xx * right.y - xy * right.x) / determinant;
-    let radius_px = (center.length_squared() + square / places_px.len() as f64).sqrt();
-    (center.is_finite() && radius_px.is_finite()).then_some(Circle {
-        center_px: mean + center,
-        radius_px,
-    })
+
+    /// Between pixels, linearly.
+    fn level(&self, place_px: DVec2) -> Option<f64> {
+        let [width, height] = self.size_px;
+        let corner = (place_px - 0.5).floor();
+        let part = place_px - 0.5 - corner;
+        let inside = corner.min_element() >= 0.0
+            && corner.x + 1.0 < width as f64
+            && corner.y + 1.0 < height as f64;
+        if !inside {
+            return None;
+        }
+        let index = corner.y as usize * width + corner.x as usize;
+        let row = |index: usize| {
+            let at = |index: usize| f64::from(self.levels[index]);
+            at(index) * (1.0 - part.x) + at(index + 1) * part.x
+        };
+        Some(row(index) * (1.0 - part.y) + row(index + width) * part.y)
+    }
 }

@@ -6,18 +6,18 @@ use std::path::{Path, PathBuf};
 
 use exif::{In, Tag, Value};
 use opencv::core::{Mat, MatTraitConst, Vec3b, Vec3f, Vector};
-use opencv::photo::{AlignMTBTrait, CalibrateCRFTrait};
-use opencv::{imgcodecs, imgproc, photo};
+use opencv::photo::CalibrateCRFTrait;
+use opencv::{imgcodecs, photo};
 
+use super::alignment::Ranks;
 use super::pixels;
 use crate::light::response::Response;
 
 /// The curve is solved for from so many places a side: a square of them, for its matrix grows with their number.
 const PLACES_A_SIDE: usize = 11;
 /// Weight of the curve's smoothness.
-const SMOOTHNESS: f32 = 10.0;
-/// Exposures whose places are moved by more are another view: 2^6 px.
-const MOST_SHIFT_BITS: i32 = 6;
+/// OpenCV's 10 follows the noise where exposures are three stops apart.
+const SMOOTHNESS: f32 = 50.0;
 
 /// Pictures of one view.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,6 +26,14 @@ pub struct Bracket {
     pub size_px: [usize; 2],
     /// 8-bit RGBA of each, rows from the top.
     pub pictures: Vec<Vec<u8>>,
+}
+
+/// A pixel that the curve could be solved from: brightness and detail are sums of levels over all exposures.
+#[derive(Clone, Copy)]
+struct Place {
+    brightness: u32,
+    detail: u32,
+    index: usize,
 }
 
 /// What can go wrong with bracketed pictures.
@@ -98,44 +106,28 @@ impl Bracket {
         })
     }
 
-    /// Moves the pictures by whole pixels on to the one in the middle of the list (Ward's threshold bitmaps); what comes
-    /// in from outside is black. Returns each one's movement, right and down.
-    ///
-    /// # Errors
-    /// OpenCV's.
-    pub fn align(&mut self) -> Result<Vec<[i32; 2]>, ExposureError> {
-        let greys: Vec<Mat> = (self.pictures.iter())
-            .map(|rgba| {
-                let rgba = self.mat(rgba)?;
-                let mut grey = Mat::default();
-                imgproc::cvt_color_def(&rgba, &mut grey, imgproc::COLOR_RGBA2GRAY)?;
-                Ok(grey)
-            })
-            .collect::<opencv::Result<_>>()?;
-        let mut aligner = photo::create_align_mtb(MOST_SHIFT_BITS, 4, false)?;
-        let fixed = greys.len() / 2;
+    /// Moves the pictures by whole pixels on to the `fixed` one; what comes in from outside is black. Returns each one's
+    /// movement, right and down.
+    pub fn align(&mut self, fixed: usize) -> Vec<[i32; 2]> {
         let [width, height] = self.size_px.map(|side| side as i32);
+        let place = Ranks::of(&self.pictures[fixed], self.size_px);
         let mut shifts_px = Vec::new();
-        for (index, grey) in greys.iter().enumerate() {
-            let shift = match index == fixed {
-                true => opencv::core::Point::default(),
-                false => aligner.calculate_shift(&greys[fixed], grey)?,
-            };
-            shifts_px.push([shift.x, shift.y]);
-            let picture = &mut self.pictures[index];
-            let was: Vec<u8> = std::mem::replace(picture, vec![0; picture.len()]);
-            for row in 0..height {
-                for column in 0..width {
-                    let from = [column - shift.x, row - shift.y];
+        for picture in &mut self.pictures {
+            let shift_px @ [right, down] = place.shift_px(&Ranks::of(picture, self.size_px));
+            shifts_px.push(shift_px);
+            let was = std::mem::replace(picture, vec![0; picture.len()]);
+            for (row, column) in
+                (0..height).flat_map(|row| (0..width).map(move |column| (row, column)))
+            {
+                let from = [column - right, row - down];
+                if (0..width).contains(&from[0]) && (0..height).contains(&from[1]) {
+                    let from = 4 * (from[1] * width + from[0]) as usize;
                     let to = 4 * (row * width + column) as usize;
-                    if (0..width).contains(&from[0]) && (0..height).contains(&from[1]) {
-                        let from = 4 * (from[1] * width + from[0]) as usize;
-                        picture[to..to + 4].copy_from_slice(&was[from..from + 4]);
-                    }
+                    picture[to..to + 4].copy_from_slice(&was[from..from + 4]);
                 }
             }
         }
-        Ok(shifts_px)
+        shifts_px
     }
 
     /// The camera's response, from even places inside a rectangle (left, top, width, height), by Debevec's method.
@@ -163,9 +155,7 @@ impl Bracket {
         for rgba in &self.pictures {
             let bgr: Vec<Vec3b> = places
                 .iter()
-                .map(|&index| {
-                    Vec3b::from([rgba[4 * index + 2], rgba[4 * index + 1], rgba[4 * index]])
-                })
+                .map(|&index| Vec3b::from([2, 1, 0].map(|channel| self.mean(rgba, index, channel))))
                 .collect();
             samples.push(Mat::new_rows_cols_with_data(side, side, &bgr)?.try_clone()?);
         }
@@ -183,54 +173,86 @@ impl Bracket {
         })
     }
 
-    /// Places of all brightnesses, of each the one with the least detail: noise and a hand that moved matter least there.
+    /// Places of all brightnesses, of each the one with the least detail: there noise can be averaged away, and a hand
+    /// that moved matters least.
     fn even_places(&self, [left, top, width, height]: [usize; 4]) -> Vec<usize> {
         let columns = self.size_px[0];
-        let wanted = PLACES_A_SIDE * PLACES_A_SIDE;
-        let mut places: Vec<(u32, u32, usize)> = Vec::new();
+        let mut places = Vec::new();
         for row in top + 1..(top + height).saturating_sub(1) {
             for column in left + 1..(left + width).saturating_sub(1) {
                 let index = row * columns + column;
-                let level = |rgba: &[u8], index: usize| {
-                    u32::from(rgba[4 * index])
-                        + u32::from(rgba[4 * index + 1])
-                        + u32::from(rgba[4 * index + 2])
-                };
-                let (mut brightness, mut detail, mut tells) = (0, 0, 0);
+                let (mut brightness, mut detail, mut tells) = (0, 0, false);
                 for rgba in &self.pictures {
-                    let here = level(rgba, index);
+                    let level = |index: usize| {
+                        rgba[4 * index..4 * index + 3]
+                            .iter()
+                            .map(|&level| u32::from(level))
+                            .sum::<u32>()
+                    };
+                    let here = level(index);
                     brightness += here;
-                    tells += u32::from((24..741).contains(&here));
+                    tells |= (24..741).contains(&here);
                     for next in [index - 1, index + 1, index - columns, index + columns] {
-                        detail += here.abs_diff(level(rgba, next));
+                        detail += here.abs_diff(level(next));
                     }
                 }
-                if tells > 0 {
-                    places.push((brightness, detail, index));
+                if tells {
+                    places.push(Place {
+                        brightness,
+                        detail,
+                        index,
+                    });
                 }
             }
         }
-        places.sort_unstable();
-        (0..wanted)
-            .filter_map(|bin| {
-                let bin = bin * places.len() / wanted..(bin + 1) * places.len() / wanted;
-                let flattest = places[bin].iter().min_by_key(|(_, detail, _)| *detail)?;
-                Some(flattest.2)
+        places.sort_unstable_by_key(|place| (place.brightness, place.index));
+        let (Some(darkest), Some(brightest)) = (places.first(), places.last()) else {
+            return Vec::new();
+        };
+        let wanted = PLACES_A_SIDE * PLACES_A_SIDE;
+        let flattest = |places: &[Place]| places.iter().min_by_key(|place| place.detail).copied();
+        // What is common: as many pixels for each place.
+        let common = |count: usize| -> Vec<Place> {
+            (0..count)
+                .filter_map(|part| {
+                    flattest(
+                        &places[part * places.len() / count..(part + 1) * places.len() / count],
+                    )
+                })
+                .collect()
+        };
+        let mut details: Vec<u32> = common(wanted).iter().map(|place| place.detail).collect();
+        details.sort_unstable();
+        let flat = 2 * details.get(details.len() / 2).copied().unwrap_or(0);
+        // What is rare tells of other levels: half of the places are evenly bright, where those are flat.
+        let [low, high] =
+            [darkest.brightness, brightest.brightness + 1].map(|level| level as usize);
+        let parts = wanted / 2;
+        let mut chosen: Vec<Place> = (0..parts)
+            .filter_map(|part| {
+                let bound = |part: usize| low + (high - low) * part / parts;
+                let start =
+                    places.partition_point(|place| (place.brightness as usize) < bound(part));
+                let end =
+                    places.partition_point(|place| (place.brightness as usize) < bound(part + 1));
+                flattest(&places[start..end]).filter(|place| place.detail <= flat)
             })
-            .collect()
+            .collect();
+        chosen.extend(common(wanted - chosen.len()));
+        chosen.iter().map(|place| place.index).collect()
     }
 
-    /// The mean of all exposures, grey.
+    /// The mean of all exposures, grey, one 32-bit float a pixel.
     pub(super) fn mean_grey(&self) -> opencv::Result<Mat> {
         let [width, height] = self.size_px;
         let count = self.pictures.len() as u32;
-        let grey: Vec<u8> = (0..width * height)
+        let grey: Vec<f32> = (0..width * height)
             .map(|index| {
                 let sum: u32 = (self.pictures.iter())
                     .flat_map(|rgba| &rgba[4 * index..4 * index + 3])
                     .map(|&level| u32::from(level))
                     .sum();
-                (sum / (3 * count)) as u8
+                sum as f32 / (3 * count) as f32
             })
             .collect();
         Mat::from_slice(&grey)?
@@ -238,10 +260,15 @@ impl Bracket {
             .try_clone()
     }
 
-    fn mat(&self, rgba: &[u8]) -> opencv::Result<Mat> {
-        Mat::from_slice(rgba)?
-            .reshape(4, self.size_px[1] as i32)?
-            .try_clone()
+    /// Of 3 x 3 pixels.
+    fn mean(&self, rgba: &[u8], index: usize, channel: usize) -> u8 {
+        let columns = self.size_px[0];
+        let rows = [index - columns, index, index + columns];
+        let sum: u32 = (rows.into_iter())
+            .flat_map(|middle| [middle - 1, middle, middle + 1])
+            .map(|index| u32::from(rgba[4 * index + channel]))
+            .sum();
+        ((sum + 4) / 9) as u8
     }
 }
 

@@ -1,6 +1,7 @@
 //! Frames from sessions, videos, folders of images and live cameras, and the calibration of the camera that took them.
 //! OpenCV's types stay inside.
 
+mod alignment;
 pub mod ball;
 pub mod calibration;
 mod error;
