@@ -309,7 +309,12 @@ fn a_photographed_ball_gives_its_surroundings_back() {
     for (name, weight) in measures() {
         let ratio = integral(&again, weight) / integral(&truth, weight);
         eprintln!("{name}, response known: {ratio}");
-        assert!((ratio - 1.0).abs().max_element() < 0.015, "{name}: {ratio}");
+        // The lamp is ten pixels wide, and the outline is found to a third of one.
+        let allowed = if name == "the lamp" { 0.02 } else { 0.01 };
+        assert!(
+            (ratio - 1.0).abs().max_element() < allowed,
+            "{name}: {ratio}"
+        );
     }
 }
 

@@ -291,3 +291,42 @@ pub fn exif_exposure(path: &Path) -> Option<f64> {
     let f_number = number(Tag::FNumber).unwrap_or(1.0);
     Some(number(Tag::ExposureTime)? * iso / 100.0 / (f_number * f_number))
 }
+
+#[cfg(test)]
+mod tests {
+    use exif::experimental::Writer;
+    use exif::{Field, Rational};
+
+    use super::*;
+
+    #[test]
+    fn exif_tells_the_light_that_was_let_in() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.tif");
+        let field = |tag, value| Field {
+            tag,
+            ifd_num: In::PRIMARY,
+            value,
+        };
+        let ratio = |num, denom| Value::Rational(vec![Rational { num, denom }]);
+        let time = field(Tag::ExposureTime, ratio(1, 30));
+        let others = [
+            field(Tag::PhotographicSensitivity, Value::Short(vec![400])),
+            field(Tag::FNumber, ratio(28, 10)),
+        ];
+        let write = |fields: &[&Field]| {
+            let mut writer = Writer::new();
+            fields.iter().for_each(|field| writer.push_field(field));
+            let mut bytes = std::io::Cursor::new(Vec::new());
+            writer.write(&mut bytes, false).unwrap();
+            std::fs::write(&path, bytes.into_inner()).unwrap();
+            exif_exposure(&path)
+        };
+        assert_eq!(write(&[&time]), Some(1.0 / 30.0));
+        let all = write(&[&time, &others[0], &others[1]]).unwrap();
+        assert!((all / (4.0 / 30.0 / 2.8 / 2.8) - 1.0).abs() < 1e-12);
+        assert_eq!(write(&[&others[0]]), None);
+        assert_eq!(write(&[&field(Tag::ExposureTime, ratio(1, 0))]), None);
+        assert_eq!(exif_exposure(&folder.path().join("none.jpg")), None);
+    }
+}
