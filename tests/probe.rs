@@ -11,9 +11,9 @@ use common::random::Random;
 use glam::{DMat3, DVec2, DVec3};
 use gnomon::app::picture_files::{write_radiance, write_rgb_png};
 use gnomon::light::probe::Probe;
-use gnomon::light::probe_maps::{ProbeKind, world_from_camera};
+use gnomon::light::probe_maps::world_from_camera;
 use gnomon::light::response::Response;
-use gnomon::scene::probe_file::read;
+use gnomon::scene::probe_file::{ProbeKind, read};
 
 const SIZE_PX: [u32; 2] = [480, 360];
 const CENTER_PX: DVec2 = DVec2::new(251.3, 172.8);

@@ -9,6 +9,7 @@
 pub mod bounds;
 pub mod camera;
 pub mod counting;
+pub mod dense;
 pub mod levels;
 mod mend;
 pub mod mesh;

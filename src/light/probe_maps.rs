@@ -7,6 +7,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
+use super::cores::on_all_cores;
 use super::probe::Probe;
 use super::radiance_picture::RadiancePicture;
 
@@ -16,17 +17,6 @@ const SAMPLES_A_PIXEL: f64 = 3.0;
 const MOST_SAMPLES: usize = 48;
 /// The outermost pixels of a ball show its surroundings too.
 const BALL_RIM_PX: f64 = 1.5;
-
-/// What a picture of all directions can be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum ProbeKind {
-    /// As [`Probe`] keeps it: row 0 looks up (+z), u = (atan2(y, x) + π) / 2π.
-    LatitudeLongitude,
-    /// Debevec's angular map: the distance from the middle is proportional to the angle from the direction looked along.
-    Angular,
-    /// A mirror ball that fills the picture, photographed from afar.
-    Ball,
-}
 
 /// Which place of a picture shows which direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -108,36 +98,37 @@ pub fn unwrap(
     let camera_from_world = world_from_camera.transpose();
     let place =
         |direction: DVec3| place_px(projection, picture.size_px(), camera_from_world * direction);
-    let mut radiance: Vec<Option<Vec3>> = Vec::with_capacity(grid.pixels().len());
-    for row in 0..size_px[1] {
-        for column in 0..size_px[0] {
-            let (column, row) = (column as f64, row as f64);
-            let corners_px = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
-                .map(|(right, down)| place(grid.direction(column + right, row + down)));
-            let samples = samples_a_side(projection, picture.size_px(), corners_px);
-            let mut sum = Vec3::ZERO;
-            let mut seen = 0;
-            for down in 0..samples {
-                // Rows of equal solid angle.
-                let part = (down as f64 + 0.5) / samples as f64;
-                let cosine = |row: f64| (row / size_px[1] as f64 * PI).cos();
-                let z = cosine(row) * (1.0 - part) + cosine(row + 1.0) * part;
-                let level = (1.0 - z * z).max(0.0).sqrt();
-                for right in 0..samples {
-                    let column = column + (right as f64 + 0.5) / samples as f64;
-                    let azimuth = column / width_px as f64 * TAU - PI;
-                    let direction = DVec3::new(level * azimuth.cos(), level * azimuth.sin(), z);
-                    let found =
-                        place(direction).and_then(|place_px| sample(picture, projection, place_px));
-                    if let Some(found) = found {
-                        sum += found;
-                        seen += 1;
-                    }
+    let mean = |index: usize| {
+        let (column, row) = ((index % width_px) as f64, (index / width_px) as f64);
+        let corners_px = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
+            .map(|(right, down)| place(grid.direction(column + right, row + down)));
+        let samples = samples_a_side(projection, picture.size_px(), corners_px);
+        let mut sum = Vec3::ZERO;
+        let mut seen = 0;
+        for down in 0..samples {
+            // Rows of equal solid angle.
+            let part = (down as f64 + 0.5) / samples as f64;
+            let cosine = |row: f64| (row / size_px[1] as f64 * PI).cos();
+            let z = cosine(row) * (1.0 - part) + cosine(row + 1.0) * part;
+            let level = (1.0 - z * z).max(0.0).sqrt();
+            for right in 0..samples {
+                let column = column + (right as f64 + 0.5) / samples as f64;
+                let azimuth = column / width_px as f64 * TAU - PI;
+                let direction = DVec3::new(level * azimuth.cos(), level * azimuth.sin(), z);
+                let found =
+                    place(direction).and_then(|place_px| sample(picture, projection, place_px));
+                if let Some(found) = found {
+                    sum += found;
+                    seen += 1;
                 }
             }
-            radiance.push((2 * seen >= samples * samples).then(|| sum / seen as f32));
         }
-    }
+        (2 * seen >= samples * samples).then(|| sum / seen as f32)
+    };
+    let radiance = on_all_cores(grid.pixels().len(), |range| {
+        range.map(mean).collect::<Vec<_>>()
+    })
+    .concat();
     fill_in(&grid, &radiance)
 }
 
@@ -306,7 +297,7 @@ mod tests {
                     (index / size_px[0]) as f64 + 0.5,
                 );
                 let shown = direction_shown(projection, size_px, place_px);
-                Vec3::splat(shown.map_or(0.0, |direction| radiance(direction)) as f32)
+                Vec3::splat(shown.map_or(0.0, &radiance) as f32)
             })
             .collect();
         RadiancePicture::new(size_px, pixels).unwrap()

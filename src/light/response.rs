@@ -156,8 +156,8 @@ pub fn merge(exposures: &[Exposure], size_px: [usize; 2], response: &Response) -
     let mut pixels = vec![Vec3::ZERO; count];
     let mut saturated = vec![false; count];
     let mut black = vec![false; count];
-    for index in 0..count {
-        for channel in 0..3 {
+    for (index, pixel) in pixels.iter_mut().enumerate() {
+        for (channel, value) in pixel.as_mut().iter_mut().enumerate() {
             let level = |exposure: &Exposure| exposure.rgba[4 * index + channel];
             let radiance = |exposure: &Exposure| {
                 response.exposure_of_level[usize::from(level(exposure))][channel] / exposure.amount
@@ -168,7 +168,7 @@ pub fn merge(exposures: &[Exposure], size_px: [usize; 2], response: &Response) -
                 sum += weight * radiance(exposure);
                 weights += weight;
             }
-            pixels[index][channel] = if weights > 0.0 {
+            *value = if weights > 0.0 {
                 sum / weights
             } else if level(shortest) >= SATURATED {
                 saturated[index] = true;

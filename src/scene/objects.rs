@@ -13,7 +13,7 @@ use super::{Anchor, Object};
 use crate::geometry::mesh::{Mesh, RawTriangle};
 use crate::light::Material;
 
-const ALBEDO: Numbers = Numbers::between(0.0, 1.0, "");
+pub const ALBEDO: Numbers = Numbers::between(0.0, 1.0, "");
 const ROUGHNESS: Numbers = Numbers::above(0.0, 1.0, "");
 const CREASE: Numbers = Numbers::between(0.0, 180.0, "degrees");
 const DEFAULT_CREASE_DEG: f64 = 30.0;
@@ -73,6 +73,7 @@ fn table_top(value: &Value) -> Result<Object, SceneError> {
         mesh,
         report,
         materials,
+        ..
     } = rectangle(&rect, albedo)?;
     Ok(Object {
         name: "table".to_owned(),
@@ -153,7 +154,7 @@ fn anchor_index(on: &Value, anchors: &[Anchor]) -> Result<usize, SceneError> {
 }
 
 /// Scale, then turn about x, then y, then z, then move.
-fn placement(table: &Table) -> Result<DAffine3, SceneError> {
+pub fn placement(table: &Table) -> Result<DAffine3, SceneError> {
     let position_m = table.vector_or("position_m", DVec3::ZERO, &POSITION)?;
     let [x, y, z] = table
         .vector_or("rotation_deg", DVec3::ZERO, &ANGLE)?
@@ -223,5 +224,6 @@ fn rectangle(value: &Value, albedo: Option<DVec3>) -> Result<LoadedMesh, SceneEr
             albedo,
             roughness: None,
         }],
+        is_given: vec![true],
     })
 }
