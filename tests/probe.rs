@@ -111,7 +111,7 @@ fn photographs(folder: &Path) -> Vec<PathBuf> {
         .iter()
         .enumerate()
         .map(|(index, time)| {
-            let time = gnomon::app::probe::exposure_of(time).unwrap();
+            let time = gnomon::app::probe::exposure_of(time).expect("a test's own numbers fit");
             let rgba: Vec<u8> = radiance
                 .iter()
                 .flat_map(|radiance| {
@@ -125,21 +125,21 @@ fn photographs(folder: &Path) -> Vec<PathBuf> {
                 })
                 .collect();
             let path = folder.join(format!("ball_{index}.png"));
-            write_rgb_png(&path, SIZE_PX, &rgba).unwrap();
+            write_rgb_png(&path, SIZE_PX, &rgba).expect("the folder is writable");
             path
         })
         .collect()
 }
 
 fn gnomon() -> Command {
-    let mut command = Command::cargo_bin("gnomon").unwrap();
+    let mut command = Command::cargo_bin("gnomon").expect("gnomon is built");
     command.arg("probe");
     command
 }
 
 /// stdout and stderr of a run that must succeed.
 fn run(command: &mut Command) -> (String, String) {
-    let output = command.output().unwrap();
+    let output = command.output().expect("gnomon starts");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let (out, err) = (text(&output.stdout), text(&output.stderr));
     assert!(output.status.success(), "{err}");
@@ -161,7 +161,8 @@ fn integral(probe: &Probe, weight: impl Fn(DVec3) -> f64) -> DVec3 {
 /// The environment itself, as a fine probe, in the units that the levels mean.
 fn truth() -> Probe {
     let size_px = [720, 360];
-    let grid = Probe::new(size_px, vec![glam::Vec3::ZERO; 720 * 360]).unwrap();
+    let grid =
+        Probe::new(size_px, vec![glam::Vec3::ZERO; 720 * 360]).expect("a test's own numbers fit");
     let pixels = (0..720 * 360)
         .map(|index| {
             let (column, row) = ((index % 720) as f64, (index / 720) as f64);
@@ -175,7 +176,7 @@ fn truth() -> Probe {
             (unit() * sum / 9.0).as_vec3()
         })
         .collect();
-    Probe::new(size_px, pixels).unwrap()
+    Probe::new(size_px, pixels).expect("a test's own numbers fit")
 }
 
 /// What light does, by the weight of each direction.

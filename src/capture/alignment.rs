@@ -10,7 +10,7 @@ const COARSEST_PX: usize = 24;
 /// Sums of three levels outside may be cut off.
 const TELLING: std::ops::RangeInclusive<usize> = 10..=750;
 /// Pictures are compared where at least this part of what tells in the first one tells in both.
-const LEAST_OVERLAP: f32 = 0.3;
+const LEAST_OVERLAP: f64 = 0.3;
 
 /// Ranks from 0 to 1 and how much each counts, in ever coarser pictures.
 pub(super) struct Ranks {
@@ -63,7 +63,7 @@ impl Ranks {
             let coarsest = depth + 1 == self.pyramid.len();
             let reach = if coarsest { COARSE_REACH_PX } else { 1 };
             let around = [2 * shift[0], 2 * shift[1]];
-            let mut best = (f32::INFINITY, around);
+            let mut best = (f64::INFINITY, around);
             for down in -reach..=reach {
                 for right in -reach..=reach {
                     let tried = [around[0] + right, around[1] + down];
@@ -100,38 +100,38 @@ impl Layer {
         Some(Self { size_px, weighted })
     }
 
-    /// Mean squared difference of the ranks where both tell; infinite where that is too little.
-    fn difference(&self, moved: &Self, shift: [i32; 2]) -> f32 {
+    /// 1 less the ranks' correlation where both tell (what a picture shows more than the other shifts and stretches its
+    /// ranks); infinite where that is too little.
+    fn difference(&self, moved: &Self, shift: [i32; 2]) -> f64 {
         let [width, height] = self.size_px.map(|side| side as i32);
-        let (mut sum, mut weights, mut most) = (0.0_f64, 0.0_f64, 0.0_f64);
-        for row in 0..height {
-            let (mut row_sum, mut row_weights, mut row_most) = (0.0_f32, 0.0_f32, 0.0_f32);
-            for column in 0..width {
-                let [rank, weight] = self.weighted[(row * width + column) as usize];
-                row_most += weight;
-                let from = [column - shift[0], row - shift[1]];
-                if weight == 0.0
-                    || !(0..width).contains(&from[0])
-                    || !(0..height).contains(&from[1])
-                {
-                    continue;
-                }
-                let [other_rank, other_weight] =
-                    moved.weighted[(from[1] * width + from[0]) as usize];
-                if other_weight > 0.0 {
-                    let off = rank / weight - other_rank / other_weight;
-                    row_sum += weight * other_weight * off * off;
-                    row_weights += weight * other_weight;
+        let mut most = 0.0;
+        // Weights, and weighted sums of a, b, a², b², ab.
+        let mut sums = [0.0_f64; 6];
+        for (row, column) in (0..height).flat_map(|row| (0..width).map(move |column| (row, column)))
+        {
+            let [rank, weight] = self.weighted[(row * width + column) as usize].map(f64::from);
+            most += weight;
+            let from = [column - shift[0], row - shift[1]];
+            let inside = (0..width).contains(&from[0]) && (0..height).contains(&from[1]);
+            if weight == 0.0 || !inside {
+                continue;
+            }
+            let other = moved.weighted[(from[1] * width + from[0]) as usize];
+            let [other_rank, other_weight] = other.map(f64::from);
+            if other_weight > 0.0 {
+                let (a, b) = (rank / weight, other_rank / other_weight);
+                let terms = [1.0, a, b, a * a, b * b, a * b];
+                for (sum, term) in sums.iter_mut().zip(terms) {
+                    *sum += weight * other_weight * term;
                 }
             }
-            sum += f64::from(row_sum);
-            weights += f64::from(row_weights);
-            most += f64::from(row_most);
         }
-        if weights <= f64::from(LEAST_OVERLAP) * most || weights == 0.0 {
-            return f32::INFINITY;
+        let [weights, a, b, aa, bb, ab] = sums;
+        let spread = (weights * aa - a * a) * (weights * bb - b * b);
+        if weights <= LEAST_OVERLAP * most || spread <= 0.0 {
+            return f64::INFINITY;
         }
-        (sum / weights) as f32
+        1.0 - (weights * ab - a * b) / spread.sqrt()
     }
 }
 
