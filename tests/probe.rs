@@ -180,7 +180,9 @@ fn truth() -> Probe {
 }
 
 /// What light does, by the weight of each direction.
-fn measures() -> [(&'static str, fn(DVec3) -> f64); 3] {
+type Measure = (&'static str, fn(DVec3) -> f64);
+
+fn measures() -> [Measure; 3] {
     [
         ("upward irradiance", |direction| direction.z.max(0.0)),
         ("all light", |_| 1.0),

@@ -9,7 +9,7 @@ use opencv::core::{Mat, MatTraitConst, Vec3b, Vec3f, Vector};
 use opencv::photo::CalibrateCRFTrait;
 use opencv::{imgcodecs, photo};
 
-use super::alignment::Ranks;
+use super::alignment::shift_px;
 use super::pixels;
 use crate::light::response::Response;
 
@@ -110,11 +110,11 @@ impl Bracket {
     /// movement, right and down.
     pub fn align(&mut self, fixed: usize) -> Vec<[i32; 2]> {
         let [width, height] = self.size_px.map(|side| side as i32);
-        let place = Ranks::of(&self.pictures[fixed], self.size_px);
+        let place = self.pictures[fixed].clone();
         let mut shifts_px = Vec::new();
         for picture in &mut self.pictures {
-            let shift_px @ [right, down] = place.shift_px(&Ranks::of(picture, self.size_px));
-            shifts_px.push(shift_px);
+            let moved_px @ [right, down] = shift_px(&place, picture, self.size_px);
+            shifts_px.push(moved_px);
             let was = std::mem::replace(picture, vec![0; picture.len()]);
             for (row, column) in
                 (0..height).flat_map(|row| (0..width).map(move |column| (row, column)))
