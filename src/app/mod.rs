@@ -1,4 +1,4 @@
-//! The jobs: replay, record, track, board, calibrate, markers, check, chart; their clock, files and progress.
+//! The jobs: replay, live, record, track, board, calibrate, probe, markers, check, chart; their clock, files and progress.
 
 mod anchor_block;
 pub mod board;
@@ -22,6 +22,8 @@ mod output_error;
 mod partial_files;
 pub mod picture_files;
 pub mod poses_file;
+pub mod probe;
+mod probe_preview;
 mod progress;
 pub mod record;
 mod recording;

@@ -18,7 +18,7 @@ mod mesh_file;
 mod obj_scan;
 mod objects;
 mod probe;
-mod probe_file;
+pub mod probe_file;
 mod reader;
 mod settings;
 
