@@ -31,19 +31,11 @@ pub(super) fn source(text: &str) -> String {
     })
 }
 
-fn debug_source(label: &str, text: &str) -> String {
-    let path = format!("/work/main/shaders/{}.wgsl", label.replace(' ', "_"));
-    match (label.starts_with("shaft"), std::fs::read_to_string(path)) {
-        (true, Ok(text)) => source(&text),
-        _ => source(text),
-    }
-}
-
 /// A shader module of one of the files under `shaders/`.
 pub(super) fn module(device: &wgpu::Device, label: &str, text: &str) -> wgpu::ShaderModule {
     device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some(label),
-        source: wgpu::ShaderSource::Wgsl(debug_source(label, text).into()),
+        source: wgpu::ShaderSource::Wgsl(source(text).into()),
     })
 }
 

@@ -59,7 +59,7 @@ impl Arriving {
         }
     }
 
-    fn from_sources(&self, vertex: u32, first: u32, last: u32) -> f32 {
+    fn of_run(&self, vertex: u32, first: u32, last: u32) -> f32 {
         let row = vertex as usize * (self.source_count + 1);
         (self.sums[row + last as usize] - self.sums[row + first as usize]) as f32
     }
@@ -92,7 +92,7 @@ impl Hierarchy {
         let to = &trees.1.nodes[receiver as usize];
         let parts = to.vertices.iter().map(|&vertex| {
             let total = arriving.totals[vertex as usize];
-            arriving.from_sources(vertex, from.first, from.last) / total.max(f32::MIN_POSITIVE)
+            arriving.of_run(vertex, from.first, from.last) / total.max(f32::MIN_POSITIVE)
         });
         let most = parts.fold(0.0, f32::max);
         if most <= 0.0 {

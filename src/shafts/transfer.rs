@@ -55,20 +55,6 @@ impl Transfers {
         }
     }
 
-    /// From its parts, as [`Self::form_factors`] gives them; `None` where they do not fit.
-    pub fn from_parts(sender_count: usize, form_factors: Vec<f32>) -> Option<Self> {
-        let fits = form_factors.is_empty() || form_factors.len() % sender_count.max(1) == 0;
-        fits.then_some(Self {
-            sender_count,
-            form_factors,
-        })
-    }
-
-    /// All of them, row by row.
-    pub fn form_factors(&self) -> &[f32] {
-        &self.form_factors
-    }
-
     /// Those of one vertex, in the senders' order.
     pub fn row(&self, vertex: usize) -> &[f32] {
         &self.form_factors[vertex * self.sender_count..(vertex + 1) * self.sender_count]

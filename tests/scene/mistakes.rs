@@ -118,14 +118,20 @@ const MISTAKES: &[Mistake] = &[
     added("[table]\nrect_m = [1, 0, 0, 1]\n", 7, 10, &["no area", "x0 < x1"]),
     added("[tracking]\ndecimation = 0.5\n", 7, 14, &["allowed: 1 to 8"]),
     // Shadows
-    added("[shadows]\ntechnique = \"shafts\"\n", 7, 13, &["this version renders `volumes`; allowed: auto, volumes"]),
-    added("[shadows]\ntechnique = \"environment\"\n", 7, 13, &["this version renders `volumes`"]),
+    added("[shadows]\ntechnique = \"shafts\"\n", 7, 13, &["the scene has no [probe]", "allowed: auto, volumes"]),
+    added("[shadows]\ntechnique = \"environment\"\n", 7, 13, &["this version does not render it", "auto, volumes, shafts"]),
+    added("[shadows]\nsources = 0\n", 7, 11, &["1 to 4096"]),
+    added("[shadows]\nsources = \"most\"\n", 7, 11, &["a number of sources", "\"all\""]),
+    added("[shadows]\nmap_px = 100\n", 7, 10, &["a side of maps", "64, 128"]),
+    added("[shadows]\nsource_power = 0\n", 7, 16, &["above 0, up to 1"]),
     added("[shadows]\nsamples = 2\n", 7, 11, &["allowed: 1, 4"]),
     added("[shadows]\nquality = \"best\"\n", 7, 11, &["quality", "allowed: fast, balanced, accurate"]),
     added("[shadows]\nmax_silhouette_error_px = -1\n", 7, 27, &["out of range; allowed: 0 to 100 px"]),
     added("[shadows]\nmax_silhouette_error_px = \"half\"\n", 7, 27, &["a number is expected"]),
     added("[shadows]\nframe_budget_ms = 0\n", 7, 19, &["allowed: above 0, up to 1000000 ms"]),
-    added("[probe]\nimage = \"probe.hdr\"\n", 6, 1, &["probe: this version renders `volumes`"]),
+    added("[probe]\nimage = \"missing.hdr\"\n", 7, 9, &["missing.hdr"]),
+    added("[probe]\nposition_m = [0, 0, 0]\n", 6, 1, &["image", "linear radiance"]),
+    added("[[room]]\nbox_m = [0, 0, 0, 1, 1, 1]\n", 6, 1, &["there is none", "[probe]"]),
 ];
 
 #[test]

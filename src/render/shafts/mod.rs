@@ -262,7 +262,17 @@ impl Shafts {
             .iter()
             .map(|&vertex| room.irradiance[vertex as usize].extend(0.0))
             .collect();
-        let lost_nearby = lost_nearby(room, &vertices, &surfels, &left);
+        let refilled: Vec<Option<f32>> = left
+            .iter()
+            .zip(&room.patches.patches)
+            .map(|(left, patch)| {
+                let (place, normal) = (room.patches.center(patch), room.patches.normal(patch));
+                let before = room.irradiance[patch.vertices[0] as usize].element_sum();
+                let back = || thrown_back(place, normal, &surfels).element_sum();
+                left.map(|left| (left + back() / before.max(f32::MIN_POSITIVE)).min(1.0))
+            })
+            .collect();
+        let lost_nearby = lost_nearby(room, &vertices, &surfels, &refilled);
         let mut lists: Vec<u32> = Vec::new();
         let mut corners: Vec<PatchCorner> = Vec::new();
         for &patch in &noticing {
