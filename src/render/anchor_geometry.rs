@@ -126,7 +126,10 @@ impl AnchorGeometry {
         ] {
             for anchor in 0..scene.anchors.len() {
                 let mut shared = SharedCorners::default();
-                for object in objects.iter().filter(|object| object.anchor == anchor) {
+                let there = objects
+                    .iter()
+                    .filter(|object| object.visible && object.anchor == anchor);
+                for object in there {
                     let coarsest_px = scene.shadows.max_silhouette_error_px;
                     let thing = thing(device, role, object, coarsest_px > 0.0, &mut shared);
                     geometry.things.extend(thing);

@@ -39,7 +39,7 @@ impl Indirect {
         }
         let on_anchor = |anchor: usize| {
             let all = scene.phantoms.iter().chain(&scene.virtuals);
-            all.filter(move |object| object.anchor == anchor)
+            all.filter(move |object| object.visible && object.anchor == anchor)
                 .flat_map(reflectors)
                 .collect::<Vec<_>>()
         };

@@ -141,12 +141,6 @@ pub fn tracking(root: &Table) -> Result<TrackingSettings, SceneError> {
 }
 
 pub fn shadows(root: &Table) -> Result<ShadowSettings, SceneError> {
-    const TECHNIQUES: [(&str, Technique); 2] =
-        [("auto", Technique::Auto), ("volumes", Technique::Volumes)];
-    const COUNTINGS: [(&str, Counting); 2] = [
-        ("auto", Counting::Auto),
-        ("depth-fail", Counting::DepthFail),
-    ];
     if let Some(probe) = root.optional("probe") {
         return Err(probe.error_without_value(
             "this version renders `volumes`, which takes [[light]] and [ambient] and no probe; allowed: no [probe]",
@@ -167,13 +161,13 @@ pub fn shadows(root: &Table) -> Result<ShadowSettings, SceneError> {
         "shafts" | "environment" => {
             Err(value.error("this version renders `volumes`; allowed: auto, volumes"))
         }
-        _ => value.one_of("technique", &TECHNIQUES),
+        _ => value.one_of("technique", &Technique::BY_NAME),
     };
     let samples = |value: Value| match value.integer(1..=4)? {
         samples @ (1 | 4) => Ok(samples),
         _ => Err(value.error("not a number of samples; allowed: 1, 4")),
     };
-    let counting = |value: Value| value.one_of("way of counting", &COUNTINGS);
+    let counting = |value: Value| value.one_of("way of counting", &Counting::BY_NAME);
     let budget = |value: Value| value.number(&Numbers::above(0.0, 1e6, "ms"));
     Ok(ShadowSettings {
         technique: shadows
