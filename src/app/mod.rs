@@ -1,6 +1,7 @@
 //! The jobs: replay, record, track, board, calibrate, markers, check; their clock, files and progress.
 
 mod anchor_block;
+pub mod authoring;
 pub mod board;
 pub mod calibrate;
 mod calibration_file;

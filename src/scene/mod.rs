@@ -19,9 +19,9 @@ mod reader;
 mod settings;
 
 pub use error::{Place, SceneError};
-pub use load::Reading;
-pub use lights::unit_direction;
 pub use family::{Codes, Family};
+pub use lights::unit_direction;
+pub use load::Reading;
 pub use reader::{NAMES, is_name};
 
 /// What one scene file says, checked.
@@ -303,8 +303,7 @@ pub enum Counting {
 
 impl Counting {
     /// All of them, by the names that files use.
-    pub const BY_NAME: [(&str, Self); 2] =
-        [("auto", Self::Auto), ("depth-fail", Self::DepthFail)];
+    pub const BY_NAME: [(&str, Self); 2] = [("auto", Self::Auto), ("depth-fail", Self::DepthFail)];
 }
 
 /// How shadows are made and how finely.

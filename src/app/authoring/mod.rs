@@ -1,0 +1,14 @@
+//! A scene as it is written: edits that keep the file's own words, their history, and what changes the file from outside.
+
+mod document;
+mod edit;
+mod history;
+mod numbers;
+mod spliced;
+mod watch;
+mod written;
+
+pub use document::{EditError, SceneDocument};
+pub use edit::{Edit, NewVirtual};
+pub use watch::{OutsideChange, SceneNews, SceneWatch};
+pub use written::Unfit;
