@@ -4,6 +4,7 @@
 pub mod calibration;
 mod error;
 mod images;
+pub mod linear;
 pub mod live;
 mod pixels;
 mod times;

@@ -301,16 +301,6 @@ fn residuals(
     Some(residuals)
 }
 
-trait Diagonal {
-    fn diagonal(&self) -> DVec3;
-}
-
-impl Diagonal for DMat3 {
-    fn diagonal(&self) -> DVec3 {
-        DVec3::new(self.x_axis.x, self.y_axis.y, self.z_axis.z)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

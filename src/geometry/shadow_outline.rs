@@ -13,8 +13,6 @@ pub struct Standing {
     triangles: Vec<[DVec3; 3]>,
     /// Of each triangle the thing that it is of.
     thing_of: Vec<usize>,
-    /// Of each thing, whether it casts shadows.
-    casts: Vec<bool>,
     all: RayCaster,
     casters: RayCaster,
     /// Of each edge of a caster the triangles on both its sides, and its ends.
@@ -31,6 +29,8 @@ struct Edge {
 pub struct Met {
     /// The thing's index.
     pub thing: usize,
+    /// The triangle's index, counted through all things.
+    pub triangle: usize,
     /// Where, with the normal on the ray's side.
     pub facet: Facet,
 }
@@ -42,7 +42,7 @@ pub struct OutlinePoint {
     pub caster_m: DVec3,
     /// The surface that it falls on, at the very point.
     pub receiver: Facet,
-    /// The thing that it falls on.
+    /// The triangle that it falls on, counted through all things.
     pub receiving: usize,
     /// Unit vector in that surface, across the outline into the light.
     pub into_light: DVec3,
@@ -99,7 +99,6 @@ impl Standing {
             casters: RayCaster::new(&casting),
             triangles,
             thing_of,
-            casts,
             edges,
         }
     }
@@ -117,6 +116,7 @@ impl Standing {
         let distance = normal.dot(corner - start_m) / normal.dot(direction);
         Some(Met {
             thing: self.thing_of[hit.triangle],
+            triangle: hit.triangle,
             facet: Facet {
                 point_m: start_m + direction * distance,
                 normal,
@@ -205,7 +205,7 @@ impl Standing {
         Some(OutlinePoint {
             caster_m,
             receiver: met.facet,
-            receiving: met.thing,
+            receiving: met.triangle,
             into_light: if behind { across } else { -across },
         })
     }
@@ -219,11 +219,6 @@ impl Standing {
         let tolerance_m = 1e-4 + 1e-3 * (place.point_m - eye_m).length();
         self.first_met(eye_m, direction)
             .is_some_and(|met| (met.facet.point_m - place.point_m).length() < tolerance_m)
-    }
-
-    /// Whether a thing casts shadows.
-    pub fn casts(&self, thing: usize) -> bool {
-        self.casts[thing]
     }
 
     fn normal(&self, triangle: usize) -> DVec3 {

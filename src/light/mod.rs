@@ -1,6 +1,7 @@
 //! Lights and reflection as plain values; radiance is linear RGB, 1 = display white at the camera's exposure.
 
 pub mod bounce;
+pub mod contrast;
 
 use std::f64::consts::PI;
 

@@ -3,6 +3,7 @@
 mod document;
 mod edit;
 mod history;
+mod light_from_picture;
 mod numbers;
 mod spliced;
 mod watch;
@@ -10,5 +11,8 @@ mod written;
 
 pub use document::{EditError, SceneDocument};
 pub use edit::{Edit, NewVirtual};
+pub use light_from_picture::{
+    FoundLight, LightNotFound, PickedVertex, PicturedThings, ShadowClick,
+};
 pub use watch::{OutsideChange, SceneNews, SceneWatch};
 pub use written::Unfit;

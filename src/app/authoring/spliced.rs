@@ -255,7 +255,12 @@ impl<'a> Spliced<'a> {
             }
             Body::Braced(_) => {
                 let spans: Vec<Range<usize>> = siblings.iter().map(|body| body.span()).collect();
-                member_span(&spans, &spans[index])
+                let mut span = member_span(&spans, &spans[index]);
+                let behind = &self.text[span.end..];
+                if spans.len() == 1 && behind.trim_start().starts_with(',') {
+                    span.end += behind.find(',').map_or(0, |comma| comma + 1);
+                }
+                span
             }
         };
         self.changes.push((span, String::new()));
@@ -403,6 +408,8 @@ mod tests {
         let removed = |index| spliced(text, |d, s| list(d, s, Some(index)));
         assert_eq!(removed(0), "a = [ { x = 2 }, ] # both\r\n");
         assert_eq!(removed(1), "a = [ { x = 1 }, ] # both\r\n");
+        let alone = spliced("a = [{ x = 1 } , ]", |d, s| list(d, s, Some(0)));
+        assert_eq!(alone, "a = [ ]");
         assert_eq!(
             spliced(text, |d, s| list(d, s, None)),
             "a = [ { x = 1 },\n  { x = 2 }, { x = 3 }, ] # both\r\n"
