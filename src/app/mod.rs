@@ -1,4 +1,4 @@
-//! The jobs: replay, record, track, board, calibrate, markers, check; their clock, files and progress.
+//! The jobs: live, replay, record, track, board, calibrate, markers, check; their clock, files and progress.
 
 mod anchor_block;
 pub mod authoring;
@@ -12,6 +12,7 @@ pub mod contact_sheet;
 pub mod detections_file;
 pub mod first_look;
 pub mod layer_files;
+pub mod live;
 pub mod live_capture;
 pub mod live_input;
 pub mod mailbox;

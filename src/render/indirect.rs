@@ -63,6 +63,14 @@ impl Indirect {
         })
     }
 
+    /// The same light for things that stand elsewhere; `None` where those are not the same things.
+    pub fn for_corners(self, (corners, _): &VirtualCorners) -> Option<Self> {
+        (self.point_of_corner.len() == corners.len()).then_some(Self {
+            settled: false,
+            ..self
+        })
+    }
+
     /// Brings the batch's light up to what moves in this frame.
     pub fn update(
         &mut self,

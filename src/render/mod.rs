@@ -26,7 +26,7 @@ mod touched;
 mod uniforms;
 mod volumes;
 
-pub use gpu::{Gpu, RenderError};
+pub use gpu::{Gpu, RenderError, SharedDevice};
 pub use gpu_clock::GpuTimes;
 pub use layers::Layers;
 pub use renderer::{Renderer, Shown};
