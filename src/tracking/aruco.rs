@@ -96,11 +96,8 @@ pub fn rejected_quads(frame: &Frame, family: Family) -> Result<Vec<Quad>, Tracki
     let border_cells = family.border_cells() as i32;
     let dictionary = installed::Dictionary::new(number, border_cells, 0, ArucoRefinement::None)?;
     let mut rejected = Vector::<Vector<Point2f>>::new();
-    let image = Mat::new_rows_cols_with_data(
-        frame.size_px[1] as i32,
-        frame.size_px[0] as i32,
-        &grey,
-    )?;
+    let image =
+        Mat::new_rows_cols_with_data(frame.size_px[1] as i32, frame.size_px[0] as i32, &grey)?;
     dictionary.detect(
         &image,
         &mut Vector::new(),
@@ -294,8 +291,7 @@ mod installed {
             ids: &mut Vector<i32>,
             rejected: &mut Vector<Vector<Point2f>>,
         ) -> opencv::Result<()> {
-            self.detector
-                .detect_markers(image, corners, ids, rejected)
+            self.detector.detect_markers(image, corners, ids, rejected)
         }
 
         pub(super) fn cells(&self, id: i32, side: usize) -> opencv::Result<Vec<bool>> {

@@ -145,7 +145,9 @@ mod tests {
             .sum();
         assert_eq!(even, 300);
         let mut pace = Pace::new(30.0);
-        let slow: Vec<u32> = (0..10).map(|frame| pace.due(f64::from(frame) / 10.0)).collect();
+        let slow: Vec<u32> = (0..10)
+            .map(|frame| pace.due(f64::from(frame) / 10.0))
+            .collect();
         assert_eq!(slow, [1, 3, 3, 3, 3, 3, 3, 3, 3, 3]);
         assert_eq!(pace.due(1.0 + 3600.0), 1, "an hour without a camera");
         assert_eq!(pace.due(1.0 + 3600.0 + 1.0 / 30.0), 1);
@@ -164,7 +166,10 @@ mod tests {
         }
         video.add([24, 32], 0.25, flat(40));
         let said = video.finish().unwrap();
-        assert!(said.starts_with("5 frames in ") && said.ends_with("1 were left out"), "{said}");
+        assert!(
+            said.starts_with("5 frames in ") && said.ends_with("1 were left out"),
+            "{said}"
+        );
         let mut source = FrameSource::open(path.to_str().unwrap()).unwrap();
         let mut levels = Vec::new();
         while let Some(frame) = source.next_frame().unwrap() {

@@ -78,7 +78,9 @@ fn scene_text(camera: &CameraSettings, id: u32, size_m: f64) -> String {
         true => quoted(&camera.source),
         false => absolute(Path::new(&camera.source)),
     };
-    let mut text = format!("# Made by gnomon live from a marker that it saw.\n\n[camera]\nsource = {source}\n");
+    let mut text = format!(
+        "# Made by gnomon live from a marker that it saw.\n\n[camera]\nsource = {source}\n"
+    );
     if let Some(calibration) = &camera.calibration {
         text += &format!("calibration = {}\n", absolute(calibration));
     }
@@ -138,7 +140,9 @@ mod tests {
                 .positions
                 .iter()
                 .map(|p| {
-                    let at = scene.virtuals[0].anchor_from_object.transform_point3(p.as_dvec3());
+                    let at = scene.virtuals[0]
+                        .anchor_from_object
+                        .transform_point3(p.as_dvec3());
                     at.z
                 })
                 .fold(f64::INFINITY, f64::min);

@@ -149,7 +149,8 @@ impl Eye {
             Worker::Looks(detector) => {
                 let mut grey = Vec::new();
                 grey_from_rgba(frame, &mut grey)?;
-                Ok((Vec::new(), detector.detect(&grey, frame.size_px)?))
+                let found = detector.detect_thoroughly(&grey, frame.size_px)?;
+                Ok((Vec::new(), found))
             }
         }
     }

@@ -41,7 +41,11 @@ pub fn depth(depth_m: &[f32]) -> Vec<u8> {
         }
         let farness = (depth_m - near_m) / span_m;
         // Contours every twentieth of the span make shapes readable.
-        let shade = if (farness * 20.0).fract() < 0.5 { 1.0 } else { 0.85 };
+        let shade = if (farness * 20.0).fract() < 0.5 {
+            1.0
+        } else {
+            0.85
+        };
         ramp(farness).map(|level| (level * shade * 255.0).round() as u8)
     }))
 }
@@ -97,7 +101,11 @@ pub fn phantoms(video: &[u8], layers: &Layers, size_px: [u32; 2], focal_px: f32)
 /// From warm over green to cold, 0 to 1.
 fn ramp(part: f32) -> [f32; 3] {
     let bump = |middle: f32| (1.5 - (4.0 * part - middle).abs()).clamp(0.0, 1.0);
-    [bump(1.0).max(if part < 0.25 { 1.0 } else { 0.0 }), bump(2.0), bump(3.0)]
+    [
+        bump(1.0).max(if part < 0.25 { 1.0 } else { 0.0 }),
+        bump(2.0),
+        bump(3.0),
+    ]
 }
 
 fn opaque(colours: impl Iterator<Item = [u8; 3]>) -> Vec<u8> {

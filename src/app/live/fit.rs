@@ -66,6 +66,9 @@ mod tests {
         let area = Rect::from_min_size(Pos2::ZERO, Vec2::new(1280.0, 960.0));
         let fit = Fit::within(area, [640, 480]);
         assert_eq!(fit.from_pixel(DVec2::ZERO), Pos2::new(1.0, 1.0));
-        assert_eq!(fit.from_pixel(DVec2::new(639.5, 479.5)), Pos2::new(1280.0, 960.0));
+        assert_eq!(
+            fit.from_pixel(DVec2::new(639.5, 479.5)),
+            Pos2::new(1280.0, 960.0)
+        );
     }
 }

@@ -129,7 +129,9 @@ impl<'a> Gizmo<'a> {
             let ends = line.windows(2);
             let to_edge = |ends: &[DVec2]| distance_to_segment(pointer_px, ends[0], ends[1]);
             let single = line.first().map(|point| point.distance(pointer_px));
-            ends.map(to_edge).chain(single).fold(f64::INFINITY, f64::min)
+            ends.map(to_edge)
+                .chain(single)
+                .fold(f64::INFINITY, f64::min)
         };
         // Arrows begin at the middle, which is others'.
         let off_middle = |line: &[DVec2]| match line {
@@ -170,7 +172,9 @@ impl<'a> Gizmo<'a> {
                     origin_m + 0.75 * length_m * DVec3::new(angle.cos(), angle.sin(), 0.0)
                 })
                 .collect(),
-            Handle::Scale => vec![origin_m - 0.6 * length_m * DVec3::new(1.0, 1.0, 0.0).normalize()],
+            Handle::Scale => {
+                vec![origin_m - 0.6 * length_m * DVec3::new(1.0, 1.0, 0.0).normalize()]
+            }
             Handle::Sphere => vec![origin_m],
         }
     }
@@ -336,7 +340,8 @@ mod tests {
             target: target.clone(),
             start,
         };
-        drag.edit(&sight, sight.pixel(start + to_m).unwrap()).unwrap()
+        drag.edit(&sight, sight.pixel(start + to_m).unwrap())
+            .unwrap()
     }
 
     #[test]
@@ -374,7 +379,10 @@ mod tests {
         let Some(Edit::Place { placement, .. }) = drag.edit(&sight, quarter_px) else {
             panic!("no placement");
         };
-        assert!((placement.rotation_deg.z - -100.0).abs() < 1e-9, "{placement:?}");
+        assert!(
+            (placement.rotation_deg.z - -100.0).abs() < 1e-9,
+            "{placement:?}"
+        );
         let drag = Drag {
             handle: Handle::Scale,
             target: target.clone(),
@@ -402,10 +410,18 @@ mod tests {
             target,
             start,
         };
-        for pointer_px in [DVec2::new(100.0, 20.0), DVec2::new(600.0, 470.0), DVec2::splat(-900.0)] {
+        for pointer_px in [
+            DVec2::new(100.0, 20.0),
+            DVec2::new(600.0, 470.0),
+            DVec2::splat(-900.0),
+        ] {
             let Some(Edit::Light {
                 index: 1,
-                light: Light::Point { position_m: moved_m, .. },
+                light:
+                    Light::Point {
+                        position_m: moved_m,
+                        ..
+                    },
             }) = drag.edit(&sight, pointer_px)
             else {
                 panic!("no light");
@@ -446,6 +462,10 @@ mod tests {
             };
             assert_eq!(gizmo.grab(at).unwrap().handle, handle);
         }
-        assert!(gizmo.grab(gizmo.origin_px() + DVec2::new(300.0, 0.0)).is_none());
+        assert!(
+            gizmo
+                .grab(gizmo.origin_px() + DVec2::new(300.0, 0.0))
+                .is_none()
+        );
     }
 }

@@ -73,7 +73,12 @@ pub fn bindings() -> Vec<Binding> {
             "take the selected thing or light out of the scene",
             Wish::RemoveSelected,
         ),
-        plain(Key::Escape, "Esc", "select nothing; leave the full screen", Wish::Escape),
+        plain(
+            Key::Escape,
+            "Esc",
+            "select nothing; leave the full screen",
+            Wish::Escape,
+        ),
     ];
     let numbers = [
         (Key::Num1, "1"),
@@ -87,15 +92,11 @@ pub fn bindings() -> Vec<Binding> {
     ];
     let views = numbers.into_iter().zip(View::BY_NAME);
     all.extend(views.map(|((key, name), (does, view))| plain(key, name, does, Wish::Show(view))));
-    let letters = [
-        (Key::M, "M"),
-        (Key::A, "A"),
-        (Key::J, "J"),
-        (Key::L, "L"),
-    ];
+    let letters = [(Key::M, "M"), (Key::A, "A"), (Key::J, "J"), (Key::L, "L")];
     let overlays = letters.into_iter().zip(Overlay::BY_NAME);
     all.extend(
-        overlays.map(|((key, name), (does, overlay))| plain(key, name, does, Wish::Toggle(overlay))),
+        overlays
+            .map(|((key, name), (does, overlay))| plain(key, name, does, Wish::Toggle(overlay))),
     );
     all
 }
@@ -120,7 +121,10 @@ mod tests {
             assert!(all.iter().any(|b| b.wish == Wish::Show(view)), "{name}");
         }
         for (name, overlay) in Overlay::BY_NAME {
-            assert!(all.iter().any(|b| b.wish == Wish::Toggle(overlay)), "{name}");
+            assert!(
+                all.iter().any(|b| b.wish == Wish::Toggle(overlay)),
+                "{name}"
+            );
         }
     }
 }

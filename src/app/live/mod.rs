@@ -7,6 +7,7 @@
 mod canvas;
 mod composite_video;
 mod demonstration;
+mod event_loop;
 mod eye;
 mod false_colour;
 mod fit;
@@ -30,17 +31,21 @@ pub mod wish;
 pub use eye::{Plan, TrackedPicture};
 
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError};
 
-use anyhow::{Context as _, Result, anyhow};
+use anyhow::{Context as _, Result, bail};
 use eframe::egui::ViewportBuilder;
+use winit::event_loop::EventLoop;
 
+use crate::app::stopwatch::Stopwatch;
+use crate::capture::live::Now;
 use crate::render::Gpu;
 use crate::scene::CameraSettings;
+use event_loop::{PassEnd, Timed};
 use screen::Screen;
 use studio::{Opening, Studio};
-use window::{Failure, Window};
+use window::{Failure, Shared, Window};
 
 /// The window's size when it opens, points, and the smallest that it can be made.
 const WINDOW: [f32; 2] = [1180.0, 720.0];
@@ -83,27 +88,52 @@ pub fn live(request: &Request, stop: &Arc<AtomicBool>) -> Result<()> {
             .with_min_inner_size(SMALLEST_WINDOW)
             .with_app_id("gnomon"),
         wgpu_options: screen::on_device(&gpu),
+        // The camera's own noise dithers enough.
+        dithering: false,
         ..eframe::NativeOptions::default()
     };
     let failure: Failure = Arc::default();
+    let is_open = Arc::new(AtomicBool::new(false));
+    let now: Now = Arc::new(Stopwatch::clock());
+    let pass_end = PassEnd::default();
     let title = format!("{} – gnomon", opening.title());
-    let (left, stop, out) = (Arc::clone(&failure), Arc::clone(stop), request.out.clone());
-    eframe::run_native(
+    let event_loop = EventLoop::<eframe::UserEvent>::with_user_event()
+        .build()
+        .context("the window cannot be opened (is there a display?)")?;
+    let shared = Shared {
+        stop: Arc::clone(stop),
+        failure: Arc::clone(&failure),
+        pass_end: pass_end.clone(),
+    };
+    let (opened, clock, out) = (Arc::clone(&is_open), Arc::clone(&now), request.out.clone());
+    let application = eframe::create_native(
         &title,
         options,
         Box::new(move |creation| {
             let context = creation.egui_ctx.clone();
             let wake = Arc::new(move || context.request_repaint());
             let state = creation.wgpu_render_state.as_ref();
-            let state = state.ok_or("the window does not draw with wgpu")?;
+            let screen = Screen::new(state.ok_or("the window does not draw with wgpu")?);
             let adapter = gpu.description().to_owned();
-            let studio = Studio::open(opening, gpu, &out, true, wake);
-            let screen = Screen::new(state);
-            Ok(Box::new(Window::new(studio, screen, adapter, stop, left)))
+            let studio = Studio::open(opening, gpu, &out, true, (clock, wake));
+            opened.store(true, Ordering::Relaxed);
+            Ok(Box::new(Window::new(studio, screen, adapter, shared)))
         }),
-    )
-    .map_err(|error| anyhow!("{error}"))
-    .context("the window cannot be opened")?;
-    let failed = failure.lock().unwrap_or_else(PoisonError::into_inner).take();
+        &event_loop,
+    );
+    event_loop.run_app(&mut Timed {
+        application,
+        now,
+        pass_end,
+    })?;
+    if !is_open.load(Ordering::Relaxed) {
+        bail!(
+            "the window cannot be opened: the adapter does not draw on this display (--adapter NAME chooses another)"
+        );
+    }
+    let failed = failure
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .take();
     failed.map_or(Ok(()), Err)
 }

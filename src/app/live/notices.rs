@@ -91,7 +91,9 @@ impl Notices {
         let lasting = [
             camera,
             self.scene.clone(),
-            self.tracking.as_ref().map(|why| format!("Not tracked: {why}")),
+            self.tracking
+                .as_ref()
+                .map(|why| format!("Not tracked: {why}")),
         ];
         let passing = self.passing.iter();
         let passing = passing.filter(|(told_secs, ..)| now_secs - told_secs < STAYS_SECS);

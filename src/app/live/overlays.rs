@@ -77,8 +77,13 @@ impl Overlays<'_> {
         let Some(gizmo) = Gizmo::new(target, sight) else {
             return;
         };
+        let origin = self.fit.from_pixel(gizmo.origin_px());
+        self.painter.circle_filled(origin, 3.0, GRIP);
         for (handle, line) in gizmo.handles() {
-            let points: Vec<Pos2> = line.iter().map(|&pixel| self.fit.from_pixel(pixel)).collect();
+            let points: Vec<Pos2> = line
+                .iter()
+                .map(|&pixel| self.fit.from_pixel(pixel))
+                .collect();
             let colour = match handle {
                 Handle::Axis(axis) => AXIS_COLOURS[axis],
                 Handle::Plane | Handle::Turn => GRIP,
@@ -87,7 +92,8 @@ impl Overlays<'_> {
             };
             match (handle, points[..].as_ref()) {
                 (Handle::Axis(_), [from, to]) => {
-                    self.painter.arrow(*from, *to - *from, Stroke::new(2.5, colour));
+                    self.painter
+                        .arrow(*from, *to - *from, Stroke::new(2.5, colour));
                 }
                 (_, [point]) => {
                     let size = Vec2::splat(9.0);
@@ -97,7 +103,11 @@ impl Overlays<'_> {
                         _ => _ = self.painter.rect_filled(square, 1.0, colour),
                     }
                 }
-                _ => _ = self.painter.add(Shape::line(points, Stroke::new(2.0, colour))),
+                _ => {
+                    _ = self
+                        .painter
+                        .add(Shape::line(points, Stroke::new(2.0, colour)))
+                }
             }
         }
     }
@@ -115,7 +125,8 @@ impl Overlays<'_> {
             };
             for (axis, colour) in DVec3::AXES.into_iter().zip(AXIS_COLOURS) {
                 if let Some(tip) = place(axis * length_m) {
-                    self.painter.arrow(origin, tip - origin, Stroke::new(2.0, colour));
+                    self.painter
+                        .arrow(origin, tip - origin, Stroke::new(2.0, colour));
                 }
             }
             let colour = match pose.status {
@@ -139,11 +150,17 @@ impl Overlays<'_> {
             };
             if let Some(foot) = self.place(&camera_from_world, foot_m) {
                 let stroke = Stroke::new(1.0, LIGHT.gamma_multiply(0.6));
-                self.painter.extend(Shape::dashed_line(&[place, foot], stroke, 5.0, 4.0));
+                self.painter
+                    .extend(Shape::dashed_line(&[place, foot], stroke, 5.0, 4.0));
             }
             self.painter.circle_filled(place, 7.0, LIGHT);
-            self.painter.circle_stroke(place, 8.0, Stroke::new(1.5, Color32::BLACK));
-            self.label(place + Vec2::new(0.0, 18.0), &format!("light {index}"), LIGHT);
+            self.painter
+                .circle_stroke(place, 8.0, Stroke::new(1.5, Color32::BLACK));
+            self.label(
+                place + Vec2::new(0.0, 18.0),
+                &format!("light {index}"),
+                LIGHT,
+            );
         }
     }
 
@@ -172,7 +189,8 @@ impl Overlays<'_> {
             if let (true, [Some(far_a), Some(far_b)]) = (with_sides, line.shadow_m.map(place)) {
                 let fill = colour.gamma_multiply(0.12);
                 let side = vec![a, b, far_b, far_a];
-                self.painter.add(Shape::convex_polygon(side, fill, Stroke::NONE));
+                self.painter
+                    .add(Shape::convex_polygon(side, fill, Stroke::NONE));
                 let stroke = Stroke::new(1.0, colour.gamma_multiply(0.5));
                 self.painter.line_segment([far_a, far_b], stroke);
             }
@@ -191,8 +209,13 @@ impl Overlays<'_> {
         let font = FontId::proportional(14.0);
         for offset in [Vec2::new(1.0, 1.0), Vec2::new(-1.0, 0.0)] {
             let behind = place + offset;
-            self.painter
-                .text(behind, Align2::CENTER_CENTER, text, font.clone(), Color32::BLACK);
+            self.painter.text(
+                behind,
+                Align2::CENTER_CENTER,
+                text,
+                font.clone(),
+                Color32::BLACK,
+            );
         }
         self.painter
             .text(place, Align2::CENTER_CENTER, text, font, colour);

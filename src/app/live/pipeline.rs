@@ -101,7 +101,10 @@ impl Pipeline {
     /// Frames so far that were not shown because a stage was still at an earlier one: tracking, then the window; and
     /// pictures that came broken.
     pub fn dropped(&self) -> [u64; 3] {
-        let broken = self.capture.as_ref().map_or(0, LiveCapture::broken_pictures);
+        let broken = self
+            .capture
+            .as_ref()
+            .map_or(0, LiveCapture::broken_pictures);
         [self.captured.dropped(), self.tracked.dropped(), broken]
     }
 }

@@ -1,7 +1,9 @@
 //! The renderer's picture in the window, on the same device: nothing is read back on the way.
 
 use eframe::egui::TextureId;
-use eframe::egui_wgpu::{RenderState, SurfaceConfig, WgpuConfiguration, WgpuSetup, WgpuSetupExisting};
+use eframe::egui_wgpu::{
+    RenderState, SurfaceConfig, WgpuConfiguration, WgpuSetup, WgpuSetupExisting,
+};
 
 use crate::render::{Gpu, Renderer, SharedDevice};
 
@@ -54,8 +56,7 @@ impl Screen {
         let mut egui_renderer = self.state.renderer.write();
         let texture = match self.shown {
             Some((texture, _)) => {
-                egui_renderer
-                    .update_egui_texture_from_wgpu_texture(device, &view, filter, texture);
+                egui_renderer.update_egui_texture_from_wgpu_texture(device, &view, filter, texture);
                 texture
             }
             None => egui_renderer.register_native_texture(device, &view, filter),

@@ -64,15 +64,21 @@ impl ShadowLines {
                     let in_world = world_from_anchor.transform_point3(point_m);
                     anchor_from_world.transform_point3(shadow_of(in_world, light))
                 };
-                lines.extend(standing.caster.outline_edges(place).into_iter().map(|edge| {
-                    let edge_m = edge.map(|end| end.as_dvec3());
-                    ShadowLine {
-                        anchor: standing.anchor,
-                        is_virtual: standing.is_virtual,
-                        edge_m,
-                        shadow_m: edge_m.map(cast),
-                    }
-                }));
+                lines.extend(
+                    standing
+                        .caster
+                        .outline_edges(place)
+                        .into_iter()
+                        .map(|edge| {
+                            let edge_m = edge.map(|end| end.as_dvec3());
+                            ShadowLine {
+                                anchor: standing.anchor,
+                                is_virtual: standing.is_virtual,
+                                edge_m,
+                                shadow_m: edge_m.map(cast),
+                            }
+                        }),
+                );
             }
         }
         lines
@@ -103,7 +109,9 @@ impl ShadowLines {
 
 fn caster_of(thing: &Object) -> Caster {
     let place = |position: &glam::Vec3| {
-        let position = thing.anchor_from_object.transform_point3(position.as_dvec3());
+        let position = thing
+            .anchor_from_object
+            .transform_point3(position.as_dvec3());
         position.as_vec3()
     };
     let positions = thing.mesh.positions.iter().map(place).collect();
@@ -117,8 +125,8 @@ fn shadow_of(point_m: DVec3, light: &Light) -> DVec3 {
         Light::Directional { direction, .. } => direction,
     };
     let away = away.normalize_or_zero();
-    let to_table_m = match away.z < -1e-6 && point_m.z > 0.0 {
-        true => -point_m.z / away.z,
+    let to_table_m = match away.z < -1e-6 {
+        true => (-point_m.z / away.z).max(0.0),
         false => LONGEST_M,
     };
     point_m + away * to_table_m.min(LONGEST_M)
@@ -146,7 +154,10 @@ mod tests {
         let found = lines.lines(&scene, &[Some(DAffine3::IDENTITY)]);
         let positions = &scene.virtuals[0].mesh.positions;
         let top_m = positions.iter().map(|p| p.z).fold(f32::MIN, f32::max);
-        assert!(found.len() >= 4, "a box from above has four edges: {found:?}");
+        assert!(
+            found.len() >= 4,
+            "a box from above has four edges: {found:?}"
+        );
         for line in &found {
             for (edge_m, shadow_m) in line.edge_m.iter().zip(line.shadow_m) {
                 assert_eq!(edge_m.truncate(), shadow_m.truncate(), "straight below");

@@ -29,6 +29,8 @@ use crate::scene::{CameraSettings, Placement, Scene};
 
 /// For composites of sources that do not say their rate.
 const ASSUMED_FPS: f64 = 30.0;
+/// A wait that is no shorter was one, milliseconds.
+const INSTANT_MS: f64 = 0.5;
 
 /// A scene or a camera that was read, before anything is opened.
 pub struct Opening {
@@ -76,6 +78,13 @@ impl Opening {
     }
 }
 
+/// A frame that was drawn, and not yet seen to be on the screen.
+struct Pending {
+    begun_secs: f64,
+    arrived_secs: f64,
+    sample: Sample,
+}
+
 /// Everything but the window.
 pub struct Studio {
     now: Now,
@@ -98,7 +107,7 @@ pub struct Studio {
     /// The view that [`Studio::last`] was drawn in, while nothing has changed since.
     drawn: Option<super::views::View>,
     /// A shown frame whose display has yet to be told of.
-    pending: Option<Sample>,
+    pending: Option<Pending>,
     /// What is shown while it lasts.
     previewed: Option<Edit>,
     /// Renderers that drew, one after the other: a new one has another picture.
@@ -106,15 +115,20 @@ pub struct Studio {
 }
 
 impl Studio {
-    /// Begins to open the camera and to draw. `wake` is called from other threads when there is something to do. What
+    /// Begins to open the camera and to draw, by the clock `now`. `wake` is called from other threads when there is something to do. What
     /// the keys record goes into the folder `out`. A recording begins again at its end if it `repeats`.
-    pub fn open(opening: Opening, gpu: Arc<Gpu>, out: &Path, repeats: bool, wake: Wake) -> Self {
+    pub fn open(
+        opening: Opening,
+        gpu: Arc<Gpu>,
+        out: &Path,
+        repeats: bool,
+        (now, wake): (Now, Wake),
+    ) -> Self {
         let Opening {
             document,
             camera,
             input,
         } = opening;
-        let now: Now = Arc::new(Stopwatch::clock());
         let scene = document.as_ref().map(|document| document.scene().clone());
         let pipeline = Pipeline::start(
             &Input {
@@ -178,7 +192,11 @@ impl Studio {
             self.drawn = None;
             self.renderers += 1;
         }
-        if let Taken::New(picture) = self.pipeline.tracked().take_within(std::time::Duration::ZERO) {
+        if let Taken::New(picture) = self
+            .pipeline
+            .tracked()
+            .take_within(std::time::Duration::ZERO)
+        {
             self.recorders.add_poses(&picture);
             self.notices.tracking.clone_from(&picture.trouble);
             self.last = Some(picture);
@@ -198,7 +216,8 @@ impl Studio {
             return Ok(());
         };
         let size_before = self.canvas.renderer().map(|(_, size_px)| size_px);
-        let (drawn, draw_ms) = Stopwatch::time(|| self.canvas.draw(picture, look.view));
+        let begun_secs = (self.now)();
+        let drawn = self.canvas.draw(picture, look.view);
         drawn.with_context(|| format!("frame {}", picture.frame.index))?;
         let size_px = self.canvas.renderer().map(|(_, size_px)| size_px);
         if size_px != size_before {
@@ -206,12 +225,14 @@ impl Studio {
         }
         self.drawn = Some(look.view);
         if is_new {
-            self.pending = Some(Sample {
-                shown_secs: picture.arrived_secs,
-                wait_ms: picture.wait_ms,
-                track_ms: picture.track_ms,
-                draw_ms,
-                latency_ms: 0.0,
+            self.pending = Some(Pending {
+                begun_secs,
+                arrived_secs: picture.arrived_secs,
+                sample: Sample {
+                    wait_ms: picture.wait_ms,
+                    track_ms: picture.track_ms,
+                    ..Sample::default()
+                },
             });
             if let (true, Some((renderer, size_px))) =
                 (self.recorders.records_video(), self.canvas.renderer())
@@ -223,17 +244,31 @@ impl Studio {
         Ok(())
     }
 
-    /// The frame that was drawn last has been on the screen since `shown_secs`; its drawing and the window around it
-    /// took `draw_ms` together, where that is known.
-    pub fn was_shown(&mut self, shown_secs: f64, draw_ms: Option<f64>) {
-        if let Some(sample) = self.pending.take() {
-            self.meters.push(Sample {
-                shown_secs,
-                draw_ms: draw_ms.unwrap_or(sample.draw_ms),
-                latency_ms: (shown_secs - sample.shown_secs) * 1e3,
-                ..sample
-            });
-        }
+    /// The frame that was drawn last is on the screen: handed over at `handed_over_secs`, or when the GPU is done with
+    /// it, whichever is later.
+    ///
+    /// # Errors
+    /// The GPU failed.
+    pub fn was_shown(&mut self, handed_over_secs: f64) -> Result<()> {
+        let (Some(pending), Some((renderer, _))) = (self.pending.take(), self.canvas.renderer())
+        else {
+            return Ok(());
+        };
+        let ((), waited_ms) = {
+            let (waited, ms) = Stopwatch::time(|| renderer.wait());
+            (waited?, ms)
+        };
+        let shown_secs = match waited_ms > INSTANT_MS {
+            true => (self.now)(),
+            false => handed_over_secs,
+        };
+        self.meters.push(Sample {
+            shown_secs,
+            draw_ms: (shown_secs - pending.begun_secs) * 1e3,
+            latency_ms: (shown_secs - pending.arrived_secs) * 1e3,
+            ..pending.sample
+        });
+        Ok(())
     }
 
     /// What the program's clock shows, seconds.
@@ -324,7 +359,8 @@ impl Studio {
             Wish::Demonstrate { id, size_m } => self.demonstrate(id, size_m),
             Wish::Save(path) => self.save(&path),
             Wish::ToggleSelected => {
-                if let (Some(Selected::Thing(thing)), Some(scene)) = (&look.selected, self.scene()) {
+                if let (Some(Selected::Thing(thing)), Some(scene)) = (&look.selected, self.scene())
+                {
                     let mut things = scene.phantoms.iter().chain(&scene.virtuals);
                     let found = things.find(|found| found.name == *thing);
                     if let Some(visible) = found.map(|found| !found.visible) {
@@ -455,7 +491,9 @@ impl Studio {
             fps: self.fps,
             calibration: self.calibration,
             scene: self.document.as_ref().map(|d| d.path().to_owned()),
-            anchors: self.scene().map_or(Vec::new(), |scene| scene.anchors.clone()),
+            anchors: self
+                .scene()
+                .map_or(Vec::new(), |scene| scene.anchors.clone()),
         };
         let said = self.recorders.toggle_session(&self.pipeline, head);
         self.say(said);
@@ -515,5 +553,6 @@ fn plan_of(document: Option<&SceneDocument>) -> Plan {
 }
 
 fn same_camera(a: &CameraSettings, b: &CameraSettings) -> bool {
-    (&a.source, &a.calibration, a.mirror, a.wanted) == (&b.source, &b.calibration, b.mirror, b.wanted)
+    (&a.source, &a.calibration, a.mirror, a.wanted)
+        == (&b.source, &b.calibration, b.mirror, b.wanted)
 }

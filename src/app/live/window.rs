@@ -5,10 +5,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use eframe::egui::{
-    Align2, Area, CentralPanel, Color32, Context, FontId, Frame, Grid, Id, PointerButton,
-    Pos2, Rect, Response, RichText, Sense, Ui, Vec2, ViewportCommand,
+    Align2, Area, CentralPanel, Color32, Context, FontId, Frame, Grid, Id, PointerButton, Pos2,
+    Rect, Response, RichText, Sense, Ui, Vec2, ViewportCommand,
 };
 
+use super::event_loop::PassEnd;
 use super::fit::Fit;
 use super::gizmo::{Drag, Gizmo, Target};
 use super::keys::bindings;
@@ -32,6 +33,16 @@ const RECORDING: Color32 = Color32::from_rgb(235, 60, 50);
 /// What ended the window before a person did.
 pub type Failure = Arc<Mutex<Option<anyhow::Error>>>;
 
+/// What the window and whoever opened it share.
+pub struct Shared {
+    /// Closes the window.
+    pub stop: Arc<AtomicBool>,
+    /// What goes wrong.
+    pub failure: Failure,
+    /// When the last pass ended.
+    pub pass_end: PassEnd,
+}
+
 /// The window's state.
 pub struct Window {
     studio: Studio,
@@ -41,33 +52,22 @@ pub struct Window {
     shadow_lines: ShadowLines,
     drag: Option<Drag>,
     adapter: String,
-    stop: Arc<AtomicBool>,
-    failure: Failure,
-    /// When the pass began that showed the last frame, by the studio's clock.
-    begun_secs: f64,
+    shared: Shared,
     full_screen: bool,
 }
 
 impl Window {
-    /// A window on a studio; `stop` closes it, and what goes wrong is left in `failure`.
-    pub fn new(
-        studio: Studio,
-        screen: Screen,
-        adapter: String,
-        stop: Arc<AtomicBool>,
-        failure: Failure,
-    ) -> Self {
+    /// A window on a studio.
+    pub fn new(studio: Studio, screen: Screen, adapter: String, shared: Shared) -> Self {
         Self {
             studio,
             screen,
             adapter,
-            stop,
-            failure,
+            shared,
             look: Look::new(),
             panel: Panel::default(),
             shadow_lines: ShadowLines::default(),
             drag: None,
-            begun_secs: 0.0,
             full_screen: false,
         }
     }
@@ -246,9 +246,12 @@ impl Window {
             .interactable(false)
             .show(ctx, |ui| {
                 ui.set_max_width((area.width() - 20.0).clamp(60.0, 620.0));
-                for (recording, what) in [(session, "session"), (video, "composite")] {
+                for (recording, what) in [(session, "the camera"), (video, "the composite")] {
                     if recording {
-                        boxed(ui, RichText::new(format!("● recording {what}")).color(RECORDING));
+                        boxed(
+                            ui,
+                            RichText::new(format!("recording {what}")).color(RECORDING),
+                        );
                     }
                 }
                 for (weight, text) in shown {
@@ -272,13 +275,16 @@ impl Window {
             .resizable(false)
             .anchor(Align2::CENTER_CENTER, Vec2::ZERO)
             .show(ctx, |ui| {
-                Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
-                    for binding in bindings() {
-                        ui.strong(binding.name);
-                        ui.label(binding.does);
-                        ui.end_row();
-                    }
-                });
+                Grid::new("keys")
+                    .num_columns(2)
+                    .striped(true)
+                    .show(ui, |ui| {
+                        for binding in bindings() {
+                            ui.strong(binding.name);
+                            ui.label(binding.does);
+                            ui.end_row();
+                        }
+                    });
                 ui.weak("Click a thing in the picture to select it, drag its handles to move it.");
             });
         self.look.keys = open;
@@ -308,30 +314,24 @@ fn pressed(ctx: &Context) -> Vec<Wish> {
 impl eframe::App for Window {
     fn logic(&mut self, ctx: &Context, _: &mut eframe::Frame) {
         ctx.request_repaint_after(PULSE);
-        if self.stop.load(Ordering::Relaxed) {
+        if self.shared.stop.load(Ordering::Relaxed) {
             ctx.send_viewport_cmd(ViewportCommand::Close);
         }
-        if let Err(error) = self.studio.step(&self.look) {
-            let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
-            failure.get_or_insert(error);
+        let shown = self.studio.was_shown(self.shared.pass_end.secs());
+        if let Err(error) = shown.and_then(|()| self.studio.step(&self.look)) {
+            self.shared.fail(error);
             ctx.send_viewport_cmd(ViewportCommand::Close);
         }
     }
 
-    fn ui(&mut self, ui: &mut Ui, frame: &mut eframe::Frame) {
+    fn ui(&mut self, ui: &mut Ui, _: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
-        // Of the pass before, which ended when its picture was on the screen.
-        if let Some(took_secs) = frame.info().cpu_usage.map(f64::from) {
-            let shown_secs = self.begun_secs + took_secs;
-            self.studio.was_shown(shown_secs, Some(took_secs * 1e3));
-        }
-        self.begun_secs = self.studio.now_secs();
         let mut wishes = pressed(&ctx);
         if self.look.panel {
             wishes.extend(self.side_panel(ui));
         }
         let area = CentralPanel::default()
-            .frame(Frame::new().fill(Color32::BLACK))
+            .frame(Frame::NONE)
             .show(ui, |ui| {
                 wishes.extend(self.picture(ui));
                 ui.max_rect()
@@ -344,19 +344,27 @@ impl eframe::App for Window {
         self.fulfil(&ctx, wishes);
     }
 
+    fn clear_color(&self, _: &eframe::egui::Visuals) -> [f32; 4] {
+        Color32::BLACK.to_normalized_gamma_f32()
+    }
+
     fn on_exit(&mut self) {
         for said in self.studio.finish() {
             match said {
                 Ok(text) => eprintln!("{text}"),
-                Err(error) => {
-                    let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
-                    failure.get_or_insert(error.into());
-                }
+                Err(error) => self.shared.fail(error.into()),
             }
         }
         if let CameraState::Failed(why) = &self.studio.notices.camera {
-            let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
-            failure.get_or_insert(anyhow::anyhow!("{why}"));
+            self.shared.fail(anyhow::anyhow!("{why}"));
         }
+    }
+}
+
+impl Shared {
+    /// The first thing that goes wrong is the one that is told.
+    fn fail(&self, error: anyhow::Error) {
+        let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
+        failure.get_or_insert(error);
     }
 }

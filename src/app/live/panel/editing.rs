@@ -1,6 +1,6 @@
 //! Fields that change the scene: shown while they are dragged, made when they are let go.
 
-use eframe::egui::{DragValue, Ui};
+use eframe::egui::{DragValue, Response, Ui};
 use glam::DVec3;
 
 use crate::app::authoring::Edit;
@@ -38,33 +38,32 @@ fn is_held(ui: &Ui) -> bool {
     ui.input(|input| input.pointer.any_down())
 }
 
-/// A number that is taken when it is written out, or as it is dragged; whether it has changed.
-pub fn number(ui: &mut Ui, value: &mut f64, speed: f64, unit: &str) -> bool {
-    let field = DragValue::new(value)
-        .speed(speed)
-        .max_decimals(4)
-        .suffix(unit)
-        .update_while_editing(false);
-    ui.add(field).changed()
+/// A number with its name, that is taken when it is written out, or as it is dragged; whether it has changed.
+pub fn number(ui: &mut Ui, name: &str, value: &mut f64, speed: f64, unit: &str) -> bool {
+    ui.horizontal(|ui| {
+        let field = field(ui, value, speed, unit);
+        let label = ui.label(name);
+        field.labelled_by(label.id).changed()
+    })
+    .inner
 }
 
 /// Three numbers in a row.
 pub fn vector(ui: &mut Ui, name: &str, value: &mut DVec3, speed: f64, unit: &str) -> bool {
     ui.horizontal(|ui| {
-        let mut changed = false;
-        for component in value.as_mut() {
-            changed |= number(ui, component, speed, unit);
-        }
-        ui.label(name);
-        changed
+        let [x, y, z] = value.as_mut();
+        let fields = [x, y, z].map(|component| field(ui, component, speed, unit));
+        let label = ui.label(name);
+        fields
+            .map(|field| field.labelled_by(label.id).changed())
+            .contains(&true)
     })
     .inner
 }
 
 /// A power of light as its strength and its colour; whether it has changed.
 pub fn power(ui: &mut Ui, name: &str, value: &mut DVec3) -> bool {
-    let strength_before = value.max_element();
-    let mut strength = strength_before;
+    let mut strength = value.max_element();
     let mut colour = match strength > 0.0 {
         true => (*value / strength).as_vec3().to_array(),
         false => [1.0; 3],
@@ -72,19 +71,27 @@ pub fn power(ui: &mut Ui, name: &str, value: &mut DVec3) -> bool {
     let changed = ui
         .horizontal(|ui| {
             let speed = 0.01 * strength.max(0.01);
-            let field = DragValue::new(&mut strength)
-                .speed(speed)
-                .range(0.0..=1e9)
-                .max_decimals(4)
-                .update_while_editing(false);
-            let by_strength = ui.add(field).changed();
-            let by_colour = ui.color_edit_button_rgb(&mut colour).changed();
-            ui.label(name);
-            by_strength || by_colour
+            let strength = field(ui, &mut strength, speed, "");
+            let colour = ui.color_edit_button_rgb(&mut colour);
+            let label = ui.label(name);
+            let fields = [strength, colour];
+            fields
+                .map(|field| field.labelled_by(label.id).changed())
+                .contains(&true)
         })
         .inner;
     if changed {
-        *value = strength * DVec3::from_array(colour.map(f64::from));
+        *value = strength.clamp(0.0, 1e9) * DVec3::from_array(colour.map(f64::from));
     }
     changed
+}
+
+fn field(ui: &mut Ui, value: &mut f64, speed: f64, unit: &str) -> Response {
+    ui.add(
+        DragValue::new(value)
+            .speed(speed)
+            .max_decimals(4)
+            .suffix(unit)
+            .update_while_editing(false),
+    )
 }

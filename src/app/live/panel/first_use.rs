@@ -58,13 +58,13 @@ impl FirstUse {
             });
         self.id = Some(id);
         ui.horizontal(|ui| {
-            ui.add(
-                DragValue::new(&mut self.size_mm)
-                    .range(1.0..=2000.0)
-                    .speed(0.5)
-                    .suffix(" mm"),
-            );
-            ui.label("side of its black square");
+            let field = DragValue::new(&mut self.size_mm)
+                .range(1.0..=2000.0)
+                .speed(0.5)
+                .suffix(" mm");
+            let field = ui.add(field);
+            let label = ui.label("side of its black square");
+            field.labelled_by(label.id);
         });
         if ui.button("Put something on it").clicked() {
             let size_m = self.size_mm * 1e-3;
@@ -76,7 +76,9 @@ impl FirstUse {
     fn offer_saving(&mut self, ui: &mut Ui, wishes: &mut Vec<Wish>) {
         ui.heading("This scene is not saved");
         ui.horizontal(|ui| {
-            ui.text_edit_singleline(&mut self.save_as);
+            let label = ui.label("as");
+            ui.text_edit_singleline(&mut self.save_as)
+                .labelled_by(label.id);
             let named = !self.save_as.trim().is_empty();
             let button = eframe::egui::Button::new("Save");
             if ui.add_enabled(named, button).clicked() {

@@ -61,7 +61,8 @@ pub fn show(
                     power(ui, "W/m²", irradiance) || turned
                 }
             };
-            let points_somewhere = !matches!(light, Light::Directional { direction, .. } if direction == DVec3::ZERO);
+            let points_somewhere =
+                !matches!(light, Light::Directional { direction, .. } if direction == DVec3::ZERO);
             if changed && points_somewhere {
                 editing.changed(ui, Edit::Light { index, light }, wishes);
             }

@@ -66,22 +66,21 @@ impl Panel {
                 self.first_use.show(ui, facts, &mut wishes);
                 recording(ui, facts, &mut wishes);
                 section(ui, "Tracking", true, |ui| tracking::show(ui, facts));
-                section(ui, "Times", true, |ui| times::show(ui, facts));
+                if let Some(scene) = facts.scene {
+                    let editing = &mut self.editing;
+                    section(ui, "Things", true, |ui| {
+                        things::show(ui, (scene, facts.placement), look, editing, &mut wishes);
+                    });
+                    section(ui, "Lights", true, |ui| {
+                        lights::show(ui, scene, look, editing, &mut wishes);
+                    });
+                    section(ui, "Shadows", false, |ui| {
+                        shadows::show(ui, scene, editing, &mut wishes);
+                    });
+                    history(ui, facts, &mut wishes);
+                }
                 section(ui, "View", false, |ui| view(ui, look, &mut wishes));
-                let Some(scene) = facts.scene else {
-                    return;
-                };
-                let editing = &mut self.editing;
-                section(ui, "Shadows", false, |ui| {
-                    shadows::show(ui, scene, editing, &mut wishes);
-                });
-                section(ui, "Lights", true, |ui| {
-                    lights::show(ui, scene, look, editing, &mut wishes);
-                });
-                section(ui, "Things", true, |ui| {
-                    things::show(ui, (scene, facts.placement), look, editing, &mut wishes);
-                });
-                history(ui, facts, &mut wishes);
+                section(ui, "Times", true, |ui| times::show(ui, facts));
             });
         self.editing.settle(ui, &mut wishes);
         wishes
@@ -104,7 +103,11 @@ fn recording(ui: &mut Ui, facts: &Facts<'_>, wishes: &mut Vec<Wish>) {
             }
         };
         button("Picture", "save it as it is shown (S)", Wish::Screenshot);
-        let text = if session { "End session" } else { "Record session" };
+        let text = if session {
+            "End session"
+        } else {
+            "Record session"
+        };
         button(text, "the camera, for replay (R)", Wish::ToggleSession);
         let text = if video { "End video" } else { "Record video" };
         button(text, "the composite (V)", Wish::ToggleVideo);
@@ -128,7 +131,6 @@ fn view(ui: &mut Ui, look: &Look, wishes: &mut Vec<Wish>) {
 }
 
 fn history(ui: &mut Ui, facts: &Facts<'_>, wishes: &mut Vec<Wish>) {
-    ui.separator();
     if let (Some(path), false) = (facts.path, facts.unsaved) {
         ui.weak(format!("Edits are written into {}.", path.display()));
     }

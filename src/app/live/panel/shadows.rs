@@ -29,17 +29,15 @@ pub fn show(ui: &mut Ui, scene: &Scene, editing: &mut Editing, wishes: &mut Vec<
         ui.label("samples per pixel");
     });
     choice(ui, "counting", &mut shadows.counting, &Counting::BY_NAME);
-    ui.horizontal(|ui| {
-        number(ui, &mut shadows.max_silhouette_error_px, 0.02, " px");
-        ui.label("outlines may be off by");
-    });
+    let error_px = &mut shadows.max_silhouette_error_px;
+    number(ui, "outlines may be off by", error_px, 0.02, " px");
     shadows.max_silhouette_error_px = shadows.max_silhouette_error_px.clamp(0.0, LARGEST_MOVE_PX);
     ui.horizontal(|ui| {
         let mut limited = shadows.frame_budget_ms.is_some();
         let mut budget_ms = shadows.frame_budget_ms.unwrap_or(FIRST_BUDGET_MS);
         ui.checkbox(&mut limited, "frame limit");
         if limited {
-            number(ui, &mut budget_ms, 0.1, " ms");
+            number(ui, "of drawing", &mut budget_ms, 0.1, " ms");
         }
         shadows.frame_budget_ms = limited.then_some(budget_ms.clamp(0.1, 1e6));
     });

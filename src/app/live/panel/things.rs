@@ -47,12 +47,14 @@ fn row(ui: &mut Ui, thing: &Object, can_move: bool, look: &Look, wishes: &mut Ve
         let mut visible = thing.visible;
         // The table has no key for it.
         let checkbox = eframe::egui::Checkbox::without_text(&mut visible);
-        if ui.add_enabled(can_move, checkbox).changed() {
+        let checkbox = ui.add_enabled(can_move, checkbox);
+        let name = ui.selectable_label(is_selected, &thing.name);
+        if name.clicked() && can_move {
+            wishes.push(Wish::Select((!is_selected).then_some(selected)));
+        }
+        if checkbox.labelled_by(name.id).changed() {
             let thing = thing.name.clone();
             wishes.push(Wish::Commit(Edit::Show { thing, visible }));
-        }
-        if ui.selectable_label(is_selected, &thing.name).clicked() && can_move {
-            wishes.push(Wish::Select((!is_selected).then_some(selected)));
         }
     });
 }

@@ -19,26 +19,29 @@ pub fn show(ui: &mut Ui, facts: &Facts<'_>) {
         ui.label(format!("{count} markers of tag36h11 are seen"));
         return;
     }
-    Grid::new("anchors").num_columns(4).striped(true).show(ui, |ui| {
-        for heading in ["anchor", "status", "markers", "error"] {
-            ui.weak(heading);
-        }
-        ui.end_row();
-        for (anchor, pose) in picture.anchors.iter().zip(&picture.poses) {
-            ui.label(&anchor.name);
-            let (word, colour) = status(pose);
-            let told = ui.colored_label(colour, word);
-            if let Some(why) = pose.why {
-                told.on_hover_text(why.to_string());
+    Grid::new("anchors")
+        .num_columns(4)
+        .striped(true)
+        .show(ui, |ui| {
+            for heading in ["anchor", "status", "markers", "error"] {
+                ui.weak(heading);
             }
-            ui.label(format!("{} of {}", pose.markers, anchor.markers.len()));
-            match pose.camera_from_anchor {
-                Some(_) => ui.label(format!("{:.2} px", pose.reprojection_px)),
-                None => ui.weak("–"),
-            };
             ui.end_row();
-        }
-    });
+            for (anchor, pose) in picture.anchors.iter().zip(&picture.poses) {
+                ui.label(&anchor.name);
+                let (word, colour) = status(pose);
+                let told = ui.colored_label(colour, word);
+                if let Some(why) = pose.why {
+                    told.on_hover_text(why.to_string());
+                }
+                ui.label(format!("{} of {}", pose.markers, anchor.markers.len()));
+                match pose.camera_from_anchor {
+                    Some(_) => ui.label(format!("{:.2} px", pose.reprojection_px)),
+                    None => ui.weak("–"),
+                };
+                ui.end_row();
+            }
+        });
     let worst_px = picture.poses.iter().map(|pose| pose.reprojection_px);
     if worst_px.fold(0.0, f64::max) > MOST_REPROJECTION_PX {
         ui.colored_label(

@@ -1,0 +1,104 @@
+//! An hour's worth of frames through the live pipeline, as fast as they go: memory does not grow. `make soak`.
+
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test may stop where its own files fail"
+)]
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use gnomon::app::live::look::Look;
+use gnomon::app::live::studio::{Opening, Studio};
+use gnomon::app::live::views::View;
+use gnomon::app::live::wish::Wish;
+use gnomon::app::stopwatch::Stopwatch;
+use gnomon::render::Gpu;
+
+/// An hour at 30 frames a second.
+const FRAMES: u64 = 108_000;
+/// What the parts of a program that come and go may leave, MiB.
+const MOST_GROWTH_MIB: f64 = 12.0;
+/// The clock runs so much faster that no frame is ever early.
+const HASTE: f64 = 1e5;
+
+#[test]
+#[ignore = "minutes to an hour: make soak"]
+fn an_hour_of_frames_leaves_memory_as_it_was() {
+    let wanted = std::env::var("GNOMON_SOAK_FRAMES").map_or(FRAMES, |n| n.parse().unwrap());
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("lamp.toml");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(root.join("config/lamp.toml")).unwrap();
+    let text = text
+        .replace(
+            "\"recordings/",
+            &format!("\"{}/recordings/", root.display()),
+        )
+        .replace("\"models/", &format!("\"{}/models/", root.display()));
+    std::fs::write(&path, text + "\n[shadows]\nsamples = 1\n").unwrap();
+
+    let clock = Stopwatch::clock();
+    let now = Arc::new(move || clock() * HASTE);
+    let gpu = Arc::new(Gpu::open(None).unwrap());
+    let opening = Opening::scene(&path).unwrap();
+    let mut studio = Studio::open(opening, gpu, folder.path(), true, (now, Arc::new(|| ())));
+    let mut look = Look::new();
+    let began = Instant::now();
+    let (mut shown, mut samples) = (0_u64, Vec::new());
+    while shown < wanted {
+        let is_new = studio.step(&look).unwrap();
+        let now_secs = studio.now_secs();
+        studio.was_shown(now_secs).unwrap();
+        if !is_new {
+            std::thread::yield_now();
+            continue;
+        }
+        shown += 1;
+        if shown.is_multiple_of((wanted / 50).max(1)) {
+            let resident_mib = resident_mib();
+            samples.push(resident_mib);
+            eprintln!(
+                "{shown} frames, {resident_mib:.1} MiB, {:.0} s",
+                began.elapsed().as_secs_f64()
+            );
+            // Now and then a view, a screenshot, or the scene made anew.
+            look.view = match samples.len() % 10 {
+                3 => View::StencilCount,
+                5 => View::Gain,
+                _ => View::Composite,
+            };
+            if samples.len() % 10 == 7 {
+                studio.fulfil(Wish::EndPreview, &look);
+            }
+        }
+    }
+    // By then everything has been used once.
+    let (early, late) = samples.split_at(samples.len() / 2);
+    let most = |of: &[f64]| of.iter().copied().fold(0.0, f64::max);
+    let growth_mib = most(late) - most(early);
+    let (captured, dropped) = studio.frames();
+    eprintln!(
+        "{shown} frames shown of {captured} ({dropped:?} dropped) in {:.0} s; {:.1} MiB at most in the first half, \
+         {:.1} MiB in the second: {growth_mib:+.1} MiB",
+        began.elapsed().as_secs_f64(),
+        most(early),
+        most(late)
+    );
+    assert!(
+        growth_mib < MOST_GROWTH_MIB,
+        "{growth_mib} MiB: {samples:?}"
+    );
+}
+
+/// Memory that is in use now, as Linux counts it.
+fn resident_mib() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap();
+    let line = status
+        .lines()
+        .find(|line| line.starts_with("VmRSS:"))
+        .unwrap();
+    let kib: f64 = line.split_whitespace().nth(1).unwrap().parse().unwrap();
+    kib / 1024.0
+}
