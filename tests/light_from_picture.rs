@@ -3,7 +3,7 @@
 
 mod common;
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use common::random::Random;
 use common::truth::key_frames;
@@ -187,13 +187,13 @@ fn the_lamp_is_found_from_clicks_that_are_off() {
 
 #[test]
 fn the_lamp_of_the_shared_session_is_found() {
-    let folder = Path::new("/work/shared/sessions/lamp");
+    let folder: PathBuf = common::project_file("../shared/sessions/lamp");
     if !folder.exists() {
         return;
     }
     let scene = scene("lamp");
     let intrinsics = load_calibration(&folder.join("session.json")).expect("a calibration");
-    for key in key_frames(folder, 1) {
+    for key in key_frames(&folder, 1) {
         let judged = rounds(&scene, intrinsics, &key, 1.5);
         assert_near(&format!("session {}", key.0.index), &judged);
     }
