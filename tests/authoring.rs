@@ -12,6 +12,7 @@ use glam::DVec3;
 use gnomon::app::authoring::{Edit, EditError, NewVirtual, SceneDocument, SceneNews, SceneWatch};
 use gnomon::app::stopwatch::Stopwatch;
 use gnomon::light::Light;
+use gnomon::render::Renderer;
 use gnomon::scene::{Counting, Placement, Scene, ShadowSettings, Technique};
 
 /// What is promised for the time from a saved file to its scene.
@@ -767,4 +768,32 @@ mod watch {
         fs::write(file, text.replace("0.05", "0.06")).unwrap();
         assert_eq!(changed(&watch).anchors[0].markers[0].size_m, 0.06);
     }
+}
+
+#[test]
+fn what_is_hidden_leaves_the_picture_as_if_it_were_not_there() {
+    let folder = common::project_file("recordings/lamp");
+    let intrinsics = gnomon::capture::load_calibration(&folder.join("camera.toml")).unwrap();
+    let (frame, poses) = common::truth::key_frames(&folder, 1).remove(0);
+    let whole = Scene::load(&common::project_file("config/lamp.toml")).unwrap();
+    let picture = |scene: &Scene| {
+        let mut renderer = Renderer::new(common::gpu(), scene, intrinsics).unwrap();
+        common::truth::draw(&mut renderer, &frame, &poses)
+    };
+    let mut hidden = whole.clone();
+    hidden.virtuals[0].visible = false;
+    let drawn = picture(&hidden);
+    assert_eq!(drawn.out, drawn.bare);
+    let mut hidden = whole.clone();
+    let house = whole
+        .phantoms
+        .iter()
+        .position(|thing| thing.name == "house")
+        .unwrap();
+    hidden.phantoms[house].visible = false;
+    let mut gone = whole.clone();
+    gone.phantoms.remove(house);
+    let without_house = picture(&gone).out;
+    assert_eq!(picture(&hidden).out, without_house);
+    assert_ne!(picture(&whole).out, without_house);
 }

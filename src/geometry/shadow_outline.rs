@@ -226,3 +226,89 @@ impl Standing {
         (b - a).cross(c - a).normalize_or_zero()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::camera::Intrinsics;
+    use glam::{DAffine3, DMat3, DVec2};
+
+    fn square(half_m: f64, z_m: f64) -> [[DVec3; 3]; 2] {
+        let corner = |x: f64, y: f64| DVec3::new(x * half_m, y * half_m, z_m);
+        let [a, b, c, d] =
+            [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| corner(x, y));
+        [[a, b, c], [a, c, d]]
+    }
+
+    fn slab(half_m: f64, low_m: f64, high_m: f64) -> Vec<[DVec3; 3]> {
+        let mut triangles = square(half_m, high_m).to_vec();
+        triangles.extend(square(half_m, low_m).map(|[a, b, c]| [a, c, b]));
+        let ring = |z: f64| {
+            [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+                .map(|(x, y)| DVec3::new(x * half_m, y * half_m, z))
+        };
+        let (low, high) = (ring(low_m), ring(high_m));
+        for side in 0..4 {
+            let next = (side + 1) % 4;
+            triangles.push([low[side], low[next], high[next]]);
+            triangles.push([low[side], high[next], high[side]]);
+        }
+        triangles
+    }
+
+    /// A lamp over the middle: the shadow of a square slab is the square that its upper side draws.
+    #[test]
+    fn the_outline_of_a_slab_is_a_square_of_known_size() {
+        let (half_m, high_m, lamp_m) = (0.05, 0.1, 0.5);
+        let standing = Standing::new(&[
+            (square(1.0, 0.0).to_vec(), false),
+            (slab(half_m, 0.08, high_m), true),
+        ]);
+        let light = FarLight {
+            center_m: DVec3::ZERO,
+            towards: DVec3::Z,
+            inverse_distance: 1.0 / lamp_m,
+        };
+        // From the side, below the slab: it hides nothing of its shadow but what lies behind it.
+        let eye_m = DVec3::new(0.0, -0.6, 0.6);
+        let forward = -eye_m.normalize();
+        let down = forward.cross(DVec3::X);
+        let camera_from_world = DAffine3 {
+            matrix3: DMat3::from_cols(DVec3::X, down, forward).transpose(),
+            translation: DVec3::ZERO,
+        } * DAffine3::from_translation(-eye_m);
+        let sight = Sight {
+            intrinsics: Intrinsics {
+                size_px: [640, 480],
+                focal_px: DVec2::splat(600.0),
+                center_px: DVec2::new(320.0, 240.0),
+                distortion: [0.0; 5],
+            },
+            camera_from_world,
+        };
+        let outline = standing.outline(&sight, &light, 0.002, 0.004);
+        assert!(outline.len() > 60, "{} points", outline.len());
+        let side_m = half_m * lamp_m / (lamp_m - high_m);
+        for point in &outline {
+            let place_m = point.receiver.point_m;
+            let off_m = place_m.truncate().abs().max_element() - side_m;
+            assert!(place_m.z.abs() < 1e-9 && off_m.abs() < 1e-6, "{point:?}");
+            assert!(point.into_light.dot(place_m) > 0.0 && point.into_light.z.abs() < 1e-9);
+            assert!((point.into_light.abs().max_element() - 1.0).abs() < 1e-9);
+            assert!((point.caster_m.z - high_m).abs() < 1e-12);
+            assert!(point.receiving < 2);
+        }
+        let inside = |x_m: f64| Facet {
+            point_m: DVec3::new(x_m, 0.0, 0.0),
+            normal: DVec3::Z,
+        };
+        assert!(standing.in_shadow(&inside(side_m - 1e-4), &light));
+        assert!(!standing.in_shadow(&inside(side_m + 1e-4), &light));
+        // Nothing stands between a place and a lamp that is nearer than the slab.
+        let low = FarLight {
+            inverse_distance: 1.0 / 0.05,
+            ..light
+        };
+        assert!(!standing.in_shadow(&inside(0.0), &low));
+    }
+}

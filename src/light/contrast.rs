@@ -37,6 +37,19 @@ pub struct Strengths {
 /// Fewer samples are no measurement.
 pub const LEAST_SAMPLES: usize = 8;
 
+impl ContrastSample {
+    /// The weight of what the sample says of the surroundings. What the things around a place hide of them and throw
+    /// back is known to one bounce alone: the more of that there is in the shade, the less it says.
+    fn trust(&self) -> f64 {
+        /// As much is uncertain in the open as well.
+        const FLOOR: f64 = 0.02;
+        let hidden = 1.0 - self.of_ambient_shaded.element_sum() / (3.0 * PI);
+        let thrown_back = (self.of_light_shaded * self.lit).element_sum()
+            / (self.of_light_lit * self.shaded).element_sum().max(1e-9);
+        (FLOOR + hidden.max(0.0) + thrown_back.max(0.0)).powi(-2)
+    }
+}
+
 /// The medians, over all samples, of the surroundings beside the light and then of the light itself: a stain on the
 /// table, or an edge that is not the shadow's, moves neither. Between the two places of a sample the albedo is the same,
 /// so it has no say in the first; `None` with fewer than [`LEAST_SAMPLES`].
@@ -63,12 +76,15 @@ pub fn strengths(samples: &[ContrastSample]) -> Option<Strengths> {
             .map(|rgb| rgb[channel]);
             // shaded / lit = (light_shaded + x ambient_shaded) / (light_lit + x ambient_lit), x: ambient by light.
             let slope = lit * ambient_shaded - shaded * ambient_lit;
-            (slope > 0.0).then(|| ((shaded * light_lit - lit * light_shaded) / slope).max(0.0))
+            (slope > 0.0).then(|| {
+                let beside = (shaded * light_lit - lit * light_shaded) / slope;
+                (beside.max(0.0), sample.trust())
+            })
         }))?;
         light[channel] = median(samples.iter().filter_map(|sample| {
             let unit = sample.albedo[channel] / PI
                 * (sample.of_light_lit[channel] + beside * sample.of_ambient_lit[channel]);
-            (unit > 0.0).then(|| sample.lit[channel] / unit)
+            (unit > 0.0).then(|| (sample.lit[channel] / unit, 1.0))
         }))?;
         ambient[channel] = beside * light[channel];
     }
@@ -79,7 +95,8 @@ pub fn strengths(samples: &[ContrastSample]) -> Option<Strengths> {
         let lit =
             sample.albedo / PI * (light * sample.of_light_lit + ambient * sample.of_ambient_lit);
         let seen = sample.shaded.element_sum() / sample.lit.element_sum();
-        (predicted.element_sum() / lit.element_sum() / seen - 1.0).abs()
+        let off = (predicted.element_sum() / lit.element_sum() / seen - 1.0).abs();
+        (off, sample.trust())
     }))?;
     Some(Strengths {
         light,
@@ -88,15 +105,20 @@ pub fn strengths(samples: &[ContrastSample]) -> Option<Strengths> {
     })
 }
 
-/// `None` with fewer than [`LEAST_SAMPLES`].
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.filter(|value| value.is_finite()).collect();
-    if values.len() < LEAST_SAMPLES {
+/// Of values with their weights; `None` with fewer than [`LEAST_SAMPLES`].
+fn median(weighted: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
+    let mut weighted: Vec<(f64, f64)> = weighted.filter(|(value, _)| value.is_finite()).collect();
+    if weighted.len() < LEAST_SAMPLES {
         return None;
     }
-    let middle = values.len() / 2;
-    let (_, median, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
-    Some(*median)
+    weighted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * weighted.iter().map(|(_, weight)| weight).sum::<f64>();
+    let mut sum = 0.0;
+    let reached = weighted.iter().find(|(_, weight)| {
+        sum += weight;
+        sum >= half
+    });
+    reached.map(|(value, _)| *value)
 }
 
 #[cfg(test)]
@@ -105,8 +127,9 @@ mod tests {
 
     fn sample(index: usize, light: DVec3, ambient: DVec3) -> ContrastSample {
         let share = index as f64 / 40.0;
-        let [of_light_lit, of_light_shaded] = [2.0 + share, 0.1 * share].map(DVec3::splat);
-        let [of_ambient_lit, of_ambient_shaded] = [3.0 - share, 2.8 - share].map(DVec3::splat);
+        let [of_light_lit, of_light_shaded] = [2.0 + share, 0.01 * share].map(DVec3::splat);
+        let [of_ambient_lit, of_ambient_shaded] =
+            [3.1 - 0.2 * share, 3.0 - 0.3 * share].map(DVec3::splat);
         let albedo = DVec3::new(0.8, 0.5, 0.3) * (1.0 - 0.5 * share);
         ContrastSample {
             lit: albedo / PI * (light * of_light_lit + ambient * of_ambient_lit),

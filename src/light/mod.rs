@@ -2,6 +2,7 @@
 
 pub mod bounce;
 pub mod contrast;
+pub mod probe;
 
 use std::f64::consts::PI;
 

@@ -204,15 +204,21 @@ impl<'a> Spliced<'a> {
     }
 
     /// A `[head]` or `[[head]]` with its keys, behind the last of those that are there, or else at the text's end.
-    pub fn add_table(&mut self, head: &str, siblings: &[Body], keys: &[(&str, String)]) {
-        if let Some(Body::Braced(last)) = siblings.last() {
+    pub fn add_table(&mut self, head: &str, written: Option<&Item>, keys: &[(&str, String)]) {
+        let siblings = bodies(written);
+        if let Some(Item::Value(list)) = written {
             let pairs: Vec<String> = keys
                 .iter()
                 .map(|(key, text)| format!("{key} = {text}"))
                 .collect();
-            let end = last.span().unwrap_or_default().end;
-            self.changes
-                .push((end..end, format!(", {{ {} }}", pairs.join(", "))));
+            let member = format!("{{ {} }}", pairs.join(", "));
+            match siblings.last() {
+                Some(last) => {
+                    let end = last.span().end;
+                    self.changes.push((end..end, format!(", {member}")));
+                }
+                None => self.replace(list, format!("[{member}]")),
+            }
             return;
         }
         let line_end = self.line_end;
@@ -402,7 +408,10 @@ mod tests {
             let members = bodies(document.as_table().get("a"));
             match index {
                 Some(index) => spliced.remove_table(&members, index),
-                None => spliced.add_table("[[a]]", &members, &[("x", "3".to_owned())]),
+                None => {
+                    let written = document.as_table().get("a");
+                    spliced.add_table("[[a]]", written, &[("x", "3".to_owned())]);
+                }
             }
         };
         let removed = |index| spliced(text, |d, s| list(d, s, Some(index)));
@@ -410,6 +419,8 @@ mod tests {
         assert_eq!(removed(1), "a = [ { x = 1 }, ] # both\r\n");
         let alone = spliced("a = [{ x = 1 } , ]", |d, s| list(d, s, Some(0)));
         assert_eq!(alone, "a = [ ]");
+        let first = spliced("a = [] # none\n", |d, s| list(d, s, None));
+        assert_eq!(first, "a = [{ x = 3 }] # none\n");
         assert_eq!(
             spliced(text, |d, s| list(d, s, None)),
             "a = [ { x = 1 },\n  { x = 2 }, { x = 3 }, ] # both\r\n"

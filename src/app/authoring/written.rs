@@ -40,7 +40,11 @@ pub fn with_edit(text: &str, scene: &Scene, edit: &Edit) -> Result<String, Unfit
             set_light(&mut spliced, body, old, light);
         }
         Edit::AddLight(light) => {
-            spliced.add_table("[[light]]", &tables("light"), &light_keys(light));
+            spliced.add_table(
+                "[[light]]",
+                document.as_table().get("light"),
+                &light_keys(light),
+            );
         }
         Edit::RemoveLight(index) => {
             let lights = tables("light");
@@ -55,7 +59,7 @@ pub fn with_edit(text: &str, scene: &Scene, edit: &Edit) -> Result<String, Unfit
             }
             None => {
                 let text = super::numbers::new_array(&radiance.to_array(), RATIO);
-                spliced.add_table("[ambient]", &[], &[("radiance", text)]);
+                spliced.add_table("[ambient]", None, &[("radiance", text)]);
             }
         },
         Edit::Place { thing, placement } => match thing_of(&document, thing)? {
@@ -96,7 +100,7 @@ pub fn with_edit(text: &str, scene: &Scene, edit: &Edit) -> Result<String, Unfit
                         .filter_map(|(key, text)| Some((key, text?)))
                         .collect();
                     if !keys.is_empty() {
-                        spliced.add_table("[shadows]", &[], &keys);
+                        spliced.add_table("[shadows]", None, &keys);
                     }
                 }
             }
@@ -106,7 +110,7 @@ pub fn with_edit(text: &str, scene: &Scene, edit: &Edit) -> Result<String, Unfit
         }
         Edit::AddVirtual(new) => {
             let keys = virtual_keys(new, scene);
-            spliced.add_table("[[virtual]]", &tables("virtual"), &keys);
+            spliced.add_table("[[virtual]]", document.as_table().get("virtual"), &keys);
         }
         Edit::RemoveVirtual(name) => {
             let virtuals = tables("virtual");
