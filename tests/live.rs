@@ -22,12 +22,13 @@ use gnomon::app::live::meters::Sample;
 use gnomon::app::live::pipeline::{Input, Pipeline};
 use gnomon::app::live::studio::{Opening, Studio};
 use gnomon::app::live::views::View;
-use gnomon::app::live::wish::Wish;
+use gnomon::app::live::wish::{Clicks, Wish};
 use gnomon::app::live_capture::Tapped;
 use gnomon::app::live_input::LiveInput;
 use gnomon::app::mailbox::Taken;
 use gnomon::app::stopwatch::Stopwatch;
 use gnomon::capture::{Frame, FrameSource};
+use gnomon::geometry::light_placing::{Freedom, Sight};
 use gnomon::light::Light;
 use gnomon::render::{Renderer, Shown};
 use gnomon::scene::{CameraSettings, Placement, Scene};
@@ -382,13 +383,15 @@ fn first_use_puts_something_on_a_marker_and_saves_a_scene() {
     let clock = (now as _, Arc::new(|| ()) as _);
     let mut studio = Studio::open(opening, gpu(), folder.path(), true, clock);
     let look = Look::new();
-    let sees = |studio: &Studio| studio.picture().is_some_and(|p| p.detections.len() == 6);
+    let sees = |studio: &Studio| {
+        let seen = studio.picture().map(|picture| &picture.detections);
+        seen.is_some_and(|seen| seen.iter().any(|marker| marker.id == 4))
+    };
     run_until(&mut studio, &look, "markers are seen", sees);
     assert!(studio.scene().is_none());
-    let bare = shown(&studio);
-    assert_eq!(
-        bare,
-        studio.picture().unwrap().frame.rgba,
+    let nothing = Scene::default();
+    assert!(
+        shown(&studio) == drawn_afresh(&studio, &nothing),
         "the video alone"
     );
 
@@ -417,6 +420,69 @@ fn first_use_puts_something_on_a_marker_and_saves_a_scene() {
     assert!(!studio.is_unsaved());
     assert_eq!(Scene::load(&saved).unwrap().anchors[0].markers[0].id, 4);
     assert!(folder.path().join("torus.obj").is_file());
+}
+
+#[test]
+fn a_light_is_found_by_clicks_on_corners_and_their_shadows() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = lamp_in(folder.path());
+    let text = std::fs::read_to_string(&path).unwrap();
+    // Nobody knows yet where the lamp is.
+    let true_m = DVec3::new(-0.26, 0.24, 0.46);
+    std::fs::write(
+        &path,
+        text.replace("[-0.26, 0.24, 0.46]", "[0.4, -0.1, 0.3]"),
+    )
+    .unwrap();
+    let mut studio = open(&path, folder.path(), true);
+    let mut look = Look::new();
+    let is_tracked = |studio: &Studio| {
+        let pose = studio.picture().and_then(|picture| picture.poses.first());
+        pose.is_some_and(|pose| pose.camera_from_anchor.is_some())
+    };
+    run_until(&mut studio, &look, "the world is seen", is_tracked);
+    look.holds = true;
+    let frame = studio.picture().unwrap().frame.index;
+    studio.fulfil(Wish::Clicks(Clicks::Begin), &look);
+    let picture = studio.picture().unwrap().clone();
+    let sight = Sight {
+        intrinsics: picture.intrinsics,
+        camera_from_world: picture.poses[0].camera_from_anchor.unwrap(),
+    };
+    // What a person sees: corners high up on the house, and where their shadows fall on the table.
+    let house = &studio.scene().unwrap().phantoms;
+    let house = house
+        .iter()
+        .find(|phantom| phantom.name == "house")
+        .unwrap();
+    let mut corners: Vec<DVec3> = house
+        .mesh
+        .positions
+        .iter()
+        .map(|p| house.anchor_from_object.transform_point3(p.as_dvec3()))
+        .collect();
+    corners.sort_by(|a, b| b.z.total_cmp(&a.z));
+    for corner_m in &corners[..2] {
+        let away = corner_m - true_m;
+        let shadow_m = corner_m - away * (corner_m.z / away.z);
+        for (clicked_m, off_px) in [(*corner_m, 2.0), (shadow_m, -1.0)] {
+            let pixel = sight.pixel(clicked_m).unwrap() + off_px;
+            studio.fulfil(Wish::Clicks(Clicks::At(pixel)), &look);
+        }
+    }
+    assert_eq!(studio.clicks().unwrap().pairs_px().len(), 2);
+    for _ in 0..20 {
+        step(&mut studio, &look);
+    }
+    assert_eq!(studio.picture().unwrap().frame.index, frame, "it is held");
+    studio.fulfil(Wish::Clicks(Clicks::Find(Freedom::Point)), &look);
+    assert!(studio.clicks().is_none(), "{:?}", studio.notices);
+    let written = Scene::load(&path).unwrap();
+    let Light::Point { position_m, .. } = written.lights[0] else {
+        panic!("a lamp");
+    };
+    let off_m = position_m.distance(true_m);
+    assert!(off_m < 0.03, "{position_m} is {off_m} m off");
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The panel of the live window, driven as a person does: what is clicked and dragged becomes what is wished for.
 
+use eframe::egui::accesskit::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use gnomon::app::authoring::Edit;
@@ -7,7 +8,7 @@ use gnomon::app::live::look::Look;
 use gnomon::app::live::meters::Meters;
 use gnomon::app::live::panel::{Facts, Panel};
 use gnomon::app::live::views::View;
-use gnomon::app::live::wish::{Overlay, Selected, Wish};
+use gnomon::app::live::wish::{Clicks, Overlay, Selected, Wish};
 use gnomon::light::Light;
 use gnomon::scene::{Placement, Scene};
 
@@ -48,6 +49,7 @@ fn desk(scene: Option<Scene>, selected: Option<Selected>) -> Harness<'static, De
                     camera: "a camera",
                     adapter: "an adapter",
                     records: [false, true],
+                    clicks: None,
                 };
                 let wishes = desk.panel.show(ui, &facts, &desk.look);
                 desk.wishes.extend(wishes);
@@ -65,7 +67,11 @@ fn lamp() -> Scene {
 fn clicked(harness: &mut Harness<'_, Desk>, label: &str) -> Vec<Wish> {
     harness.run();
     harness.state_mut().wishes.clear();
-    harness.get_by_label(label).click();
+    // A field that is named by a button has the same label.
+    let button = harness.query_by_role_and_label(Role::Button, label);
+    button
+        .unwrap_or_else(|| harness.get_by_label(label))
+        .click();
     harness.run();
     std::mem::take(&mut harness.state_mut().wishes)
 }
@@ -98,6 +104,10 @@ fn buttons_wish_for_what_they_say() {
     assert_eq!(
         clicked(&mut harness, "light 0 (point)"),
         select(Selected::Light(0))
+    );
+    assert_eq!(
+        clicked(&mut harness, "Find the light in the picture"),
+        [Wish::Clicks(Clicks::Begin)]
     );
     assert_eq!(
         clicked(&mut harness, "remove"),

@@ -62,6 +62,12 @@ pub fn bindings() -> Vec<Binding> {
             Wish::ToggleVideo,
         ),
         plain(
+            Key::Space,
+            "Space",
+            "hold the picture, or let it go on",
+            Wish::ToggleHold,
+        ),
+        plain(
             Key::H,
             "H",
             "hide or show the selected thing",

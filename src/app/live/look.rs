@@ -10,6 +10,8 @@ pub struct Look {
     pub view: View,
     /// What lies over it.
     pub overlays: Vec<Overlay>,
+    /// Whether the picture is held.
+    pub holds: bool,
     /// Whether the panel is there.
     pub panel: bool,
     /// Whether the keys are listed.
@@ -26,6 +28,7 @@ impl Look {
         Self {
             view: View::Composite,
             overlays: Vec::new(),
+            holds: false,
             panel: true,
             keys: false,
             full_screen: false,
@@ -47,6 +50,7 @@ impl Look {
                     None => self.overlays.push(*overlay),
                 }
             }
+            Wish::ToggleHold => self.holds = !self.holds,
             Wish::TogglePanel => self.panel = !self.panel,
             Wish::ToggleKeys => self.keys = !self.keys,
             Wish::ToggleFullScreen => self.full_screen = !self.full_screen,
@@ -79,6 +83,7 @@ mod tests {
         for wish in [
             Wish::Show(View::Depth),
             Wish::Toggle(Overlay::Axes),
+            Wish::ToggleHold,
             Wish::TogglePanel,
             Wish::ToggleKeys,
             Wish::ToggleFullScreen,

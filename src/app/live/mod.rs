@@ -22,6 +22,7 @@ pub mod pipeline;
 mod recorders;
 mod screen;
 mod selection;
+mod shadow_clicks;
 mod shadow_lines;
 pub mod studio;
 pub mod views;

@@ -7,6 +7,7 @@ use super::eye::TrackedPicture;
 use super::fit::Fit;
 use super::gizmo::{Gizmo, Handle, Target, light_place_m};
 use super::look::Look;
+use super::shadow_clicks::ShadowClicks;
 use super::shadow_lines::ShadowLines;
 use super::views::View;
 use super::wish::Overlay;
@@ -109,6 +110,22 @@ impl Overlays<'_> {
                         .add(Shape::line(points, Stroke::new(2.0, colour)))
                 }
             }
+        }
+    }
+
+    /// Corners of real things and the shadows that were clicked.
+    pub fn clicks(&self, clicks: &ShadowClicks) {
+        let stroke = Stroke::new(2.0, LIGHT);
+        for pair in clicks.pairs_px() {
+            let [vertex, shadow] = pair.map(|pixel| self.fit.from_pixel(pixel));
+            self.painter.line_segment([vertex, shadow], stroke);
+            self.painter.circle_filled(vertex, 4.0, LIGHT);
+            self.painter.circle_stroke(shadow, 5.0, stroke);
+        }
+        if let Some(vertex) = clicks.vertex() {
+            let place = self.fit.from_pixel(vertex.pixel);
+            self.painter.circle_filled(place, 5.0, LIGHT);
+            self.label(place - Vec2::new(0.0, 16.0), &vertex.phantom, LIGHT);
         }
     }
 

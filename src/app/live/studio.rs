@@ -3,6 +3,7 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
 use anyhow::{Context as _, Result};
 
@@ -14,7 +15,8 @@ use super::meters::{Meters, Sample};
 use super::notices::{CameraState, Notices, Weight};
 use super::pipeline::{Input, Pipeline, Wake};
 use super::recorders::Recorders;
-use super::wish::{Overlay, Selected, Wish};
+use super::shadow_clicks::{self, ShadowClicks};
+use super::wish::{Clicks, Overlay, Selected, Wish};
 use crate::app::authoring::{Edit, SceneDocument, SceneNews, SceneWatch};
 use crate::app::live_capture::CaptureEvent;
 use crate::app::live_input::LiveInput;
@@ -108,6 +110,8 @@ pub struct Studio {
     drawn: Option<super::views::View>,
     /// A shown frame whose display has yet to be told of.
     pending: Option<Pending>,
+    /// A light is being found in the picture, which is held meanwhile.
+    clicks: Option<ShadowClicks>,
     /// What is shown while it lasts.
     previewed: Option<Edit>,
     /// Renderers that drew, one after the other: a new one has another picture.
@@ -151,6 +155,7 @@ impl Studio {
             last: None,
             drawn: None,
             pending: None,
+            clicks: None,
             previewed: None,
             renderers: 0,
             calibration: input.calibration,
@@ -192,10 +197,9 @@ impl Studio {
             self.drawn = None;
             self.renderers += 1;
         }
-        if let Taken::New(picture) = self
-            .pipeline
-            .tracked()
-            .take_within(std::time::Duration::ZERO)
+        let is_held = self.last.is_some() && (look.holds || self.clicks.is_some());
+        if let (false, Taken::New(picture)) =
+            (is_held, self.pipeline.tracked().take_within(Duration::ZERO))
         {
             self.recorders.add_poses(&picture);
             self.notices.tracking.clone_from(&picture.trouble);
@@ -324,6 +328,11 @@ impl Studio {
         (self.pipeline.captured(), self.pipeline.dropped())
     }
 
+    /// The clicks by which a light is being found.
+    pub fn clicks(&self) -> Option<&ShadowClicks> {
+        self.clicks.as_ref()
+    }
+
     /// Whether a session and a video are being recorded.
     pub fn records(&self) -> [bool; 2] {
         [
@@ -356,6 +365,7 @@ impl Studio {
                 let said = self.recorders.toggle_video(size_px, fps);
                 self.say(said);
             }
+            Wish::Clicks(clicks) => self.take_clicks(clicks, look),
             Wish::Demonstrate { id, size_m } => self.demonstrate(id, size_m),
             Wish::Save(path) => self.save(&path),
             Wish::ToggleSelected => {
@@ -380,6 +390,7 @@ impl Studio {
             | Wish::Toggle(_)
             | Wish::TogglePanel
             | Wish::ToggleKeys
+            | Wish::ToggleHold
             | Wish::ToggleFullScreen
             | Wish::Escape
             | Wish::Quit => {}
@@ -469,6 +480,43 @@ impl Studio {
     fn watch_files(&mut self) {
         let wake = Arc::clone(&self.wake);
         self.watch = self.document.as_ref().map(|d| d.watch(move || wake()));
+    }
+
+    fn take_clicks(&mut self, step: Clicks, look: &Look) {
+        let (Some(document), Some(picture)) = (&self.document, &self.last) else {
+            return self.tell(Weight::Trouble, "There is no picture of the scene yet.");
+        };
+        match (step, &mut self.clicks) {
+            (Clicks::Begin, clicks) => {
+                *clicks = ShadowClicks::begin(document.scene(), picture);
+                if clicks.is_none() {
+                    self.tell(Weight::Trouble, "The world's markers are not seen.");
+                }
+            }
+            (Clicks::At(pixel), Some(clicks)) => {
+                if let Err(why) = clicks.click(pixel) {
+                    self.tell(Weight::Trouble, why);
+                }
+            }
+            (Clicks::TakeBack, Some(clicks)) => clicks.take_back(),
+            (Clicks::Cancel, clicks) => *clicks = None,
+            (Clicks::Find(freedom), Some(clicks)) => match clicks.find(picture, freedom) {
+                Ok(found) => {
+                    let index = match look.selected {
+                        Some(Selected::Light(index)) => index,
+                        _ => 0,
+                    };
+                    let edits = shadow_clicks::edits(document.scene(), index, &found);
+                    self.clicks = None;
+                    for edit in edits {
+                        self.commit(&edit);
+                    }
+                    self.tell(Weight::Done, shadow_clicks::in_words(&found));
+                }
+                Err(why) => self.tell(Weight::Trouble, why),
+            },
+            (_, None) => {}
+        }
     }
 
     fn screenshot(&mut self) {

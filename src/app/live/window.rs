@@ -21,7 +21,7 @@ use super::screen::Screen;
 use super::selection::selected_at;
 use super::shadow_lines::ShadowLines;
 use super::studio::Studio;
-use super::wish::{Overlay, Selected, Wish};
+use super::wish::{Clicks, Overlay, Selected, Wish};
 use crate::geometry::light_placing::Sight;
 
 /// The window looks at the world at least this often, even when no frame comes.
@@ -117,6 +117,9 @@ impl Window {
             camera: &camera,
             adapter,
             records: studio.records(),
+            clicks: studio
+                .clicks()
+                .map(|clicks| (clicks.pairs_px().len(), clicks.vertex().is_some())),
         };
         let panel = &mut self.panel;
         eframe::egui::Panel::right("panel")
@@ -152,7 +155,9 @@ impl Window {
         if scene.is_none() {
             overlays.markers();
         }
-        if let Some((target, sight)) = self.target() {
+        if let Some(clicks) = self.studio.clicks() {
+            overlays.clicks(clicks);
+        } else if let Some((target, sight)) = self.target() {
             overlays.handles(&target, &sight);
         }
         wishes
@@ -164,6 +169,11 @@ impl Window {
             return Vec::new();
         };
         let pixel = fit.pixel(pointer);
+        if self.studio.clicks().is_some() {
+            let clicked = response.clicked();
+            let wish = clicked.then_some(Wish::Clicks(Clicks::At(pixel)));
+            return wish.into_iter().collect();
+        }
         let left = PointerButton::Primary;
         if response.drag_started_by(left) {
             let pressed = response.ctx.input(|input| input.pointer.press_origin());

@@ -2,8 +2,11 @@
 
 use std::path::PathBuf;
 
+use glam::DVec2;
+
 use super::views::View;
 use crate::app::authoring::Edit;
+use crate::geometry::light_placing::Freedom;
 
 /// One thing that is asked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,6 +48,10 @@ pub enum Wish {
     },
     /// Save the demonstration's scene.
     Save(PathBuf),
+    /// Find a light in the picture.
+    Clicks(Clicks),
+    /// Hold the picture, or let it go on.
+    ToggleHold,
     /// Hide the selected thing, or show it again.
     ToggleSelected,
     /// Take the selected thing or light out of the scene.
@@ -53,6 +60,21 @@ pub enum Wish {
     Escape,
     /// End the program.
     Quit,
+}
+
+/// Steps on the way to a light that is found in the picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Clicks {
+    /// Hold the picture and wait for clicks.
+    Begin,
+    /// A click on a pixel of the undistorted picture.
+    At(DVec2),
+    /// Forget the last one.
+    TakeBack,
+    /// Forget all.
+    Cancel,
+    /// Find the light.
+    Find(Freedom),
 }
 
 /// What is selected.

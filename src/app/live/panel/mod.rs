@@ -2,6 +2,7 @@
 
 mod editing;
 mod first_use;
+mod light_from_picture;
 mod lights;
 mod shadows;
 mod things;
@@ -47,6 +48,8 @@ pub struct Facts<'a> {
     pub adapter: &'a str,
     /// Whether a session and a video are being recorded.
     pub records: [bool; 2],
+    /// Where a light is being found in the picture: pairs that were clicked, and whether a shadow is to be clicked next.
+    pub clicks: Option<(usize, bool)>,
 }
 
 /// What the panel itself remembers.
@@ -73,6 +76,7 @@ impl Panel {
                     });
                     section(ui, "Lights", true, |ui| {
                         lights::show(ui, scene, look, editing, &mut wishes);
+                        light_from_picture::show(ui, facts.clicks, &mut wishes);
                     });
                     section(ui, "Shadows", false, |ui| {
                         shadows::show(ui, scene, editing, &mut wishes);
