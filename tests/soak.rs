@@ -18,6 +18,8 @@ use gnomon::render::Gpu;
 
 /// An hour at 30 frames a second.
 const FRAMES: u64 = 108_000;
+/// Memory is looked at so often.
+const ROUNDS: u64 = 50;
 /// What the parts of a program that come and go may leave, MiB.
 const MOST_GROWTH_MIB: f64 = 12.0;
 /// The clock runs so much faster that no frame is ever early.
@@ -56,22 +58,22 @@ fn an_hour_of_frames_leaves_memory_as_it_was() {
             continue;
         }
         shown += 1;
-        if shown.is_multiple_of((wanted / 50).max(1)) {
+        let round = (wanted / ROUNDS).max(1);
+        // Now and then another view for a while, or the scene made anew.
+        look.view = match shown % (5 * round) {
+            0..20 => View::StencilCount,
+            20..40 => View::Gain,
+            40..60 => View::Phantoms,
+            _ => View::Composite,
+        };
+        if shown % (5 * round) == 100 {
+            studio.fulfil(Wish::EndPreview, &look);
+        }
+        if shown.is_multiple_of(round) {
             let resident_mib = resident_mib();
             samples.push(resident_mib);
-            eprintln!(
-                "{shown} frames, {resident_mib:.1} MiB, {:.0} s",
-                began.elapsed().as_secs_f64()
-            );
-            // Now and then a view, a screenshot, or the scene made anew.
-            look.view = match samples.len() % 10 {
-                3 => View::StencilCount,
-                5 => View::Gain,
-                _ => View::Composite,
-            };
-            if samples.len() % 10 == 7 {
-                studio.fulfil(Wish::EndPreview, &look);
-            }
+            let secs = began.elapsed().as_secs_f64();
+            eprintln!("{shown} frames, {resident_mib:.1} MiB, {secs:.0} s");
         }
     }
     // By then everything has been used once.

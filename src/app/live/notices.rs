@@ -1,6 +1,7 @@
 //! What the window tells: for a while, or for as long as it is so.
 
 use crate::app::live_capture::CaptureEvent;
+use crate::capture::live::{Opened, is_live};
 
 /// How long a passing notice stays, seconds.
 const STAYS_SECS: f64 = 6.0;
@@ -65,12 +66,10 @@ impl Notices {
     /// Takes what happened to the camera.
     pub fn take(&mut self, now_secs: f64, event: &CaptureEvent) {
         self.camera = match event {
-            CaptureEvent::Opened(opened) => {
-                CameraState::Open(format!("{}: {}", opened.name, opened.format))
-            }
+            CaptureEvent::Opened(opened) => CameraState::Open(in_words(opened)),
             CaptureEvent::Back(opened) => {
                 self.tell(now_secs, Weight::Done, format!("{} is back", opened.name));
-                CameraState::Open(format!("{}: {}", opened.name, opened.format))
+                CameraState::Open(in_words(opened))
             }
             CaptureEvent::Failed(error) => CameraState::Failed(error.to_string()),
             CaptureEvent::Lost(error) => CameraState::Lost(error.to_string()),
@@ -104,6 +103,15 @@ impl Notices {
             .chain(passing.map(|(_, weight, text)| (*weight, text.clone())))
             .collect()
     }
+}
+
+/// A source and its format; of a recording's path the last part.
+fn in_words(opened: &Opened) -> String {
+    let name = match is_live(&opened.name) {
+        true => &opened.name,
+        false => opened.name.rsplit('/').next().unwrap_or(&opened.name),
+    };
+    format!("{name}: {}", opened.format)
 }
 
 impl Default for Notices {

@@ -16,6 +16,7 @@ use super::notices::{CameraState, Notices, Weight};
 use super::pipeline::{Input, Pipeline, Wake};
 use super::recorders::Recorders;
 use super::shadow_clicks::{self, ShadowClicks};
+use super::views::View;
 use super::wish::{Clicks, Overlay, Selected, Wish};
 use crate::app::authoring::{Edit, SceneDocument, SceneNews, SceneWatch};
 use crate::app::live_capture::CaptureEvent;
@@ -107,7 +108,7 @@ pub struct Studio {
     fps: Option<f64>,
     last: Option<TrackedPicture>,
     /// The view that [`Studio::last`] was drawn in, while nothing has changed since.
-    drawn: Option<super::views::View>,
+    drawn: Option<View>,
     /// A shown frame whose display has yet to be told of.
     pending: Option<Pending>,
     /// A light is being found in the picture, which is held meanwhile.
@@ -207,11 +208,20 @@ impl Studio {
             self.draw(look, true)?;
             return Ok(true);
         }
-        if self.drawn != Some(look.view) && self.last.is_some() {
+        let view_is_drawn = self.drawn == Some(self.view(look));
+        if !view_is_drawn && self.last.is_some() {
             self.draw(look, false)?;
             return Ok(true);
         }
         Ok(false)
+    }
+
+    /// Virtual things would hide the shadows that are to be clicked.
+    fn view(&self, look: &Look) -> View {
+        match self.clicks {
+            Some(_) => View::Bare,
+            None => look.view,
+        }
     }
 
     /// Draws the last frame; `is_new`: for the first time.
@@ -221,13 +231,14 @@ impl Studio {
         };
         let size_before = self.canvas.renderer().map(|(_, size_px)| size_px);
         let begun_secs = (self.now)();
-        let drawn = self.canvas.draw(picture, look.view);
+        let view = self.view(look);
+        let drawn = self.canvas.draw(picture, view);
         drawn.with_context(|| format!("frame {}", picture.frame.index))?;
         let size_px = self.canvas.renderer().map(|(_, size_px)| size_px);
         if size_px != size_before {
             self.renderers += 1;
         }
-        self.drawn = Some(look.view);
+        self.drawn = Some(view);
         if is_new {
             self.pending = Some(Pending {
                 begun_secs,

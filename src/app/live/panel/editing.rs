@@ -86,7 +86,8 @@ pub fn power(ui: &mut Ui, name: &str, value: &mut DVec3) -> bool {
     changed
 }
 
-fn field(ui: &mut Ui, value: &mut f64, speed: f64, unit: &str) -> Response {
+/// A number alone.
+pub fn field(ui: &mut Ui, value: &mut f64, speed: f64, unit: &str) -> Response {
     ui.add(
         DragValue::new(value)
             .speed(speed)

@@ -68,9 +68,11 @@ impl Panel {
             .show(ui, |ui| {
                 self.first_use.show(ui, facts, &mut wishes);
                 recording(ui, facts, &mut wishes);
-                section(ui, "Tracking", true, |ui| tracking::show(ui, facts));
+                let editing = &mut self.editing;
+                section(ui, "Tracking", true, |ui| {
+                    tracking::show(ui, facts, editing, &mut wishes);
+                });
                 if let Some(scene) = facts.scene {
-                    let editing = &mut self.editing;
                     section(ui, "Things", true, |ui| {
                         things::show(ui, (scene, facts.placement), look, editing, &mut wishes);
                     });
