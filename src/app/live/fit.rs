@@ -29,7 +29,7 @@ impl Fit {
     }
 
     /// Where a pixel is in the window; an integer coordinate is the pixel's centre.
-    pub fn from_pixel(&self, pixel: DVec2) -> Pos2 {
+    pub fn place_of(&self, pixel: DVec2) -> Pos2 {
         let [x, y] = (pixel + 0.5).to_array().map(|side| side as f32);
         self.rect.min + Vec2::new(x, y) * self.points_per_px()
     }
@@ -55,7 +55,7 @@ mod tests {
             let touches_width = (fit.rect.width() - width).abs() < 1e-3;
             assert!(touches_width || (fit.rect.height() - height).abs() < 1e-3);
             let pixel = DVec2::new(12.25, 400.0);
-            assert!((fit.pixel(fit.from_pixel(pixel)) - pixel).length() < 0.05);
+            assert!((fit.pixel(fit.place_of(pixel)) - pixel).length() < 0.05);
         }
         let none = Fit::within(Rect::ZERO, [640, 480]);
         assert!(none.pixel(Pos2::ZERO).is_finite(), "a window made tiny");
@@ -65,9 +65,9 @@ mod tests {
     fn the_first_pixels_centre_is_half_a_pixel_in() {
         let area = Rect::from_min_size(Pos2::ZERO, Vec2::new(1280.0, 960.0));
         let fit = Fit::within(area, [640, 480]);
-        assert_eq!(fit.from_pixel(DVec2::ZERO), Pos2::new(1.0, 1.0));
+        assert_eq!(fit.place_of(DVec2::ZERO), Pos2::new(1.0, 1.0));
         assert_eq!(
-            fit.from_pixel(DVec2::new(639.5, 479.5)),
+            fit.place_of(DVec2::new(639.5, 479.5)),
             Pos2::new(1280.0, 960.0)
         );
     }

@@ -66,7 +66,7 @@ impl Overlays<'_> {
         for seen in &self.picture.detections {
             self.outline(&seen.corners_px, Stroke::new(2.0, SEEN));
             let middle = seen.corners_px.iter().sum::<DVec2>() / 4.0;
-            let Some(place) = self.from_distorted(middle) else {
+            let Some(place) = self.place_of_distorted(middle) else {
                 continue;
             };
             self.label(place, &seen.id.to_string(), SEEN);
@@ -78,13 +78,10 @@ impl Overlays<'_> {
         let Some(gizmo) = Gizmo::new(target, sight) else {
             return;
         };
-        let origin = self.fit.from_pixel(gizmo.origin_px());
+        let origin = self.fit.place_of(gizmo.origin_px());
         self.painter.circle_filled(origin, 3.0, GRIP);
         for (handle, line) in gizmo.handles() {
-            let points: Vec<Pos2> = line
-                .iter()
-                .map(|&pixel| self.fit.from_pixel(pixel))
-                .collect();
+            let points: Vec<Pos2> = line.iter().map(|&pixel| self.fit.place_of(pixel)).collect();
             let colour = match handle {
                 Handle::Axis(axis) => AXIS_COLOURS[axis],
                 Handle::Plane | Handle::Turn => GRIP,
@@ -117,13 +114,13 @@ impl Overlays<'_> {
     pub fn clicks(&self, clicks: &ShadowClicks) {
         let stroke = Stroke::new(2.0, LIGHT);
         for pair in clicks.pairs_px() {
-            let [vertex, shadow] = pair.map(|pixel| self.fit.from_pixel(pixel));
+            let [vertex, shadow] = pair.map(|pixel| self.fit.place_of(pixel));
             self.painter.line_segment([vertex, shadow], stroke);
             self.painter.circle_filled(vertex, 4.0, LIGHT);
             self.painter.circle_stroke(shadow, 5.0, stroke);
         }
         if let Some(vertex) = clicks.vertex() {
-            let place = self.fit.from_pixel(vertex.pixel);
+            let place = self.fit.place_of(vertex.pixel);
             self.painter.circle_filled(place, 5.0, LIGHT);
             self.label(place - Vec2::new(0.0, 16.0), &vertex.phantom, LIGHT);
         }
@@ -216,7 +213,7 @@ impl Overlays<'_> {
     }
 
     fn outline(&self, quad: &Quad, stroke: Stroke) {
-        let points: Option<Vec<Pos2>> = quad.iter().map(|&c| self.from_distorted(c)).collect();
+        let points: Option<Vec<Pos2>> = quad.iter().map(|&c| self.place_of_distorted(c)).collect();
         if let Some(points) = points {
             self.painter.add(Shape::closed_line(points, stroke));
         }
@@ -239,8 +236,8 @@ impl Overlays<'_> {
     }
 
     /// The picture is shown without distortion, markers are found with it.
-    fn from_distorted(&self, pixel: DVec2) -> Option<Pos2> {
-        undistorted_pixel(&self.picture.intrinsics, pixel).map(|pixel| self.fit.from_pixel(pixel))
+    fn place_of_distorted(&self, pixel: DVec2) -> Option<Pos2> {
+        undistorted_pixel(&self.picture.intrinsics, pixel).map(|pixel| self.fit.place_of(pixel))
     }
 
     fn place(&self, camera_from_anchor: &DAffine3, point_m: DVec3) -> Option<Pos2> {
@@ -248,6 +245,6 @@ impl Overlays<'_> {
             intrinsics: self.picture.intrinsics,
             camera_from_world: *camera_from_anchor,
         };
-        sight.pixel(point_m).map(|pixel| self.fit.from_pixel(pixel))
+        sight.pixel(point_m).map(|pixel| self.fit.place_of(pixel))
     }
 }

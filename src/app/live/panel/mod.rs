@@ -22,6 +22,9 @@ use crate::scene::{Placement, Scene};
 use editing::Editing;
 use first_use::FirstUse;
 
+/// Where a thing stands, in the numbers of the scene's file; `None` where it has none there.
+pub type Placements<'a> = dyn Fn(&str) -> Option<Placement> + 'a;
+
 /// What the panel shows.
 pub struct Facts<'a> {
     /// The scene; `None` on first use.
@@ -31,7 +34,7 @@ pub struct Facts<'a> {
     /// Whether it has yet to be saved.
     pub unsaved: bool,
     /// Where a thing stands, in the numbers of the scene's file.
-    pub placement: &'a dyn Fn(&str) -> Option<Placement>,
+    pub placement: &'a Placements<'a>,
     /// What would be taken back, and what made again.
     pub history: [Option<&'a str>; 2],
     /// The frame that is shown.

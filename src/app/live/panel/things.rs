@@ -2,6 +2,7 @@
 
 use eframe::egui::Ui;
 
+use super::Placements;
 use super::editing::{Editing, vector};
 use crate::app::authoring::Edit;
 use crate::app::live::look::Look;
@@ -16,7 +17,7 @@ const LEAST_SCALE: f64 = 1e-3;
 /// Shows them.
 pub fn show(
     ui: &mut Ui,
-    (scene, placement): (&Scene, &dyn Fn(&str) -> Option<Placement>),
+    (scene, placement): (&Scene, &Placements<'_>),
     look: &Look,
     editing: &mut Editing,
     wishes: &mut Vec<Wish>,

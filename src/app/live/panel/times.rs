@@ -9,6 +9,9 @@ use crate::app::live::meters::Sample;
 /// Height of the plot, points.
 const PLOT_HEIGHT: f32 = 120.0;
 
+/// What is measured, by its name.
+type Figure = (&'static str, fn(&Sample) -> f64);
+
 /// Shows it.
 pub fn show(ui: &mut Ui, facts: &Facts<'_>) {
     let meters = facts.meters;
@@ -16,7 +19,7 @@ pub fn show(ui: &mut Ui, facts: &Facts<'_>) {
         "{:.0} frames/s",
         meters.frames_per_sec(facts.now_secs)
     ));
-    let stages: [(&str, fn(&Sample) -> f64); 4] = [
+    let stages: [Figure; 4] = [
         ("tracking", |sample| sample.track_ms),
         ("drawing", |sample| sample.draw_ms),
         ("waiting", Sample::idle_ms),
