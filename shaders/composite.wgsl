@@ -36,11 +36,11 @@ fn change(pixel: vec2i) -> Change {
     }
     // The video's pixel is what all its light made of it: of that, and not sample by sample, a part is taken. Where a
     // virtual shadow meets a real one, the samples in the real one have less to lose, and made less of the pixel.
-    let gain = select(vec3f(1.0), max(light - taken, vec3f(0.0)) / max(light, vec3f(1e-6)), taken > vec3f(0.0));
+    let gain = select(vec3f(1.0), max(light - taken, vec3f(0.0)) / max(light, vec3f(1e-6)), taken != vec3f(0.0));
     let kept = f32(SAMPLES) - seeming;
     let weight = 1.0 / f32(SAMPLES);
-    // A surface that loses nothing keeps its picture bit for bit.
-    let touched = seeming > 0.0 || any(taken > vec3f(0.0));
+    // A surface that loses and gains nothing keeps its picture bit for bit.
+    let touched = seeming > 0.0 || any(taken != vec3f(0.0));
     return Change((gain * modelled + kept - modelled) * weight, added * weight, kept * weight, touched);
 }
 

@@ -21,8 +21,8 @@ use gnomon::app::record;
 use gnomon::app::replay::{self, replay};
 use gnomon::app::report::Report;
 use gnomon::app::track::{self, is_scene, track};
+use gnomon::calibration::{Target, TargetMarkers};
 use gnomon::scene::{CameraSettings, Family, PixelFormat, Scene, TrackingSettings, WantedFormat};
-use gnomon::tracking::calibrating::Chessboard;
 use gnomon::tracking::mapping::MapSettings;
 
 /// Virtual things on a real table, lit and shadowed as if they stood there.
@@ -56,16 +56,18 @@ enum Command {
         after_help = "Example:\n  gnomon board --from walk.mp4 --calibration camera.toml --size-mm 40 --out table.toml"
     )]
     Board(BoardArgs),
-    /// Calibrates a camera from a video or pictures of a chessboard.
+    /// Calibrates a camera from a video or pictures of a printed target.
     #[command(
-        after_help = "Example:\n  gnomon calibrate walk.mp4 --chessboard 9x6 --square-mm 25 --out camera.toml --coverage out/coverage.png"
+        after_help = "Example:\n  gnomon calibrate walk.mp4 --chessboard 9x6 --square-mm 25 --out camera.toml --coverage out/coverage.png\n  \
+                      gnomon calibrate stills/ --charuco 10x7 --square-mm 25 --marker-mm 18 --out camera.toml"
     )]
     Calibrate(CalibrateArgs),
-    /// Makes sheets of markers, or a chessboard, to print.
+    /// Makes sheets to print: markers, boards, calibration targets.
     #[command(
         after_help = "Example:\n  gnomon markers --board 3x2 --size-mm 45 --gap-mm 40 --landscape --out table.pdf\n  \
                       gnomon markers --ids 17,18 --size-mm 36 --out cards.pdf\n  \
-                      gnomon markers --chessboard 9x6 --square-mm 25 --landscape --out chessboard.pdf"
+                      gnomon markers --chessboard 9x6 --square-mm 25 --landscape --out chessboard.pdf\n  \
+                      gnomon markers --charuco 10x7 --square-mm 25 --marker-mm 18 --landscape --out charuco.pdf"
     )]
     Markers(MarkersArgs),
     /// Records a camera as a session that replay and track take up, until Ctrl-C.
@@ -192,25 +194,46 @@ struct BoardArgs {
 }
 
 #[derive(Args)]
+#[command(group = clap::ArgGroup::new("pattern").required(true).args(["chessboard", "charuco"]))]
 struct CalibrateArgs {
-    /// Video, folder of pictures or session that shows the chessboard from all around
-    source: String,
-    /// Its inner corners, where four squares meet
-    #[arg(long, value_name = "COLUMNSxROWS", value_parser = counts_of)]
-    chessboard: [u32; 2],
-    /// Side of its squares
-    #[arg(long, value_name = "MM")]
-    square_mm: f64,
+    /// Videos, pictures, folders of pictures or sessions that show the target from all around, by one camera at one size
+    #[arg(required = true)]
+    source: Vec<String>,
+    #[command(flatten)]
+    target: TargetArgs,
     /// Write the calibration (TOML)
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Write a picture of where in the picture there were corners (PNG)
+    /// Write a picture of where the corners lie, how far they are off, and where there are none (PNG)
     #[arg(long, value_name = "FILE")]
     coverage: Option<PathBuf>,
+    /// The camera mirrors its pictures: turn them back first
+    #[arg(long)]
+    mirror: bool,
+}
+
+/// What a camera is calibrated with.
+#[derive(Args)]
+struct TargetArgs {
+    /// A chessboard of so many inner corners, where four squares meet
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = counts_of, requires = "square_mm")]
+    chessboard: Option<[u32; 2]>,
+    /// A ChArUco board of so many squares, markers in the white ones; parts of it will do
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = counts_of, requires_all = ["square_mm", "marker_mm"])]
+    charuco: Option<[u32; 2]>,
+    /// Side of the target's squares
+    #[arg(long, value_name = "MM")]
+    square_mm: Option<f64>,
+    /// Side of the black squares of a ChArUco board's markers
+    #[arg(long, value_name = "MM", requires = "charuco")]
+    marker_mm: Option<f64>,
+    /// Family of a ChArUco board's markers: DICT_4X4_50, DICT_6X6_250, tag36h11, …, or a dictionary's file (.yml)
+    #[arg(long, value_name = "NAME", default_value = "DICT_5X5_100", value_parser = family_of, requires = "charuco")]
+    dictionary: Family,
 }
 
 #[derive(Args)]
-#[command(group = clap::ArgGroup::new("sheet").required(true).args(["board", "ids", "chessboard"]))]
+#[command(group = clap::ArgGroup::new("sheet").required(true).args(["board", "ids", "chessboard", "charuco"]))]
 struct MarkersArgs {
     /// The sheet: .pdf (true size), .svg or .png; what a scene file takes is written beside it as .toml
     #[arg(long, value_name = "FILE")]
@@ -221,18 +244,14 @@ struct MarkersArgs {
     /// Markers to be cut out, each on its own
     #[arg(long, value_name = "ID,…", value_delimiter = ',', requires = "size_mm")]
     ids: Option<Vec<u32>>,
-    /// A chessboard with so many inner corners, to calibrate a camera with
-    #[arg(long, value_name = "COLUMNSxROWS", value_parser = counts_of, requires = "square_mm")]
-    chessboard: Option<[u32; 2]>,
+    #[command(flatten)]
+    target: TargetArgs,
     /// Side of the markers' black squares
     #[arg(long, value_name = "MM")]
     size_mm: Option<f64>,
     /// White between the markers of a board
     #[arg(long, value_name = "MM")]
     gap_mm: Option<f64>,
-    /// Side of the chessboard's squares
-    #[arg(long, value_name = "MM")]
-    square_mm: Option<f64>,
     /// Id of the board's upper left marker; the others follow row by row
     #[arg(long, value_name = "ID", default_value = "0")]
     first_id: u32,
@@ -323,7 +342,7 @@ impl RecordingArgs {
 /// Markers that no scene describes.
 #[derive(Args)]
 struct FamilyArgs {
-    /// Family of the markers: tag16h5, tag25h9, tag36h10, tag36h11, DICT_4X4_50, …
+    /// Family of the markers: tag16h5, tag25h9, tag36h10, tag36h11, DICT_4X4_50, …, or a dictionary's file (.yml)
     #[arg(long, value_name = "NAME", default_value = "tag36h11", value_parser = family_of, requires = "size_mm")]
     family: Family,
     /// Width of the markers' black border, cells: 1, or 2 as on Kalibr's AprilGrids
@@ -347,19 +366,7 @@ fn run(cli: Cli) -> Result<()> {
         Command::Replay(args) => run_replay(args),
         Command::Track(args) => run_track(args),
         Command::Board(args) => run_board(args),
-        Command::Calibrate(args) => {
-            let request = calibrate::Request {
-                source: args.source,
-                board: Chessboard {
-                    corners: args.chessboard,
-                    square_m: args.square_mm / 1000.0,
-                },
-                out: args.out,
-                coverage: args.coverage,
-            };
-            print!("{}", calibrate::calibrate(&request, &*interrupts()?)?);
-            Ok(())
-        }
+        Command::Calibrate(args) => run_calibrate(args),
         Command::Markers(args) => run_markers(args),
         Command::Record(args) => run_record(args),
         Command::Cameras => {
@@ -425,8 +432,8 @@ fn run_markers(args: MarkersArgs) -> Result<()> {
     let family = args.family.family()?;
     // Each kind of sheet requires its sizes (`requires` above).
     let mm = |size: Option<f64>| size.unwrap_or(f64::NAN);
-    let sheet = match (args.board, args.ids, args.chessboard) {
-        (Some([columns, rows]), ..) => Sheet::Board {
+    let sheet = match (args.board, args.ids) {
+        (Some([columns, rows]), _) => Sheet::Board {
             family,
             first_id: args.first_id,
             rows,
@@ -435,19 +442,12 @@ fn run_markers(args: MarkersArgs) -> Result<()> {
             gap_mm: mm(args.gap_mm),
             name: args.name,
         },
-        (_, Some(ids), _) => Sheet::Lone {
+        (_, Some(ids)) => Sheet::Lone {
             family,
             ids,
             size_mm: mm(args.size_mm),
         },
-        (.., corners) => {
-            let [columns, rows] = corners.unwrap_or_default();
-            Sheet::Chessboard {
-                columns,
-                rows,
-                square_mm: mm(args.square_mm),
-            }
-        }
+        _ => Sheet::Target(args.target.target()?),
     };
     let written = markers::markers(&markers::Request {
         out: args.out,
@@ -464,6 +464,45 @@ fn run_markers(args: MarkersArgs) -> Result<()> {
         eprintln!("{}", path.display());
     }
     Ok(())
+}
+
+fn run_calibrate(args: CalibrateArgs) -> Result<()> {
+    let stop = interrupts()?;
+    let request = calibrate::Request {
+        sources: args.source,
+        target: args.target.target()?,
+        mirror: args.mirror,
+        out: args.out,
+        coverage: args.coverage,
+    };
+    let done = calibrate::calibrate(&request, &stop)?;
+    print!("{}", done.summary);
+    for warning in &done.warnings {
+        eprintln!("warning: {warning}");
+    }
+    if !done.notices.is_empty() {
+        bail!(
+            "a recording is damaged; its good frames were used: {}",
+            done.notices.join("; ")
+        );
+    }
+    Ok(())
+}
+
+impl TargetArgs {
+    fn target(&self) -> Result<Target> {
+        let metres = |length_mm: Option<f64>| length_mm.unwrap_or(f64::NAN) / 1000.0;
+        let square_m = metres(self.square_mm);
+        let markers = TargetMarkers {
+            family: self.dictionary,
+            size_m: metres(self.marker_mm),
+        };
+        match (self.chessboard, self.charuco) {
+            (Some(corners), _) => Ok(Target::chessboard(corners, square_m)?),
+            (_, Some(squares)) => Ok(Target::charuco(squares, square_m, markers)?),
+            (None, None) => bail!("give --chessboard or --charuco"),
+        }
+    }
 }
 
 /// Columns and rows, "9x6".
@@ -610,6 +649,9 @@ impl FamilyArgs {
 }
 
 fn family_of(name: &str) -> Result<Family, String> {
+    if Family::is_file_name(name) {
+        return Family::from_file(Path::new(name)).map_err(|error| error.to_string());
+    }
     Family::from_name(name).ok_or_else(|| {
         let known: Vec<&str> = Family::all_names().collect();
         format!("unknown family; allowed: {}", known.join(", "))

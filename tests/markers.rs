@@ -206,6 +206,143 @@ fn millimetres_are_millimetres() {
 }
 
 #[test]
+fn a_picture_says_its_resolution_and_what_it_shows() {
+    let folder = tempfile::tempdir().expect("a folder");
+    written(
+        folder.path(),
+        "markers --ids 3 --size-mm 40 --dpi 300 --out card.png",
+    );
+    let file = std::fs::File::open(folder.path().join("card.png")).expect("a file");
+    let decoder = png::Decoder::new(std::io::BufReader::new(file));
+    let mut reader = decoder.read_info().expect("a header");
+    let dims = reader.info().pixel_dims.expect("a resolution");
+    assert_eq!(
+        (dims.xppu, dims.yppu, dims.unit),
+        (11811, 11811, png::Unit::Meter)
+    );
+    let (width, height) = (reader.info().width as usize, reader.info().height as usize);
+    assert_eq!((width, height), (2480, 3508), "210 x 297 mm at 300 dpi");
+    let mut grey = vec![0; width * height];
+    reader.next_frame(&mut grey).expect("pixels");
+    // As in an SVG: two lines at the foot, which begin where the ruler does, and one below the card; capitals of 1.7 mm.
+    let px = |mm: f64| (mm * 300.0 / 25.4).round() as usize;
+    let dark = |left: f64, top: f64, right: f64, bottom: f64| {
+        (px(top)..px(bottom))
+            .flat_map(|y| (px(left)..px(right)).map(move |x| (x, y)))
+            .filter(|&(x, y)| grey[y * width + x] < 128)
+            .count()
+    };
+    let base = 297.0 - 8.0 - 4.0;
+    written(folder.path(), "markers --ids 3 --size-mm 40 --out card.svg");
+    let svg = std::fs::read_to_string(folder.path().join("card.svg")).expect("the file");
+    assert!(svg.contains("tag36h11, 40 mm; page 210 x 297 mm"), "{svg}");
+    let lines: Vec<(f64, f64)> = svg
+        .split("<text x=\"")
+        .skip(1)
+        .map(|text| {
+            let numbers: Vec<f64> = text
+                .split('"')
+                .step_by(2)
+                .take(2)
+                .map(|number| number.parse().expect("a number"))
+                .collect();
+            (numbers[0], numbers[1])
+        })
+        .collect();
+    assert_eq!(lines.len(), 3);
+    assert!(lines.iter().any(|&(_, y)| (y - base - 3.5).abs() < 1e-9));
+    for (x, y) in lines {
+        let written = dark(x, y - 1.8, x + 20.0, y);
+        let inked = written as f64 / (px(20.0) * px(1.8)) as f64;
+        assert!((0.08..0.5).contains(&inked), "{inked} at {x}, {y}");
+        assert_eq!(dark(x, y - 2.4, x + 20.0, y - 1.9), 0, "above {x}, {y}");
+    }
+}
+
+/// White and black cells of a sheet, looked at in the middle of each of `columns` x `rows` cells of a rectangle, pixels.
+fn looked_at(
+    grey: &image::GrayImage,
+    [left, top, right, bottom]: [f64; 4],
+    [columns, rows]: [usize; 2],
+) -> Vec<bool> {
+    let at = |low: f64, high: f64, k: usize, count: usize| {
+        (low + (high - low) * (k as f64 + 0.5) / count as f64) as u32
+    };
+    (0..rows)
+        .flat_map(|row| (0..columns).map(move |column| (column, row)))
+        .map(|(column, row)| {
+            let x = at(left, right, column, columns);
+            let y = at(top, bottom, row, rows);
+            grey.get_pixel(x, y).0[0] > 127
+        })
+        .collect()
+}
+
+/// OpenCV's own picture of a ChArUco board is the oracle. From 4.7 on it is in another module, with the same layout.
+#[cfg(aruco_in_contrib)]
+#[test]
+fn a_charuco_sheet_is_the_board_that_opencv_draws() {
+    use opencv::core::{Mat, Size};
+    use opencv::prelude::*;
+
+    let folder = tempfile::tempdir().expect("a folder");
+    // Even and odd numbers of rows: before 4.6 the former began with a white square. 7 or 8 cells a marker, squares of
+    // half as much again: all cells of the board are on one grid.
+    for (name, number, [columns, rows], square_mm, marker_mm) in [
+        ("DICT_5X5_100", 5, [5, 4], 28.0, 21.0),
+        ("DICT_6X6_250", 10, [6, 5], 24.0, 16.0),
+        ("DICT_4X4_50", 0, [3, 8], 24.0, 18.0),
+    ] {
+        written(
+            folder.path(),
+            &format!(
+                "markers --charuco {columns}x{rows} --square-mm {square_mm} --marker-mm {marker_mm} \
+                 --dictionary {name} --dpi 254 --out board.png"
+            ),
+        );
+        let dictionary =
+            opencv::aruco::get_predefined_dictionary_i32(number).expect("a dictionary");
+        let mut board = opencv::aruco::CharucoBoard::create(
+            columns,
+            rows,
+            square_mm as f32,
+            marker_mm as f32,
+            &dictionary,
+        )
+        .expect("a board");
+        let mut drawn = Mat::default();
+        let size = Size::new(columns * 240, rows * 240);
+        board.draw(size, &mut drawn, 0, 1).expect("a picture");
+        let drawn = image::GrayImage::from_raw(
+            size.width as u32,
+            size.height as u32,
+            drawn.data_bytes().expect("pixels").to_vec(),
+        )
+        .expect("a picture");
+        let sheet = image::open(folder.path().join("board.png"))
+            .expect("the sheet")
+            .into_luma8();
+        // In the middle of what the ruler leaves free, ten pixels a millimetre.
+        let [width, height] = [columns, rows].map(|count| f64::from(count) * square_mm * 10.0);
+        let (left, top) = (1050.0 - width / 2.0, 1405.0 - height / 2.0);
+        let cells = [columns, rows].map(|count| count as usize * 48);
+        let ours = looked_at(&sheet, [left, top, left + width, top + height], cells);
+        let theirs = looked_at(
+            &drawn,
+            [0.0, 0.0, f64::from(size.width), f64::from(size.height)],
+            cells,
+        );
+        let off = ours.iter().zip(&theirs).filter(|(a, b)| a != b).count();
+        // A point of the grid may lie on an edge of a cell, where OpenCV rounds to pixels.
+        assert!(
+            off < cells[0] * cells[1] / 100,
+            "{name}: {off} of {}",
+            cells[0] * cells[1]
+        );
+    }
+}
+
+#[test]
 fn mistakes_say_what_is_allowed_and_leave_nothing() {
     let folder = tempfile::tempdir().expect("a folder");
     for (arguments, message) in [
@@ -237,6 +374,19 @@ fn mistakes_say_what_is_allowed_and_leave_nothing() {
         (
             "--chessboard 2x2 --square-mm 25 --out x.pdf",
             "at least 3 x 3",
+        ),
+        (
+            "--charuco 12x9 --square-mm 25 --marker-mm 18 --out x.pdf",
+            "7 x 10 squares",
+        ),
+        (
+            "--charuco 5x7 --square-mm 25 --marker-mm 24 --out x.pdf",
+            "allowed: 7.5 to 22.5",
+        ),
+        ("--charuco 5x7 --square-mm 25 --out x.pdf", "--marker-mm"),
+        (
+            "--charuco 5x7 --square-mm 25 --marker-mm 18 --dictionary DICT_9X9_50 --out x.pdf",
+            "DICT_4X4_50",
         ),
         ("--out x.pdf", "--board"),
     ] {

@@ -611,17 +611,37 @@ fn photographs_of_the_aruco_tutorials_show_their_markers() {
     let Some(folder) = photographs("opencv_tutorial") else {
         return;
     };
-    let family = Family::from_name("DICT_6X6_250").expect("a dictionary");
-    let anchors = lone_markers(family, 0..250, 0.03);
-    // A mouse hides four markers of one; the boards gb* have a dictionary of their own.
-    let pictures: [(&str, Vec<u32>); 5] = [
-        ("singlemarkersoriginal", vec![23, 40, 62, 98, 124, 203]),
-        ("choriginal", (0..17).collect()),
-        ("chocclusion_original", (0..11).chain([12, 15]).collect()),
-        ("gboriginal", vec![]),
-        ("gbocclusion", vec![]),
+    let predefined = Family::from_name("DICT_6X6_250").expect("a dictionary");
+    let own = Family::from_file(&folder.join("tutorial_dict.yml")).expect("a dictionary");
+    assert_eq!(own.id_count(), 35);
+    // A mouse hides four markers of one, two of another, on which lines are drawn that cross ten more; the boards gb* have
+    // a dictionary of their own.
+    let pictures: [(&str, Family, Vec<u32>); 7] = [
+        (
+            "singlemarkersoriginal",
+            predefined,
+            vec![23, 40, 62, 98, 124, 203],
+        ),
+        ("choriginal", predefined, (0..17).collect()),
+        (
+            "chocclusion_original",
+            predefined,
+            (0..11).chain([12, 15]).collect(),
+        ),
+        ("gboriginal", predefined, vec![]),
+        ("gbocclusion", predefined, vec![]),
+        ("gboriginal", own, (0..35).collect()),
+        (
+            "gbocclusion",
+            own,
+            [7..11, 12..15, 16..20, 21..29, 30..34]
+                .into_iter()
+                .flatten()
+                .collect(),
+        ),
     ];
-    for (name, expected) in pictures {
+    for (name, family, expected) in pictures {
+        let anchors = lone_markers(family, 0..family.id_count(), 0.03);
         let frame = read_photograph(&folder.join(format!("{name}.jpg")));
         let camera = camera_of(&frame);
         let seen = seen_ids(&settings(DetectorKind::Aruco), &anchors, camera, &frame);

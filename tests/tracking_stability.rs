@@ -8,12 +8,12 @@ use glam::{DAffine3, DVec2, DVec3};
 use gnomon::capture::Frame;
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::scene::{Anchor, DetectorKind, Marker, TrackingSettings};
-use gnomon::tracking::{AnchorPose, Status, Why};
+use gnomon::tracking::{AnchorPose, Detector, Status, Why};
 
 use common::random::Random;
 use common::sheets::{
     CAMERA, FRAME_SECS, Light, WIDE_CAMERA, anchor, angle_between_deg, camera_above,
-    detector_alone, marker, photograph, settings, shift_px, sway, table, tracker, turned,
+    detector_alone, grey_of, marker, photograph, settings, shift_px, sway, table, tracker, turned,
     with_noise,
 };
 
@@ -1003,6 +1003,42 @@ fn a_double_id_beside_a_board() {
         .collect();
     let ours = beside_peers("a copy beside a board", &CAMERA, &markers, &moments);
     hold("a copy beside a board", &ours, 0.1);
+}
+
+#[test]
+fn a_marker_that_was_gone_for_long() {
+    // So small that libapriltag does not find it in a picture of half the size.
+    let card = [marker(9, 0.024, 0.0, 0.0)];
+    let markers = table();
+    let rest = camera_above(25.0, 10.0, DVec3::new(0.0, 0.0, 0.75));
+    let there = camera_above(10.0, 25.0, DVec3::new(0.03, 0.0, 0.95));
+    let alone = with_noise(&photograph(&CAMERA, &[(&markers, rest)], 0.0), 2.0, 1);
+    let sheets = [(&card[..], there), (&markers[..], rest)];
+    let both = with_noise(&photograph(&CAMERA, &sheets, 0.0), 2.0, 2);
+    let [quick, full] = [2.0, 1.0].map(|decimation| {
+        let settings = TrackingSettings {
+            decimation,
+            ..default_settings()
+        };
+        let mut detector = Detector::new(&settings, &[card[0].family]).unwrap();
+        let found = detector.detect(&grey_of(&both), both.size_px).unwrap();
+        found.iter().any(|found| found.id == 9)
+    });
+    assert!(full && !quick, "full {full}, quick {quick}");
+    // Whichever frame it comes back in, after twelve frames a second apart.
+    for frames_away in 13..16 {
+        let anchors = [anchor("table", &markers), anchor("card", &card)];
+        let mut tracker = tracker(&default_settings(), &anchors, CAMERA);
+        for k in 0..=frames_away {
+            let frame = Frame {
+                time_secs: f64::from(k.min(12)) + FRAME_SECS * f64::from((k - 12).max(0)),
+                ..if k < frames_away { &alone } else { &both }.clone()
+            };
+            let pose = &tracker.track(&frame).unwrap()[1];
+            let is_seen = matches!(pose.status, Status::Tracked | Status::Ambiguous);
+            assert_eq!(is_seen, k == frames_away, "frame {k} of {frames_away}");
+        }
+    }
 }
 
 // ---------------------------------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ use crate::geometry::levels::{Level, levels};
 use crate::geometry::mesh::MeshReport;
 use crate::geometry::outline_scale::largest_stretch;
 use crate::light::Light;
-use crate::scene::{Anchor, DetectorKind, Object, Scene, Technique};
+use crate::scene::{Anchor, DetectorKind, Object, Scene};
 
 /// A summary of a scene: aligned plain text that ends with a line break.
 pub fn summary(scene: &Scene) -> String {
@@ -66,11 +66,11 @@ pub fn summary(scene: &Scene) -> String {
         &format!("radiance {}", vector(scene.ambient_radiance)),
     );
     let (technique, reason) = scene.chosen_technique();
-    let name = match technique {
-        Technique::Volumes => "volumes",
-        Technique::Auto => "auto",
-    };
-    line(&mut text, "technique", &format!("{name}: {reason}"));
+    line(
+        &mut text,
+        "technique",
+        &format!("{}: {reason}", technique.name()),
+    );
     let budget = scene
         .shadows
         .frame_budget_ms

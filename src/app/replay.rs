@@ -13,7 +13,7 @@ use anyhow::{Context as _, Result, bail};
 use crate::capture::{Frame, FrameSource};
 use crate::geometry::camera::Intrinsics;
 use crate::render::{Gpu, Layers, Renderer, Shown};
-use crate::scene::{Scene, Technique};
+use crate::scene::Scene;
 use crate::tracking::{AnchorPose, Tracker};
 
 use super::check;
@@ -346,10 +346,7 @@ impl Run<'_> {
                 Some(path) => format!("none: poses from {}", path.display()),
                 None => detector_in_words(&self.scene.tracking),
             },
-            technique: Some(match self.scene.chosen_technique().0 {
-                Technique::Auto => "auto",
-                Technique::Volumes => "volumes",
-            }),
+            technique: Some(self.scene.chosen_technique().0.name()),
             adapter,
             stages: self.tally.log.summary(),
             total_secs,

@@ -113,6 +113,28 @@ pub(super) fn load_calibration_or_fill(
     calibration.into_intrinsics(path, size_px)
 }
 
+/// A calibration in gnomon's own format, which [`load_calibration`] reads from a `.toml` file.
+pub fn calibration_text(intrinsics: &Intrinsics) -> String {
+    /// As many decimals as any lens is known to, and some more.
+    fn list<const N: usize>(numbers: [f64; N]) -> String {
+        // Adding 0 turns -0 into 0.
+        let rounded = numbers.map(|number| ((number * 1e8).round() / 1e8 + 0.0).to_string());
+        rounded.join(", ")
+    }
+    let Intrinsics {
+        size_px: [width, height],
+        focal_px,
+        center_px,
+        distortion,
+    } = intrinsics;
+    format!(
+        "size_px = [{width}, {height}]\nfocal_px = [{}]\ncenter_px = [{}]\ndistortion = [{}]\n",
+        list(focal_px.to_array()),
+        list(center_px.to_array()),
+        list(*distortion)
+    )
+}
+
 /// What a file says, before it is known to make sense.
 struct Calibration {
     size_px: Option<[u32; 2]>,
@@ -583,6 +605,24 @@ mod tests {
                 .y,
             260.908
         );
+    }
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("camera.toml");
+        let camera = Intrinsics {
+            size_px: [1280, 720],
+            focal_px: DVec2::new(900.123_456_789, 901.0),
+            center_px: DVec2::new(639.5, -1e-12),
+            distortion: [-0.3, 1e-7, 0.0, -0.000_123_46, 0.0],
+        };
+        std::fs::write(&path, calibration_text(&camera)).unwrap();
+        let read = load_calibration(&path).unwrap();
+        assert_eq!(read.size_px, camera.size_px);
+        assert!((read.focal_px - camera.focal_px).length() < 1e-8);
+        assert!((read.center_px - camera.center_px).length() < 1e-8);
+        assert_eq!(read.distortion, camera.distortion);
     }
 
     #[test]

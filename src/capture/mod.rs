@@ -14,7 +14,9 @@ use std::path::{Path, PathBuf};
 
 use crate::geometry::camera::Intrinsics;
 
-pub use calibration::{CalibrationError, check_frame_size, load_calibration, load_calibration_for};
+pub use calibration::{
+    CalibrationError, calibration_text, check_frame_size, load_calibration, load_calibration_for,
+};
 pub use error::{CaptureError, Notice};
 
 use images::ImageFrames;

@@ -9,6 +9,7 @@
 pub mod bounds;
 pub mod camera;
 pub mod counting;
+pub mod dense;
 pub mod levels;
 pub mod light_placing;
 mod mend;

@@ -6,12 +6,12 @@
 //! then only takes from those rays what it hides ([`Gathering::irradiances`]), frame by frame.
 
 use std::f64::consts::{PI, TAU};
-use std::panic::resume_unwind;
 
 use glam::{DAffine3, DVec3, Vec3};
 
 use crate::geometry::ray_caster::RayCaster;
 
+use super::cores::on_all_cores;
 use super::{Light, irradiance};
 
 /// Rays per point where there are few points; more change no diffuse thing by a level of the display.
@@ -292,28 +292,6 @@ fn way_to(light: &Light, point: DVec3) -> (DVec3, f32) {
         Light::Point { position_m, .. } => (position_m - point, 1.0),
         Light::Directional { direction, .. } => (-direction, f32::INFINITY),
     }
-}
-
-/// Splits `0..count` among the cores; the results come in order.
-fn on_all_cores<T: Send>(
-    count: usize,
-    work: impl Fn(std::ops::Range<usize>) -> T + Sync,
-) -> Vec<T> {
-    let threads = std::thread::available_parallelism().map_or(1, |threads| threads.get());
-    let share = count.div_ceil(threads).max(1);
-    std::thread::scope(|scope| {
-        let ranges = (0..count)
-            .step_by(share)
-            .map(|first| first..count.min(first + share));
-        let work = &work;
-        let workers: Vec<_> = ranges
-            .map(|range| scope.spawn(move || work(range)))
-            .collect();
-        let join = |worker: std::thread::ScopedJoinHandle<'_, T>| {
-            worker.join().unwrap_or_else(|panic| resume_unwind(panic))
-        };
-        workers.into_iter().map(join).collect()
-    })
 }
 
 #[cfg(test)]

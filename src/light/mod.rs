@@ -2,6 +2,7 @@
 
 pub mod bounce;
 pub mod contrast;
+pub(crate) mod cores;
 pub mod probe;
 
 use std::f64::consts::PI;

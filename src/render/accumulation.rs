@@ -1,4 +1,4 @@
-//! Where several lights or samples are added up before the composite: targets and pipelines.
+//! Where light is added up before the composite: targets, and the pipelines of shadow volumes that do it.
 
 use super::background::{Background, extent};
 use super::composite::Composite;
@@ -6,10 +6,8 @@ use super::gpu::Gpu;
 use super::surfaces::{LIGHT_FORMAT, Surfaces};
 use super::volumes::Volumes;
 
-/// The targets that lights add to, and the pipelines that do it.
-pub(super) struct Accumulation {
-    pub surfaces: Surfaces,
-    pub volumes: Volumes,
+/// The targets that light is added to, and the composite that reads them.
+pub(super) struct Targets {
     pub composite: Composite,
     /// See surfaces.wgsl.
     pub reaching: wgpu::TextureView,
@@ -17,14 +15,8 @@ pub(super) struct Accumulation {
     pub depth_stencil: wgpu::TextureView,
 }
 
-impl Accumulation {
-    pub fn new(
-        gpu: &Gpu,
-        layout: &wgpu::PipelineLayout,
-        background: &Background,
-        samples: u32,
-        glossy: bool,
-    ) -> Self {
+impl Targets {
+    pub fn new(gpu: &Gpu, background: &Background, samples: u32) -> Self {
         let device = &gpu.device;
         let target = |label, format, usage| {
             device
@@ -44,14 +36,6 @@ impl Accumulation {
         let reaching = target("reaching", LIGHT_FORMAT, read);
         let change = target("change", LIGHT_FORMAT, read);
         Self {
-            surfaces: Surfaces::new(device, layout, gpu.depth_format, samples, glossy),
-            volumes: Volumes::new(
-                device,
-                layout,
-                gpu.depth_format,
-                samples,
-                &[LIGHT_FORMAT, LIGHT_FORMAT],
-            ),
             composite: Composite::new(device, samples, background, [&reaching, &change]),
             depth_stencil: target(
                 "depth and stencil",
@@ -60,6 +44,36 @@ impl Accumulation {
             ),
             reaching,
             change,
+        }
+    }
+}
+
+/// Where several lights or samples of shadow volumes are added up.
+pub(super) struct Accumulation {
+    pub surfaces: Surfaces,
+    pub volumes: Volumes,
+    pub targets: Targets,
+}
+
+impl Accumulation {
+    pub fn new(
+        gpu: &Gpu,
+        layout: &wgpu::PipelineLayout,
+        background: &Background,
+        samples: u32,
+        glossy: bool,
+    ) -> Self {
+        let device = &gpu.device;
+        Self {
+            surfaces: Surfaces::new(device, layout, gpu.depth_format, samples, glossy),
+            volumes: Volumes::new(
+                device,
+                layout,
+                gpu.depth_format,
+                samples,
+                &[LIGHT_FORMAT, LIGHT_FORMAT],
+            ),
+            targets: Targets::new(gpu, background, samples),
         }
     }
 }

@@ -100,7 +100,7 @@ pub(super) struct LevelCaster {
     pub smooth_normals: Option<Vec<[Vec3; 3]>>,
 }
 
-/// Corners of the world's virtual batch (place and unit normal) and the triangles that join them.
+/// Corners of a virtual batch (place and unit normal, in its anchor's space) and the triangles that join them.
 pub(super) type VirtualCorners = (Vec<(Vec3, Vec3)>, Vec<[u32; 3]>);
 
 /// Everything that stands on anchors.
@@ -108,7 +108,8 @@ pub(super) struct AnchorGeometry {
     pub batches: Vec<SurfaceBatch>,
     /// The real ones first.
     pub things: Vec<Thing>,
-    pub world_virtuals: VirtualCorners,
+    /// For each virtual batch its anchor and corners.
+    pub virtual_corners: Vec<(usize, VirtualCorners)>,
 }
 
 /// Coarser versions of meshes, which take long to make: each with the mesh that it is of.
@@ -133,7 +134,7 @@ impl AnchorGeometry {
         let mut geometry = Self {
             batches: Vec::new(),
             things: Vec::new(),
-            world_virtuals: Default::default(),
+            virtual_corners: Vec::new(),
         };
         for (role, objects) in [
             (Role::Real, &scene.phantoms),
@@ -159,10 +160,11 @@ impl AnchorGeometry {
                 geometry
                     .batches
                     .push(shared.batch(device, role, anchor, ambient));
-                if (role, anchor) == (Role::Virtual, 0) {
+                if role == Role::Virtual {
                     let places = shared.corners.iter();
                     let places = places.map(|corner| (corner.position, corner.normal));
-                    geometry.world_virtuals = (places.collect(), shared.triangles);
+                    let corners = (places.collect(), shared.triangles);
+                    geometry.virtual_corners.push((anchor, corners));
                 }
             }
         }

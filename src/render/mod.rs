@@ -19,6 +19,7 @@ mod layers;
 mod readback;
 mod renderer;
 mod shader;
+mod shafts;
 mod stage;
 mod stencil;
 mod surfaces;

@@ -8,9 +8,9 @@ use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
 use crate::light::Material;
-use crate::scene::{Object, Scene, ShadowSettings};
+use crate::scene::{Object, Scene, ShadowSettings, Technique};
 
-use super::accumulation::Accumulation;
+use super::accumulation::{Accumulation, Targets};
 use super::anchor_geometry::Role;
 use super::background::{Background, PICTURE_FORMAT, extent};
 use super::composite::GAIN_FORMAT;
@@ -20,6 +20,8 @@ use super::gpu::{Gpu, RenderError};
 use super::gpu_clock::{GpuClock, GpuTimes, Stretch};
 use super::layers::{LayerPasses, Layers};
 use super::readback::Readback;
+use super::shafts::Shafts;
+use super::shafts::room::prepare;
 use super::stage::Stage;
 use super::touched::Touched;
 use super::volumes::{Among, set_scissor};
@@ -37,6 +39,7 @@ pub enum Shown {
 pub struct Renderer {
     gpu: Arc<Gpu>,
     size_px: [u32; 2],
+    intrinsics: Intrinsics,
     samples: u32,
     /// Whether any material is.
     glossy: bool,
@@ -47,6 +50,8 @@ pub struct Renderer {
     direct: Option<Direct>,
     /// Otherwise; beside it for the `gain` layer alone.
     accumulation: Option<Accumulation>,
+    /// Where the light comes from a room, with the targets that it is added to.
+    shafts: Option<(Shafts, Targets)>,
     picture: wgpu::Texture,
     picture_readback: Readback,
     clock: Option<GpuClock>,
@@ -65,6 +70,7 @@ pub struct Renderer {
 /// What of a scene a renderer cannot change.
 #[derive(PartialEq)]
 struct Shape {
+    technique: Technique,
     shadows: ShadowSettings,
     lights: usize,
     ambient_radiance: DVec3,
@@ -82,6 +88,7 @@ impl Shape {
             (thing.name.clone(), thing.anchor, triangles, thing.casts)
         };
         Self {
+            technique: scene.chosen_technique().0,
             shadows: scene.shadows,
             lights: scene.lights.len(),
             ambient_radiance: scene.ambient_radiance,
@@ -122,11 +129,20 @@ impl Renderer {
             let mut materials = object.materials.iter();
             materials.any(|material| material.roughness.is_some())
         });
-        let is_direct = samples == 1 && scene.lights.len() == 1;
+        let room = match (scene.chosen_technique().0, &scene.probe) {
+            (Technique::Shafts, Some(probe)) => Some(Arc::new(prepare(scene, probe))),
+            _ => None,
+        };
+        let shafts = room.map(|room| {
+            let targets = Targets::new(&gpu, &background, samples);
+            (Shafts::new(&gpu, scene, room, &stage), targets)
+        });
+        let is_direct = samples == 1 && scene.lights.len() == 1 && shafts.is_none();
         Ok(Self {
             direct: is_direct.then(|| Direct::new(&gpu, &stage.layouts, &background, glossy)),
-            accumulation: (!is_direct)
+            accumulation: (!is_direct && shafts.is_none())
                 .then(|| Accumulation::new(&gpu, &geometry_layout, &background, samples, glossy)),
+            shafts,
             picture: device.create_texture(&wgpu::TextureDescriptor {
                 label: Some("picture"),
                 size: extent(size_px),
@@ -151,6 +167,7 @@ impl Renderer {
             stale: PixelRect::whole(size_px),
             made_for: Shape::of(scene),
             size_px,
+            intrinsics,
             samples,
             glossy,
             stage,
@@ -164,7 +181,8 @@ impl Renderer {
     /// elsewhere, are shown or hidden. Light that surroundings throw back is not gathered anew. False where more has
     /// changed: that takes a new renderer.
     pub fn follow(&mut self, scene: &Scene) -> bool {
-        let follows = self.made_for == Shape::of(scene);
+        // Shafts hold their own idea of what stands where.
+        let follows = self.shafts.is_none() && self.made_for == Shape::of(scene);
         if follows {
             self.stage.follow(&self.gpu, scene);
             self.stale = PixelRect::whole(self.size_px);
@@ -233,13 +251,21 @@ impl Renderer {
     pub fn draw(&mut self, camera_from_anchor: &[Option<DAffine3>], shown: Shown) {
         self.shown = shown;
         self.stage.place(&self.gpu, camera_from_anchor);
-        self.touched = match shown {
-            Shown::Composite => self.stage.cast_on_touched(&self.gpu),
-            Shown::Bare => None,
+        self.touched = match (shown, &mut self.shafts) {
+            (Shown::Bare, _) => None,
+            (Shown::Composite, None) => self.stage.cast_on_touched(&self.gpu),
+            (Shown::Composite, Some((shafts, _))) => {
+                let pixels =
+                    shafts.update(&self.gpu, &self.stage, camera_from_anchor, &self.intrinsics);
+                pixels.map(Touched::pixels_alone)
+            }
         };
 
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let mut drawn = Vec::new();
+        if let Some((shafts, _)) = &mut self.shafts {
+            shafts.draw_maps(&self.gpu, &mut encoder);
+        }
         if self
             .background
             .draw(&mut encoder, &self.picture, self.stale, self.clock.as_ref())
@@ -252,9 +278,21 @@ impl Renderer {
             drawn.push(Stretch::Light);
             if let Some(direct) = &self.direct {
                 self.draw_direct(&mut encoder, direct, touched);
+            } else if let Some((shafts, targets)) = &self.shafts {
+                let (stage, pixels) = (&self.stage, touched.pixels);
+                draw_shafts(
+                    &mut encoder,
+                    shafts,
+                    targets,
+                    stage,
+                    pixels,
+                    self.clock.as_ref(),
+                );
+                self.composite(&mut encoder, targets, pixels);
+                drawn.push(Stretch::Composite);
             } else if let Some(accumulation) = &self.accumulation {
                 self.accumulate(&mut encoder, accumulation, touched.pixels);
-                self.composite(&mut encoder, accumulation, touched.pixels);
+                self.composite(&mut encoder, &accumulation.targets, touched.pixels);
                 drawn.push(Stretch::Composite);
             }
         }
@@ -464,11 +502,11 @@ impl Renderer {
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("light"),
                 color_attachments: &[
-                    Some(loaded(&accumulation.reaching, load)),
-                    Some(loaded(&accumulation.change, load)),
+                    Some(loaded(&accumulation.targets.reaching, load)),
+                    Some(loaded(&accumulation.targets.change, load)),
                 ],
                 depth_stencil_attachment: Some(depth_stencil(
-                    &accumulation.depth_stencil,
+                    &accumulation.targets.depth_stencil,
                     first,
                     last,
                 )),
@@ -523,12 +561,7 @@ impl Renderer {
     }
 
     /// Video and virtual light together, where virtual things reach.
-    fn composite(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        accumulation: &Accumulation,
-        touched: PixelRect,
-    ) {
+    fn composite(&self, encoder: &mut wgpu::CommandEncoder, targets: &Targets, touched: PixelRect) {
         let picture = self.picture.create_view(&Default::default());
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("composite"),
@@ -540,8 +573,8 @@ impl Renderer {
             ..Default::default()
         });
         set_scissor(&mut pass, touched);
-        pass.set_pipeline(&accumulation.composite.composite);
-        pass.set_bind_group(0, &accumulation.composite.group, &[]);
+        pass.set_pipeline(&targets.composite.composite);
+        pass.set_bind_group(0, &targets.composite.group, &[]);
         pass.set_bind_group(2, &self.background.group, &[]);
         pass.draw(0..3, 0..1);
     }
@@ -549,19 +582,29 @@ impl Renderer {
     /// The factor that the picture's own samples put on the video.
     fn read_gain(&mut self, touched: PixelRect) -> Result<Vec<[f32; 3]>, RenderError> {
         let gpu = Arc::clone(&self.gpu);
-        let accumulation = self.accumulation.take().unwrap_or_else(|| {
-            Accumulation::new(
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        if self.shafts.is_none() && self.accumulation.is_none() {
+            self.accumulation = Some(Accumulation::new(
                 &gpu,
                 &self.geometry_layout,
                 &self.background,
                 self.samples,
                 self.glossy,
-            )
-        });
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        if self.direct.is_some() {
-            self.accumulate(&mut encoder, &accumulation, touched);
+            ));
         }
+        // Shafts leave the targets as they were drawn; the direct pass has none.
+        let targets = match (&self.shafts, &self.accumulation) {
+            (Some((_, targets)), _) => targets,
+            (None, Some(accumulation)) => {
+                if self.direct.is_some() {
+                    self.accumulate(&mut encoder, accumulation, touched);
+                }
+                &accumulation.targets
+            }
+            (None, None) => {
+                return Ok(vec![[1.0; 3]; (self.size_px[0] * self.size_px[1]) as usize]);
+            }
+        };
         let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("gain layer"),
             size: self.picture.size(),
@@ -579,18 +622,41 @@ impl Renderer {
             ..Default::default()
         });
         set_scissor(&mut pass, touched);
-        pass.set_pipeline(&accumulation.composite.gain);
-        pass.set_bind_group(0, &accumulation.composite.group, &[]);
+        pass.set_pipeline(&targets.composite.gain);
+        pass.set_bind_group(0, &targets.composite.group, &[]);
         pass.set_bind_group(2, &self.background.group, &[]);
         pass.draw(0..3, 0..1);
         drop(pass);
-        self.accumulation = Some(accumulation);
         let readback = Readback::new(&gpu.device, self.size_px, 16);
         readback.copy_from(&mut encoder, &texture);
         gpu.queue.submit([encoder.finish()]);
         let texels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&readback.read(&gpu)?);
         Ok(texels.into_iter().map(|[r, g, b, _]| [r, g, b]).collect())
     }
+}
+
+/// Gibson et al. 2003, section 7, in as few passes over the pixels as there are: one.
+fn draw_shafts(
+    encoder: &mut wgpu::CommandEncoder,
+    shafts: &Shafts,
+    targets: &Targets,
+    stage: &Stage,
+    pixels: PixelRect,
+    clock: Option<&GpuClock>,
+) {
+    let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
+    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some("shafts"),
+        color_attachments: &[
+            Some(loaded(&targets.reaching, clear)),
+            Some(loaded(&targets.change, clear)),
+        ],
+        depth_stencil_attachment: Some(depth_stencil(&targets.depth_stencil, true, true)),
+        timestamp_writes: clock.and_then(|clock| clock.pass(Stretch::Light, true, true)),
+        ..Default::default()
+    });
+    set_scissor(&mut pass, pixels);
+    shafts.draw(&mut pass, stage, pixels);
 }
 
 /// A colour target that is kept.

@@ -1,10 +1,14 @@
 //! The WGSL sources, built into the program; a line `//!include "NAME.wgsl"` stands for that file.
 
 /// What others include, each after those that it is included by.
-const INCLUDED: [(&str, &str); 4] = [
+const INCLUDED: [(&str, &str); 5] = [
     (
         "//!include \"shading.wgsl\"",
         include_str!("../../shaders/shading.wgsl"),
+    ),
+    (
+        "//!include \"source.wgsl\"",
+        include_str!("../../shaders/source.wgsl"),
     ),
     (
         "//!include \"video.wgsl\"",
@@ -27,11 +31,19 @@ pub(super) fn source(text: &str) -> String {
     })
 }
 
+fn debug_source(label: &str, text: &str) -> String {
+    let path = format!("/work/main/shaders/{}.wgsl", label.replace(' ', "_"));
+    match (label.starts_with("shaft"), std::fs::read_to_string(path)) {
+        (true, Ok(text)) => source(&text),
+        _ => source(text),
+    }
+}
+
 /// A shader module of one of the files under `shaders/`.
 pub(super) fn module(device: &wgpu::Device, label: &str, text: &str) -> wgpu::ShaderModule {
     device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some(label),
-        source: wgpu::ShaderSource::Wgsl(source(text).into()),
+        source: wgpu::ShaderSource::Wgsl(debug_source(label, text).into()),
     })
 }
 

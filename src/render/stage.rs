@@ -1,13 +1,16 @@
 //! What stands where in a frame: the scene's surfaces, casters and lights on the GPU, and how passes draw them.
 
-use glam::DAffine3;
+use glam::{DAffine3, Vec3};
 
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
 use crate::light::Light;
-use crate::scene::Scene;
+use crate::light::cores::on_all_cores;
+use crate::scene::{Scene, Technique};
 
-use super::anchor_geometry::{AnchorGeometry, KnownLevels, Role, SurfaceBatch, Thing};
+use super::anchor_geometry::{
+    AnchorGeometry, KnownLevels, Role, SurfaceBatch, Thing, VirtualCorners,
+};
 use super::casters::{Casters, LitSides};
 use super::detail::chosen_levels;
 use super::gpu::Gpu;
@@ -31,7 +34,9 @@ pub(super) struct Stage {
     /// For each thing where its inside can be seen.
     insides: Vec<Insides>,
     casters: Casters,
+    /// Of shadow volumes alone.
     indirect: Option<Indirect>,
+    virtual_corners: Vec<(usize, VirtualCorners)>,
     views: UniformRow,
     light_sources: UniformRow,
     view_group: wgpu::BindGroup,
@@ -69,7 +74,7 @@ impl Stage {
         let AnchorGeometry {
             batches,
             things,
-            world_virtuals,
+            virtual_corners,
         } = AnchorGeometry::new(device, scene, &mut known_levels);
         Self {
             standing: standing(scene),
@@ -81,7 +86,12 @@ impl Stage {
                 &layouts[1],
                 scene.shadows.counting,
             ),
-            indirect: Indirect::new(scene, &world_virtuals),
+            indirect: virtual_corners
+                .iter()
+                .filter(|_| scene.chosen_technique().0 == Technique::Volumes)
+                .find(|(anchor, _)| *anchor == 0)
+                .and_then(|(_, corners)| Indirect::new(scene, corners)),
+            virtual_corners,
             max_silhouette_error_px: scene.shadows.max_silhouette_error_px,
             samples: scene.shadows.samples,
             levels: vec![0; things.len()],
@@ -91,7 +101,10 @@ impl Stage {
             view_group: group(&layouts[0], &views),
             light_group: group(&layouts[1], &light_sources),
             camera_from_anchor: vec![None; scene.anchors.len()],
-            lights: scene.lights.clone(),
+            lights: match scene.chosen_technique().0 {
+                Technique::Shafts => Vec::new(),
+                _ => scene.lights.clone(),
+            },
             intrinsics,
             layouts,
             views,
@@ -110,7 +123,7 @@ impl Stage {
         let AnchorGeometry {
             batches,
             things,
-            world_virtuals,
+            virtual_corners,
         } = AnchorGeometry::new(&gpu.device, scene, &mut self.known_levels);
         self.casters = Casters::new(
             &gpu.device,
@@ -119,10 +132,13 @@ impl Stage {
             &self.layouts[1],
             scene.shadows.counting,
         );
+        let world_virtuals = virtual_corners.iter().find(|(anchor, _)| *anchor == 0);
         self.indirect = self
             .indirect
             .take()
-            .and_then(|gathered| gathered.for_corners(&world_virtuals));
+            .zip(world_virtuals)
+            .and_then(|(gathered, (_, corners))| gathered.for_corners(corners));
+        self.virtual_corners = virtual_corners;
         self.levels = vec![0; things.len()];
         self.insides = vec![Insides::Anywhere; things.len()];
         self.batches = batches;
@@ -149,16 +165,10 @@ impl Stage {
             return;
         };
         let world_virtuals = self
-            .batches
-            .iter()
-            .find(|batch| batch.role == Role::Virtual && batch.anchor == 0);
-        if let (Some(indirect), Some(batch)) = (&mut self.indirect, world_virtuals) {
-            indirect.update(
-                queue,
-                &batch.indirect,
-                camera_from_anchor,
-                &camera_from_world,
-            );
+            .batch(Role::Virtual, 0)
+            .map(|batch| batch.indirect.clone());
+        if let (Some(indirect), Some(buffer)) = (&mut self.indirect, world_virtuals) {
+            indirect.update(queue, &buffer, camera_from_anchor, &camera_from_world);
         }
         for (index, light) in self.lights.iter().enumerate() {
             let light = LightSource::new(light, &camera_from_world);
@@ -184,6 +194,52 @@ impl Stage {
                 }
             })
             .collect();
+    }
+
+    /// Gives the virtual things' corners the irradiance that a function of place and unit normal (world space) says.
+    pub fn set_indirect(
+        &self,
+        queue: &wgpu::Queue,
+        world_from_anchor: &[Option<DAffine3>],
+        irradiance: impl Fn(Vec3, Vec3) -> Vec3 + Sync,
+    ) {
+        for (anchor, (corners, _)) in &self.virtual_corners {
+            let batch = self.batch(Role::Virtual, *anchor);
+            let (Some(pose), Some(batch)) = (world_from_anchor[*anchor], batch) else {
+                continue;
+            };
+            let pose = pose.as_affine3();
+            let shares = on_all_cores(corners.len(), |range| {
+                let corners = corners[range].iter();
+                let of_corner = |&(place, normal): &(Vec3, Vec3)| {
+                    irradiance(pose.transform_point3(place), pose.transform_vector3(normal))
+                };
+                corners.map(of_corner).collect::<Vec<_>>()
+            });
+            queue.write_buffer(&batch.indirect, 0, bytemuck::cast_slice(&shares.concat()));
+        }
+    }
+
+    /// What passes draw from here on stands in the world.
+    pub fn set_world(&self, pass: &mut wgpu::RenderPass<'_>) {
+        pass.set_bind_group(0, &self.view_group, &[self.views.offset(0)]);
+        pass.set_bind_group(1, &self.light_group, &[self.light_sources.offset(0)]);
+    }
+
+    /// Draws the real surfaces of all anchors but the world.
+    pub fn draw_moving_real(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        pipelines: &Sided,
+        within: PixelRect,
+    ) {
+        self.set_light(pass, 0);
+        for batch in self.placed(Role::Real).filter(|batch| batch.anchor != 0) {
+            self.set_batch(pass, batch);
+            for (number, thing) in self.of_batch(batch) {
+                self.draw_whole(pass, pipelines, number, thing, within);
+            }
+        }
     }
 
     /// Makes the shadow volumes that matter to the picture. Returns what virtual things touch in it, if anything.
@@ -360,6 +416,12 @@ impl Stage {
         let has_pose = |anchor: usize| self.camera_from_anchor[anchor].is_some();
         let batches = self.batches.iter();
         batches.filter(move |b| b.role == role && has_pose(0) && has_pose(b.anchor))
+    }
+
+    /// What a role has on an anchor.
+    fn batch(&self, role: Role, anchor: usize) -> Option<&SurfaceBatch> {
+        let mut batches = self.batches.iter();
+        batches.find(|batch| (batch.role, batch.anchor) == (role, anchor))
     }
 
     /// The things of a batch, with their numbers.

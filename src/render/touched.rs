@@ -35,6 +35,17 @@ pub(super) struct ShadowReach {
     pub end: Option<HalfSpace>,
 }
 
+impl Touched {
+    /// Where the passes make no difference between things and shadows.
+    pub fn pixels_alone(pixels: PixelRect) -> Self {
+        Self {
+            pixels,
+            virtuals: pixels,
+            shadows: Vec::new(),
+        }
+    }
+}
+
 /// What virtual things and their shadows can change; `None` if nothing.
 pub(super) fn touched_by_virtual(
     things: &[Thing],

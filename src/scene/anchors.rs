@@ -96,12 +96,16 @@ impl AnchorReader {
 
     fn named_family(&self, value: &Value) -> Result<Family, SceneError> {
         let written = value.text()?;
-        let family = Family::from_name(written).ok_or_else(|| {
-            value.error(format!(
-                "unknown family{}",
-                suggestion(written, &Family::all_names().collect::<Vec<_>>())
-            ))
-        })?;
+        let family = if Family::is_file_name(written) {
+            Family::from_file(&value.existing_path()?)?
+        } else {
+            Family::from_name(written).ok_or_else(|| {
+                value.error(format!(
+                    "unknown family{}",
+                    suggestion(written, &Family::all_names().collect::<Vec<_>>())
+                ))
+            })?
+        };
         if !family.is_april_tag() && self.detector == DetectorKind::AprilTag {
             return Err(value.error(
                 "libapriltag does not know this family; set tracking.detector = \"aruco\" for it",

@@ -2,6 +2,9 @@
 
 use std::fmt;
 use std::ops::RangeInclusive;
+use std::path::Path;
+
+use super::{Dictionary, SceneError};
 
 /// A family of markers as printed: its codes and the black border around them. The same code in another border is
 /// another marker.
@@ -31,6 +34,8 @@ pub enum Codes {
     },
     /// The original ArUco library's markers: 5 × 5 cells.
     ArucoOriginal,
+    /// Somebody's own, from a file.
+    Own(&'static Dictionary),
 }
 
 /// All codes with their names.
@@ -111,8 +116,25 @@ impl Family {
             .map(|&(_, codes)| Self::of(codes))
     }
 
-    /// The name that [`Family::from_name`] knows; it does not tell the border.
+    /// Whether a name is that of a dictionary's file, which [`Family::from_file`] reads.
+    pub fn is_file_name(name: &str) -> bool {
+        let extension = Path::new(name).extension().unwrap_or_default();
+        extension.eq_ignore_ascii_case("yml") || extension.eq_ignore_ascii_case("yaml")
+    }
+
+    /// The dictionary of a file as OpenCV's `writeDictionary` writes it (YAML), in a border of one cell.
+    ///
+    /// # Errors
+    /// A file that cannot be read; a mistake in it, with its line.
+    pub fn from_file(path: &Path) -> Result<Self, SceneError> {
+        Dictionary::read(path).map(|dictionary| Self::of(Codes::Own(dictionary)))
+    }
+
+    /// The name that [`Family::from_name`] knows, or the path of its file; it does not tell the border.
     pub fn name(self) -> &'static str {
+        if let Codes::Own(dictionary) = self.codes {
+            return dictionary.name();
+        }
         // An `Aruco` of a size that does not exist can be written down in code, never read from a scene.
         NAMES
             .iter()
@@ -175,6 +197,7 @@ impl Codes {
             Self::Tag36h11 => 587,
             Self::Aruco { count, .. } => u32::from(count),
             Self::ArucoOriginal => 1024,
+            Self::Own(dictionary) => dictionary.id_count(),
         }
     }
 
@@ -185,6 +208,7 @@ impl Codes {
             Self::Tag25h9 | Self::ArucoOriginal => 5,
             Self::Tag36h10 | Self::Tag36h11 => 6,
             Self::Aruco { cells, .. } => u32::from(cells),
+            Self::Own(dictionary) => dictionary.cells(),
         }
     }
 
@@ -195,6 +219,7 @@ impl Codes {
             Self::Tag36h10 => 10,
             Self::Tag36h11 => 11,
             Self::ArucoOriginal => 1,
+            Self::Own(dictionary) => dictionary.least_distance(),
             Self::Aruco { cells, count } => match (cells, count) {
                 (4, 50) => 4,
                 (4, 100 | 250) => 3,

@@ -6,12 +6,12 @@ use toml::de::DeTable;
 
 use super::error::SceneError;
 use super::reader::{Document, Table};
-use super::{Scene, anchors, lights, objects, settings};
+use super::{Scene, anchors, lights, objects, probe, settings};
 
-/// What may stand at the outermost level; `probe` is known and refused with its reason.
-const TABLES: [&str; 11] = [
+/// What may stand at the outermost level.
+const TABLES: [&str; 12] = [
     "camera", "tracking", "board", "marker", "phantom", "virtual", "light", "ambient", "table",
-    "shadows", "probe",
+    "shadows", "probe", "room",
 ];
 
 /// What reading a scene's text gave.
@@ -71,10 +71,11 @@ impl Scene {
         let root = Table::root(document, &tree, &TABLES)?;
         let camera = settings::camera(&root)?;
         let tracking = settings::tracking(&root)?;
-        let shadows = settings::shadows(&root)?;
         let anchors = anchors::anchors(&root, tracking.detector)?;
         let lights = lights::lights(&root)?;
         let ambient_radiance = lights::ambient_radiance(&root)?;
+        let probe = probe::probe(&root)?;
+        let shadows = settings::shadows(&root, probe.as_ref())?;
         let (phantoms, virtuals) = objects::objects(&root, &anchors)?;
         Ok(Self {
             camera,
@@ -84,6 +85,7 @@ impl Scene {
             virtuals,
             lights,
             ambient_radiance,
+            probe,
             shadows,
         })
     }

@@ -22,6 +22,8 @@ pub struct LoadedMesh {
     pub mesh: Mesh,
     pub report: MeshReport,
     pub materials: Vec<Material>,
+    /// For each of them whether an MTL file gives it.
+    pub is_given: Vec<bool>,
 }
 
 /// Where a mesh's normals come from.
@@ -96,6 +98,7 @@ fn read(
         mesh,
         report,
         materials: builder.materials,
+        is_given: builder.is_given,
     })
 }
 
@@ -160,6 +163,7 @@ struct Builder {
     materials: Vec<Material>,
     /// tobj's number of each of `materials`.
     material_ids: Vec<Option<usize>>,
+    is_given: Vec<bool>,
 }
 
 impl Builder {
@@ -203,8 +207,9 @@ impl Builder {
         let known = self.material_ids.iter().position(|known| *known == id);
         let index = known.unwrap_or_else(|| {
             self.material_ids.push(id);
-            self.materials
-                .push(material(id.and_then(|id| mtl_materials.get(id))));
+            let mtl = id.and_then(|id| mtl_materials.get(id));
+            self.is_given.push(mtl.is_some());
+            self.materials.push(material(mtl));
             self.materials.len() - 1
         });
         index as u32

@@ -2,12 +2,14 @@
 
 use std::path::PathBuf;
 
-use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
+use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
 
 use crate::geometry::mesh::{Mesh, MeshReport};
+use crate::light::probe::Probe;
 use crate::light::{Light, Material};
 
 mod anchors;
+mod dictionary;
 mod error;
 mod family;
 mod lights;
@@ -15,9 +17,12 @@ mod load;
 mod mesh_file;
 mod obj_scan;
 mod objects;
+mod probe;
+mod probe_file;
 mod reader;
 mod settings;
 
+pub use dictionary::Dictionary;
 pub use error::{Place, SceneError};
 pub use family::{Codes, Family};
 pub use lights::unit_direction;
@@ -41,6 +46,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// Radiance of the constant surrounding light, linear RGB.
     pub ambient_radiance: DVec3,
+    /// The light that a probe saw, and the room that sent it.
+    pub probe: Option<ProbeScene>,
     /// How shadows are made.
     pub shadows: ShadowSettings,
 }
@@ -278,6 +285,31 @@ impl Placement {
     }
 }
 
+/// The light that a probe saw, and the room that sent it.
+#[derive(Debug, Clone)]
+pub struct ProbeScene {
+    /// The probe's file.
+    pub image: PathBuf,
+    /// What it saw.
+    pub probe: Probe,
+    /// Where it was taken, in the world, metres.
+    pub position_m: DVec3,
+    /// Display white over the probe's unit of radiance.
+    pub exposure: f64,
+    /// What is around the table, in the world.
+    pub room: Vec<RoomPiece>,
+}
+
+/// A part of the room.
+#[derive(Debug, Clone)]
+pub struct RoomPiece {
+    /// Triangles, counter-clockwise seen from the side that is lit, metres, each with its diffuse reflectance if that is
+    /// given.
+    pub triangles: Vec<([Vec3; 3], Option<Vec3>)>,
+    /// Whether they bound a volume.
+    pub is_closed: bool,
+}
+
 /// How shadows are made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Technique {
@@ -285,11 +317,23 @@ pub enum Technique {
     Auto,
     /// Shadow volumes (Haller, Drab & Hartmann 2003).
     Volumes,
+    /// Soft shadows of a probe's light in a room (Gibson, Cook, Howard & Hubbold 2003).
+    Shafts,
 }
 
 impl Technique {
     /// All of them, by the names that files use.
-    pub const BY_NAME: [(&str, Self); 2] = [("auto", Self::Auto), ("volumes", Self::Volumes)];
+    pub const BY_NAME: [(&str, Self); 3] = [
+        ("auto", Self::Auto),
+        ("volumes", Self::Volumes),
+        ("shafts", Self::Shafts),
+    ];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        let found = Self::BY_NAME.iter().find(|(_, known)| *known == self);
+        found.map_or("", |(name, _)| name)
+    }
 }
 
 /// How shadow volumes are counted.
@@ -320,6 +364,38 @@ pub struct ShadowSettings {
     pub max_silhouette_error_px: f64,
     /// What a frame may take, milliseconds; `None`: no limit is asked for.
     pub frame_budget_ms: Option<f64>,
+    /// What technique shafts alone is asked for.
+    pub shafts: ShaftSettings,
+}
+
+/// How finely shafts make soft shadows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShaftSettings {
+    /// Sources, each with a shadow of its own: n of Gibson et al. 2003; `None`: every one that is hidden.
+    pub sources: Option<u32>,
+    /// Patches that the room is cut into, about.
+    pub patches: u32,
+    /// Part of all power that the sources send out, the brightest first.
+    pub source_power: f64,
+    /// Patches in a leaf of the receivers' octree.
+    pub receivers_per_leaf: u32,
+    /// Shafts that bring every vertex less than this part of its light are cut no further.
+    pub least_part: f64,
+    /// Side of a source's shadow map, pixels.
+    pub map_px: u32,
+}
+
+impl Default for ShaftSettings {
+    fn default() -> Self {
+        Self {
+            sources: Some(50),
+            patches: 1500,
+            source_power: 1.0,
+            receivers_per_leaf: 8,
+            least_part: 0.02,
+            map_px: 256,
+        }
+    }
 }
 
 impl Default for ShadowSettings {
@@ -330,6 +406,7 @@ impl Default for ShadowSettings {
             counting: Counting::Auto,
             max_silhouette_error_px: 0.5,
             frame_budget_ms: None,
+            shafts: ShaftSettings::default(),
         }
     }
 }
@@ -338,7 +415,11 @@ impl Scene {
     /// The technique that makes this scene's shadows (never [`Technique::Auto`]), and why.
     pub fn chosen_technique(&self) -> (Technique, &'static str) {
         match self.shadows.technique {
-            Technique::Auto => (Technique::Volumes, "the scene has no probe"),
+            Technique::Auto => match &self.probe {
+                None => (Technique::Volumes, "the scene has no probe"),
+                Some(_) => (Technique::Shafts, "the scene has a probe and a room"),
+            },
+            Technique::Shafts => (Technique::Shafts, "the scene asks for it"),
             Technique::Volumes => (Technique::Volumes, "the scene asks for it"),
         }
     }

@@ -13,7 +13,7 @@ use super::{Anchor, Object, Placement};
 use crate::geometry::mesh::{Mesh, RawTriangle};
 use crate::light::Material;
 
-const ALBEDO: Numbers = Numbers::between(0.0, 1.0, "");
+pub const ALBEDO: Numbers = Numbers::between(0.0, 1.0, "");
 const ROUGHNESS: Numbers = Numbers::above(0.0, 1.0, "");
 const CREASE: Numbers = Numbers::between(0.0, 180.0, "degrees");
 const DEFAULT_CREASE_DEG: f64 = 30.0;
@@ -74,6 +74,7 @@ fn table_top(value: &Value) -> Result<Object, SceneError> {
         mesh,
         report,
         materials,
+        ..
     } = rectangle(&rect, albedo)?;
     Ok(Object {
         name: "table".to_owned(),
@@ -156,7 +157,8 @@ fn anchor_index(on: &Value, anchors: &[Anchor]) -> Result<usize, SceneError> {
         })
 }
 
-fn placement(table: &Table) -> Result<Placement, SceneError> {
+/// Where a thing stands.
+pub fn placement(table: &Table) -> Result<Placement, SceneError> {
     let default = Placement::default();
     Ok(Placement {
         position_m: table.vector_or("position_m", default.position_m, &POSITION)?,
@@ -220,5 +222,6 @@ fn rectangle(value: &Value, albedo: Option<DVec3>) -> Result<LoadedMesh, SceneEr
             albedo,
             roughness: None,
         }],
+        is_given: vec![true],
     })
 }

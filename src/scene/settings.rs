@@ -3,8 +3,8 @@
 use super::error::SceneError;
 use super::reader::{Numbers, Table, Value};
 use super::{
-    ArucoRefinement, CameraSettings, Counting, DetectorKind, PixelFormat, Search, ShadowSettings,
-    Technique, TrackingSettings, WantedFormat,
+    ArucoRefinement, CameraSettings, Counting, DetectorKind, PixelFormat, ProbeScene, Search,
+    ShadowSettings, ShaftSettings, Technique, TrackingSettings, WantedFormat,
 };
 use crate::geometry::outline_scale::LARGEST_MOVE_PX;
 
@@ -140,15 +140,16 @@ pub fn tracking(root: &Table) -> Result<TrackingSettings, SceneError> {
     })
 }
 
-pub fn shadows(root: &Table) -> Result<ShadowSettings, SceneError> {
-    if let Some(probe) = root.optional("probe") {
-        return Err(probe.error_without_value(
-            "this version renders `volumes`, which takes [[light]] and [ambient] and no probe; allowed: no [probe]",
-        ));
-    }
+pub fn shadows(root: &Table, probe: Option<&ProbeScene>) -> Result<ShadowSettings, SceneError> {
     let default = ShadowSettings::default();
-    const KEYS: [&str; 5] = [
+    const KEYS: [&str; 11] = [
         "technique",
+        "sources",
+        "patches",
+        "source_power",
+        "receivers_per_leaf",
+        "least_part",
+        "map_px",
         "samples",
         "counting",
         "max_silhouette_error_px",
@@ -157,10 +158,13 @@ pub fn shadows(root: &Table) -> Result<ShadowSettings, SceneError> {
     let Some(shadows) = root.table("shadows", &KEYS)? else {
         return Ok(default);
     };
-    let technique = |value: Value| match value.text()? {
-        "shafts" | "environment" => {
-            Err(value.error("this version renders `volumes`; allowed: auto, volumes"))
+    let technique = |value: Value| match (value.text()?, probe) {
+        ("environment", _) => {
+            Err(value.error("this version does not render it; allowed: auto, volumes, shafts"))
         }
+        ("shafts", None) => Err(value.error(
+            "the scene has no [probe], which shafts take their light from; allowed: auto, volumes",
+        )),
         _ => value.one_of("technique", &Technique::BY_NAME),
     };
     let samples = |value: Value| match value.integer(1..=4)? {
@@ -194,5 +198,46 @@ pub fn shadows(root: &Table) -> Result<ShadowSettings, SceneError> {
             .optional("frame_budget_ms")
             .map(budget)
             .transpose()?,
+        shafts: shaft_settings(&shadows, default.shafts)?,
+    })
+}
+
+fn shaft_settings(shadows: &Table, default: ShaftSettings) -> Result<ShaftSettings, SceneError> {
+    let sources = |value: Value| match value.text() {
+        Ok("all") => Ok(None),
+        Ok(_) => Err(value.error("not a number of sources; allowed: 1 to 4096, or \"all\"")),
+        Err(_) => value.integer(1..=4096).map(Some),
+    };
+    let map_px = |value: Value| match value.integer(16..=1024)? {
+        side if side.is_power_of_two() => Ok(side),
+        _ => Err(value.error("not a side of maps; allowed: 16, 32, 64, 128, 256, 512, 1024")),
+    };
+    Ok(ShaftSettings {
+        sources: shadows
+            .optional("sources")
+            .map(sources)
+            .transpose()?
+            .unwrap_or(default.sources),
+        patches: shadows.integer_or("patches", default.patches, 100..=20_000)?,
+        source_power: shadows.number_or(
+            "source_power",
+            default.source_power,
+            &Numbers::above(0.0, 1.0, ""),
+        )?,
+        receivers_per_leaf: shadows.integer_or(
+            "receivers_per_leaf",
+            default.receivers_per_leaf,
+            1..=1000,
+        )?,
+        least_part: shadows.number_or(
+            "least_part",
+            default.least_part,
+            &Numbers::between(0.0, 1.0, ""),
+        )?,
+        map_px: shadows
+            .optional("map_px")
+            .map(map_px)
+            .transpose()?
+            .unwrap_or(default.map_px),
     })
 }

@@ -231,7 +231,7 @@ fn c_name(codes: Codes) -> Option<&'static CStr> {
         Codes::Tag25h9 => Some(c"tag25h9"),
         Codes::Tag36h10 => Some(c"tag36h10"),
         Codes::Tag36h11 => Some(c"tag36h11"),
-        Codes::Aruco { .. } | Codes::ArucoOriginal => None,
+        Codes::Aruco { .. } | Codes::ArucoOriginal | Codes::Own(_) => None,
     }
 }
 

@@ -1,6 +1,7 @@
 //! OpenCV's ArUco, in the contrib module `aruco` before OpenCV 4.7 and in `objdetect` since (`build.rs` tells which).
 
 use glam::DVec2;
+use opencv::boxed_ref::BoxedRef;
 use opencv::core::{Mat, Point2f, Vector};
 use opencv::prelude::*;
 
@@ -8,7 +9,7 @@ use super::apriltag;
 use super::conventions::{corners_from_aruco, quarter_turns_between};
 use super::{Detection, TrackingError};
 use crate::capture::Frame;
-use crate::scene::{ArucoRefinement, Codes, Family, TrackingSettings};
+use crate::scene::{ArucoRefinement, Codes, Dictionary, Family, TrackingSettings};
 
 /// OpenCV's detector for some dictionaries, each with the turn of its pictures against the prints.
 pub(super) struct ArucoDetector {
@@ -26,7 +27,7 @@ impl ArucoDetector {
         let dictionaries = families
             .iter()
             .map(|&family| {
-                let number = dictionary_number(family.codes()).ok_or_else(|| {
+                let codes = installed_codes(family.codes()).ok_or_else(|| {
                     TrackingError::FamilyNotAvailable {
                         family: family.name(),
                         detector: "OpenCV's ArUco",
@@ -35,7 +36,7 @@ impl ArucoDetector {
                 })?;
                 let bits = settings.corrected_bits.min(family.correctable_bits()) as i32;
                 let dictionary = installed::Dictionary::new(
-                    number,
+                    codes,
                     family.border_cells() as i32,
                     bits,
                     settings.aruco_refinement,
@@ -88,13 +89,13 @@ pub type Quad = [DVec2; 4];
 
 /// Quadrilaterals in a picture that could be markers and are none of `family`: what a detector of OpenCV's throws away.
 pub fn rejected_quads(frame: &Frame, family: Family) -> Result<Vec<Quad>, TrackingError> {
-    let Some(number) = dictionary_number(family.codes()) else {
+    let Some(codes) = installed_codes(family.codes()) else {
         return Ok(Vec::new());
     };
     let mut grey = Vec::new();
     super::grey_from_rgba(frame, &mut grey)?;
     let border_cells = family.border_cells() as i32;
-    let dictionary = installed::Dictionary::new(number, border_cells, 0, ArucoRefinement::None)?;
+    let dictionary = installed::Dictionary::new(codes, border_cells, 0, ArucoRefinement::None)?;
     let mut rejected = Vector::<Vector<Point2f>>::new();
     let image =
         Mat::new_rows_cols_with_data(frame.size_px[1] as i32, frame.size_px[0] as i32, &grey)?;
@@ -112,21 +113,26 @@ pub fn rejected_quads(frame: &Frame, family: Family) -> Result<Vec<Quad>, Tracki
     Ok(rejected.iter().filter_map(quad).collect())
 }
 
-/// The cells of a marker as printed, rows from the top, true for white; black border included, white rim not. `None`
-/// where the family has no such marker.
-pub fn printed_cells(family: Family, id: u32) -> Result<Option<Vec<bool>>, TrackingError> {
-    if family.is_april_tag() {
-        return Ok(apriltag::printed_cells(family, id));
-    }
-    let number = dictionary_number(family.codes()).filter(|_| id < family.id_count());
-    let Some(number) = number else {
-        return Ok(None);
+/// The cells of a marker as printed, rows from the top, true for white; black border included, white rim not. AprilTag's
+/// families stand as AprilTag prints them, the others as OpenCV does.
+///
+/// # Errors
+/// A marker that the family does not have.
+pub fn printed_cells(family: Family, id: u32) -> Result<Vec<bool>, TrackingError> {
+    let no_such_marker = || TrackingError::NoSuchMarker {
+        family: family.name(),
+        id,
+        count: family.id_count(),
     };
+    if family.is_april_tag() {
+        return apriltag::printed_cells(family, id).ok_or_else(no_such_marker);
+    }
+    let codes = installed_codes(family.codes())
+        .filter(|_| id < family.id_count())
+        .ok_or_else(no_such_marker)?;
     let border_cells = family.border_cells() as i32;
-    let dictionary = installed::Dictionary::new(number, border_cells, 0, ArucoRefinement::None)?;
-    Ok(Some(
-        dictionary.cells(id as i32, family.cells_across() as usize)?,
-    ))
+    let dictionary = installed::Dictionary::new(codes, border_cells, 0, ArucoRefinement::None)?;
+    Ok(dictionary.cells(id as i32, family.cells_across() as usize)?)
 }
 
 /// The turn of the installed dictionary against the prints; its own pictures are the prints of OpenCV's families.
@@ -146,9 +152,18 @@ fn quarter_turns(
         })
 }
 
-/// The number of OpenCV's predefined dictionary, the same in all its releases.
-fn dictionary_number(codes: Codes) -> Option<i32> {
-    Some(match codes {
+/// Where OpenCV's dictionary comes from.
+#[derive(Clone, Copy)]
+enum InstalledCodes {
+    /// One of its own, by a number that is the same in all its releases.
+    Predefined(i32),
+    /// From somebody's file.
+    Own(&'static Dictionary),
+}
+
+fn installed_codes(codes: Codes) -> Option<InstalledCodes> {
+    Some(InstalledCodes::Predefined(match codes {
+        Codes::Own(dictionary) => return Some(InstalledCodes::Own(dictionary)),
         Codes::Tag16h5 => 17,
         Codes::Tag25h9 => 18,
         Codes::Tag36h10 => 19,
@@ -160,7 +175,24 @@ fn dictionary_number(codes: Codes) -> Option<i32> {
                 .position(|&known| known == count)?;
             i32::from(cells.checked_sub(4).filter(|&size| size < 4)?) * 4 + of_size as i32
         }
-    })
+    }))
+}
+
+/// The codes of somebody's own dictionary as OpenCV keeps them, a row for each marker; `row_of` makes one from a picture
+/// with a 1 for each white cell.
+fn byte_list(
+    dictionary: &Dictionary,
+    row_of: impl Fn(&BoxedRef<'_, Mat>) -> opencv::Result<Mat>,
+) -> opencv::Result<Mat> {
+    let side = dictionary.cells() as i32;
+    let mut rows = Vector::<Mat>::new();
+    for cells in dictionary.markers() {
+        let bits: Vec<u8> = cells.into_iter().map(u8::from).collect();
+        rows.push(row_of(&Mat::new_rows_cols_with_data(side, side, &bits)?)?);
+    }
+    let mut list = Mat::default();
+    opencv::core::vconcat(&rows, &mut list)?;
+    Ok(list)
 }
 
 /// `cv::aruco::CornerRefineMethod`, the same numbers in all releases.
@@ -189,7 +221,7 @@ mod installed {
     use opencv::core::{Mat, Point2f, Ptr, ToInputArray, Vector};
     use opencv::prelude::*;
 
-    use super::{refinement_number, white_cells};
+    use super::{InstalledCodes, byte_list, refinement_number, white_cells};
     use crate::scene::ArucoRefinement;
 
     pub(super) struct Dictionary {
@@ -199,12 +231,19 @@ mod installed {
 
     impl Dictionary {
         pub(super) fn new(
-            number: i32,
+            codes: InstalledCodes,
             border_cells: i32,
             corrected_bits: i32,
             refinement: ArucoRefinement,
         ) -> opencv::Result<Self> {
-            let mut dictionary = aruco::get_predefined_dictionary_i32(number)?;
+            let mut dictionary = match codes {
+                InstalledCodes::Predefined(number) => aruco::get_predefined_dictionary_i32(number)?,
+                InstalledCodes::Own(own) => {
+                    let list =
+                        byte_list(own, |bits| aruco::Dictionary::get_byte_list_from_bits(bits))?;
+                    Ptr::new(aruco::Dictionary::new(&list, own.cells() as i32, 0)?)
+                }
+            };
             dictionary.set_max_correction_bits(corrected_bits);
             let mut parameters = aruco::DetectorParameters::create()?;
             parameters.set_marker_border_bits(border_cells);
@@ -255,7 +294,7 @@ mod installed {
     use opencv::objdetect;
     use opencv::prelude::*;
 
-    use super::{refinement_number, white_cells};
+    use super::{InstalledCodes, byte_list, refinement_number, white_cells};
     use crate::scene::ArucoRefinement;
 
     pub(super) struct Dictionary {
@@ -265,12 +304,22 @@ mod installed {
 
     impl Dictionary {
         pub(super) fn new(
-            number: i32,
+            codes: InstalledCodes,
             border_cells: i32,
             corrected_bits: i32,
             refinement: ArucoRefinement,
         ) -> opencv::Result<Self> {
-            let mut dictionary = objdetect::get_predefined_dictionary_i32(number)?;
+            let mut dictionary = match codes {
+                InstalledCodes::Predefined(number) => {
+                    objdetect::get_predefined_dictionary_i32(number)?
+                }
+                InstalledCodes::Own(own) => {
+                    let list = byte_list(own, |bits| {
+                        objdetect::Dictionary::get_byte_list_from_bits(bits)
+                    })?;
+                    objdetect::Dictionary::new(&list, own.cells() as i32, 0)?
+                }
+            };
             dictionary.set_max_correction_bits(corrected_bits);
             let mut parameters = objdetect::DetectorParameters::default()?;
             parameters.set_marker_border_bits(border_cells);
@@ -317,9 +366,9 @@ mod tests {
     use super::*;
 
     fn installed_dictionary(family: Family) -> installed::Dictionary {
-        let number = dictionary_number(family.codes()).unwrap();
+        let codes = installed_codes(family.codes()).unwrap();
         let border_cells = family.border_cells() as i32;
-        installed::Dictionary::new(number, border_cells, 0, ArucoRefinement::None).unwrap()
+        installed::Dictionary::new(codes, border_cells, 0, ArucoRefinement::None).unwrap()
     }
 
     #[test]

@@ -70,6 +70,13 @@ pub struct Detector {
     refines: bool,
 }
 
+/// What a slower search does.
+#[derive(Clone, Copy, PartialEq)]
+enum Care {
+    FullResolution,
+    LightToo,
+}
+
 enum Thorough {
     /// What the detector itself does not find, nothing does.
     Never,
@@ -144,11 +151,34 @@ impl Detector {
         Ok(self.finished(detections, grey, size_px))
     }
 
+    /// As [`detect`](Self::detect), but at full resolution. OpenCV's ArUco finds no more than it does anyway.
+    pub fn detect_at_full_resolution(
+        &mut self,
+        grey: &[u8],
+        size_px: [u32; 2],
+    ) -> Result<Vec<Detection>, TrackingError> {
+        self.detect_with(Care::FullResolution, grey, size_px)
+    }
+
     /// As [`detect`](Self::detect), but at full resolution and at any price: in the picture as it is, and in one of
     /// light, where a marker in the shade stands out less and one in a glare more. OpenCV's ArUco finds no more than
     /// it does anyway.
     pub fn detect_thoroughly(
         &mut self,
+        grey: &[u8],
+        size_px: [u32; 2],
+    ) -> Result<Vec<Detection>, TrackingError> {
+        self.detect_with(Care::LightToo, grey, size_px)
+    }
+
+    /// Whether the slower searches can find what [`detect`](Self::detect) does not.
+    pub(super) fn can_do_better(&self) -> bool {
+        !matches!(self.thorough, Thorough::Never)
+    }
+
+    fn detect_with(
+        &mut self,
+        care: Care,
         grey: &[u8],
         size_px: [u32; 2],
     ) -> Result<Vec<Detection>, TrackingError> {
@@ -162,12 +192,14 @@ impl Detector {
             return Ok(Vec::new());
         }
         let mut detections = detector.detect(grey, size_px)?;
-        self.encoded_anew.clear();
-        let as_light = grey.iter().map(|&level| LIGHT[usize::from(level)]);
-        self.encoded_anew.extend(as_light);
-        for found in detector.detect(&self.encoded_anew, size_px)? {
-            if !detections.iter().any(|known| known.is_same(&found)) {
-                detections.push(found);
+        if care == Care::LightToo {
+            self.encoded_anew.clear();
+            let as_light = grey.iter().map(|&level| LIGHT[usize::from(level)]);
+            self.encoded_anew.extend(as_light);
+            for found in detector.detect(&self.encoded_anew, size_px)? {
+                if !detections.iter().any(|known| known.is_same(&found)) {
+                    detections.push(found);
+                }
             }
         }
         Ok(self.finished(detections, grey, size_px))

@@ -41,15 +41,10 @@ struct SeenMarker {
 
 impl Layout {
     pub(super) fn new(anchor: &Anchor) -> Result<Self, TrackingError> {
-        let prints = anchor.markers.iter().map(|marker| {
-            let cells = printed_cells(marker.family, marker.id)?;
-            let cells = cells.ok_or_else(|| TrackingError::NoSuchMarker {
-                family: marker.family.name(),
-                id: marker.id,
-                count: marker.family.id_count(),
-            })?;
-            Ok(Print::new(marker, cells))
-        });
+        let prints = anchor
+            .markers
+            .iter()
+            .map(|marker| Ok(Print::new(marker, printed_cells(marker.family, marker.id)?)));
         Ok(Self {
             markers: anchor
                 .markers

@@ -9,7 +9,6 @@
 )]
 mod apriltag;
 mod aruco;
-pub mod calibrating;
 mod condition;
 mod conventions;
 mod detector;

@@ -14,10 +14,11 @@ use crate::scene::{Anchor, Search, TrackingSettings};
 
 /// The whole picture is searched again after this, even when nothing is missing, seconds.
 const SEARCH_AGAIN_SECS: f64 = 2.0;
-/// An anchor that has been missing for longer than this is thoroughly looked for less often, seconds,
+/// An anchor that has been missing for longer than this is looked for at full resolution in every frame, as before, but
+/// in the picture of light less often, seconds,
 const LONG_GONE_SECS: f64 = 10.0;
-/// in one of so many frames.
-const LONG_GONE_FRAMES: u32 = 3;
+/// for no library finds more there: it costs the same again, seconds.
+const LIGHT_AGAIN_SECS: f64 = 1.0;
 /// A search that puts an anchor's corners farther than this from where it was followed to has found another place,
 /// pixels.
 const ELSEWHERE_PX: f64 = 5.0;
@@ -35,7 +36,8 @@ pub struct Tracker {
     detections: Vec<Detection>,
     /// When the whole picture was searched last, seconds.
     searched_secs: f64,
-    frames: u32,
+    /// When the picture of light was, seconds.
+    searched_light_secs: f64,
 }
 
 impl Tracker {
@@ -62,7 +64,7 @@ impl Tracker {
             grey: Vec::new(),
             detections: Vec::new(),
             searched_secs: f64::NEG_INFINITY,
-            frames: 0,
+            searched_light_secs: f64::NEG_INFINITY,
         })
     }
 
@@ -93,7 +95,6 @@ impl Tracker {
         now_secs: f64,
     ) -> Result<Vec<AnchorPose>, TrackingError> {
         let intrinsics = &self.intrinsics;
-        self.frames = self.frames.wrapping_add(1);
         for anchor in &mut self.anchors {
             anchor.forget(now_secs);
         }
@@ -137,8 +138,13 @@ impl Tracker {
         self.searched_secs = now_secs;
         let Grey { levels, size_px } = picture;
         self.detections = self.detector.detect(levels, size_px)?;
-        if self.needs_thorough_search(fits, now_secs) {
-            self.detections = self.detector.detect_thoroughly(levels, size_px)?;
+        if let Some(in_light_too) = self.needs_better_search(fits, now_secs) {
+            self.detections = if in_light_too {
+                self.searched_light_secs = now_secs;
+                self.detector.detect_thoroughly(levels, size_px)?
+            } else {
+                self.detector.detect_at_full_resolution(levels, size_px)?
+            };
         }
         let intrinsics = &self.intrinsics;
         let mut all_located = Vec::with_capacity(self.anchors.len());
@@ -184,20 +190,25 @@ impl Tracker {
         is_due || fits.iter().any(Option::is_none)
     }
 
-    /// Whether it is to be searched once more and better, for an anchor that is in none of what was found.
-    fn needs_thorough_search(&self, fits: &[Option<PixelPose>], now_secs: f64) -> bool {
-        let mut anchors = self.anchors.iter().zip(fits).zip(&self.missing_since_secs);
-        self.follows
-            && anchors.any(|((anchor, fit), since_secs)| {
-                let long_gone =
-                    since_secs.is_some_and(|since_secs| now_secs - since_secs > LONG_GONE_SECS);
-                fit.is_none()
-                    && (!long_gone || self.frames.is_multiple_of(LONG_GONE_FRAMES))
-                    && anchor
-                        .layout
-                        .locate(&self.intrinsics, &self.detections)
-                        .is_err()
+    /// Whether it is to be searched once more and better, for an anchor that is in none of what was found; and if so,
+    /// whether in the picture of light too.
+    fn needs_better_search(&self, fits: &[Option<PixelPose>], now_secs: f64) -> Option<bool> {
+        if !self.follows || !self.detector.can_do_better() {
+            return None;
+        }
+        let all = self.anchors.iter().zip(fits).zip(&self.missing_since_secs);
+        let missing = all.filter(|((anchor, fit), _)| {
+            let located = anchor.layout.locate(&self.intrinsics, &self.detections);
+            fit.is_none() && located.is_err()
+        });
+        let since_secs = now_secs - self.searched_light_secs;
+        let is_due = !(0.0..LIGHT_AGAIN_SECS).contains(&since_secs);
+        missing
+            .map(|(_, since_secs)| {
+                let gone_secs = since_secs.map_or(0.0, |since_secs| now_secs - since_secs);
+                is_due || gone_secs <= LONG_GONE_SECS
             })
+            .reduce(|a, b| a || b)
     }
 }
 

@@ -436,3 +436,39 @@ fn the_summary_survives_odd_scenes() {
         "{text}"
     );
 }
+
+#[test]
+fn a_family_may_be_a_file_beside_the_scene() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let dictionary = folder.path().join("own.yml");
+    let codes = "nmarkers: 2\nmarkersize: 3\nmarker_0: \"110100000\"\nmarker_1: \"111001011\"\n";
+    std::fs::write(&dictionary, codes).expect("a written file");
+    let scene = |detector: &str, family: &str, id: u32| {
+        let text = format!(
+            "[camera]\nsource = \".\"\n[tracking]\ndetector = \"{detector}\"\n[[marker]]\nname = \"card\"\n\
+             family = \"{family}\"\nid = {id}\nsize_m = 0.04\n[ambient]\nradiance = [1, 1, 1]\n"
+        );
+        Scene::parse(&folder.path().join("scene.toml"), &text)
+    };
+    let read = scene("aruco", "own.yml", 1).expect("a scene");
+    let family = read.anchors[0].markers[0].family;
+    assert_eq!((family.id_count(), family.cells_across()), (2, 5));
+    for (detector, name, id, message) in [
+        ("aruco", "own.yml", 2, "own.yml"),
+        ("aruco", "other.yml", 0, "other.yml"),
+        ("apriltag", "own.yml", 0, "detector = \"aruco\""),
+    ] {
+        let error = scene(detector, name, id)
+            .expect_err("a mistake")
+            .to_string();
+        assert!(
+            error.contains("scene.toml:") && error.contains(message),
+            "{error}"
+        );
+    }
+    std::fs::write(&dictionary, codes.replace("111001011", "111")).expect("a written file");
+    let error = scene("aruco", "own.yml", 1)
+        .expect_err("a mistake")
+        .to_string();
+    assert!(error.contains("own.yml:4:1: marker_1: 9 digits"), "{error}");
+}

@@ -7,7 +7,9 @@ use super::edit::{Edit, NewVirtual};
 use super::numbers::{ANGLE, DIRECTION, POSITION, PRINT, RATIO, number_of};
 use super::spliced::{Body, Spliced, bodies, parsed};
 use crate::light::Light;
-use crate::scene::{Counting, Placement, Scene, ShadowSettings, Technique, unit_direction};
+use crate::scene::{
+    Counting, Placement, Scene, ShadowSettings, ShaftSettings, Technique, unit_direction,
+};
 
 /// Why an edit does not fit a text.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -348,9 +350,11 @@ fn shadow_keys(old: &ShadowSettings, new: &ShadowSettings) -> Vec<(&'static str,
         counting,
         max_silhouette_error_px,
         frame_budget_ms,
+        shafts,
     } = *new;
     let ratio = |number: f64| super::numbers::new_number(number, RATIO);
-    let all = [
+    let mut all = shaft_keys(&old.shafts, &shafts);
+    all.extend([
         (
             technique != old.technique,
             "technique",
@@ -372,11 +376,53 @@ fn shadow_keys(old: &ShadowSettings, new: &ShadowSettings) -> Vec<(&'static str,
             "frame_budget_ms",
             frame_budget_ms.map(ratio),
         ),
-    ];
+    ]);
     all.into_iter()
         .filter(|(differs, ..)| *differs)
         .map(|(_, key, text)| (key, text))
         .collect()
+}
+
+/// For each key of shafts whether it differs, and its text.
+fn shaft_keys(
+    old: &ShaftSettings,
+    new: &ShaftSettings,
+) -> Vec<(bool, &'static str, Option<String>)> {
+    let ShaftSettings {
+        sources,
+        patches,
+        source_power,
+        receivers_per_leaf,
+        least_part,
+        map_px,
+    } = *new;
+    let ratio = |number: f64| Some(super::numbers::new_number(number, RATIO));
+    let count = |number: u32| Some(number.to_string());
+    let all = || Some(quoted("all"));
+    vec![
+        (
+            sources != old.sources,
+            "sources",
+            sources.map_or_else(all, count),
+        ),
+        (patches != old.patches, "patches", count(patches)),
+        (
+            source_power != old.source_power,
+            "source_power",
+            ratio(source_power),
+        ),
+        (
+            receivers_per_leaf != old.receivers_per_leaf,
+            "receivers_per_leaf",
+            count(receivers_per_leaf),
+        ),
+        (
+            least_part != old.least_part,
+            "least_part",
+            ratio(least_part),
+        ),
+        (map_px != old.map_px, "map_px", count(map_px)),
+    ]
 }
 
 /// The word for a setting.

@@ -11,7 +11,8 @@ use anyhow::{Context as _, Result, bail, ensure};
 use glam::DVec2;
 
 use super::anchor_block;
-use super::picture_files::{write_bytes, write_grey_png, write_text};
+use super::picture_files::{write_bytes, write_text};
+use crate::calibration::Target;
 use crate::scene::{Family, Marker};
 use crate::tracking::printed_cells;
 pub use page::Paper;
@@ -71,15 +72,8 @@ pub enum Sheet {
         /// Side of the black squares.
         size_mm: f64,
     },
-    /// A chessboard for the calibration of a camera.
-    Chessboard {
-        /// Inner corners in a row.
-        columns: u32,
-        /// Inner corners in a column.
-        rows: u32,
-        /// Side of a square.
-        square_mm: f64,
-    },
+    /// A target for the calibration of a camera.
+    Target(Target),
 }
 
 /// Writes the sheet, and beside it the text for the scene file. Returns the files.
@@ -117,22 +111,14 @@ pub fn markers(request: &Request) -> Result<Vec<PathBuf>> {
             let (pages, block) = lone(*family, ids, *marker_mm, size_mm)?;
             (pages, Some(block))
         }
-        Sheet::Chessboard {
-            columns,
-            rows,
-            square_mm,
-        } => (
-            vec![chessboard([*columns, *rows], *square_mm, size_mm)?],
-            None,
-        ),
+        Sheet::Target(target) => (vec![calibration_target(target, size_mm)?], None),
     };
     let out = request.out.as_path();
     match (extension.as_str(), pages.as_slice()) {
         ("pdf", pages) => write_bytes(out, &pdf::bytes(pages))?,
         ("svg", [page]) => write_text(out, &svg::text(page))?,
         ("png", [page]) => {
-            let (size_px, levels) = png::raster(page, request.dpi);
-            write_grey_png(out, size_px, &levels)?;
+            write_bytes(out, &png::bytes(page, request.dpi)?)?;
         }
         _ => bail!(
             "the markers take {} pages; only a PDF has more than one: give --out a .pdf, or fewer ids at a time",
@@ -211,7 +197,7 @@ fn board(sheet: &Sheet, size_mm: [f64; 2]) -> Result<(Page, String)> {
                 origin[0] + f64::from(column) * pitch_mm,
                 origin[1] + f64::from(row) * pitch_mm,
             ];
-            page.print(at, *marker_mm, &cells(*family, id)?);
+            page.print(at, *marker_mm, &printed_cells(*family, id)?);
             let from_center = [0, 1].map(|k| at[k] + marker_mm / 2.0 - origin[k] - extent[k] / 2.0);
             placed.push(Marker {
                 family: *family,
@@ -264,7 +250,11 @@ fn lone(
             let at =
                 [0, 1].map(|k| MARGIN_MM + BETWEEN_MM + step[k] as f64 * (card_mm[k] + BETWEEN_MM));
             page.cut_marks(at, card_mm);
-            page.print(at.map(|at| at + quiet_mm), marker_mm, &cells(family, id)?);
+            page.print(
+                at.map(|at| at + quiet_mm),
+                marker_mm,
+                &printed_cells(family, id)?,
+            );
             let label = format!("{} {id}  {marker_mm} mm", family.name());
             page.write([at[0] + quiet_mm, at[1] + card_mm[1] - 1.2], 2.5, &label);
             let marker = Marker {
@@ -284,39 +274,45 @@ fn lone(
     Ok((pages, block))
 }
 
-/// A chessboard in the middle of the paper.
-fn chessboard(corners: [u32; 2], square_mm: f64, size_mm: [f64; 2]) -> Result<Page> {
-    check_size("--square-mm", square_mm)?;
-    ensure!(
-        corners.iter().all(|&count| count >= 3),
-        "a chessboard of {} x {} inner corners is too small to be told from its turns; at least 3 x 3",
-        corners[0],
-        corners[1]
-    );
-    let squares = corners.map(|count| count + 1);
-    let extent = squares.map(|count| f64::from(count) * square_mm);
+/// A chessboard or a ChArUco board in the middle of the paper.
+fn calibration_target(target: &Target, size_mm: [f64; 2]) -> Result<Page> {
+    let square_mm = target.square_m * 1000.0;
+    let extent = target.squares.map(|count| f64::from(count) * square_mm);
     let [left, top, right, bottom] = Page::free_mm(size_mm);
     let free = [right - left, bottom - top];
     ensure!(
-        extent[0] <= free[0] && extent[1] <= free[1],
-        "a chessboard of {:.0} x {:.0} mm does not fit on {:.0} x {:.0} mm of this paper",
+        // Rounding must not turn away what just fits.
+        extent[0] <= free[0] + 1e-6 && extent[1] <= free[1] + 1e-6,
+        "a target of {:.0} x {:.0} mm does not fit on {:.0} x {:.0} mm of this paper; {} x {} squares of this size would",
         extent[0],
         extent[1],
         free[0],
-        free[1]
+        free[1],
+        (free[0] / square_mm).floor(),
+        (free[1] / square_mm).floor()
     );
-    let about = format!(
-        "chessboard, {} x {} inner corners, squares of {square_mm} mm",
-        corners[0], corners[1]
-    );
-    let mut page = Page::new(size_mm, &about);
-    for row in 0..squares[1] {
-        for column in (row % 2..squares[0]).step_by(2) {
-            let at = [
-                left + (free[0] - extent[0]) / 2.0 + f64::from(column) * square_mm,
-                top + (free[1] - extent[1]) / 2.0 + f64::from(row) * square_mm,
-            ];
-            page.fill(at, [square_mm; 2]);
+    let mut page = Page::new(size_mm, &target.to_string());
+    let origin = [
+        left + (free[0] - extent[0]) / 2.0,
+        top + (free[1] - extent[1]) / 2.0,
+    ];
+    let corner_mm = |[column, row]: [u32; 2]| {
+        [
+            origin[0] + f64::from(column) * square_mm,
+            origin[1] + f64::from(row) * square_mm,
+        ]
+    };
+    let [columns, rows] = target.squares;
+    for square in (0..rows).flat_map(|row| (0..columns).map(move |column| [column, row])) {
+        if Target::is_black(square) {
+            page.fill(corner_mm(square), [square_mm; 2]);
+        }
+    }
+    if let Some(markers) = &target.markers {
+        let marker_mm = markers.size_m * 1000.0;
+        for (id, square) in (0..).zip(target.marker_squares(false)) {
+            let at = corner_mm(square).map(|at| at + (square_mm - marker_mm) / 2.0);
+            page.print(at, marker_mm, &printed_cells(markers.family, id)?);
         }
     }
     Ok(page)
@@ -336,16 +332,4 @@ fn check_size(option: &str, mm: f64) -> Result<()> {
         "{option} {mm} is out of range; allowed: {least} to {most}"
     );
     Ok(())
-}
-
-/// The cells of a marker, its border included.
-fn cells(family: Family, id: u32) -> Result<Vec<bool>> {
-    let cells = printed_cells(family, id)?;
-    cells.with_context(|| {
-        format!(
-            "{} has no marker {id}; it has 0 to {}",
-            family.name(),
-            family.id_count() - 1
-        )
-    })
 }

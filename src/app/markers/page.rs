@@ -103,7 +103,9 @@ impl Page {
             2.5,
             "100 mm: if a rule says otherwise, the page was scaled",
         );
-        page.write([left, base - 6.0], 2.5, about);
+        let [width, height] = size_mm;
+        let says = format!("{about}; page {width} x {height} mm");
+        page.write([left, base - 6.0], 2.5, &says);
         page
     }
 

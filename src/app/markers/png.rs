@@ -1,10 +1,47 @@
-//! A page as pixels: the share of a pixel that is black makes its level. Small print is left out: an SVG or a PDF has it.
+//! A page as PNG that says its resolution, so that it prints in its true size. A pixel that an edge goes through gets the
+//! light that its white part throws back: edges lie where they should to a fraction of a pixel.
 
-use super::page::{Page, Rect};
+use anyhow::Result;
+use opencv::core::{Mat, Point, Scalar};
+use opencv::imgproc;
 
-/// Width, height and grey levels, rows from the top.
-pub fn raster(page: &Page, dpi: f64) -> ([u32; 2], Vec<u8>) {
-    let pixels_per_mm = dpi / 25.4;
+use super::page::{Page, Rect, Text};
+
+const MM_PER_INCH: f64 = 25.4;
+const FONT: i32 = imgproc::FONT_HERSHEY_SIMPLEX;
+/// Height of a capital and thickness of a stroke, as parts of the size of the type.
+const CAPITAL: f64 = 0.7;
+const STROKE: f64 = 0.08;
+
+/// The whole file: grey, 8 bits.
+///
+/// # Errors
+/// A failure of OpenCV, which letters, or of the encoder.
+pub fn bytes(page: &Page, dpi: f64) -> Result<Vec<u8>> {
+    let pixels_per_mm = dpi / MM_PER_INCH;
+    let ([width, height], mut grey) = shapes(page, pixels_per_mm);
+    let mut picture = Mat::new_rows_cols_with_data_mut(height as i32, width as i32, &mut grey)?;
+    for text in &page.texts {
+        letter(&mut picture, text, pixels_per_mm)?;
+    }
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Eight);
+    let per_metre = (pixels_per_mm * 1000.0).round() as u32;
+    encoder.set_pixel_dims(Some(png::PixelDimensions {
+        xppu: per_metre,
+        yppu: per_metre,
+        unit: png::Unit::Meter,
+    }));
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&grey)?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// Width, height and grey levels, rows from the top, of all but the small print.
+fn shapes(page: &Page, pixels_per_mm: f64) -> ([u32; 2], Vec<u8>) {
     let size_px = page.size_mm.map(|mm| (mm * pixels_per_mm).round() as u32);
     let [width, height] = size_px.map(|side| side as usize);
     let mut black = vec![0.0_f32; width * height];
@@ -14,8 +51,8 @@ pub fn raster(page: &Page, dpi: f64) -> ([u32; 2], Vec<u8>) {
             add(&mut black, width, hole, pixels_per_mm, -1.0);
         }
     }
-    let level = |black: f32| (255.0 * (1.0 - black.clamp(0.0, 1.0))).round() as u8;
-    (size_px, black.into_iter().map(level).collect())
+    let levels = black.into_iter().map(|black| srgb(1.0 - black)).collect();
+    (size_px, levels)
 }
 
 /// Adds the area that a rectangle covers of each pixel.
@@ -37,4 +74,38 @@ fn add(black: &mut [f32], width: usize, rect: &Rect, pixels_per_mm: f64, sign: f
             black[y * width + x] += share * covered(x, left, right);
         }
     }
+}
+
+/// The level of a part of white paper's light.
+fn srgb(linear: f32) -> u8 {
+    let linear = linear.clamp(0.0, 1.0);
+    let encoded = if linear <= 0.003_130_8 {
+        12.92 * linear
+    } else {
+        1.055 * linear.powf(1.0 / 2.4) - 0.055
+    };
+    (255.0 * encoded).round() as u8
+}
+
+fn letter(
+    picture: &mut impl opencv::core::ToInputOutputArray,
+    text: &Text,
+    pixels_per_mm: f64,
+) -> opencv::Result<()> {
+    let size_px = text.size_mm * pixels_per_mm;
+    let thickness = (STROKE * size_px).round().max(1.0) as i32;
+    let height_px = (CAPITAL * size_px).round().max(1.0) as i32;
+    let scale = imgproc::get_font_scale_from_height(FONT, height_px, thickness)?;
+    let [x, y] = text.at.map(|at| (at * pixels_per_mm).round() as i32);
+    imgproc::put_text(
+        picture,
+        &text.text,
+        Point::new(x, y),
+        FONT,
+        scale,
+        Scalar::all(0.0),
+        thickness,
+        imgproc::LINE_AA,
+        false,
+    )
 }

@@ -7,8 +7,8 @@
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 
 use super::super::least_squares::inverse;
-use super::dense::Square;
 use crate::geometry::camera::Intrinsics;
+use crate::geometry::dense::Square;
 
 /// Corners of a marker of side 1: top left, top right, bottom right, bottom left.
 pub(super) const UNIT_CORNERS: [DVec3; 4] = [

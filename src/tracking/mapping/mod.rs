@@ -12,7 +12,6 @@ use crate::scene::{Family, Marker};
 use bundle::{Bundle, Certainty, Freedom, MARKER_UNKNOWNS, Placed, Seen, View};
 
 mod bundle;
-mod dense;
 mod keyframes;
 mod placing;
 mod plane;

@@ -1,17 +1,22 @@
 //! The knobs of the technique.
 
-use eframe::egui::{ComboBox, Ui};
+use eframe::egui::{ComboBox, DragValue, Ui};
 
 use super::editing::{Editing, number};
 use crate::app::authoring::Edit;
 use crate::app::live::wish::Wish;
 use crate::geometry::outline_scale::LARGEST_MOVE_PX;
-use crate::scene::{Counting, Scene, Technique};
+use crate::scene::{Counting, Scene, ShaftSettings, Technique};
 
 /// Samples per pixel that there are.
 const SAMPLES: [u32; 2] = [1, 4];
 /// What a frame may take when a limit is first asked for, milliseconds.
 const FIRST_BUDGET_MS: f64 = 16.0;
+
+/// Sources when a limit is first asked for.
+const FIRST_SOURCES: u32 = 50;
+/// Sides that a source's shadow map may have.
+const MAP_SIDES_PX: [u32; 5] = [64, 128, 256, 512, 1024];
 
 /// Shows them.
 pub fn show(ui: &mut Ui, scene: &Scene, editing: &mut Editing, wishes: &mut Vec<Wish>) {
@@ -41,9 +46,44 @@ pub fn show(ui: &mut Ui, scene: &Scene, editing: &mut Editing, wishes: &mut Vec<
         }
         shadows.frame_budget_ms = limited.then_some(budget_ms.clamp(0.1, 1e6));
     });
+    if technique == Technique::Shafts {
+        shaft_knobs(ui, &mut shadows.shafts);
+    }
     if shadows != scene.shadows {
         editing.changed(ui, Edit::Shadows(shadows), wishes);
     }
+}
+
+fn shaft_knobs(ui: &mut Ui, shafts: &mut ShaftSettings) {
+    ui.horizontal(|ui| {
+        let mut limited = shafts.sources.is_some();
+        let mut sources = shafts.sources.unwrap_or(FIRST_SOURCES);
+        ui.checkbox(&mut limited, "limit of sources");
+        if limited {
+            whole(ui, "with a shadow each", &mut sources, 1..=4096);
+        }
+        shafts.sources = limited.then_some(sources);
+    });
+    whole(ui, "patches of the room", &mut shafts.patches, 100..=20_000);
+    let map_name = shafts.map_px.to_string();
+    ComboBox::from_label("pixels of a shadow map")
+        .selected_text(map_name)
+        .show_ui(ui, |ui| {
+            for side_px in MAP_SIDES_PX {
+                ui.selectable_value(&mut shafts.map_px, side_px, side_px.to_string());
+            }
+        });
+}
+
+fn whole(ui: &mut Ui, name: &str, value: &mut u32, range: std::ops::RangeInclusive<u32>) {
+    ui.horizontal(|ui| {
+        let field = DragValue::new(value)
+            .range(range)
+            .update_while_editing(false);
+        let field = ui.add(field);
+        let label = ui.label(name);
+        field.labelled_by(label.id);
+    });
 }
 
 fn choice<T: PartialEq + Copy>(ui: &mut Ui, name: &str, value: &mut T, all: &[(&str, T)]) {

@@ -2,27 +2,31 @@
 
 /// A square matrix, row by row.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Square {
+pub struct Square {
+    /// Number of rows, and of columns.
     pub side: usize,
     values: Vec<f64>,
 }
 
 /// The lower triangle L of a matrix L·Lᵀ.
-pub(super) struct Cholesky(Square);
+pub struct Cholesky(Square);
 
 impl Square {
-    pub(super) fn zero(side: usize) -> Self {
+    /// All zeros.
+    pub fn zero(side: usize) -> Self {
         Self {
             side,
             values: vec![0.0; side * side],
         }
     }
 
-    pub(super) fn at(&self, row: usize, column: usize) -> f64 {
+    /// An entry.
+    pub fn at(&self, row: usize, column: usize) -> f64 {
         self.values[row * self.side + column]
     }
 
-    pub(super) fn at_mut(&mut self, row: usize, column: usize) -> &mut f64 {
+    /// The same, to be changed.
+    pub fn at_mut(&mut self, row: usize, column: usize) -> &mut f64 {
         &mut self.values[row * self.side + column]
     }
 
@@ -31,7 +35,7 @@ impl Square {
     }
 
     /// `None` when the matrix is not positive definite. Its upper triangle is not looked at.
-    pub(super) fn cholesky(&self) -> Option<Cholesky> {
+    pub fn cholesky(&self) -> Option<Cholesky> {
         let mut lower = Self::zero(self.side);
         for i in 0..self.side {
             for j in 0..=i {
@@ -54,7 +58,7 @@ impl Square {
 
 impl Cholesky {
     /// The x of `matrix · x = right`.
-    pub(super) fn solve(&self, right: &[f64]) -> Vec<f64> {
+    pub fn solve(&self, right: &[f64]) -> Vec<f64> {
         let lower = &self.0;
         let mut x = right.to_vec();
         for i in 0..x.len() {
@@ -71,7 +75,7 @@ impl Cholesky {
     }
 
     /// The diagonal of the matrix's inverse.
-    pub(super) fn inverse_diagonal(&self) -> Vec<f64> {
+    pub fn inverse_diagonal(&self) -> Vec<f64> {
         let side = self.0.side;
         let unit = |k: usize| {
             (0..side)

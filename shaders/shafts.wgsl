@@ -1,0 +1,157 @@
+// Soft shadows of a room's light (Gibson et al. 2003, section 7): what virtual things hide of the light of real surfaces, what
+// they throw back, and the light on them.
+//!include "shading.wgsl"
+//!include "source.wgsl"
+
+struct Frame {
+    world_from_camera: mat4x4f,
+    source_count: u32,
+    padding: vec3u,
+}
+
+@group(2) @binding(0) var<uniform> frame: Frame;
+@group(2) @binding(1) var<storage, read> sources: array<Source>;
+// Of each vertex, without virtual things.
+@group(2) @binding(2) var<storage, read> irradiances: array<vec3f>;
+// Irradiance of each vertex from each source: rows of `source_count`, packed into two halves and one.
+@group(2) @binding(3) var<storage, read> transfers: array<vec2u>;
+// For each patch the sources that things may hide from it.
+@group(2) @binding(4) var<storage, read> lists: array<u32>;
+@group(2) @binding(5) var maps: texture_2d<f32>;
+@group(2) @binding(6) var map_sampler: sampler;
+
+
+
+
+// `same_part` of surfaces that are casters themselves.
+const SAME_PART: f32 = 0.02;
+
+struct PatchCorner {
+    @location(0) position: vec3f,
+    // Rows of the patch's three vertices.
+    @location(1) rows: vec3u,
+    // Weights of the first two there; those of a patch's own corners are 0 and 1.
+    @location(2) weights: vec2f,
+    // First of the patch's sources in `lists`, and their number.
+    @location(3) list: vec2u,
+    // Irradiance from virtual things.
+    @location(4) thrown_back: vec3f,
+}
+
+struct PatchSurface {
+    @builtin(position) clip: vec4f,
+    @location(0) @interpolate(perspective, centroid) point_in_world: vec3f,
+    @location(1) @interpolate(perspective, centroid) weights: vec2f,
+    @location(2) @interpolate(flat) rows: vec3u,
+    @location(3) @interpolate(flat) list: vec2u,
+    @location(4) @interpolate(perspective, centroid) thrown_back: vec3f,
+}
+
+struct Light {
+    // Irradiance on a real surface without virtual things; a = 1 where it is known.
+    @location(0) reaching: vec4f,
+    // Irradiance that virtual things take from a real surface, or the radiance of a virtual one; a = 1 where the surface is
+    // virtual.
+    @location(1) change: vec4f,
+}
+
+@vertex
+fn place_patch(corner: PatchCorner) -> PatchSurface {
+    return PatchSurface(
+        clip_from_point(view, vec4f(corner.position, 1.0)),
+        corner.position,
+        corner.weights,
+        corner.rows,
+        corner.list,
+        corner.thrown_back,
+    );
+}
+
+@vertex
+fn place_depth(@location(0) position: vec3f) -> @invariant @builtin(position) vec4f {
+    return clip_from_point(view, vec4f(position, 1.0));
+}
+
+// Part of a source's light that casters hide from a place, 0 to 1: percentage-closer soft shadows (Fernando 2005) on averaged
+// maps. What lies no farther behind a caster than `same_part` of the map's range is that caster.
+fn hidden(index: u32, point_in_world: vec3f, same_part: f32) -> f32 {
+    let placed = sources[index].map_from_world * vec4f(point_in_world, 1.0);
+    let depth = placed.w;
+    if depth <= sources[index].near_m {
+        return 0.0;
+    }
+    let in_tile = placed.xy / depth;
+    if any(in_tile < vec2f(0.0)) || any(in_tile > vec2f(1.0)) {
+        return 0.0;
+    }
+    let source = sources[index];
+    let blockers = map_at(source, in_tile, source.near_m, depth);
+    if blockers.x < 1e-3 {
+        return 0.0;
+    }
+    let blocker = source.near_m + source.range_m * blockers.y / blockers.x;
+    let behind = (depth - blocker) / source.range_m;
+    if behind <= same_part {
+        return 0.0;
+    }
+    return map_at(source, in_tile, blocker, depth).x * smoothstep(same_part, 2.0 * same_part + 1e-3, behind);
+}
+
+// The map around a place, averaged over what the source's extent sees through a caster at a depth.
+fn map_at(source: Source, in_tile: vec2f, caster: f32, depth: f32) -> vec2f {
+    let texels = source.spread_m * (depth - caster) / (depth * caster) * source.focal_texels;
+    let level = clamp(log2(2.0 * texels), 0.0, log2(source.tile_px));
+    let margin = 0.5 * exp2(level) / source.tile_px;
+    let inside = clamp(in_tile, vec2f(margin), vec2f(1.0 - margin));
+    return textureSampleLevel(maps, map_sampler, source.tile_corner + inside * source.tile_side, level).xy;
+}
+
+fn transfer(row: u32, source: u32) -> vec3f {
+    let packed = transfers[row * frame.source_count + source];
+    return vec3f(unpack2x16float(packed.x), unpack2x16float(packed.y).x);
+}
+
+@fragment
+fn light_on_patch(surface: PatchSurface) -> Light {
+    let weights = vec3f(surface.weights, 1.0 - surface.weights.x - surface.weights.y);
+    var taken = -surface.thrown_back;
+    for (var place = 0u; place < surface.list.y; place++) {
+        let index = lists[surface.list.x + place];
+        let hidden = hidden(index, surface.point_in_world, 0.0);
+        if hidden > 0.0 {
+            let arriving = weights.x * transfer(surface.rows.x, index)
+                + weights.y * transfer(surface.rows.y, index)
+                + weights.z * transfer(surface.rows.z, index);
+            taken += hidden * arriving;
+        }
+    }
+    let reaching = weights.x * irradiances[surface.rows.x]
+        + weights.y * irradiances[surface.rows.y]
+        + weights.z * irradiances[surface.rows.z];
+    return Light(vec4f(reaching, 1.0), vec4f(taken, 0.0));
+}
+
+@fragment
+fn light_on_virtual(surface: Surface, @builtin(front_facing) outside: bool) -> Light {
+    let point_in_world = (frame.world_from_camera * vec4f(surface.point_in_camera, 1.0)).xyz;
+    let normal_in_camera = normalize(surface.normal_in_camera) * select(-1.0, 1.0, outside);
+    let normal = (frame.world_from_camera * vec4f(normal_in_camera, 0.0)).xyz;
+    var taken = vec3f(0.0);
+    for (var index = 0u; index < frame.source_count; index++) {
+        let way = sources[index].position - point_in_world;
+        let distance_squared = dot(way, way);
+        let facing = dot(normal, way);
+        if facing > 0.0 {
+            let hidden = hidden(index, point_in_world, SAME_PART);
+            let spread = 2.0 * sources[index].spread_m * sources[index].spread_m;
+            taken += hidden * sources[index].intensity * facing * inverseSqrt(distance_squared) / (distance_squared + spread);
+        }
+    }
+    let arriving = max(surface.indirect - taken, vec3f(0.0));
+    return Light(vec4f(0.0), vec4f(surface.material.rgb / PI * arriving, 1.0));
+}
+
+// For what is drawn into depth alone.
+@fragment
+fn nothing() {
+}

@@ -1,0 +1,115 @@
+//! A camera's calibration from pictures of a flat target.
+//!
+//! [`Views`] is shown one grey picture after the other, from files or from a webcam, and says after each what the set
+//! still lacks; [`solve`] makes a calibration of it. No type of OpenCV's leaves.
+
+mod coverage;
+mod coverage_picture;
+mod deviations;
+mod finder;
+mod homography;
+mod solve;
+mod target;
+mod views;
+
+use glam::DVec2;
+
+use crate::tracking::TrackingError;
+
+pub use coverage::Coverage;
+pub use coverage_picture::{CoveragePicture, coverage_picture};
+pub use finder::TargetFinder;
+pub use solve::{Calibration, FittedView, LensTerms, solve};
+pub use target::{Target, TargetError, TargetMarkers};
+pub use views::{FEWEST_VIEWS, Lack, Look, View, Views};
+
+/// An inner corner of the target, and where a picture shows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Corner {
+    /// In the target's frame, metres.
+    pub target_m: DVec2,
+    /// Distorted pixel; an integer coordinate is a pixel's centre.
+    pub pixel: DVec2,
+}
+
+/// Why pictures give no calibration.
+#[derive(Debug, thiserror::Error)]
+pub enum CalibrateError {
+    /// Pictures of more than one size.
+    #[error(
+        "a picture of {} x {} pixels among those of {} x {}: a calibration needs one camera at one size",
+        size_px[0], size_px[1], expected_px[0], expected_px[1]
+    )]
+    OtherSize {
+        /// Width and height of the odd one.
+        size_px: [u32; 2],
+        /// Width and height of the first one.
+        expected_px: [u32; 2],
+    },
+    /// The target is in none of them.
+    #[error(
+        "none of {looked} pictures shows what was looked for ({target}); {}",
+        if target.markers.is_some() {
+            "a ChArUco board is counted by its squares; its markers must be of that dictionary"
+        } else {
+            "a chessboard is counted by its inner corners, where four squares meet, and must be whole in the picture"
+        }
+    )]
+    NoTarget {
+        /// Number of pictures.
+        looked: u32,
+        /// What was looked for.
+        target: Target,
+    },
+    /// Too few pictures show it.
+    #[error(
+        "{found} of {looked} pictures show the target; at least {FEWEST_VIEWS} different views are needed, 15 to 30 are good"
+    )]
+    TooFewViews {
+        /// Number of pictures.
+        looked: u32,
+        /// How many of them show the target.
+        found: u32,
+    },
+    /// It always lies in the same place.
+    #[error(
+        "{found} pictures show the target, but just {different} of them differ; move it through the whole picture and \
+         tilt it by 20 to 40 degrees to all sides (at least {FEWEST_VIEWS} different views are needed)"
+    )]
+    Alike {
+        /// How many pictures show the target.
+        found: u32,
+        /// How many views are left without those that are like others.
+        different: usize,
+    },
+    /// The views do not tell the focal length.
+    #[error(
+        "these views do not tell the focal length ({}); tilt the target by 20 to 40 degrees to all sides",
+        focal_deviation.map_or_else(
+            || "no camera explains them".to_owned(),
+            |deviation| format!("it is uncertain by {:.1} %", 100.0 * deviation)
+        )
+    )]
+    Degenerate {
+        /// The larger standard deviation of the focal lengths, as a part of them; `None` where nothing was found.
+        focal_deviation: Option<f64>,
+    },
+    /// The lens would send two rays to one pixel.
+    #[error(
+        "the lens that fits these views turns back on itself within the picture; move the target into the picture's \
+         corners"
+    )]
+    Folds,
+    /// A detector failed.
+    #[error(transparent)]
+    Tracking(#[from] TrackingError),
+    /// OpenCV failed.
+    #[error("OpenCV: {0}")]
+    Library(String),
+}
+
+impl From<opencv::Error> for CalibrateError {
+    fn from(error: opencv::Error) -> Self {
+        Self::Library(error.message)
+    }
+}

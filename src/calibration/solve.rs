@@ -1,0 +1,331 @@
+//! The calibration itself: OpenCV's bundle adjustment (Zhang, "A flexible new technique for camera calibration", 2000),
+//! without the views that do not fit, with no more of the lens model than the views tell.
+
+use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
+use opencv::calib3d;
+use opencv::core::{
+    Mat, Point2f, Point3f, Size, TermCriteria, TermCriteria_COUNT, TermCriteria_EPS, Vec3d, Vector,
+};
+use opencv::prelude::*;
+
+use super::deviations::{Parameters, deviations, parameters_of, pixel_of};
+use super::views::{FEWEST_VIEWS, TILTED_RAD, View, Views, coverage_of, lacks_of};
+use super::{CalibrateError, Coverage, Lack};
+use crate::geometry::camera::Intrinsics;
+
+/// A camera, and how it is known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Calibration {
+    /// The camera.
+    pub intrinsics: Intrinsics,
+    /// What of the lens the views tell; the rest is 0.
+    pub lens: LensTerms,
+    /// Standard deviation of the focal lengths, pixels.
+    pub focal_deviation_px: DVec2,
+    /// Standard deviation of the principal point, pixels.
+    pub center_deviation_px: DVec2,
+    /// Standard deviations of the distortion coefficients.
+    pub distortion_deviations: [f64; 5],
+    /// Root mean square distance of all corners from where the calibration puts them, pixels.
+    pub rms_px: f64,
+    /// What it rests on.
+    pub views: Vec<FittedView>,
+    /// Views that did not fit: number of the picture and root mean square distance, pixels.
+    pub dropped: Vec<(u32, f64)>,
+    /// Where the corners lie.
+    pub coverage: Coverage,
+    /// What the views lack; nothing when they are good.
+    pub lacks: Vec<Lack>,
+}
+
+/// The terms of the lens's distortion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LensTerms {
+    /// How many of k1, k2, k3: 1 to 3.
+    pub radial: u32,
+    /// p1 and p2.
+    pub tangential: bool,
+}
+
+/// A view as the calibration explains it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedView {
+    /// The number under which the picture was shown.
+    pub picture: u32,
+    /// Where the target lies (its frame: x right, y down as printed).
+    pub camera_from_target: DAffine3,
+    /// Root mean square distance of its corners from where the calibration puts them, pixels.
+    pub rms_px: f64,
+    /// Its corners: where they are, and how far that is from where the calibration puts them; pixels.
+    pub residuals: Vec<(DVec2, DVec2)>,
+}
+
+/// A focal length that is less certain is none.
+const MOST_FOCAL_DEVIATION: f64 = 0.03;
+/// A view this many times worse than the median view is a bad one…
+const BAD_TIMES: f64 = 3.0;
+/// …if it is also worse by this much, pixels.
+const BAD_BY_PX: f64 = 0.15;
+/// Of the views no more than this part is dropped: where more do not fit, it is not the views.
+const MOST_DROPPED: f64 = 0.25;
+/// Fewer standard deviations from 0 a coefficient is noise: a few views are poor judges of their own scatter.
+const SIGNIFICANT: f64 = 4.0;
+
+impl LensTerms {
+    /// Which of fx, fy, cx, cy, k1, k2, p1, p2, k3 the views decide.
+    fn free(self) -> [bool; 9] {
+        let (k2, k3) = (self.radial > 1, self.radial > 2);
+        [
+            true,
+            true,
+            true,
+            true,
+            true,
+            k2,
+            self.tangential,
+            self.tangential,
+            k3,
+        ]
+    }
+}
+
+impl FittedView {
+    /// The angle between the target's normal and the camera's axis, radians.
+    pub fn tilt_rad(&self) -> f64 {
+        self.camera_from_target
+            .matrix3
+            .z_axis
+            .z
+            .abs()
+            .min(1.0)
+            .acos()
+    }
+}
+
+/// Calibrates from the views that were collected.
+///
+/// # Errors
+/// Too few views, views that are all alike, views that do not tell the focal length.
+pub fn solve(views: &Views) -> Result<Calibration, CalibrateError> {
+    let mut chosen = views.chosen()?;
+    // `chosen` made sure that there is a picture.
+    let size_px = views.size_px().unwrap_or_default();
+    let most_dropped = (MOST_DROPPED * chosen.len() as f64) as usize;
+    let mut dropped = Vec::new();
+    // The last radial term would bend to bad views.
+    let robust = LensTerms {
+        radial: 2,
+        tangential: true,
+    };
+    let mut fit = Fit::of(&chosen, size_px, robust)?;
+    while dropped.len() < most_dropped && chosen.len() > FEWEST_VIEWS {
+        let Some(worst) = fit.bad_view() else { break };
+        let view = chosen.remove(worst);
+        dropped.push((view.picture, fit.view_rms_px[worst]));
+        fit = Fit::of(&chosen, size_px, robust)?;
+    }
+    let (fit, lens, deviations) = simplest(&chosen, size_px)?;
+    let focal_deviation_px = DVec2::new(deviations[0], deviations[1]);
+    let focal_deviation = (focal_deviation_px / fit.intrinsics.focal_px).max_element();
+    // Also where it is not finite.
+    if focal_deviation.is_nan() || focal_deviation > MOST_FOCAL_DEVIATION {
+        return Err(CalibrateError::Degenerate {
+            focal_deviation: Some(focal_deviation).filter(|deviation| deviation.is_finite()),
+        });
+    }
+    let fitted: Vec<FittedView> = chosen
+        .iter()
+        .enumerate()
+        .map(|(k, view)| fit.fitted(k, view))
+        .collect();
+    let coverage = coverage_of(chosen.iter().copied(), size_px);
+    let tilted = fitted.iter().filter(|view| view.tilt_rad() > TILTED_RAD);
+    let lacks = lacks_of(chosen.len(), &coverage, tilted.count());
+    Ok(Calibration {
+        intrinsics: fit.intrinsics,
+        lens,
+        focal_deviation_px,
+        center_deviation_px: DVec2::new(deviations[2], deviations[3]),
+        distortion_deviations: std::array::from_fn(|k| deviations[4 + k]),
+        rms_px: fit.rms_px,
+        views: fitted,
+        dropped,
+        coverage,
+        lacks,
+    })
+}
+
+/// The lens with no more terms than the views tell, and the parameters' standard deviations.
+fn simplest(
+    views: &[&View],
+    size_px: [u32; 2],
+) -> Result<(Fit, LensTerms, Parameters), CalibrateError> {
+    let mut lens = LensTerms {
+        radial: 3,
+        tangential: true,
+    };
+    loop {
+        let fit = match Fit::of(views, size_px, lens) {
+            Ok(fit) => fit,
+            Err(_) if lens.radial == 3 => {
+                lens.radial = 2;
+                continue;
+            }
+            Err(error) => return Err(error),
+        };
+        let seen = views.iter().map(|view| view.corners.as_slice());
+        let poses = fit.camera_from_target.iter().copied();
+        let deviations = deviations(&fit.intrinsics, seen.zip(poses), lens.free());
+        let parameters = parameters_of(&fit.intrinsics);
+        let is_noise = |k: usize| parameters[k].abs() < SIGNIFICANT * deviations[k];
+        // k1 always stays: most lenses have some.
+        let last_is_noise = match lens.radial {
+            3 => is_noise(8),
+            2 => is_noise(5),
+            _ => false,
+        };
+        let folds = folds(&fit.intrinsics);
+        if lens.radial > 1 && (folds || last_is_noise) {
+            lens.radial -= 1;
+        } else if lens.tangential && is_noise(6) && is_noise(7) {
+            lens.tangential = false;
+        } else if folds {
+            return Err(CalibrateError::Folds);
+        } else {
+            return Ok((fit, lens, deviations));
+        }
+    }
+}
+
+/// What OpenCV makes of some views.
+struct Fit {
+    intrinsics: Intrinsics,
+    camera_from_target: Vec<DAffine3>,
+    view_rms_px: Vec<f64>,
+    rms_px: f64,
+}
+
+impl Fit {
+    fn of(views: &[&View], size_px: [u32; 2], lens: LensTerms) -> Result<Self, CalibrateError> {
+        let object_points: Vector<Vector<Point3f>> = views
+            .iter()
+            .map(|view| {
+                let points = view.corners.iter().map(|corner| corner.target_m.as_vec2());
+                points
+                    .map(|point| Point3f::new(point.x, point.y, 0.0))
+                    .collect()
+            })
+            .collect();
+        let image_points: Vector<Vector<Point2f>> = views
+            .iter()
+            .map(|view| {
+                let pixels = view.pixels().map(|pixel| pixel.as_vec2());
+                pixels.map(|pixel| Point2f::new(pixel.x, pixel.y)).collect()
+            })
+            .collect();
+        let (mut matrix, mut coefficients) = (Mat::default(), Mat::default());
+        let (mut turns, mut shifts) = (Vector::<Vec3d>::new(), Vector::<Vec3d>::new());
+        let mut view_rms_px = Mat::default();
+        let mut flags = 0;
+        for (is_fixed, flag) in [
+            (lens.radial < 3, calib3d::CALIB_FIX_K3),
+            (lens.radial < 2, calib3d::CALIB_FIX_K2),
+            (!lens.tangential, calib3d::CALIB_ZERO_TANGENT_DIST),
+        ] {
+            if is_fixed {
+                flags |= flag;
+            }
+        }
+        let rms_px = calib3d::calibrate_camera_extended(
+            &object_points,
+            &image_points,
+            Size::new(size_px[0] as i32, size_px[1] as i32),
+            &mut matrix,
+            &mut coefficients,
+            &mut turns,
+            &mut shifts,
+            &mut Mat::default(),
+            &mut Mat::default(),
+            &mut view_rms_px,
+            flags,
+            TermCriteria::new(TermCriteria_COUNT + TermCriteria_EPS, 100, 1e-9)?,
+        )
+        // Views that leave its first guess undetermined make it throw.
+        .map_err(|_| CalibrateError::Degenerate {
+            focal_deviation: None,
+        })?;
+        let matrix = matrix.data_typed::<f64>()?;
+        let coefficients = coefficients.data_typed::<f64>()?;
+        let intrinsics = Intrinsics {
+            size_px,
+            focal_px: DVec2::new(matrix[0], matrix[4]),
+            center_px: DVec2::new(matrix[2], matrix[5]),
+            distortion: std::array::from_fn(|k| coefficients.get(k).copied().unwrap_or(0.0)),
+        };
+        let poses = turns.iter().zip(&shifts);
+        Ok(Self {
+            intrinsics,
+            camera_from_target: poses.map(|(turn, shift)| pose_of(turn, shift)).collect(),
+            view_rms_px: view_rms_px.data_typed::<f64>()?.to_vec(),
+            rms_px,
+        })
+    }
+
+    /// The view that fits worst, if it is a bad one.
+    fn bad_view(&self) -> Option<usize> {
+        let errors_px = &self.view_rms_px;
+        let mut sorted = errors_px.clone();
+        sorted.sort_by(f64::total_cmp);
+        let median_px = *sorted.get(sorted.len() / 2)?;
+        let worst = (0..errors_px.len()).max_by(|&a, &b| errors_px[a].total_cmp(&errors_px[b]))?;
+        let bad = errors_px[worst] > (BAD_TIMES * median_px).max(median_px + BAD_BY_PX);
+        bad.then_some(worst)
+    }
+
+    fn fitted(&self, k: usize, view: &View) -> FittedView {
+        let camera_from_target = self.camera_from_target[k];
+        let intrinsics = &self.intrinsics;
+        let residuals = view.corners.iter().map(|corner| {
+            let expected_px = pixel_of(intrinsics, &camera_from_target, corner.target_m);
+            (corner.pixel, corner.pixel - expected_px)
+        });
+        FittedView {
+            picture: view.picture,
+            camera_from_target,
+            rms_px: self.view_rms_px[k],
+            residuals: residuals.collect(),
+        }
+    }
+}
+
+/// A pose from a Rodrigues vector and a shift.
+fn pose_of(turn: Vec3d, shift: Vec3d) -> DAffine3 {
+    let (turn, shift) = (DVec3::from_array(turn.0), DVec3::from_array(shift.0));
+    DAffine3::from_mat3_translation(DMat3::from_quat(DQuat::from_scaled_axis(turn)), shift)
+}
+
+/// Whether the radial distortion turns back on itself within the picture: two rays would share a pixel.
+fn folds(intrinsics: &Intrinsics) -> bool {
+    const STEPS: u32 = 1000;
+    let [width, height] = intrinsics.size_px.map(f64::from);
+    let corners = [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)].map(DVec2::from);
+    let farthest = corners
+        .map(|corner| intrinsics.plane_from_pixel(corner).length())
+        .into_iter()
+        .fold(0.0, f64::max);
+    let [k1, k2, _, _, k3] = intrinsics.distortion;
+    let radius = |r: f64| r * (1.0 + r * r * (k1 + r * r * (k2 + r * r * k3)));
+    // Barrel distortion needs more than `farthest` to reach it, but never twice that in a lens that this model fits.
+    let mut before = 0.0;
+    for step in 1..=STEPS {
+        let now = radius(2.0 * farthest * f64::from(step) / f64::from(STEPS));
+        if now >= farthest {
+            return false;
+        }
+        if now <= before {
+            return true;
+        }
+        before = now;
+    }
+    true
+}

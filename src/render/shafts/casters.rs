@@ -1,0 +1,192 @@
+//! Virtual things as they hide light: simplified, in the world.
+
+use std::f32::consts::FRAC_1_PI;
+
+use glam::{DAffine3, Vec3};
+
+use crate::geometry::levels::levels;
+use crate::geometry::ray_caster::RayCaster;
+use crate::light::cores::on_all_cores;
+use crate::scene::{Object, Scene};
+use crate::shafts::prepared::Prepared;
+use crate::shafts::selection::Representative;
+use crate::shafts::source_tree::BoxM;
+use crate::shafts::surfels::{LitSurfel, Surfel, open_directions, surfels};
+
+use super::maps::Ball;
+
+/// How far outlines may move for fewer triangles, in parts of a thing's size.
+const COARSE_PART: f64 = 0.004;
+/// Surfels of all things together.
+const SURFELS: usize = 128;
+/// Rays that gather the light of a surfel.
+const RAYS: usize = 48;
+
+/// Patches are cut into parts of this size by a caster, metres, and of this part of the distance farther off.
+const SMALLEST_PART_M: f32 = 0.004;
+const PART_OF_DISTANCE: f32 = 0.3;
+const MOST_PARTS: u32 = 10;
+
+/// A virtual thing that hides light.
+struct Caster {
+    anchor: usize,
+    /// In the anchor's space.
+    triangles: Vec<[Vec3; 3]>,
+    surfels: Vec<Surfel>,
+}
+
+/// All virtual things that hide light.
+pub(super) struct ShaftCasters {
+    casters: Vec<Caster>,
+}
+
+/// The casters where they are in a frame, world space.
+pub(super) struct PlacedCasters {
+    pub triangles: Vec<[Vec3; 3]>,
+    /// Around each caster.
+    pub boxes: Vec<BoxM>,
+    pub ball: Ball,
+    pub caster: RayCaster,
+    surfels: Vec<Surfel>,
+}
+
+impl ShaftCasters {
+    pub fn new(scene: &Scene) -> Self {
+        let casting = || {
+            scene
+                .virtuals
+                .iter()
+                .filter(|object| object.visible && object.casts)
+        };
+        let share = SURFELS / casting().count().max(1);
+        let casters = casting().map(|object| caster(object, share.max(16)));
+        Self {
+            casters: casters.collect(),
+        }
+    }
+
+    /// The casters whose anchors have a pose; `None` where none has.
+    pub fn place(&self, world_from_anchor: &[Option<DAffine3>]) -> Option<PlacedCasters> {
+        let mut placed = PlacedCasters {
+            triangles: Vec::new(),
+            boxes: Vec::new(),
+            ball: Ball {
+                center: Vec3::ZERO,
+                radius: 0.0,
+            },
+            caster: RayCaster::new(&[]),
+            surfels: Vec::new(),
+        };
+        for caster in &self.casters {
+            let Some(pose) = world_from_anchor[caster.anchor] else {
+                continue;
+            };
+            let point = |point: Vec3| pose.transform_point3(point.as_dvec3()).as_vec3();
+            let triangles = caster.triangles.iter().map(|corners| corners.map(point));
+            let first = placed.triangles.len();
+            placed.triangles.extend(triangles);
+            let corners = placed.triangles[first..].iter().flatten();
+            placed.boxes.push(BoxM::around(corners.copied()));
+            placed
+                .surfels
+                .extend(caster.surfels.iter().map(|surfel| Surfel {
+                    position: point(surfel.position),
+                    normal: pose.transform_vector3(surfel.normal.as_dvec3()).as_vec3(),
+                    ..*surfel
+                }));
+        }
+        let all = BoxM::around(
+            placed
+                .boxes
+                .iter()
+                .flat_map(|bounds| [bounds.min, bounds.max]),
+        );
+        placed.ball.center = all.min.midpoint(all.max);
+        let corners = placed.triangles.iter().flatten();
+        placed.ball.radius = corners
+            .map(|corner| corner.distance(placed.ball.center))
+            .fold(0.0, f32::max);
+        (!placed.triangles.is_empty()).then_some(placed)
+    }
+}
+
+fn caster(object: &Object, surfel_count: usize) -> Caster {
+    let size = BoxM::around(object.mesh.positions.iter().copied()).diagonal();
+    let coarser = levels(&object.mesh);
+    let coarse_enough = coarser
+        .into_iter()
+        .rfind(|level| level.max_error_m <= COARSE_PART * f64::from(size));
+    let mesh = coarse_enough.map_or_else(|| object.mesh.clone(), |level| level.mesh);
+    let place = |position: Vec3| {
+        let place = object
+            .anchor_from_object
+            .transform_point3(position.as_dvec3());
+        place.as_vec3()
+    };
+    let triangles: Vec<[Vec3; 3]> = mesh
+        .triangles
+        .iter()
+        .map(|triangle| triangle.map(|index| place(mesh.positions[index as usize])))
+        .collect();
+    let albedos = mesh
+        .triangle_materials
+        .iter()
+        .map(|&material| object.materials[material as usize].albedo.as_vec3());
+    let with_albedo: Vec<([Vec3; 3], Vec3)> = triangles.iter().copied().zip(albedos).collect();
+    Caster {
+        anchor: object.anchor,
+        surfels: surfels(&with_albedo, surfel_count),
+        triangles,
+    }
+}
+
+impl PlacedCasters {
+    /// The light that the casters throw back (one bounce): for each surfel what arrives past all casters, from the room as
+    /// their shadows leave it.
+    pub fn lit_surfels(
+        &self,
+        room: &Prepared,
+        sources: &[(Representative, Vec3)],
+        is_near: &[bool],
+    ) -> Vec<LitSurfel> {
+        let caster = &self.caster;
+        let hides = |start, direction| caster.is_hidden(start, direction, f32::INFINITY);
+        let shares = on_all_cores(self.surfels.len(), |range| {
+            let lit = |surfel: &Surfel| {
+                let irradiance = room.light_on_surfel(surfel, RAYS, caster, sources, is_near);
+                LitSurfel {
+                    surfel: *surfel,
+                    open: open_directions(surfel, hides),
+                    radiance: surfel.albedo * irradiance * FRAC_1_PI,
+                }
+            };
+            self.surfels[range].iter().map(lit).collect::<Vec<_>>()
+        });
+        shares.into_iter().flatten().collect()
+    }
+
+    /// Into how many parts a patch's edges are to be cut, so that what the casters throw on it is smooth within each part.
+    pub fn parts(&self, corners: [Vec3; 3]) -> u32 {
+        let patch = BoxM::around(corners);
+        let distance = |bounds: &BoxM| {
+            let apart = (bounds.min - patch.max).max(patch.min - bounds.max);
+            apart.max(Vec3::ZERO).length()
+        };
+        let nearest = self
+            .boxes
+            .iter()
+            .map(distance)
+            .fold(f32::INFINITY, f32::min);
+        let part = (PART_OF_DISTANCE * nearest).max(SMALLEST_PART_M);
+        ((patch.diagonal() / part).ceil() as u32).clamp(1, MOST_PARTS)
+    }
+
+    /// Where the casters' own shadows matter to the light that they get.
+    pub fn shadowed_room(&self) -> BoxM {
+        let reach = Vec3::splat(3.0 * self.ball.radius);
+        BoxM {
+            min: self.ball.center - reach,
+            max: self.ball.center + reach,
+        }
+    }
+}

@@ -1,0 +1,468 @@
+//! Soft shadows by shafts: what virtual things hide of a room's light, what they throw back, and the light on them.
+//! Reads the room as it was worked out, and poses. Writes `reaching` and `change` (see shafts.wgsl).
+//!
+//! What depends on where things are in the world is worked out when they move, not when the camera does.
+
+mod casters;
+mod data;
+mod maps;
+mod pipelines;
+pub mod room;
+
+use std::sync::Arc;
+
+use glam::{DAffine3, Vec3, Vec4};
+use wgpu::util::DeviceExt as _;
+
+use crate::geometry::camera::Intrinsics;
+use crate::geometry::reach::{self, PixelRect};
+use crate::light::cores::on_all_cores;
+use crate::scene::{Scene, ShaftSettings};
+use crate::shafts::patches::PatchVertex;
+use crate::shafts::prepared::Prepared;
+use crate::shafts::selection::{Representative, representatives};
+use crate::shafts::source_tree::BoxM;
+use crate::shafts::surfels::{LitSurfel, thrown_back};
+
+use super::anchor_geometry::Role;
+use super::gpu::Gpu;
+use super::stage::Stage;
+use casters::{PlacedCasters, ShaftCasters};
+use data::{Frame, PatchCorner, Source, packed};
+use maps::{Maps, Tiling, source};
+use pipelines::Pipelines;
+
+/// Nodes of sources that give receivers less than this part of their light on the average are not cut: less than a level
+/// of 255.
+const LEAST_WEIGHT: f32 = 1.0 / 2048.0;
+/// Penumbras are given room in the maps up to this many radii behind the casters.
+const REACH: f32 = 4.0;
+
+/// Sources that light the surfels.
+const SOURCES_OF_BOUNCE: usize = 96;
+/// Sources nearer to the casters' middle than so many of their radii are among them.
+const NEAREST_SOURCE: f32 = 3.0;
+
+/// What shafts need from frame to frame.
+pub(super) struct Shafts {
+    room: Arc<Prepared>,
+    settings: ShaftSettings,
+    casters: ShaftCasters,
+    pipelines: Pipelines,
+    maps: Maps,
+    /// Places of all patches' corners, three each.
+    places: wgpu::Buffer,
+    place_count: u32,
+    frame: wgpu::Buffer,
+    sampler: wgpu::Sampler,
+    /// Where the casters' anchors were when `hidden` was worked out.
+    world_from_anchor: Vec<Option<DAffine3>>,
+    hidden: Option<Hidden>,
+}
+
+/// What the casters hide where they are.
+struct Hidden {
+    sources: wgpu::Buffer,
+    source_count: u32,
+    casters: wgpu::Buffer,
+    caster_vertices: u32,
+    /// Corners of the patches that may notice.
+    corners: wgpu::Buffer,
+    corner_count: u32,
+    group: wgpu::BindGroup,
+    /// Around the casters, and around all that may notice.
+    boxes: Vec<BoxM>,
+    noticing: BoxM,
+    /// What the casters throw back.
+    surfels: Vec<LitSurfel>,
+    /// Whether the maps show it.
+    is_drawn: bool,
+}
+
+impl Shafts {
+    pub fn new(gpu: &Gpu, scene: &Scene, room: Arc<Prepared>, stage: &Stage) -> Self {
+        let device = &gpu.device;
+        let buffer = |label, contents: &[u8], usage| {
+            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(label),
+                contents,
+                usage,
+            })
+        };
+        let places: Vec<Vec3> = room
+            .patches
+            .patches
+            .iter()
+            .flat_map(|patch| room.patches.corners(patch))
+            .collect();
+        let settings = scene.shadows.shafts;
+        let tiling = Tiling::new(1, settings.map_px, device.limits().max_texture_dimension_2d);
+        let glossy = scene.virtuals.iter().any(|object| {
+            let mut materials = object.materials.iter();
+            materials.any(|material| material.roughness.is_some())
+        });
+        Self {
+            pipelines: Pipelines::new(gpu, &stage.layouts, scene.shadows.samples, glossy),
+            maps: Maps::new(device, tiling),
+            casters: ShaftCasters::new(scene),
+            places: buffer(
+                "patches",
+                bytemuck::cast_slice(&places),
+                wgpu::BufferUsages::VERTEX,
+            ),
+            place_count: places.len() as u32,
+            frame: device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("shafts"),
+                size: size_of::<Frame>() as u64,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }),
+            sampler: device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("shaft maps"),
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                mipmap_filter: wgpu::MipmapFilterMode::Linear,
+                ..Default::default()
+            }),
+            world_from_anchor: Vec::new(),
+            hidden: None,
+            settings,
+            room,
+        }
+    }
+
+    /// Works out what is hidden where things are now. Returns the pixels that it can change, `None` if none.
+    pub fn update(
+        &mut self,
+        gpu: &Gpu,
+        stage: &Stage,
+        camera_from_anchor: &[Option<DAffine3>],
+        intrinsics: &Intrinsics,
+    ) -> Option<PixelRect> {
+        let camera_from_world = (*camera_from_anchor.first()?)?;
+        let world_from_camera = camera_from_world.inverse();
+        let mut world_from_anchor: Vec<Option<DAffine3>> = camera_from_anchor
+            .iter()
+            .map(|pose| pose.map(|camera_from_anchor| world_from_camera * camera_from_anchor))
+            .collect();
+        world_from_anchor[0] = Some(DAffine3::IDENTITY);
+        if self.world_from_anchor != world_from_anchor {
+            self.hidden = self
+                .casters
+                .place(&world_from_anchor)
+                .map(|placed| self.hide(gpu, &placed));
+            let volume = &self.room.volume;
+            stage.set_indirect(&gpu.queue, &world_from_anchor, |place, normal| {
+                let surfels = self.hidden.iter().flat_map(|hidden| &hidden.surfels[..]);
+                volume.radiance(place).irradiance(normal) + thrown_back(place, normal, surfels)
+            });
+            self.world_from_anchor = world_from_anchor;
+        }
+        let hidden = self.hidden.as_ref()?;
+        let frame = Frame {
+            world_from_camera: glam::DMat4::from(world_from_camera).as_mat4(),
+            source_count: hidden.source_count,
+            padding: [0; 3],
+            end: [0; 4],
+        };
+        gpu.queue
+            .write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
+        let covered = |bounds: &BoxM| {
+            let corners = [0, 1, 2, 3, 4, 5, 6, 7].map(|index: usize| {
+                let pick = |axis: usize| match index >> axis & 1 {
+                    0 => bounds.min[axis],
+                    _ => bounds.max[axis],
+                };
+                Vec3::new(pick(0), pick(1), pick(2)).as_dvec3()
+            });
+            reach::covered(&corners, &camera_from_world, intrinsics)
+        };
+        let all = hidden.boxes.iter().chain([&hidden.noticing]);
+        let pixels = all.map(covered).fold(PixelRect::NONE, PixelRect::union);
+        (!pixels.is_empty()).then_some(pixels)
+    }
+
+    /// Gibson et al. 2003, sections 6.1 and 8: sources that may be hidden, receivers that may notice, n representatives and
+    /// what each gives to each receiver.
+    fn hide(&mut self, gpu: &Gpu, placed: &PlacedCasters) -> Hidden {
+        let room = &self.room;
+        let marks = room.mark(&placed.boxes);
+        let mut may_be_hidden = marks.sources(&room.sources);
+        // Sources among the casters have no shadow map that could show them.
+        let among = room.sources_within(placed.ball.center, NEAREST_SOURCE * placed.ball.radius);
+        let mut is_among = vec![false; room.patches.patches.len()];
+        for &source in &among {
+            may_be_hidden[source] = false;
+            is_among[room.sources.patches[source] as usize] = true;
+        }
+        let may_notice = marks.receivers(&room.receivers);
+        let noticing: Vec<usize> = (0..may_notice.len())
+            .filter(|&patch| may_notice[patch])
+            .collect();
+        let mut vertices: Vec<u32> = noticing
+            .iter()
+            .flat_map(|&patch| room.patches.patches[patch].vertices)
+            .collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        let weighed = room.weighed(&may_be_hidden, &vertices);
+        let count = self
+            .settings
+            .sources
+            .map_or(usize::MAX, |count| count as usize);
+        let mut chosen = representatives(
+            &room.sources,
+            &weighed,
+            count,
+            LEAST_WEIGHT,
+            placed.ball.center,
+        );
+        let limit = gpu.device.limits().max_texture_dimension_2d;
+        let tiling = Tiling::new(chosen.len(), self.settings.map_px, limit);
+        let reach_m = REACH * placed.ball.radius;
+        let mut sources: Vec<Source> = Vec::new();
+        chosen.retain(|one| {
+            let intensity = room.intensity(one, &may_be_hidden, placed.ball.center);
+            let index = sources.len() as u32;
+            let source = source(one, &placed.ball, reach_m, intensity, &tiling, index);
+            sources.extend(source);
+            source.is_some()
+        });
+        self.maps.resize(&gpu.device, tiling);
+
+        let transfers = transfers(room, &vertices, &chosen, &may_be_hidden);
+        let detailed: Vec<(Representative, Vec3)> = representatives(
+            &room.sources,
+            &weighed,
+            SOURCES_OF_BOUNCE,
+            LEAST_WEIGHT,
+            placed.ball.center,
+        )
+        .into_iter()
+        .map(|one| {
+            (
+                one,
+                room.intensity(&one, &may_be_hidden, placed.ball.center),
+            )
+        })
+        .collect();
+        let surfels = placed.lit_surfels(room, &detailed, &is_among);
+        let row_of = |vertex: u32| vertices.binary_search(&vertex).unwrap_or(0) as u32;
+        let irradiances: Vec<Vec4> = vertices
+            .iter()
+            .map(|&vertex| room.irradiance[vertex as usize].extend(0.0))
+            .collect();
+        let dimmed = room.dimmed(&placed.caster, &detailed, &placed.shadowed_room());
+        let lost_nearby = lost_nearby(room, &vertices, &surfels, &is_among, &dimmed);
+        let mut lists: Vec<u32> = Vec::new();
+        let mut corners: Vec<PatchCorner> = Vec::new();
+        for &patch in &noticing {
+            let patch = &room.patches.patches[patch];
+            let rows = patch.vertices.map(row_of);
+            let places = room.patches.corners(patch);
+            let normal = room.patches.normal(patch);
+            let first = lists.len();
+            lists.extend((0..sources.len()).filter_map(|index| {
+                let arrives =
+                    |&row: &u32| transfers[row as usize * sources.len() + index] != [0, 0];
+                let may_fall = rows.iter().any(arrives) && sources[index].may_shade(places);
+                may_fall.then_some(index as u32)
+            }));
+            let list = [first as u32, (lists.len() - first) as u32];
+            let before = corners.len();
+            corners.extend(parts(placed.parts(places)).map(|weights| {
+                let [a, b] = weights;
+                let c = 1.0 - a - b;
+                let position = places[0] * a + places[1] * b + places[2] * c;
+                let [at_a, at_b, at_c] = rows.map(|row| lost_nearby[row as usize]);
+                let lost = at_a * a + at_b * b + at_c * c;
+                PatchCorner {
+                    position,
+                    rows,
+                    weights,
+                    list,
+                    thrown_back: thrown_back(position, normal, &surfels) - lost,
+                }
+            }));
+            let least = rows.map(|row| irradiances[row as usize].truncate() * LEAST_WEIGHT);
+            let least = least.into_iter().fold(Vec3::MAX, Vec3::min);
+            let gains = |corner: &PatchCorner| corner.thrown_back.abs().cmpgt(least).any();
+            if list[1] == 0 && !corners[before..].iter().any(gains) {
+                corners.truncate(before);
+            }
+        }
+
+        let device = &gpu.device;
+        // A binding cannot be empty.
+        let buffer = |label, contents: &[u8], usage| {
+            let contents = if contents.is_empty() {
+                &[0; 256]
+            } else {
+                contents
+            };
+            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(label),
+                contents,
+                usage,
+            })
+        };
+        let storage = wgpu::BufferUsages::STORAGE;
+        let source_buffer = buffer("sources", bytemuck::cast_slice(&sources), storage);
+        let list_buffer = buffer("shadowed by", bytemuck::cast_slice(&lists), storage);
+        let irradiances = buffer("irradiances", bytemuck::cast_slice(&irradiances), storage);
+        let transfers = buffer("transfers", bytemuck::cast_slice(&transfers), storage);
+        let bound = |binding, buffer: &'_ wgpu::Buffer| (binding, buffer.clone());
+        let buffers = [
+            bound(0, &self.frame),
+            bound(1, &source_buffer),
+            bound(2, &irradiances),
+            bound(3, &transfers),
+            bound(4, &list_buffer),
+        ];
+        let mut entries: Vec<wgpu::BindGroupEntry> = buffers
+            .iter()
+            .map(|(binding, buffer)| wgpu::BindGroupEntry {
+                binding: *binding,
+                resource: buffer.as_entire_binding(),
+            })
+            .collect();
+        entries.push(wgpu::BindGroupEntry {
+            binding: 5,
+            resource: wgpu::BindingResource::TextureView(&self.maps.view),
+        });
+        entries.push(wgpu::BindGroupEntry {
+            binding: 6,
+            resource: wgpu::BindingResource::Sampler(&self.sampler),
+        });
+        Hidden {
+            group: device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("shafts"),
+                layout: &self.pipelines.layout,
+                entries: &entries,
+            }),
+            source_count: sources.len() as u32,
+            casters: buffer(
+                "shaft casters",
+                bytemuck::cast_slice(&placed.triangles),
+                wgpu::BufferUsages::VERTEX,
+            ),
+            caster_vertices: 3 * placed.triangles.len() as u32,
+            corners: buffer(
+                "noticing patches",
+                bytemuck::cast_slice(&corners),
+                wgpu::BufferUsages::VERTEX,
+            ),
+            corner_count: corners.len() as u32,
+            noticing: BoxM::around(corners.iter().map(|corner| corner.position)),
+            boxes: placed.boxes.clone(),
+            surfels,
+            sources: source_buffer,
+            is_drawn: false,
+        }
+    }
+
+    /// Draws the sources' maps where they are not drawn yet.
+    pub fn draw_maps(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder) {
+        let Some(hidden) = self.hidden.as_mut().filter(|hidden| !hidden.is_drawn) else {
+            return;
+        };
+        self.maps.draw(
+            &gpu.device,
+            encoder,
+            &hidden.sources,
+            hidden.source_count,
+            (&hidden.casters, hidden.caster_vertices),
+        );
+        hidden.is_drawn = true;
+    }
+
+    /// Draws what is real into depth, what is virtual over it, and the light on both.
+    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, stage: &Stage, within: PixelRect) {
+        let Some(hidden) = &self.hidden else {
+            return;
+        };
+        pass.set_bind_group(2, &hidden.group, &[]);
+        stage.set_world(pass);
+        pass.set_pipeline(&self.pipelines.depth_of_room);
+        pass.set_vertex_buffer(0, self.places.slice(..));
+        pass.draw(0..self.place_count, 0..1);
+        stage.draw_moving_real(pass, &self.pipelines.depth_of_real, within);
+        stage.draw_surfaces(
+            pass,
+            &self.pipelines.light_on_virtual,
+            Role::Virtual,
+            0,
+            within,
+        );
+        stage.set_world(pass);
+        pass.set_pipeline(&self.pipelines.light_on_patch);
+        pass.set_vertex_buffer(0, hidden.corners.slice(..));
+        pass.draw(0..hidden.corner_count, 0..1);
+    }
+}
+
+/// For each vertex the irradiance that it loses from patches among the casters: what the casters' surfels cover, and what
+/// their shadows took from patches around them.
+fn lost_nearby(
+    room: &Prepared,
+    vertices: &[u32],
+    surfels: &[LitSurfel],
+    is_among: &[bool],
+    dimmed: &[(usize, Vec3)],
+) -> Vec<Vec3> {
+    let shares = on_all_cores(vertices.len(), |range| {
+        let hidden = |&vertex: &u32| {
+            let PatchVertex { position, normal } = room.patches.vertices[vertex as usize];
+            room.hidden_among(position, normal, surfels, is_among) + room.lost_at(vertex, dimmed)
+        };
+        vertices[range].iter().map(hidden).collect::<Vec<_>>()
+    });
+    shares.concat()
+}
+
+/// Cuts a triangle's edges into parts and returns the corners of all small triangles, three each, as the weights of its
+/// first two corners.
+fn parts(count: u32) -> impl Iterator<Item = [f32; 2]> {
+    let corner = move |column: u32, row: u32| [column, row].map(|at| at as f32 / count as f32);
+    let cell = move |row: u32, column: u32| {
+        let upright = [[column, row], [column + 1, row], [column, row + 1]];
+        let turned = [[column + 1, row], [column + 1, row + 1], [column, row + 1]];
+        let fits = column + row + 1 < count;
+        let corners = upright
+            .into_iter()
+            .chain(turned.into_iter().filter(move |_| fits));
+        corners.map(move |[column, row]| corner(column, row))
+    };
+    (0..count).flat_map(move |row| (0..count - row).flat_map(move |column| cell(row, column)))
+}
+
+/// For each vertex and each representative the irradiance that hidden sources would take, packed.
+fn transfers(
+    room: &Prepared,
+    vertices: &[u32],
+    chosen: &[Representative],
+    may_be_hidden: &[bool],
+) -> Vec<[u32; 2]> {
+    let radiance: Vec<Vec3> = room
+        .source_radiance
+        .iter()
+        .zip(may_be_hidden)
+        .map(|(&radiance, &hidden)| match hidden {
+            true => radiance * std::f32::consts::PI,
+            false => Vec3::ZERO,
+        })
+        .collect();
+    let shares = on_all_cores(vertices.len(), |range| {
+        let mut packed_rows = Vec::with_capacity(range.len() * chosen.len());
+        for &vertex in &vertices[range] {
+            let row = room.transfers.row(vertex as usize);
+            packed_rows.extend(chosen.iter().map(|one| {
+                let sources = one.first as usize..one.last as usize;
+                let arriving = row[sources.clone()].iter().zip(&radiance[sources]);
+                packed(arriving.map(|(&part, &radiance)| radiance * part).sum())
+            }));
+        }
+        packed_rows
+    });
+    shares.concat()
+}

@@ -1,0 +1,224 @@
+//! Reads `[probe]` and `[[room]]`: the light that a probe saw, and the room that sent it.
+
+use std::collections::HashMap;
+
+use glam::{DVec3, Vec3};
+
+use super::error::SceneError;
+use super::lights::POSITION;
+use super::mesh_file::{self, Normals};
+use super::objects::{ALBEDO, placement};
+use super::probe_file::{ProbeKind, read};
+use super::reader::{Numbers, Table, Value};
+use super::{ProbeScene, RoomPiece};
+use crate::geometry::winding::winding_number;
+
+const PROBE_KEYS: [&str; 5] = ["image", "kind", "position_m", "exposure", "room"];
+const ROOM_KEYS: [&str; 8] = [
+    "name",
+    "mesh",
+    "box_m",
+    "corners_m",
+    "position_m",
+    "rotation_deg",
+    "scale",
+    "albedo",
+];
+
+/// The probe and its room; `None` without `[probe]`.
+pub fn probe(root: &Table) -> Result<Option<ProbeScene>, SceneError> {
+    let rooms = root.tables("room", &ROOM_KEYS)?;
+    let Some(table) = root.table("probe", &PROBE_KEYS)? else {
+        return match rooms.first() {
+            Some(room) => Err(room.error(
+                "room: it is lit by a [probe], and there is none; allowed: no [[room]], or one with a [probe]",
+            )),
+            None => Ok(None),
+        };
+    };
+    let kinds = [
+        ("latitude-longitude", ProbeKind::LatitudeLongitude),
+        ("angular", ProbeKind::Angular),
+        ("ball", ProbeKind::Ball),
+    ];
+    let kind = table
+        .optional("kind")
+        .map(|value| value.one_of("kind of probe", &kinds))
+        .transpose()?
+        .unwrap_or(ProbeKind::LatitudeLongitude);
+    let image = table.required(
+        "image",
+        "a picture in linear radiance (.hdr or .exr) is expected",
+    )?;
+    let path = image.existing_path()?;
+    let probe = read(&path, kind).map_err(|message| image.error(message))?;
+    let position_m = table.vector_or("position_m", DVec3::ZERO, &POSITION)?;
+    let exposure = table.number_or("exposure", 1.0, &Numbers::above(0.0, 1e9, ""))?;
+    let mut room = Vec::new();
+    if let Some(files) = table.optional("room") {
+        let files = match files.text() {
+            Ok(_) => vec![files],
+            Err(_) => files.array("an OBJ file or a list of them is expected")?,
+        };
+        for file in &files {
+            let piece = mesh_piece(file, None)?;
+            room.push(piece);
+        }
+    }
+    let mut name_lines = HashMap::new();
+    for table in &rooms {
+        room.push(piece(table, &mut name_lines)?);
+    }
+    for piece in &mut room {
+        turn_to(piece, position_m.as_vec3());
+    }
+    Ok(Some(ProbeScene {
+        image: path,
+        probe,
+        position_m,
+        exposure,
+        room,
+    }))
+}
+
+fn piece(table: &Table, name_lines: &mut HashMap<String, usize>) -> Result<RoomPiece, SceneError> {
+    if table.optional("name").is_some() {
+        super::anchors::unique_name(table, name_lines)?;
+    }
+    let albedo = table
+        .optional("albedo")
+        .map(|value| value.splat_or_vector(&ALBEDO))
+        .transpose()?;
+    let shapes = ["mesh", "box_m", "corners_m"].map(|key| table.optional(key));
+    let mut given = shapes.iter().flatten();
+    let (Some(_), None) = (given.next(), given.next()) else {
+        return Err(table.error("room: one shape is expected; allowed: mesh, box_m or corners_m"));
+    };
+    let mut piece = match &shapes {
+        [Some(mesh), ..] => mesh_piece(mesh, albedo)?,
+        [_, Some(bounds), _] => box_piece(bounds, albedo)?,
+        [.., corners] => corners_piece(corners.as_ref(), table, albedo)?,
+    };
+    let world_from_piece = placement(table)?.anchor_from_object();
+    for (triangle, _) in &mut piece.triangles {
+        let place = |corner: Vec3| {
+            world_from_piece
+                .transform_point3(corner.as_dvec3())
+                .as_vec3()
+        };
+        *triangle = triangle.map(place);
+        if world_from_piece.matrix3.determinant() < 0.0 {
+            triangle.swap(1, 2);
+        }
+    }
+    Ok(piece)
+}
+
+fn mesh_piece(value: &Value, albedo: Option<DVec3>) -> Result<RoomPiece, SceneError> {
+    let loaded = mesh_file::load(value, Normals::Flat)?;
+    let mesh = loaded.mesh;
+    let triangles = mesh.triangles.iter().zip(&mesh.triangle_materials);
+    let triangles = triangles.map(|(triangle, &material)| {
+        let given =
+            loaded.is_given[material as usize].then(|| loaded.materials[material as usize].albedo);
+        let corners = triangle.map(|corner| mesh.positions[corner as usize]);
+        (corners, albedo.or(given).map(|albedo| albedo.as_vec3()))
+    });
+    Ok(RoomPiece {
+        triangles: triangles.collect(),
+        is_closed: loaded.report.closed,
+    })
+}
+
+/// A box: a room around the probe, or something in it.
+fn box_piece(value: &Value, albedo: Option<DVec3>) -> Result<RoomPiece, SceneError> {
+    let [x0, y0, z0, x1, y1, z1] = value.numbers::<6>(&POSITION)?.map(|part| part as f32);
+    if x0 >= x1 || y0 >= y1 || z0 >= z1 {
+        return Err(value.error(
+            "no volume; allowed: [x0, y0, z0, x1, y1, z1] with x0 < x1, y0 < y1 and z0 < z1",
+        ));
+    }
+    let (low, high) = (Vec3::new(x0, y0, z0), Vec3::new(x1, y1, z1));
+    let corner = |index: usize| {
+        let pick = |axis: usize| {
+            if index >> axis & 1 == 1 {
+                high[axis]
+            } else {
+                low[axis]
+            }
+        };
+        Vec3::new(pick(0), pick(1), pick(2))
+    };
+    // Counter-clockwise seen from outside.
+    const FACES: [[usize; 4]; 6] = [
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+    ];
+    let albedo = albedo.map(|albedo| albedo.as_vec3());
+    let triangles = FACES
+        .iter()
+        .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+        .map(|triangle| (triangle.map(corner), albedo));
+    Ok(RoomPiece {
+        triangles: triangles.collect(),
+        is_closed: true,
+    })
+}
+
+/// A flat polygon of three or four corners.
+fn corners_piece(
+    value: Option<&Value>,
+    table: &Table,
+    albedo: Option<DVec3>,
+) -> Result<RoomPiece, SceneError> {
+    const WHAT: &str = "three or four corners are expected: [[x, y, z], …] in metres";
+    let value = value.ok_or_else(|| table.error(WHAT))?;
+    let corners: Vec<Vec3> = value
+        .array(WHAT)?
+        .iter()
+        .map(|corner| Ok(DVec3::from_array(corner.numbers(&POSITION)?).as_vec3()))
+        .collect::<Result<_, SceneError>>()?;
+    let triangles: &[[usize; 3]] = match corners.len() {
+        3 => &[[0, 1, 2]],
+        4 => &[[0, 1, 2], [0, 2, 3]],
+        _ => return Err(value.error(WHAT)),
+    };
+    let albedo = albedo.map(|albedo| albedo.as_vec3());
+    let triangles = triangles
+        .iter()
+        .map(|triangle| (triangle.map(|corner| corners[corner]), albedo));
+    Ok(RoomPiece {
+        triangles: triangles.collect(),
+        is_closed: false,
+    })
+}
+
+/// Turns the lit side of a piece's triangles to the front: what is closed is lit from outside, or from inside where the
+/// probe was taken there; a sheet from where the probe was taken.
+fn turn_to(piece: &mut RoomPiece, probe_m: Vec3) {
+    if piece.is_closed {
+        let corners: Vec<Vec3> = piece
+            .triangles
+            .iter()
+            .flat_map(|(corners, _)| *corners)
+            .collect();
+        let indices = (0..piece.triangles.len() as u32)
+            .map(|triangle| [3 * triangle, 3 * triangle + 1, 3 * triangle + 2]);
+        if winding_number(&corners, indices, probe_m.as_dvec3()).abs() > 0.5 {
+            for (corners, _) in &mut piece.triangles {
+                corners.swap(1, 2);
+            }
+        }
+        return;
+    }
+    for (corners, _) in &mut piece.triangles {
+        let [a, b, c] = *corners;
+        if (b - a).cross(c - a).dot(probe_m - a) < 0.0 {
+            corners.swap(1, 2);
+        }
+    }
+}

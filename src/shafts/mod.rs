@@ -1,0 +1,23 @@
+//! Soft shadows by shafts (Gibson, Cook, Howard & Hubbold 2003), as plain values: the room in patches, the light that
+//! each sends to each place, and which of it a moving thing may hide. World space, metres, linear radiance.
+
+mod form_factor;
+mod harmonics;
+pub mod hierarchy;
+pub mod irradiance_volume;
+mod light_of_room;
+pub mod patches;
+pub mod prepared;
+mod receiver_tree;
+pub mod selection;
+mod shaft;
+pub mod source_tree;
+pub mod surfels;
+pub mod transfer;
+
+use glam::Vec3;
+
+/// Luminance of linear RGB (Rec. 709).
+pub(crate) fn luminance(color: Vec3) -> f32 {
+    color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
+}

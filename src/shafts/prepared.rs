@@ -1,0 +1,388 @@
+//! All that is worked out about a room before the first frame: its patches, their light, and who lights whom.
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+
+use crate::geometry::bounds::Bounds;
+use crate::geometry::ray_caster::RayCaster;
+use crate::light::cores::on_all_cores;
+
+use super::hierarchy::{Arriving, Hierarchy, Marks};
+use super::irradiance_volume::IrradianceVolume;
+pub use super::light_of_room::{PatchLight, PlacedProbe};
+use super::light_of_room::{hemisphere, light_of_room};
+use super::luminance;
+use super::patches::{Patches, RoomTriangle};
+use super::receiver_tree::ReceiverTree;
+use super::selection::{Representative, WeighedSource, triangle_spread};
+use super::source_tree::{BoxM, Source, SourceTree};
+use super::surfels::{LitSurfel, Surfel};
+use super::transfer::{Transfers, irradiance};
+
+/// How finely a room is worked out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Patches, about.
+    pub patches: usize,
+    /// Part of all power that the sources send out, the brightest first, in (0, 1].
+    pub source_power: f64,
+    /// Patches in a leaf of the receivers' octree.
+    pub receivers_per_leaf: usize,
+    /// Shafts that bring every vertex less than this part of its light are cut no further.
+    pub least_part: f64,
+}
+
+/// What is known of a room.
+pub struct Prepared {
+    /// The room, the table and the phantoms.
+    pub patches: Patches,
+    /// Light of each patch.
+    pub light: Vec<PatchLight>,
+    /// The sources.
+    pub sources: SourceTree,
+    /// Radiance of each source in the tree's order.
+    pub source_radiance: Vec<Vec3>,
+    /// Form factors of each vertex: the sources in the tree's order, then all other patches.
+    pub transfers: Transfers,
+    /// For each patch its place in the rows of `transfers`.
+    pub sender_of_patch: Vec<u32>,
+    /// All light of each vertex: irradiance.
+    pub irradiance: Vec<Vec3>,
+    /// The receivers.
+    pub receivers: ReceiverTree,
+    /// Who may hide what from whom.
+    pub hierarchy: Hierarchy,
+    /// The light where virtual things may be.
+    pub volume: IrradianceVolume,
+    /// The patches' triangles.
+    pub caster: RayCaster,
+}
+
+/// Spacing of the irradiance volume's grid, metres.
+const VOLUME_SPACING_M: f32 = 0.06;
+/// How far it reaches beyond where things stand.
+const VOLUME_MARGIN_M: f64 = 0.15;
+
+impl Prepared {
+    /// Works a room out. `things` is around all phantoms but the table, and all virtual things where they first stand.
+    pub fn new(
+        triangles: &[RoomTriangle],
+        probe: PlacedProbe<'_>,
+        things: &[Bounds],
+        options: &Options,
+    ) -> Self {
+        let brightness = |place: Vec3| luminance(probe.radiance_of(place));
+        let mut focuses = things.to_vec();
+        focuses.extend(Bounds::around([probe.position_m]));
+        let patches = Patches::new(triangles, options.patches, &focuses, brightness);
+        let corners: Vec<[Vec3; 3]> = patches.patches.iter().map(|p| patches.corners(p)).collect();
+        let caster = RayCaster::new(&corners);
+        let light = light_of_room(&patches, &caster, probe);
+
+        let power =
+            |patch: usize| luminance(light[patch].radiance) * patches.area(&patches.patches[patch]);
+        let (brightest, others) = source_set(&light, power, options.source_power);
+        let sources = SourceTree::new(
+            brightest
+                .into_iter()
+                .map(|patch| Source {
+                    patch: patch as u32,
+                    corners: corners[patch],
+                    power: power(patch),
+                    luminance: luminance(light[patch].radiance),
+                })
+                .collect(),
+        );
+        let mut senders = sources.patches.clone();
+        senders.extend(others.iter().map(|&patch| patch as u32));
+        let sender_radiance: Vec<Vec3> = senders
+            .iter()
+            .map(|&patch| light[patch as usize].radiance)
+            .collect();
+        let transfers = Transfers::new(&patches, &senders, &caster);
+        let mut sender_of_patch = vec![0; senders.len()];
+        for (sender, &patch) in (0..).zip(&senders) {
+            sender_of_patch[patch as usize] = sender;
+        }
+        let rows = || (0..patches.vertices.len()).map(|vertex| transfers.row(vertex));
+        let irradiance: Vec<Vec3> = rows()
+            .map(|row| irradiance(row, &sender_radiance))
+            .collect();
+
+        let source_count = sources.patches.len();
+        let luminances: Vec<f32> = sender_radiance[..source_count]
+            .iter()
+            .map(|&radiance| luminance(radiance) * PI)
+            .collect();
+        let arriving = Arriving::new(
+            rows().map(|row| row.iter().zip(&luminances).map(|(f, l)| f * l).collect()),
+            irradiance.iter().map(|&light| luminance(light)).collect(),
+        );
+        let receivers = ReceiverTree::new(&patches, options.receivers_per_leaf);
+        let hierarchy = Hierarchy::new(&sources, &receivers, &arriving, options.least_part as f32);
+        let radiance: Vec<Vec3> = light.iter().map(|light| light.radiance).collect();
+        let volume = IrradianceVolume::new(
+            around(things, VOLUME_MARGIN_M),
+            VOLUME_SPACING_M,
+            &patches,
+            &caster,
+            &radiance,
+        );
+        Self {
+            source_radiance: sender_radiance[..source_count].to_vec(),
+            patches,
+            light,
+            sources,
+            transfers,
+            sender_of_patch,
+            irradiance,
+            receivers,
+            hierarchy,
+            volume,
+            caster,
+        }
+    }
+
+    /// Marks what things in boxes may hide, and who may notice.
+    pub fn mark(&self, boxes: &[BoxM]) -> Marks {
+        let mut marks = Marks::new(&self.sources, &self.receivers);
+        for bounds in boxes {
+            self.hierarchy.mark(bounds, &mut marks);
+        }
+        marks
+    }
+
+    /// The sources as they weigh for some vertices; those that are not marked weigh nothing.
+    pub fn weighed(&self, is_marked: &[bool], vertices: &[u32]) -> Vec<WeighedSource> {
+        let mut weights = vec![0.0_f32; is_marked.len()];
+        for &vertex in vertices {
+            let total = luminance(self.irradiance[vertex as usize]).max(1e-9);
+            let row = self.transfers.row(vertex as usize);
+            for (weight, form_factor) in weights.iter_mut().zip(row) {
+                *weight += form_factor / total;
+            }
+        }
+        let count = vertices.len().max(1) as f32;
+        let sources = self.sources.patches.iter().zip(is_marked);
+        sources
+            .zip(weights.iter().zip(&self.source_radiance))
+            .map(|((&patch, &is_marked), (&weight, &radiance))| {
+                let corners = self.patches.corners(&self.patches.patches[patch as usize]);
+                WeighedSource {
+                    center: corners.iter().sum::<Vec3>() / 3.0,
+                    spread: triangle_spread(corners),
+                    weight: match is_marked {
+                        true => weight * luminance(radiance) * PI / count,
+                        false => 0.0,
+                    },
+                }
+            })
+            .collect()
+    }
+
+    /// The sources, in the tree's order, whose middle lies within a ball.
+    pub fn sources_within(&self, center: Vec3, radius: f32) -> Vec<usize> {
+        let middle = |patch: u32| self.patches.center(&self.patches.patches[patch as usize]);
+        let sources = self.sources.patches.iter().enumerate();
+        sources
+            .filter(|(_, patch)| middle(**patch).distance(center) < radius)
+            .map(|(source, _)| source)
+            .collect()
+    }
+
+    /// Irradiance of a place from marked patches that surfels cover.
+    pub fn hidden_among(
+        &self,
+        place: Vec3,
+        normal: Vec3,
+        surfels: &[LitSurfel],
+        is_marked: &[bool],
+    ) -> Vec3 {
+        let start = place + normal * SURFEL_OFFSET_M;
+        let covered = |surfel: &LitSurfel| {
+            let part = surfel.irradiance_part(place, normal);
+            if part < LEAST_COVERED {
+                return Vec3::ZERO;
+            }
+            match self.radiance_along(start, (surfel.surfel.position - start).normalize()) {
+                Some((radiance, patch, _)) if is_marked[patch] => radiance * part,
+                _ => Vec3::ZERO,
+            }
+        };
+        surfels.iter().map(covered).sum()
+    }
+
+    /// The patches within `near`, each with the radiance that it loses to the casters' shadows on it.
+    pub fn dimmed(
+        &self,
+        caster: &RayCaster,
+        sources: &[(Representative, Vec3)],
+        near: &BoxM,
+    ) -> Vec<(usize, Vec3)> {
+        let weight: f32 = sources.iter().map(|(source, _)| source.weight).sum();
+        let close: Vec<usize> = (0..self.patches.patches.len())
+            .filter(|&patch| {
+                near.touches(&BoxM::around([self
+                    .patches
+                    .center(&self.patches.patches[patch])]))
+            })
+            .collect();
+        let shares = on_all_cores(close.len(), |range| {
+            let dimmed = |&index: &usize| {
+                let patch = &self.patches.patches[index];
+                let (center, normal) = (self.patches.center(patch), self.patches.normal(patch));
+                let start = center + normal * SURFEL_OFFSET_M;
+                let (mut arriving, mut hidden) = (0, 0);
+                for ray in 0..DIMMING_RAYS {
+                    let at = (ray as f32 + 0.5) / DIMMING_RAYS as f32 * weight;
+                    let way = at_weight(sources, at) - start;
+                    if way.dot(normal) > 0.0 {
+                        arriving += 1;
+                        hidden += u32::from(caster.is_hidden(start, way, 1.0));
+                    }
+                }
+                let part = hidden as f32 / arriving.max(1) as f32;
+                (index, self.light[index].radiance * part)
+            };
+            close[range].iter().map(dimmed).collect::<Vec<_>>()
+        });
+        let all = shares.into_iter().flatten();
+        all.filter(|(_, lost)| *lost != Vec3::ZERO).collect()
+    }
+
+    /// Irradiance that a vertex loses with patches' lost radiance.
+    pub fn lost_at(&self, vertex: u32, dimmed: &[(usize, Vec3)]) -> Vec3 {
+        let row = self.transfers.row(vertex as usize);
+        let part =
+            |(patch, lost): &(usize, Vec3)| *lost * row[self.sender_of_patch[*patch] as usize];
+        dimmed.iter().map(part).sum::<Vec3>() * PI
+    }
+
+    /// Radiant intensity of a representative's marked sources towards a place, as far as the room lets it through.
+    pub fn intensity(&self, one: &Representative, is_marked: &[bool], place: Vec3) -> Vec3 {
+        let range = one.first as usize..one.last as usize;
+        range
+            .filter(|&source| is_marked[source])
+            .map(|source| {
+                let patch = &self.patches.patches[self.sources.patches[source] as usize];
+                let center = self.patches.center(patch);
+                let way = place - center;
+                let facing = self.patches.normal(patch).dot(way) / way.length().max(1e-9);
+                let start = center + self.patches.normal(patch) * SURFEL_OFFSET_M;
+                if facing <= 0.0 || self.caster.is_hidden(start, place - start, 1.0) {
+                    return Vec3::ZERO;
+                }
+                self.source_radiance[source] * (self.patches.area(patch) * facing)
+            })
+            .sum()
+    }
+
+    /// Radiance along a ray; none from backs, or where there is no room.
+    pub fn radiance_along(&self, origin: Vec3, direction: Vec3) -> Option<(Vec3, usize, f32)> {
+        let hit = self.caster.first_hit(origin, direction, f32::INFINITY)?;
+        let patch = &self.patches.patches[hit.triangle];
+        let is_front = self.patches.normal(patch).dot(direction) < 0.0;
+        is_front.then_some((
+            self.light[hit.triangle].radiance,
+            hit.triangle,
+            hit.distance,
+        ))
+    }
+}
+
+impl Prepared {
+    /// Irradiance of a surfel past what `caster` hides: from representatives of sources, with their radiant intensities,
+    /// and from the patches `is_near` by `rays`, which see them with the casters' shadows on them.
+    pub fn light_on_surfel(
+        &self,
+        surfel: &Surfel,
+        rays: usize,
+        caster: &RayCaster,
+        sources: &[(Representative, Vec3)],
+        is_near: &[bool],
+    ) -> Vec3 {
+        let weight: f32 = sources.iter().map(|(source, _)| source.weight).sum();
+        let start = surfel.position + surfel.normal * SURFEL_OFFSET_M;
+        let from_source = |(source, intensity): &(Representative, Vec3)| {
+            let way = source.position - start;
+            let facing = surfel.normal.dot(way);
+            if facing <= 0.0 || caster.is_hidden(start, way, 1.0) {
+                return Vec3::ZERO;
+            }
+            // Seen from among its sources, a representative is no point.
+            let squared = way.length_squared() + source.spread_trace();
+            *intensity * (facing / (squared * way.length()))
+        };
+        let mut near = Vec3::ZERO;
+        for (index, direction) in hemisphere(surfel.normal, rays).enumerate() {
+            let seen = self.radiance_along(start, direction);
+            let Some((radiance, patch, distance)) = seen.filter(|(_, patch, _)| is_near[*patch])
+            else {
+                continue;
+            };
+            if caster.is_hidden(start, direction, distance) {
+                continue;
+            }
+            let normal = self.patches.normal(&self.patches.patches[patch]);
+            let place = start + direction * distance + normal * SURFEL_OFFSET_M;
+            let at = (index as f32 * 0.618_034 + 0.5).fract() * weight;
+            let way = at_weight(sources, at) - place;
+            if weight == 0.0 || !caster.is_hidden(place, way, 1.0) {
+                near += radiance;
+            }
+        }
+        sources.iter().map(from_source).sum::<Vec3>() + near * (PI / rays as f32)
+    }
+}
+
+/// The place of the representative at a part of all weight.
+fn at_weight(sources: &[(Representative, Vec3)], mut at: f32) -> Vec3 {
+    for (source, _) in sources {
+        at -= source.weight;
+        if at <= 0.0 {
+            return source.position;
+        }
+    }
+    sources
+        .last()
+        .map_or(Vec3::ZERO, |(source, _)| source.position)
+}
+
+/// Rays that tell how much of a patch's light the casters hide.
+const DIMMING_RAYS: usize = 48;
+/// Surfels that cover less of a place's hemisphere (over π) hide nothing that shows.
+const LEAST_COVERED: f32 = 1e-4;
+/// How far off a surfel rays start, metres: past the rounding of a simplified thing.
+const SURFEL_OFFSET_M: f32 = 1e-4;
+
+/// Patches by falling radiance until they have a part of all power, and the others (Gibson et al. 2003, section 4).
+fn source_set(
+    light: &[PatchLight],
+    power: impl Fn(usize) -> f32,
+    part: f64,
+) -> (Vec<usize>, Vec<usize>) {
+    let mut order: Vec<usize> = (0..light.len()).collect();
+    let brightness = |&patch: &usize| luminance(light[patch].radiance);
+    order.sort_by(|one, other| brightness(other).total_cmp(&brightness(one)));
+    let all: f64 = order.iter().map(|&patch| f64::from(power(patch))).sum();
+    let mut sum = 0.0;
+    let enough = order.iter().take_while(|&&patch| {
+        let before = sum;
+        sum += f64::from(power(patch));
+        before < part * all && power(patch) > 0.0
+    });
+    let others = order.split_off(enough.count());
+    (order, others)
+}
+
+fn around(things: &[Bounds], margin_m: f64) -> BoxM {
+    let corners = things.iter().flat_map(|bounds| {
+        [bounds.low - margin_m, bounds.high + margin_m].map(|corner| corner.as_vec3())
+    });
+    let bounds = BoxM::around(corners);
+    match bounds.min.cmple(bounds.max).all() {
+        true => bounds,
+        false => BoxM::around([Vec3::splat(-0.5), Vec3::splat(0.5)]),
+    }
+}
