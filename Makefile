@@ -2,7 +2,7 @@
 # Mesa's layer that asks the desktop for its favourite card complains on machines without a desktop; gnomon chooses itself.
 export NODEVICE_SELECT = 1
 
-.PHONY: demo test test-camera soak bench bench-volumes bench-tracking setup
+.PHONY: demo test test-camera soak charts reference bench bench-volumes bench-tracking setup
 
 demo: setup
 	cargo build --release
@@ -29,15 +29,23 @@ test-camera: setup
 soak: setup
 	cargo test --release --test soak -- --ignored --nocapture
 
-# How the cost of shadow volumes grows, whether silhouettes belong on the CPU, and what phantoms that are off do: figures
-# in out/.
+# Speed against accuracy on this machine: charts/.
+charts: setup
+	cargo build --release
+	target/release/gnomon chart
+
+# What a camera would have seen of a scene of your own, path-traced: make reference SCENE=config/lamp.toml ARGS="--frames 30".
+# Nothing else needs it. tools/reference/README.md tells more.
+SCENE = config/lamp.toml
+reference:
+	tools/reference/setup
+	tools/reference/venv/bin/python tools/reference/render_session.py $(SCENE) --out out/reference/$(basename $(notdir $(SCENE))) $(ARGS)
+
+# What a frame with shadow volumes costs, and whether silhouettes belong on the CPU: figures in out/.
 bench: setup
 	mkdir -p out
 	cargo bench --bench volumes -- --csv $(CURDIR)/out/volumes.csv
-	cargo bench --bench volumes -- --sweep --csv $(CURDIR)/out/volumes_sweep.csv
 	cargo bench --bench extrusion -- --csv $(CURDIR)/out/extrusion.csv
-	cargo bench --bench displacement -- --csv $(CURDIR)/out/displacement.csv
-	cargo bench --bench displaced_lamp -- --csv $(CURDIR)/out/displaced_lamp.csv
 
 # Beside what a user would run instead, where ../shared/peers has it.
 bench-volumes: setup

@@ -18,9 +18,9 @@ use gnomon::geometry::mesh::Mesh;
 use gnomon::geometry::shadow_volume::{Caster, Casting, LightPlace};
 use wgpu::util::DeviceExt as _;
 
-use common::{
-    Csv, LIGHT_M, SIZE_PX, TORUS_CENTER_M, Times, WARM_UP_FRAMES, at_least_one, camera_from_world,
-    intrinsics, torus, turn,
+use common::{Csv, Times, at_least_one};
+use gnomon::app::chart::peers_table::{
+    LIGHT_M, SIZE_PX, TORUS_CENTER_M, WARM_UP_FRAMES, camera_from_world, intrinsics, torus, turn,
 };
 
 /// Times silhouettes and extrusion on the CPU and in a vertex shader.

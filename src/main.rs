@@ -12,16 +12,19 @@ use clap::{Args, Parser, Subcommand};
 use gnomon::app::board::{self, Distance, board};
 use gnomon::app::calibrate;
 use gnomon::app::cameras;
+use gnomon::app::chart::{self, chart};
 use gnomon::app::check;
 use gnomon::app::first_look::first_look;
 use gnomon::app::layer_files::Layer;
 use gnomon::app::live;
 use gnomon::app::markers::{self, Paper, Sheet};
+use gnomon::app::probe::{self, exposure_of};
 use gnomon::app::record;
 use gnomon::app::replay::{self, replay};
 use gnomon::app::report::Report;
 use gnomon::app::track::{self, is_scene, track};
 use gnomon::calibration::{Target, TargetMarkers};
+use gnomon::light::probe_maps::Circle;
 use gnomon::scene::{CameraSettings, Family, PixelFormat, Scene, TrackingSettings, WantedFormat};
 use gnomon::tracking::mapping::MapSettings;
 
@@ -75,6 +78,13 @@ enum Command {
         after_help = "Example:\n  gnomon record webcam:0 --calibration camera.toml --out out/session --seconds 20"
     )]
     Record(RecordArgs),
+    /// Makes a light probe from exposures of a mirror ball, an angular map or a panorama.
+    #[command(
+        after_help = "Examples:\n  gnomon probe ball-*.jpg --kind ball --out probe.hdr --preview out/probe.png\n  \
+                      gnomon probe a.png b.png c.png --exposures 1/4,1/30,1/250 --kind ball --reflectance 0.65 --out probe.hdr\n  \
+                      gnomon probe room_angmap.hdr --kind angular --turn-deg 90 --out probe.hdr"
+    )]
+    Probe(ProbeArgs),
     /// Lists the cameras and their formats.
     #[command(
         after_help = "Example:\n  gnomon cameras    # and then: gnomon record webcam:0 --out out/session"
@@ -86,6 +96,31 @@ enum Command {
         /// Scene file (TOML)
         scene: PathBuf,
     },
+    /// Measures speed against accuracy on this machine, and draws it.
+    #[command(
+        after_help = "Example:\n  gnomon chart --quick --only tracking\n\nIt runs in the project's folder. \
+                      What has been measured is not measured again by the same program from the same recordings: after \
+                      an interrupt it goes on where it was."
+    )]
+    Chart(ChartArgs),
+}
+
+#[derive(Args)]
+struct ChartArgs {
+    /// Folder for the charts; charts without this, charts/quick with --quick
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', help = format!("Make these alone: {}", chart::names().join(", ")))]
+    only: Vec<String>,
+    /// Fewer rounds: rougher times in a tenth of the time
+    #[arg(long)]
+    quick: bool,
+    /// Track the sessions of this folder too
+    #[arg(long, value_name = "DIR")]
+    sessions: Option<PathBuf>,
+    /// Graphics adapter, by a part of its name; the fastest kind without this
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
 }
 
 #[derive(Args)]
@@ -339,6 +374,68 @@ impl RecordingArgs {
     }
 }
 
+#[derive(Args)]
+struct ProbeArgs {
+    /// Exposures of one view; or one picture in linear radiance (.hdr, .exr)
+    #[arg(required = true)]
+    pictures: Vec<PathBuf>,
+    /// What they show
+    #[arg(long, value_enum)]
+    kind: ProbeKindArg,
+    /// Exposure times in the pictures' order, or a file with a picture's name and its time a line; from EXIF without this
+    #[arg(long, value_name = "S,…|FILE")]
+    exposures: Option<String>,
+    /// Outline of the ball or the map, pixels from the upper left corner; a ball is found without this
+    #[arg(long, value_name = "X,Y,RADIUS", value_parser = circle_of, allow_hyphen_values = true)]
+    crop: Option<Circle>,
+    /// From the camera to the ball's middle, in radii of the ball; far away without this
+    #[arg(long, value_name = "RADII", value_parser = ball_distance_of)]
+    ball_distance: Option<f64>,
+    /// Part of the light that the ball reflects: 0.6 to 0.7 for chrome
+    #[arg(long, value_name = "PART", value_parser = reflectance_of, default_value = "1")]
+    reflectance: f64,
+    /// The camera was turned so far to the left from looking along the world's +y
+    #[arg(long, value_name = "DEG", value_parser = degrees_of, default_value = "0", allow_negative_numbers = true)]
+    turn_deg: f64,
+    /// It was tilted downward by so much
+    #[arg(long, value_name = "DEG", value_parser = degrees_of, default_value = "0", allow_negative_numbers = true)]
+    tilt_deg: f64,
+    /// It was rolled clockwise by so much
+    #[arg(long, value_name = "DEG", value_parser = degrees_of, default_value = "0", allow_negative_numbers = true)]
+    roll_deg: f64,
+    /// Move the exposures on to each other first: the camera was held by hand
+    #[arg(long)]
+    align: bool,
+    /// The camera's response, as --save-response wrote it, instead of estimating it
+    #[arg(long, value_name = "FILE")]
+    response: Option<PathBuf>,
+    /// Write the camera's response (CSV)
+    #[arg(long, value_name = "FILE")]
+    save_response: Option<PathBuf>,
+    /// Exposure at which radiance 1 is white; the middle picture's without this
+    #[arg(long, value_name = "S", value_parser = exposure_of)]
+    white_at: Option<f64>,
+    /// Columns of the probe, which has half as many rows; as fine as the pictures, up to 1024, without this
+    #[arg(long, value_name = "PX", value_parser = probe_width_of)]
+    width_px: Option<usize>,
+    /// The probe: .hdr (Radiance) or .exr (OpenEXR), latitude-longitude
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Write a picture of the probe with rings around its brightest lights (PNG)
+    #[arg(long, value_name = "FILE")]
+    preview: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum ProbeKindArg {
+    /// A mirror ball
+    Ball,
+    /// Debevec's angular map
+    Angular,
+    /// All directions, twice as wide as high
+    Panorama,
+}
+
 /// Markers that no scene describes.
 #[derive(Args)]
 struct FamilyArgs {
@@ -369,10 +466,12 @@ fn run(cli: Cli) -> Result<()> {
         Command::Calibrate(args) => run_calibrate(args),
         Command::Markers(args) => run_markers(args),
         Command::Record(args) => run_record(args),
+        Command::Probe(args) => run_probe(args),
         Command::Cameras => {
             print!("{}", cameras::cameras()?);
             Ok(())
         }
+        Command::Chart(args) => run_chart(args),
         Command::Check { scene } => {
             let scene = Scene::load(&scene)?;
             print!("{}", check::summary(&scene));
@@ -415,6 +514,23 @@ fn run_replay(args: ReplayArgs) -> Result<()> {
         adapter: args.adapter,
     };
     conclude(&replay(&request, &stop)?)
+}
+
+fn run_chart(args: ChartArgs) -> Result<()> {
+    let stop = interrupts()?;
+    let out = match args.quick {
+        true => "charts/quick",
+        false => "charts",
+    };
+    let request = chart::Request {
+        out: args.out.unwrap_or_else(|| out.into()),
+        only: args.only,
+        quick: args.quick,
+        sessions: args.sessions,
+        adapter: args.adapter,
+    };
+    eprintln!("{}", chart(&request, &stop)?);
+    Ok(())
 }
 
 fn run_track(args: TrackArgs) -> Result<()> {
@@ -579,6 +695,90 @@ fn run_record(args: RecordArgs) -> Result<()> {
     };
     eprintln!("{}", record::record(&request, &stop)?);
     Ok(())
+}
+
+fn run_probe(args: ProbeArgs) -> Result<()> {
+    let request = probe::Request {
+        pictures: args.pictures,
+        exposures: args.exposures,
+        kind: match args.kind {
+            ProbeKindArg::Ball => probe::Kind::Ball,
+            ProbeKindArg::Angular => probe::Kind::Angular,
+            ProbeKindArg::Panorama => probe::Kind::Panorama,
+        },
+        crop: args.crop,
+        ball_distance_radii: args.ball_distance.unwrap_or(f64::INFINITY),
+        ball_reflectance: args.reflectance,
+        turn_tilt_roll_deg: [args.turn_deg, args.tilt_deg, args.roll_deg],
+        align: args.align,
+        response: args.response,
+        save_response: args.save_response,
+        white_at: args.white_at,
+        width_px: args.width_px,
+        out: args.out,
+        preview: args.preview,
+    };
+    let told = probe::probe(&request)?;
+    for remark in &told.remarks {
+        eprintln!("{remark}");
+    }
+    print!("{}", told.lights);
+    Ok(())
+}
+
+fn circle_of(written: &str) -> Result<Circle, String> {
+    let numbers: Option<Vec<f64>> = written
+        .split(',')
+        .map(|number| {
+            number
+                .trim()
+                .parse()
+                .ok()
+                .filter(|number: &f64| number.is_finite())
+        })
+        .collect();
+    match numbers.as_deref() {
+        Some([x, y, radius_px]) if *radius_px >= 2.0 => Ok(Circle {
+            center_px: glam::DVec2::new(*x, *y),
+            radius_px: *radius_px,
+        }),
+        _ => Err(
+            "three numbers are expected, like 640,360,210: the middle, and a radius of at least 2"
+                .to_owned(),
+        ),
+    }
+}
+
+fn number_between(written: &str, allowed: std::ops::RangeInclusive<f64>) -> Result<f64, String> {
+    let number = written.parse().ok();
+    number
+        .filter(|number| allowed.contains(number))
+        .ok_or_else(|| {
+            format!(
+                "out of range; allowed: {} to {}",
+                allowed.start(),
+                allowed.end()
+            )
+        })
+}
+
+fn ball_distance_of(written: &str) -> Result<f64, String> {
+    number_between(written, 1.5..=1e6)
+}
+
+fn reflectance_of(written: &str) -> Result<f64, String> {
+    number_between(written, 0.01..=1.0)
+}
+
+fn degrees_of(written: &str) -> Result<f64, String> {
+    number_between(written, -360.0..=360.0)
+}
+
+fn probe_width_of(written: &str) -> Result<usize, String> {
+    let width_px = written.parse().ok();
+    width_px
+        .filter(|width_px| (16..=8192).contains(width_px) && width_px % 2 == 0)
+        .ok_or_else(|| "an even number from 16 to 8192 is expected".to_owned())
 }
 
 fn seconds_of(written: &str) -> Result<f64, String> {

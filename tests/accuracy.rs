@@ -6,8 +6,8 @@ mod common;
 
 use std::path::{Path, PathBuf};
 
-use common::truth::{Errors, Truth, compare, draw, key_frames};
 use common::{gpu, project_file};
+use gnomon::app::truth::{Errors, Truth, compare, draw, key_frames};
 use gnomon::capture::load_calibration;
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::render::Renderer;
@@ -18,10 +18,11 @@ fn errors_of(folder: &Path, name: &str, intrinsics: Intrinsics) -> Vec<Errors> {
     let scene =
         Scene::load(&project_file(&format!("config/{name}.toml"))).expect("the scene of the demo");
     let mut renderer = Renderer::new(gpu(), &scene, intrinsics).expect("a renderer");
-    let keys = key_frames(folder, scene.anchors.len());
+    let keys = key_frames(folder, &scene.anchors).expect("key frames");
     let errors = keys.iter().map(|(frame, poses)| {
-        let drawn = draw(&mut renderer, frame, poses);
-        compare(frame.index, &Truth::open(folder, frame.index), &drawn)
+        let drawn = draw(&mut renderer, frame, poses).expect("a drawn frame");
+        let truth = Truth::open(folder, frame.index).expect("the truth");
+        compare(frame.index, &truth, &drawn).expect("errors")
     });
     errors.collect()
 }
@@ -36,8 +37,9 @@ fn hold(folder: &Path, name: &str) {
     assert!(found.len() >= 2, "{} has key frames", folder.display());
     for e in &found {
         assert!(e.role_pct <= 0.5, "{name}: roles: {e:?}");
+        let shadow = e.shadow.expect("the lamp's mask");
         assert!(
-            e.wrong_pct <= 0.05 && e.far == 0,
+            shadow.wrong_pct <= 0.05 && shadow.far == 0,
             "{name}: shadow mask: {e:?}"
         );
         assert!(e.change_real <= 0.15, "{name}: shadow: {e:?}");

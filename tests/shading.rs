@@ -3,9 +3,9 @@
 
 mod common;
 
-use common::ray_cast::pixels;
 use common::{flat_mesh, gpu, grey_frame, lamp, look_at, object, scene, sun};
 use glam::{DAffine3, DVec2, DVec3, Vec3};
+use gnomon::app::truth::ray_cast::pixels;
 use gnomon::capture::Frame;
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::geometry::mesh::Mesh;

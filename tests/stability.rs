@@ -5,13 +5,14 @@ mod common;
 
 use common::judge::{gain_error, shadow_error};
 use common::random::Random;
-use common::ray_cast::{FACES_AWAY, REAL, REAL_HIDES, Ray, VIRTUAL_HIDES, View, is_uniform};
 use common::shapes::{self, Soup};
 use common::{Stage, Thing, lamp, look_at, look_with_up, project_file, stability_row, sun};
 use glam::{DAffine3, DQuat, DVec2, DVec3};
+use gnomon::app::truth::FACES_AWAY;
+use gnomon::app::truth::ray_cast::{Ray, Triangle, View, World, is_uniform};
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::light::Light;
-use gnomon::render::Layers;
+use gnomon::render::{Layers, REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};
 use std::path::Path;
 
 const MOST_WRONG_PCT: f64 = 0.02;
@@ -117,6 +118,26 @@ fn hold_mask(name: &str, layers: &Layers, exact: &[u8]) {
     );
 }
 
+/// The world's hierarchies hold what every triangle in turn does.
+fn check_against_brute_force(world: &World, ray: &Ray) {
+    let nearest = |casters: &dyn Fn(&Triangle) -> bool| {
+        let hits = world
+            .triangles
+            .iter()
+            .filter(|triangle| casters(triangle))
+            .filter_map(|triangle| triangle.hit(ray));
+        hits.min_by(f64::total_cmp)
+    };
+    let first = world.first_hit(ray).map(|(_, distance)| distance);
+    assert_eq!(first, nearest(&|_| true));
+    for role in [REAL, VIRTUAL] {
+        assert_eq!(
+            world.is_hidden(ray, role),
+            nearest(&|triangle| triangle.casts && triangle.role == role).is_some()
+        );
+    }
+}
+
 #[test]
 fn the_oracle_s_hierarchy_finds_what_every_triangle_in_turn_does() {
     let mut random = Random::new(7);
@@ -129,12 +150,15 @@ fn the_oracle_s_hierarchy_finds_what_every_triangle_in_turn_does() {
         let (phantoms, virtuals) = (things(&mut random), things(&mut random));
         let stage = Stage::new(&phantoms, &virtuals, None, vec![], DVec3::ZERO);
         for _ in 0..200 {
-            stage.world.check_against_brute_force(&Ray {
-                origin: random.vector_wide() * 2.0,
-                direction: random.direction() * random.between(0.1, 3.0),
-                near: 0.0,
-                reach: random.between(0.5, 20.0),
-            });
+            check_against_brute_force(
+                &stage.world,
+                &Ray {
+                    origin: random.vector_wide() * 2.0,
+                    direction: random.direction() * random.between(0.1, 3.0),
+                    near: 0.0,
+                    reach: random.between(0.5, 20.0),
+                },
+            );
         }
     }
 }

@@ -7,14 +7,15 @@ mod common;
 use std::path::Path;
 
 use glam::{DAffine3, DVec2, DVec3};
+use gnomon::app::truth::affine;
 use gnomon::capture::{Frame, FrameSource};
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::scene::{Anchor, DetectorKind, Scene, TrackingSettings};
 use gnomon::tracking::{Status, Tracker};
 use serde_json::Value;
 
+use common::project_file;
 use common::sheets::{angle_between_deg, detector_alone};
-use common::{affine, project_file};
 
 /// Points about the anchor's origin whose shift is judged, metres.
 const JUDGED_M: [DVec3; 4] = [
@@ -47,12 +48,15 @@ impl Recording {
         let truth: Value = serde_json::from_str(&text).expect("the truth");
         let truths = frames.iter().map(|frame| {
             let truth = &truth["frames"][frame.index as usize];
-            let camera_from_world = affine(&truth["world_to_camera"]);
+            let camera_from_world = affine(&truth["world_to_camera"]).expect("a pose");
             let on_table = scene
                 .anchors
                 .iter()
                 .map(|anchor| match &anchor.markers[..] {
-                    [lone] => camera_from_world * affine(&truth["markers"][lone.id.to_string()]),
+                    [lone] => {
+                        let lone = affine(&truth["markers"][lone.id.to_string()]);
+                        camera_from_world * lone.expect("a pose")
+                    }
                     _ => camera_from_world,
                 });
             on_table.collect()

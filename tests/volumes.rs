@@ -5,15 +5,16 @@ mod common;
 
 use common::judge::{ENOUGH, gain_error, is_edge};
 use common::random::{Random, random_camera, random_stage};
-use common::ray_cast::{
-    Exact, FACES_AWAY, GRAZES, REAL, REAL_HIDES, SAMPLES_PX, Surface, VIRTUAL_HIDES, View, World,
-    is_uniform, pixels, sample_places,
-};
 use common::shapes;
 use common::{Stage, Thing, lamp, look_at, sun};
 use glam::{DAffine3, DQuat, DVec2, DVec3};
+use gnomon::app::truth::FACES_AWAY;
+use gnomon::app::truth::ray_cast::{
+    Exact, GRAZES, SAMPLES_PX, Surface, View, World, is_uniform, pixels, sample_places,
+};
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::light::{Light, irradiance};
+use gnomon::render::{REAL, REAL_HIDES, VIRTUAL_HIDES};
 use std::f64::consts::PI;
 
 /// Random scenes, of each kind; each has some lights and is seen from some places.

@@ -36,7 +36,7 @@ gnomon() { # SCENE: the median, ms
     local csv
     csv=$(mktemp)
     cargo bench --quiet --bench volumes -- --scene "$1" --frames "$frames" --csv "$csv" >/dev/null
-    tail -n 1 "$csv" | cut -d , -f 9
+    tail -n 1 "$csv" | cut -d , -f 8
     rm -f "$csv"
 }
 for round in $(seq "$rounds"); do

@@ -8,7 +8,7 @@ use crate::geometry::levels::{Level, levels};
 use crate::geometry::mesh::MeshReport;
 use crate::geometry::outline_scale::largest_stretch;
 use crate::light::Light;
-use crate::scene::{Anchor, DetectorKind, Object, Scene};
+use crate::scene::{Anchor, DetectorKind, Object, Quality, Scene, ShadowSettings};
 
 /// A summary of a scene: aligned plain text that ends with a line break.
 pub fn summary(scene: &Scene) -> String {
@@ -71,6 +71,9 @@ pub fn summary(scene: &Scene) -> String {
         "technique",
         &format!("{}: {reason}", technique.name()),
     );
+    if let Some(quality) = scene.shadows.quality {
+        line(&mut text, "quality", &quality_row(quality, &scene.shadows));
+    }
     let budget = scene
         .shadows
         .frame_budget_ms
@@ -93,6 +96,23 @@ pub fn summary(scene: &Scene) -> String {
         text.push_str(&warning_line(&warning));
     }
     text
+}
+
+/// A quality, and what the scene sets otherwise.
+fn quality_row(quality: Quality, shadows: &ShadowSettings) -> String {
+    let meant = quality.shadows();
+    let mut others = Vec::new();
+    if shadows.samples != meant.samples {
+        others.push("samples");
+    }
+    if shadows.max_silhouette_error_px != meant.max_silhouette_error_px {
+        others.push("max_silhouette_error_px");
+    }
+    let name = quality.name();
+    match others.is_empty() {
+        true => format!("{name}: samples and detail are what it means"),
+        false => format!("{name}, but the scene sets {}", others.join(" and ")),
+    }
 }
 
 /// What is well defined but hardly meant: lights inside closed casters of the world's anchor (where others are is not

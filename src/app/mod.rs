@@ -1,4 +1,4 @@
-//! The jobs: live, replay, record, track, board, calibrate, markers, check; their clock, files and progress.
+//! The jobs: replay, live, record, track, board, calibrate, probe, markers, check, chart; their clock, files and progress.
 
 mod anchor_block;
 pub mod authoring;
@@ -7,6 +7,7 @@ pub mod calibrate;
 mod calibration_file;
 pub mod cameras;
 mod capture_talk;
+pub mod chart;
 pub mod check;
 pub mod contact_sheet;
 pub mod detections_file;
@@ -23,6 +24,8 @@ mod output_error;
 mod partial_files;
 pub mod picture_files;
 pub mod poses_file;
+pub mod probe;
+mod probe_preview;
 mod progress;
 pub mod record;
 mod recording;
@@ -36,4 +39,5 @@ pub mod stopwatch;
 mod tally;
 pub mod track;
 mod tracked;
+pub mod truth;
 pub mod video_writer;

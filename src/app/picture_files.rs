@@ -1,10 +1,12 @@
-//! Single pictures: PNGs of frames and layers, EXR for depth. Each is written beside its place and then moved there.
+//! Single pictures: PNGs of frames and layers, EXR for depth, Radiance HDR and EXR for probes. Each is written beside its place and then moved there.
 
 use std::fs::{self, File};
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, Cursor, Write};
 use std::path::Path;
 
 use exr::prelude::WritableImage;
+use glam::Vec3;
+use image::codecs::hdr::HdrEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
@@ -52,23 +54,74 @@ pub fn write_float_exr(path: &Path, size_px: [u32; 2], values: &[f32]) -> Result
             "the picture's size and its data disagree".to_owned(),
         ));
     }
-    write_whole(path, |writer| {
-        // The format is written with seeks, so it is made in memory first.
-        let mut bytes = std::io::Cursor::new(Vec::new());
-        let value_at =
-            |position: exr::math::Vec2<usize>| (values[position.y() * width + position.x()],);
-        let channels = exr::image::SpecificChannels::build()
-            .with_channel("Y")
-            .with_pixel_fn(value_at);
-        exr::image::Image::from_channels((width, height), channels)
-            .write()
-            .non_parallel()
-            .to_buffered(&mut bytes)
-            .map_err(|error| refuse(path, error.to_string()))?;
-        writer
-            .write_all(bytes.get_ref())
-            .map_err(|error| io_error(path, error))
+    let value_at =
+        |position: exr::math::Vec2<usize>| (values[position.y() * width + position.x()],);
+    let channels = exr::image::SpecificChannels::build()
+        .with_channel("Y")
+        .with_pixel_fn(value_at);
+    let image = exr::image::Image::from_channels((width, height), channels);
+    write_exr(path, |bytes| {
+        image.write().non_parallel().to_buffered(bytes)
     })
+}
+
+/// Writes linear radiance, RGB, as Radiance HDR (.hdr, one exponent a pixel) or OpenEXR (.exr, 32-bit floats).
+pub fn write_radiance(path: &Path, size_px: [usize; 2], rgb: &[Vec3]) -> Result<(), OutputError> {
+    let [width, height] = size_px;
+    if rgb.len() != width * height {
+        return Err(refuse(
+            path,
+            "the picture's size and its data disagree".to_owned(),
+        ));
+    }
+    match radiance_format(path)? {
+        RadianceFormat::Hdr => write_whole(path, |writer| {
+            let rgb: Vec<image::Rgb<f32>> = rgb
+                .iter()
+                .map(|pixel| image::Rgb(pixel.to_array()))
+                .collect();
+            HdrEncoder::new(writer)
+                .encode(&rgb, width, height)
+                .map_err(|error| match error {
+                    image::ImageError::IoError(error) => io_error(path, error),
+                    error => refuse(path, error.to_string()),
+                })
+        }),
+        RadianceFormat::Exr => {
+            let pixel_at =
+                |position: exr::math::Vec2<usize>| rgb[position.y() * width + position.x()].into();
+            let channels = exr::image::SpecificChannels::rgb::<f32, f32, f32>(pixel_at);
+            let image = exr::image::Image::from_channels((width, height), channels);
+            write_exr(path, |bytes| {
+                image.write().non_parallel().to_buffered(bytes)
+            })
+        }
+    }
+}
+
+/// How radiance is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RadianceFormat {
+    /// Radiance HDR.
+    Hdr,
+    /// OpenEXR.
+    Exr,
+}
+
+/// By the file's extension.
+///
+/// # Errors
+/// Another extension.
+pub fn radiance_format(path: &Path) -> Result<RadianceFormat, OutputError> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    match extension.to_ascii_lowercase().as_str() {
+        "hdr" => Ok(RadianceFormat::Hdr),
+        "exr" => Ok(RadianceFormat::Exr),
+        _ => Err(refuse(
+            path,
+            "probes are written as .hdr (Radiance) or .exr (OpenEXR)".to_owned(),
+        )),
+    }
 }
 
 /// Writes bytes that are a whole file (PDF).
@@ -87,6 +140,16 @@ pub fn write_text(path: &Path, text: &str) -> Result<(), OutputError> {
             .write_all(text.as_bytes())
             .map_err(|error| io_error(path, error))
     })
+}
+
+/// The format is written with seeks, so it is made in memory first.
+fn write_exr(
+    path: &Path,
+    encode: impl FnOnce(&mut Cursor<Vec<u8>>) -> exr::error::UnitResult,
+) -> Result<(), OutputError> {
+    let mut bytes = Cursor::new(Vec::new());
+    encode(&mut bytes).map_err(|error| refuse(path, error.to_string()))?;
+    write_bytes(path, bytes.get_ref())
 }
 
 fn write_png(

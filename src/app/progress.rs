@@ -1,8 +1,8 @@
-//! A progress bar with frames, speed and time left; shown only where stderr is a terminal.
+//! Progress bars with what is done and time left; shown only where stderr is a terminal.
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// Counts frames.
+/// Counts frames, or measurements.
 pub struct Progress(ProgressBar);
 
 impl Progress {
@@ -18,6 +18,16 @@ impl Progress {
                 "{spinner} {pos} frames  {per_sec}",
             ),
         };
+        Self::styled(bar, template)
+    }
+
+    /// Counts the measurements of charts, of which there are `count`.
+    pub fn of_measurements(count: usize) -> Self {
+        let bar = ProgressBar::new(count as u64);
+        Self::styled(bar, "{bar:40} {pos}/{len}  {msg}  {elapsed} so far")
+    }
+
+    fn styled(bar: ProgressBar, template: &str) -> Self {
         // A template that cannot be read falls back to the library's own.
         Self(match ProgressStyle::with_template(template) {
             Ok(style) => bar.with_style(style),
@@ -25,7 +35,12 @@ impl Progress {
         })
     }
 
-    /// One frame more is done.
+    /// Says what is being done.
+    pub fn tell(&self, what: &str) {
+        self.0.set_message(what.to_owned());
+    }
+
+    /// One more is done.
     pub fn advance(&self) {
         self.0.inc(1);
     }

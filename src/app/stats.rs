@@ -41,19 +41,20 @@ impl StageLog {
 }
 
 fn summarise(samples_ms: &[f64]) -> StageTimes {
-    let mut sorted = samples_ms.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    // The sample that at least this part of all does not exceed.
-    let quantile = |part: f64| {
-        let rank = (part * sorted.len() as f64).ceil() as usize;
-        sorted.get(rank.saturating_sub(1)).copied().unwrap_or(0.0)
-    };
     StageTimes {
-        median_ms: quantile(0.5),
-        p95_ms: quantile(0.95),
-        max_ms: quantile(1.0),
-        frames: sorted.len(),
+        median_ms: quantile(samples_ms, 0.5),
+        p95_ms: quantile(samples_ms, 0.95),
+        max_ms: quantile(samples_ms, 1.0),
+        frames: samples_ms.len(),
     }
+}
+
+/// The sample that at least this part of all does not exceed; 0 where there is none.
+pub fn quantile(samples: &[f64], part: f64) -> f64 {
+    let mut sorted = samples.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let rank = (part * sorted.len() as f64).ceil() as usize;
+    sorted.get(rank.saturating_sub(1)).copied().unwrap_or(0.0)
 }
 
 /// The whole of `--stats`.

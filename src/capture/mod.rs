@@ -1,8 +1,11 @@
 //! Frames from sessions, videos, folders of images and live cameras, and the calibration of the camera that took them.
 //! OpenCV's types stay inside.
 
+mod alignment;
+pub mod ball;
 pub mod calibration;
 mod error;
+pub mod exposures;
 mod images;
 pub mod linear;
 pub mod live;

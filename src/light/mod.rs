@@ -1,9 +1,13 @@
 //! Lights and reflection as plain values; radiance is linear RGB, 1 = display white at the camera's exposure.
 
 pub mod bounce;
+pub mod brightest;
 pub mod contrast;
 pub(crate) mod cores;
 pub mod probe;
+pub mod probe_maps;
+pub mod radiance_picture;
+pub mod response;
 
 use std::f64::consts::PI;
 

@@ -182,6 +182,12 @@ impl Gpu {
     }
 
     /// The first failure that the device reported, if any.
+    /// Memory that the driver has given out so far, bytes; `None` where it does not tell.
+    pub fn allocated_bytes(&self) -> Option<u64> {
+        let report = self.device.generate_allocator_report()?;
+        Some(report.total_allocated_bytes)
+    }
+
     pub(super) fn check(&self) -> Result<(), RenderError> {
         let failure = self
             .failure

@@ -13,14 +13,23 @@ const ROLE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
 const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
 const BITS_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
 
+/// Role of a pixel that shows a real thing.
+pub const REAL: u8 = 100;
+/// Role of a pixel that shows a virtual thing.
+pub const VIRTUAL: u8 = 200;
+/// Bit of a shadow layer: a real thing hides the light.
+pub const REAL_HIDES: u8 = 1;
+/// Bit of a shadow layer: a virtual thing hides the light.
+pub const VIRTUAL_HIDES: u8 = 2;
+
 /// What is seen at each pixel's centre, rows from the top.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Layers {
-    /// 0 none, 100 real, 200 virtual.
+    /// 0 none, [`REAL`] or [`VIRTUAL`].
     pub role: Vec<u8>,
     /// Distance along the camera's axis, metres; 0 where there is nothing.
     pub depth_m: Vec<f32>,
-    /// For each light: bit 0 in a real thing's shadow, bit 1 in a virtual thing's.
+    /// For each light [`REAL_HIDES`] and [`VIRTUAL_HIDES`].
     pub shadow: Vec<Vec<u8>>,
     /// Factor on the real part of the pixel's light, linear RGB.
     pub gain: Vec<[f32; 3]>,

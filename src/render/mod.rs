@@ -29,5 +29,5 @@ mod volumes;
 
 pub use gpu::{Gpu, RenderError, SharedDevice};
 pub use gpu_clock::GpuTimes;
-pub use layers::Layers;
+pub use layers::{Layers, REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};
 pub use renderer::{Renderer, Shown};

@@ -307,6 +307,11 @@ impl Renderer {
         &self.picture
     }
 
+    /// Triangles of the things that were drawn last, in the levels of detail that were chosen for them.
+    pub fn triangles(&self) -> usize {
+        self.stage.triangles()
+    }
+
     /// Waits until the picture is drawn, so that drawing and reading back can be timed apart.
     ///
     /// # Errors

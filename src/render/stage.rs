@@ -151,6 +151,14 @@ impl Stage {
         self.lights.len()
     }
 
+    /// Triangles of the levels that the present frame's things are drawn in.
+    pub fn triangles(&self) -> usize {
+        let chosen = self.things.iter().zip(&self.levels);
+        chosen
+            .map(|(thing, &level)| thing.levels[level].range.len() / 3)
+            .sum()
+    }
+
     /// Places what stands on the anchors.
     pub fn place(&mut self, gpu: &Gpu, camera_from_anchor: &[Option<DAffine3>]) {
         let queue = &gpu.queue;

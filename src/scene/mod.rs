@@ -18,7 +18,7 @@ mod mesh_file;
 mod obj_scan;
 mod objects;
 mod probe;
-mod probe_file;
+pub mod probe_file;
 mod reader;
 mod settings;
 
@@ -144,8 +144,10 @@ pub struct TrackingSettings {
     pub decimation: f64,
     /// libapriltag: standard deviation of the blur before the search, pixels.
     pub blur_px: f64,
-    /// libapriltag: fit the edges of what decodes at full resolution, in linear light.
+    /// Fit the edges of what decodes at full resolution, in linear light.
     pub refine_edges: bool,
+    /// libapriltag: let the library fit the edges of whatever is square before it decodes.
+    pub library_edges: bool,
     /// OpenCV's ArUco: corner refinement.
     pub aruco_refinement: ArucoRefinement,
     /// Bits that may be corrected in a marker's code.
@@ -178,6 +180,7 @@ impl Default for TrackingSettings {
             decimation: 2.0,
             blur_px: 0.0,
             refine_edges: true,
+            library_edges: false,
             aruco_refinement: ArucoRefinement::Contour,
             corrected_bits: 1,
             min_margin: 20.0,
@@ -350,9 +353,54 @@ impl Counting {
     pub const BY_NAME: [(&str, Self); 2] = [("auto", Self::Auto), ("depth-fail", Self::DepthFail)];
 }
 
+/// A place on the measured front of speed against accuracy (`charts/shadows.csv`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quality {
+    /// The least time at which no shadow is visibly elsewhere.
+    Fast,
+    /// Smooth outlines; things as coarse as no eye can see.
+    Balanced,
+    /// Nothing is left out.
+    Accurate,
+}
+
+impl Quality {
+    /// All of them, by the names that files use.
+    pub const BY_NAME: [(&str, Self); 3] = [
+        ("fast", Self::Fast),
+        ("balanced", Self::Balanced),
+        ("accurate", Self::Accurate),
+    ];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        Self::BY_NAME
+            .iter()
+            .find(|(_, quality)| *quality == self)
+            .map_or("", |(name, _)| name)
+    }
+
+    /// What it means where nothing else is said.
+    pub fn shadows(self) -> ShadowSettings {
+        let (samples, max_silhouette_error_px) = match self {
+            Self::Fast => (1, 2.0),
+            Self::Balanced => (4, 0.5),
+            Self::Accurate => (4, 0.0),
+        };
+        ShadowSettings {
+            quality: Some(self),
+            samples,
+            max_silhouette_error_px,
+            ..ShadowSettings::default()
+        }
+    }
+}
+
 /// How shadows are made and how finely.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShadowSettings {
+    /// What the others were taken from where the file does not say them; `None`: from nothing, but the defaults.
+    pub quality: Option<Quality>,
     /// The technique that is asked for.
     pub technique: Technique,
     /// Samples per pixel: 1 or 4.
@@ -401,6 +449,7 @@ impl Default for ShaftSettings {
 impl Default for ShadowSettings {
     fn default() -> Self {
         Self {
+            quality: None,
             technique: Technique::Auto,
             samples: 4,
             counting: Counting::Auto,

@@ -3,8 +3,8 @@
 use super::error::SceneError;
 use super::reader::{Numbers, Table, Value};
 use super::{
-    ArucoRefinement, CameraSettings, Counting, DetectorKind, PixelFormat, ProbeScene, Search,
-    ShadowSettings, ShaftSettings, Technique, TrackingSettings, WantedFormat,
+    ArucoRefinement, CameraSettings, Counting, DetectorKind, PixelFormat, ProbeScene, Quality,
+    Search, ShadowSettings, ShaftSettings, Technique, TrackingSettings, WantedFormat,
 };
 use crate::geometry::outline_scale::LARGEST_MOVE_PX;
 
@@ -76,11 +76,12 @@ fn source(value: &Value) -> Result<String, SceneError> {
 }
 
 pub fn tracking(root: &Table) -> Result<TrackingSettings, SceneError> {
-    const KEYS: [&str; 11] = [
+    const KEYS: [&str; 12] = [
         "detector",
         "decimation",
         "blur_px",
         "refine_edges",
+        "library_edges",
         "aruco_refinement",
         "corrected_bits",
         "min_margin",
@@ -126,6 +127,7 @@ pub fn tracking(root: &Table) -> Result<TrackingSettings, SceneError> {
             &Numbers::between(0.0, 10.0, "px"),
         )?,
         refine_edges: tracking.flag_or("refine_edges", default.refine_edges)?,
+        library_edges: tracking.flag_or("library_edges", default.library_edges)?,
         aruco_refinement: refinement.transpose()?.unwrap_or(default.aruco_refinement),
         corrected_bits: tracking.integer_or("corrected_bits", default.corrected_bits, 0..=3)?,
         min_margin: tracking.number_or(
@@ -141,8 +143,8 @@ pub fn tracking(root: &Table) -> Result<TrackingSettings, SceneError> {
 }
 
 pub fn shadows(root: &Table, probe: Option<&ProbeScene>) -> Result<ShadowSettings, SceneError> {
-    let default = ShadowSettings::default();
-    const KEYS: [&str; 11] = [
+    const KEYS: [&str; 12] = [
+        "quality",
         "technique",
         "sources",
         "patches",
@@ -156,8 +158,14 @@ pub fn shadows(root: &Table, probe: Option<&ProbeScene>) -> Result<ShadowSetting
         "frame_budget_ms",
     ];
     let Some(shadows) = root.table("shadows", &KEYS)? else {
-        return Ok(default);
+        return Ok(ShadowSettings::default());
     };
+    let quality = |value: Value| value.one_of("quality", &Quality::BY_NAME);
+    let default = shadows
+        .optional("quality")
+        .map(quality)
+        .transpose()?
+        .map_or_else(ShadowSettings::default, Quality::shadows);
     let technique = |value: Value| match (value.text()?, probe) {
         ("environment", _) => {
             Err(value.error("this version does not render it; allowed: auto, volumes, shafts"))
@@ -174,6 +182,7 @@ pub fn shadows(root: &Table, probe: Option<&ProbeScene>) -> Result<ShadowSetting
     let counting = |value: Value| value.one_of("way of counting", &Counting::BY_NAME);
     let budget = |value: Value| value.number(&Numbers::above(0.0, 1e6, "ms"));
     Ok(ShadowSettings {
+        quality: default.quality,
         technique: shadows
             .optional("technique")
             .map(technique)

@@ -11,7 +11,7 @@ use crate::light::cores::on_all_cores;
 use super::hierarchy::{Arriving, Hierarchy, Marks};
 use super::irradiance_volume::IrradianceVolume;
 pub use super::light_of_room::{PatchLight, PlacedProbe};
-use super::light_of_room::{hemisphere, light_of_room};
+use super::light_of_room::{hemisphere, light_of_room, points_on};
 use super::luminance;
 use super::patches::{Patches, RoomTriangle};
 use super::receiver_tree::ReceiverTree;
@@ -153,17 +153,19 @@ impl Prepared {
         marks
     }
 
-    /// The sources as they weigh for some vertices; those that are not marked weigh nothing.
-    pub fn weighed(&self, is_marked: &[bool], vertices: &[u32]) -> Vec<WeighedSource> {
+    /// The sources as they weigh for some vertices, each with what it counts among them; those that are not marked weigh
+    /// nothing.
+    pub fn weighed(&self, is_marked: &[bool], vertices: &[(u32, f32)]) -> Vec<WeighedSource> {
         let mut weights = vec![0.0_f32; is_marked.len()];
-        for &vertex in vertices {
-            let total = luminance(self.irradiance[vertex as usize]).max(1e-9);
+        for &(vertex, share) in vertices {
+            let total = luminance(self.irradiance[vertex as usize]).max(1e-9) / share;
             let row = self.transfers.row(vertex as usize);
             for (weight, form_factor) in weights.iter_mut().zip(row) {
                 *weight += form_factor / total;
             }
         }
-        let count = vertices.len().max(1) as f32;
+        let count: f32 = vertices.iter().map(|(_, share)| share).sum();
+        let count = count.max(f32::MIN_POSITIVE);
         let sources = self.sources.patches.iter().zip(is_marked);
         sources
             .zip(weights.iter().zip(&self.source_radiance))
@@ -191,13 +193,14 @@ impl Prepared {
             .collect()
     }
 
-    /// Irradiance of a place from marked patches that surfels cover.
+    /// Irradiance of a place that surfels cover, from patches of which `left` knows the part of their light that the
+    /// casters' shadows leave.
     pub fn hidden_among(
         &self,
         place: Vec3,
         normal: Vec3,
         surfels: &[LitSurfel],
-        is_marked: &[bool],
+        left: &[Option<f32>],
     ) -> Vec3 {
         let start = place + normal * SURFEL_OFFSET_M;
         let covered = |surfel: &LitSurfel| {
@@ -206,76 +209,92 @@ impl Prepared {
                 return Vec3::ZERO;
             }
             match self.radiance_along(start, (surfel.surfel.position - start).normalize()) {
-                Some((radiance, patch, _)) if is_marked[patch] => radiance * part,
-                _ => Vec3::ZERO,
+                Some((radiance, patch, _)) => radiance * (part * left[patch].unwrap_or(0.0)),
+                None => Vec3::ZERO,
             }
         };
         surfels.iter().map(covered).sum()
     }
 
-    /// The patches within `near`, each with the radiance that it loses to the casters' shadows on it.
-    pub fn dimmed(
-        &self,
-        caster: &RayCaster,
-        sources: &[(Representative, Vec3)],
-        near: &BoxM,
-    ) -> Vec<(usize, Vec3)> {
-        let weight: f32 = sources.iter().map(|(source, _)| source.weight).sum();
-        let close: Vec<usize> = (0..self.patches.patches.len())
-            .filter(|&patch| {
-                near.touches(&BoxM::around([self
-                    .patches
-                    .center(&self.patches.patches[patch])]))
-            })
-            .collect();
-        let shares = on_all_cores(close.len(), |range| {
-            let dimmed = |&index: &usize| {
-                let patch = &self.patches.patches[index];
-                let (center, normal) = (self.patches.center(patch), self.patches.normal(patch));
-                let start = center + normal * SURFEL_OFFSET_M;
-                let (mut arriving, mut hidden) = (0, 0);
-                for ray in 0..DIMMING_RAYS {
-                    let at = (ray as f32 + 0.5) / DIMMING_RAYS as f32 * weight;
-                    let way = at_weight(sources, at) - start;
-                    if way.dot(normal) > 0.0 {
-                        arriving += 1;
-                        hidden += u32::from(caster.is_hidden(start, way, 1.0));
-                    }
-                }
-                let part = hidden as f32 / arriving.max(1) as f32;
-                (index, self.light[index].radiance * part)
+    /// For patches with their middle in a ball the part of their light that `caster` leaves them, `None` for others.
+    pub fn left_by(&self, caster: &RayCaster, center: Vec3, radius: f32) -> Vec<Option<f32>> {
+        let middle = |patch: usize| self.patches.center(&self.patches.patches[patch]);
+        let shares = on_all_cores(self.patches.patches.len(), |range| {
+            let left = |patch: usize| {
+                (middle(patch).distance(center) < radius).then(|| self.left_on(patch, caster))
             };
-            close[range].iter().map(dimmed).collect::<Vec<_>>()
+            range.map(left).collect::<Vec<_>>()
         });
-        let all = shares.into_iter().flatten();
-        all.filter(|(_, lost)| *lost != Vec3::ZERO).collect()
+        shares.concat()
     }
 
-    /// Irradiance that a vertex loses with patches' lost radiance.
-    pub fn lost_at(&self, vertex: u32, dimmed: &[(usize, Vec3)]) -> Vec3 {
+    /// The part of a patch's light that `caster` leaves: sources are tried as often as they bring it light.
+    fn left_on(&self, patch: usize, caster: &RayCaster) -> f32 {
+        let patch = &self.patches.patches[patch];
+        let row = self.transfers.row(patch.vertices[0] as usize);
+        let arriving = row.iter().zip(&self.source_radiance);
+        let arriving: Vec<f32> = arriving
+            .map(|(&part, &radiance)| luminance(radiance) * part)
+            .collect();
+        let all: f32 = arriving.iter().sum();
+        if all <= 0.0 {
+            return 1.0;
+        }
+        let start = self.patches.center(patch) + self.patches.normal(patch) * SURFEL_OFFSET_M;
+        let (mut sum, mut tried, mut hidden) = (0.0, 0, 0);
+        for (source, arriving) in self.sources.patches.iter().zip(arriving) {
+            sum += arriving;
+            let due = (sum / all * DIMMING_RAYS as f32 + 0.5) as usize;
+            if due > tried {
+                let corners = self
+                    .patches
+                    .corners(&self.patches.patches[*source as usize]);
+                for place in points_on(corners, due - tried) {
+                    hidden += usize::from(caster.is_hidden(start, place - start, 1.0));
+                }
+                tried = due;
+            }
+        }
+        1.0 - hidden as f32 / tried.max(1) as f32
+    }
+
+    /// Irradiance that a vertex loses with the light that patches lose.
+    pub fn lost_at(&self, vertex: u32, left: &[Option<f32>]) -> Vec3 {
         let row = self.transfers.row(vertex as usize);
-        let part =
-            |(patch, lost): &(usize, Vec3)| *lost * row[self.sender_of_patch[*patch] as usize];
-        dimmed.iter().map(part).sum::<Vec3>() * PI
+        let lost = |(patch, left): (usize, &Option<f32>)| {
+            let part = 1.0 - (*left)?;
+            Some(self.light[patch].radiance * (row[self.sender_of_patch[patch] as usize] * part))
+        };
+        left.iter().enumerate().filter_map(lost).sum::<Vec3>() * PI
     }
 
-    /// Radiant intensity of a representative's marked sources towards a place, as far as the room lets it through.
+    /// Radiant intensity of a representative's marked sources towards a place.
     pub fn intensity(&self, one: &Representative, is_marked: &[bool], place: Vec3) -> Vec3 {
         let range = one.first as usize..one.last as usize;
-        range
-            .filter(|&source| is_marked[source])
-            .map(|source| {
-                let patch = &self.patches.patches[self.sources.patches[source] as usize];
-                let center = self.patches.center(patch);
-                let way = place - center;
-                let facing = self.patches.normal(patch).dot(way) / way.length().max(1e-9);
-                let start = center + self.patches.normal(patch) * SURFEL_OFFSET_M;
-                if facing <= 0.0 || self.caster.is_hidden(start, place - start, 1.0) {
-                    return Vec3::ZERO;
-                }
-                self.source_radiance[source] * (self.patches.area(patch) * facing)
-            })
-            .sum()
+        let sent = |source: usize| {
+            let patch = &self.patches.patches[self.sources.patches[source] as usize];
+            let way = place - self.patches.center(patch);
+            let facing = self.patches.normal(patch).dot(way) / way.length().max(1e-9);
+            self.source_radiance[source] * (self.patches.area(patch) * facing.max(0.0))
+        };
+        range.filter(|&source| is_marked[source]).map(sent).sum()
+    }
+
+    /// The part of a representative's light that the room lets through to a place.
+    pub fn let_through(&self, one: &Representative, is_marked: &[bool], place: Vec3) -> f32 {
+        let (mut all, mut seen) = (0.0, 0.0);
+        for source in (one.first as usize..one.last as usize).filter(|&source| is_marked[source]) {
+            let patch = &self.patches.patches[self.sources.patches[source] as usize];
+            let (center, normal) = (self.patches.center(patch), self.patches.normal(patch));
+            let start = center + normal * SURFEL_OFFSET_M;
+            let sent = luminance(self.source_radiance[source]) * self.patches.area(patch);
+            all += sent;
+            if normal.dot(place - center) > 0.0 && !self.caster.is_hidden(start, place - start, 1.0)
+            {
+                seen += sent;
+            }
+        }
+        seen / f32::max(all, f32::MIN_POSITIVE)
     }
 
     /// Radiance along a ray; none from backs, or where there is no room.
@@ -292,61 +311,37 @@ impl Prepared {
 }
 
 impl Prepared {
-    /// Irradiance of a surfel past what `caster` hides: from representatives of sources, with their radiant intensities,
-    /// and from the patches `is_near` by `rays`, which see them with the casters' shadows on them.
+    /// Irradiance of a surfel past what `caster` and the room hide: from representatives of sources, with their radiant
+    /// intensities, and by `rays` from the patches of which `left` knows which part of their light the casters' shadows
+    /// leave.
     pub fn light_on_surfel(
         &self,
         surfel: &Surfel,
         rays: usize,
         caster: &RayCaster,
         sources: &[(Representative, Vec3)],
-        is_near: &[bool],
+        left: &[Option<f32>],
     ) -> Vec3 {
-        let weight: f32 = sources.iter().map(|(source, _)| source.weight).sum();
         let start = surfel.position + surfel.normal * SURFEL_OFFSET_M;
         let from_source = |(source, intensity): &(Representative, Vec3)| {
             let way = source.position - start;
             let facing = surfel.normal.dot(way);
-            if facing <= 0.0 || caster.is_hidden(start, way, 1.0) {
+            let is_hidden = |caster: &RayCaster| caster.is_hidden(start, way, 0.99);
+            if facing <= 0.0 || is_hidden(caster) || is_hidden(&self.caster) {
                 return Vec3::ZERO;
             }
             // Seen from among its sources, a representative is no point.
             let squared = way.length_squared() + source.spread_trace();
             *intensity * (facing / (squared * way.length()))
         };
-        let mut near = Vec3::ZERO;
-        for (index, direction) in hemisphere(surfel.normal, rays).enumerate() {
-            let seen = self.radiance_along(start, direction);
-            let Some((radiance, patch, distance)) = seen.filter(|(_, patch, _)| is_near[*patch])
-            else {
-                continue;
-            };
-            if caster.is_hidden(start, direction, distance) {
-                continue;
-            }
-            let normal = self.patches.normal(&self.patches.patches[patch]);
-            let place = start + direction * distance + normal * SURFEL_OFFSET_M;
-            let at = (index as f32 * 0.618_034 + 0.5).fract() * weight;
-            let way = at_weight(sources, at) - place;
-            if weight == 0.0 || !caster.is_hidden(place, way, 1.0) {
-                near += radiance;
-            }
-        }
+        let from_near = |direction: Vec3| {
+            let (radiance, patch, distance) = self.radiance_along(start, direction)?;
+            let left = left[patch]?;
+            (!caster.is_hidden(start, direction, distance)).then_some(radiance * left)
+        };
+        let near: Vec3 = hemisphere(surfel.normal, rays).filter_map(from_near).sum();
         sources.iter().map(from_source).sum::<Vec3>() + near * (PI / rays as f32)
     }
-}
-
-/// The place of the representative at a part of all weight.
-fn at_weight(sources: &[(Representative, Vec3)], mut at: f32) -> Vec3 {
-    for (source, _) in sources {
-        at -= source.weight;
-        if at <= 0.0 {
-            return source.position;
-        }
-    }
-    sources
-        .last()
-        .map_or(Vec3::ZERO, |(source, _)| source.position)
 }
 
 /// Rays that tell how much of a patch's light the casters hide.

@@ -55,6 +55,16 @@ pub fn thrown_back<'a>(
     surfels.into_iter().map(from_surfel).sum()
 }
 
+/// The same for a place on the things themselves: the discs that it faces and that face it, as those of a hollow do.
+pub fn thrown_on_caster<'a>(
+    place: Vec3,
+    normal: Vec3,
+    surfels: impl IntoIterator<Item = &'a LitSurfel>,
+) -> Vec3 {
+    let from_surfel = |lit: &LitSurfel| lit.radiance * from_disc(place, normal, &lit.surfel);
+    surfels.into_iter().map(from_surfel).sum()
+}
+
 impl LitSurfel {
     /// Irradiance of a place for each unit of its radiance.
     pub fn irradiance_part(&self, place: Vec3, normal: Vec3) -> f32 {

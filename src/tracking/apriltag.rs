@@ -119,6 +119,7 @@ impl Search {
             gnomon_apriltag_create(
                 settings.decimation as f32,
                 settings.blur_px as f32,
+                settings.library_edges,
                 settings.threads as i32,
             )
         };
@@ -250,7 +251,12 @@ struct RawDetection {
 }
 
 unsafe extern "C" {
-    fn gnomon_apriltag_create(decimation: f32, blur_px: f32, threads: i32) -> *mut RawDetector;
+    fn gnomon_apriltag_create(
+        decimation: f32,
+        blur_px: f32,
+        refines_edges: bool,
+        threads: i32,
+    ) -> *mut RawDetector;
     fn gnomon_apriltag_add_family(
         detector: *mut RawDetector,
         name: *const c_char,

@@ -76,7 +76,8 @@ void gnomon_apriltag_destroy(struct gnomon_apriltag *self) {
     free(self);
 }
 
-struct gnomon_apriltag *gnomon_apriltag_create(float decimation, float blur_px, int32_t threads) {
+struct gnomon_apriltag *gnomon_apriltag_create(float decimation, float blur_px, bool refines_edges,
+                                               int32_t threads) {
     struct gnomon_apriltag *self = calloc(1, sizeof *self);
     if (!self) return NULL;
     self->detector = apriltag_detector_create();
@@ -86,8 +87,8 @@ struct gnomon_apriltag *gnomon_apriltag_create(float decimation, float blur_px, 
     }
     self->detector->quad_decimate = decimation;
     self->detector->quad_sigma = blur_px;
-    // The library would refine every quadrilateral, marker or not; refine.rs does it for those that decode.
-    self->detector->refine_edges = false;
+    // The library refines every quadrilateral, marker or not; refine.rs those that decode.
+    self->detector->refine_edges = refines_edges;
     self->detector->nthreads = threads;
     return self;
 }

@@ -122,7 +122,7 @@ impl Detector {
             }
             DetectorKind::Aruco => (
                 Backend::Aruco(ArucoDetector::new(settings, &families)?),
-                settings.aruco_refinement != ArucoRefinement::None,
+                settings.refine_edges && settings.aruco_refinement != ArucoRefinement::None,
                 Thorough::Never,
             ),
         };

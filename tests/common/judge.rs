@@ -1,13 +1,12 @@
 //! Rendered layers held against the ray cast.
 
 use glam::{DVec2, DVec3};
-use gnomon::light::{Light, irradiance};
-use gnomon::render::Layers;
-
-use super::ray_cast::{
-    Exact, FACES_AWAY, GRAZES, REAL, REAL_HIDES, SAMPLES_PX, Surface, VIRTUAL_HIDES, View, World,
-    is_uniform, pixels, sample_places,
+use gnomon::app::truth::FACES_AWAY;
+use gnomon::app::truth::ray_cast::{
+    Exact, GRAZES, SAMPLES_PX, Surface, View, World, is_uniform, pixels, sample_places,
 };
+use gnomon::light::{Light, irradiance};
+use gnomon::render::{Layers, REAL, REAL_HIDES, VIRTUAL_HIDES};
 
 /// So many pixels that are surely wrong: the rest of a picture's need no rays to say so.
 pub const ENOUGH: usize = 20;

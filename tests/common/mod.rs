@@ -4,24 +4,22 @@
 pub mod judge;
 pub mod photographs;
 pub mod random;
-pub mod ray_cast;
 pub mod shapes;
 pub mod sheets;
-pub mod truth;
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use glam::{DAffine3, DMat3, DMat4, DVec2, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
+use gnomon::app::chart::known_scene::{AMBIENT, KnownScene, Placed};
+use gnomon::app::truth::ray_cast::{Triangle, View, World};
 use gnomon::capture::Frame;
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::geometry::mesh::{Mesh, MeshReport};
 use gnomon::light::{Light, Material};
-use gnomon::render::{Gpu, Layers, Renderer, Shown};
+use gnomon::render::{Gpu, Layers, REAL, Renderer, Shown, VIRTUAL};
 use gnomon::scene::{Anchor, Object, Scene, ShadowSettings, Technique};
-use serde_json::Value;
 
-use ray_cast::{REAL, Triangle, VIRTUAL, View, World};
 use shapes::Soup;
 
 /// One device for all tests of a binary.
@@ -317,71 +315,27 @@ pub struct StabilityRow {
 
 /// Reads `FOLDER/NAME.json` and its exact mask.
 pub fn stability_row(folder: &Path, name: &str) -> StabilityRow {
-    let text = std::fs::read_to_string(folder.join(format!("{name}.json"))).expect("a row");
-    let row: Value = serde_json::from_str(&text).expect("JSON");
-    let k = |i: usize, j: usize| row["camera"]["K"][i][j].as_f64().expect("K");
-    let intrinsics = Intrinsics {
-        size_px: [
-            row["width"].as_u64().expect("width") as u32,
-            row["height"].as_u64().expect("height") as u32,
-        ],
-        focal_px: DVec2::new(k(0, 0), k(1, 1)),
-        // There a pixel's centre is at .5.
-        center_px: DVec2::new(k(0, 2), k(1, 2)) - 0.5,
-        distortion: [0.0; 5],
+    let known = KnownScene::read(folder, name).expect("a row");
+    let things = |placed: &[Placed]| -> Vec<Thing> {
+        let thing = |placed: &Placed| {
+            Thing::new(Shape::File(placed.mesh.clone())).placed(placed.world_from_object)
+        };
+        placed.iter().map(thing).collect()
     };
-    let things = |key: &str| -> Vec<Thing> {
-        let list = row[key].as_array().expect("objects");
-        list.iter()
-            .map(|o| {
-                let obj = folder.join(o["obj"].as_str().expect("obj"));
-                let pose = o.get("transform").map_or(DAffine3::IDENTITY, affine);
-                Thing::new(Shape::File(obj)).placed(pose)
-            })
-            .collect()
-    };
-    let lights = row["lights"]
-        .as_array()
-        .expect("lights")
-        .iter()
-        .map(|l| Light::Point {
-            position_m: vector(&l["position"]),
-            intensity: vector(&l["intensity"]),
-        })
-        .collect();
-    let exact = image::open(folder.join(format!("{name}_exact.png")))
-        .expect("the exact mask")
-        .to_luma8();
     StabilityRow {
         stage: Stage::new(
-            &things("phantoms"),
-            &things("virtuals"),
+            &things(&known.phantoms),
+            &things(&known.virtuals),
             None,
-            lights,
-            DVec3::splat(0.05),
+            known.lights,
+            DVec3::splat(AMBIENT),
         ),
         view: View {
-            intrinsics,
-            camera_from_world: affine(&row["camera"]["world_to_camera"]),
+            intrinsics: known.intrinsics,
+            camera_from_world: known.camera_from_world,
         },
-        exact: exact.into_raw(),
+        exact: known.exact,
     }
-}
-
-/// An affine map from a row-major 4x4 matrix.
-pub fn affine(matrix: &Value) -> DAffine3 {
-    let at = |i: usize, j: usize| matrix[i][j].as_f64().expect("a matrix");
-    let transposed = DMat4::from_cols_array(&std::array::from_fn(|index| at(index % 4, index / 4)));
-    DAffine3 {
-        matrix3: DMat3::from_mat4(transposed),
-        translation: transposed.w_axis.truncate(),
-    }
-}
-
-fn vector(value: &Value) -> DVec3 {
-    DVec3::from_array(std::array::from_fn(|index| {
-        value[index].as_f64().expect("a vector")
-    }))
 }
 
 /// OpenCV's camera at `eye` that looks at `target`, the world's z up.

@@ -18,7 +18,7 @@ use gnomon::app::check::summary;
 use gnomon::geometry::mesh::Mesh;
 use gnomon::light::{Light, Material};
 use gnomon::scene::{
-    ArucoRefinement, Codes, Counting, DetectorKind, Family, Object, Scene, SceneError,
+    ArucoRefinement, Codes, Counting, DetectorKind, Family, Object, Quality, Scene, SceneError,
     ShadowSettings, Technique,
 };
 use tempfile::TempDir;
@@ -133,11 +133,13 @@ fn a_small_scene_has_the_defaults() {
     assert_eq!(
         scene.shadows,
         ShadowSettings {
+            quality: None,
             technique: Technique::Auto,
             samples: 4,
             counting: Counting::Auto,
             max_silhouette_error_px: 0.5,
-            frame_budget_ms: None
+            frame_budget_ms: None,
+            shafts: Default::default(),
         }
     );
     assert_eq!(scene.chosen_technique().0, Technique::Volumes);
@@ -205,10 +207,10 @@ irradiance = 2
 [ambient]
 radiance = 0.5
 [shadows]
+quality = \"accurate\"
 technique = \"volumes\"
 samples = 1
 counting = \"depth-fail\"
-max_silhouette_error_px = 0
 frame_budget_ms = 16
 ";
     let scene = load_in(&project, text).unwrap();
@@ -296,13 +298,37 @@ frame_budget_ms = 16
     assert_eq!(
         scene.shadows,
         ShadowSettings {
+            quality: Some(Quality::Accurate),
             technique: Technique::Volumes,
             samples: 1,
             counting: Counting::DepthFail,
             max_silhouette_error_px: 0.0,
-            frame_budget_ms: Some(16.0)
+            frame_budget_ms: Some(16.0),
+            shafts: Default::default(),
         }
     );
+}
+
+#[test]
+fn a_quality_is_told_by_the_settings_that_it_means() {
+    let settings = |shadows: &str| load(&format!("[shadows]\n{shadows}\n")).unwrap().shadows;
+    let meant = [("fast", 1, 2.0), ("balanced", 4, 0.5), ("accurate", 4, 0.0)];
+    for (name, samples, error_px) in meant {
+        let found = settings(&format!("quality = {name:?}"));
+        let told = (found.samples, found.max_silhouette_error_px);
+        assert_eq!(told, (samples, error_px), "{name}");
+        assert_eq!(found.quality.map(Quality::name), Some(name));
+        // What is said beside it goes before it.
+        let other = settings(&format!("quality = {name:?}\nmax_silhouette_error_px = 7"));
+        let told = (other.samples, other.max_silhouette_error_px);
+        assert_eq!(told, (samples, 7.0), "{name}");
+    }
+    let balanced = Quality::Balanced.shadows();
+    let unsaid = ShadowSettings {
+        quality: Some(Quality::Balanced),
+        ..ShadowSettings::default()
+    };
+    assert_eq!(balanced, unsaid);
 }
 
 #[test]

@@ -121,6 +121,7 @@ const MISTAKES: &[Mistake] = &[
     added("[shadows]\ntechnique = \"shafts\"\n", 7, 13, &["this version renders `volumes`; allowed: auto, volumes"]),
     added("[shadows]\ntechnique = \"environment\"\n", 7, 13, &["this version renders `volumes`"]),
     added("[shadows]\nsamples = 2\n", 7, 11, &["allowed: 1, 4"]),
+    added("[shadows]\nquality = \"best\"\n", 7, 11, &["quality", "allowed: fast, balanced, accurate"]),
     added("[shadows]\nmax_silhouette_error_px = -1\n", 7, 27, &["out of range; allowed: 0 to 100 px"]),
     added("[shadows]\nmax_silhouette_error_px = \"half\"\n", 7, 27, &["a number is expected"]),
     added("[shadows]\nframe_budget_ms = 0\n", 7, 19, &["allowed: above 0, up to 1000000 ms"]),

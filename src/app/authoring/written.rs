@@ -351,10 +351,16 @@ fn shadow_keys(old: &ShadowSettings, new: &ShadowSettings) -> Vec<(&'static str,
         max_silhouette_error_px,
         frame_budget_ms,
         shafts,
+        quality,
     } = *new;
     let ratio = |number: f64| super::numbers::new_number(number, RATIO);
     let mut all = shaft_keys(&old.shafts, &shafts);
     all.extend([
+        (
+            quality != old.quality,
+            "quality",
+            quality.map(|quality| quoted(quality.name())),
+        ),
         (
             technique != old.technique,
             "technique",

@@ -95,6 +95,7 @@ impl ShaftCasters {
                     ..*surfel
                 }));
         }
+        placed.caster = RayCaster::new(&placed.triangles);
         let all = BoxM::around(
             placed
                 .boxes
@@ -147,13 +148,13 @@ impl PlacedCasters {
         &self,
         room: &Prepared,
         sources: &[(Representative, Vec3)],
-        is_near: &[bool],
+        left: &[Option<f32>],
     ) -> Vec<LitSurfel> {
         let caster = &self.caster;
         let hides = |start, direction| caster.is_hidden(start, direction, f32::INFINITY);
         let shares = on_all_cores(self.surfels.len(), |range| {
             let lit = |surfel: &Surfel| {
-                let irradiance = room.light_on_surfel(surfel, RAYS, caster, sources, is_near);
+                let irradiance = room.light_on_surfel(surfel, RAYS, caster, sources, left);
                 LitSurfel {
                     surfel: *surfel,
                     open: open_directions(surfel, hides),
@@ -179,14 +180,5 @@ impl PlacedCasters {
             .fold(f32::INFINITY, f32::min);
         let part = (PART_OF_DISTANCE * nearest).max(SMALLEST_PART_M);
         ((patch.diagonal() / part).ceil() as u32).clamp(1, MOST_PARTS)
-    }
-
-    /// Where the casters' own shadows matter to the light that they get.
-    pub fn shadowed_room(&self) -> BoxM {
-        let reach = Vec3::splat(3.0 * self.ball.radius);
-        BoxM {
-            min: self.ball.center - reach,
-            max: self.ball.center + reach,
-        }
     }
 }

@@ -22,7 +22,7 @@ use crate::shafts::patches::PatchVertex;
 use crate::shafts::prepared::Prepared;
 use crate::shafts::selection::{Representative, representatives};
 use crate::shafts::source_tree::BoxM;
-use crate::shafts::surfels::{LitSurfel, thrown_back};
+use crate::shafts::surfels::{LitSurfel, thrown_back, thrown_on_caster};
 
 use super::anchor_geometry::Role;
 use super::gpu::Gpu;
@@ -154,7 +154,7 @@ impl Shafts {
             let volume = &self.room.volume;
             stage.set_indirect(&gpu.queue, &world_from_anchor, |place, normal| {
                 let surfels = self.hidden.iter().flat_map(|hidden| &hidden.surfels[..]);
-                volume.radiance(place).irradiance(normal) + thrown_back(place, normal, surfels)
+                volume.radiance(place).irradiance(normal) + thrown_on_caster(place, normal, surfels)
             });
             self.world_from_anchor = world_from_anchor;
         }
@@ -190,10 +190,8 @@ impl Shafts {
         let mut may_be_hidden = marks.sources(&room.sources);
         // Sources among the casters have no shadow map that could show them.
         let among = room.sources_within(placed.ball.center, NEAREST_SOURCE * placed.ball.radius);
-        let mut is_among = vec![false; room.patches.patches.len()];
         for &source in &among {
             may_be_hidden[source] = false;
-            is_among[room.sources.patches[source] as usize] = true;
         }
         let may_notice = marks.receivers(&room.receivers);
         let noticing: Vec<usize> = (0..may_notice.len())
@@ -205,7 +203,16 @@ impl Shafts {
             .collect();
         vertices.sort_unstable();
         vertices.dedup();
-        let weighed = room.weighed(&may_be_hidden, &vertices);
+        // Shadows fall off with the square of the distance, and so does what a source counts for.
+        let shares: Vec<(u32, f32)> = vertices
+            .iter()
+            .map(|&vertex| {
+                let place = room.patches.vertices[vertex as usize].position;
+                let squared = place.distance_squared(placed.ball.center);
+                (vertex, (squared + placed.ball.radius.powi(2)).recip())
+            })
+            .collect();
+        let weighed = room.weighed(&may_be_hidden, &shares);
         let count = self
             .settings
             .sources
@@ -222,7 +229,9 @@ impl Shafts {
         let reach_m = REACH * placed.ball.radius;
         let mut sources: Vec<Source> = Vec::new();
         chosen.retain(|one| {
-            let intensity = room.intensity(one, &may_be_hidden, placed.ball.center);
+            let center = placed.ball.center;
+            let intensity = room.intensity(one, &may_be_hidden, center)
+                * room.let_through(one, &may_be_hidden, center);
             let index = sources.len() as u32;
             let source = source(one, &placed.ball, reach_m, intensity, &tiling, index);
             sources.extend(source);
@@ -240,20 +249,20 @@ impl Shafts {
         )
         .into_iter()
         .map(|one| {
-            (
-                one,
-                room.intensity(&one, &may_be_hidden, placed.ball.center),
-            )
+            let center = placed.ball.center;
+            let sent = room.intensity(&one, &may_be_hidden, center);
+            (one, sent * room.let_through(&one, &may_be_hidden, center))
         })
         .collect();
-        let surfels = placed.lit_surfels(room, &detailed, &is_among);
+        let among_m = NEAREST_SOURCE * placed.ball.radius;
+        let left = room.left_by(&placed.caster, placed.ball.center, among_m);
+        let surfels = placed.lit_surfels(room, &detailed, &left);
         let row_of = |vertex: u32| vertices.binary_search(&vertex).unwrap_or(0) as u32;
         let irradiances: Vec<Vec4> = vertices
             .iter()
             .map(|&vertex| room.irradiance[vertex as usize].extend(0.0))
             .collect();
-        let dimmed = room.dimmed(&placed.caster, &detailed, &placed.shadowed_room());
-        let lost_nearby = lost_nearby(room, &vertices, &surfels, &is_among, &dimmed);
+        let lost_nearby = lost_nearby(room, &vertices, &surfels, &left);
         let mut lists: Vec<u32> = Vec::new();
         let mut corners: Vec<PatchCorner> = Vec::new();
         for &patch in &noticing {
@@ -407,13 +416,12 @@ fn lost_nearby(
     room: &Prepared,
     vertices: &[u32],
     surfels: &[LitSurfel],
-    is_among: &[bool],
-    dimmed: &[(usize, Vec3)],
+    left: &[Option<f32>],
 ) -> Vec<Vec3> {
     let shares = on_all_cores(vertices.len(), |range| {
         let hidden = |&vertex: &u32| {
             let PatchVertex { position, normal } = room.patches.vertices[vertex as usize];
-            room.hidden_among(position, normal, surfels, is_among) + room.lost_at(vertex, dimmed)
+            room.hidden_among(position, normal, surfels, left) + room.lost_at(vertex, left)
         };
         vertices[range].iter().map(hidden).collect::<Vec<_>>()
     });

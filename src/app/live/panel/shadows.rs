@@ -6,7 +6,7 @@ use super::editing::{Editing, number};
 use crate::app::authoring::Edit;
 use crate::app::live::wish::Wish;
 use crate::geometry::outline_scale::LARGEST_MOVE_PX;
-use crate::scene::{Counting, Scene, ShaftSettings, Technique};
+use crate::scene::{Counting, Quality, Scene, ShadowSettings, ShaftSettings, Technique};
 
 /// Samples per pixel that there are.
 const SAMPLES: [u32; 2] = [1, 4];
@@ -21,6 +21,19 @@ const MAP_SIDES_PX: [u32; 5] = [64, 128, 256, 512, 1024];
 /// Shows them.
 pub fn show(ui: &mut Ui, scene: &Scene, editing: &mut Editing, wishes: &mut Vec<Wish>) {
     let mut shadows = scene.shadows;
+    ui.horizontal(|ui| {
+        for (name, quality) in Quality::BY_NAME {
+            let is_chosen = shadows.quality == Some(quality);
+            if ui.selectable_label(is_chosen, name).clicked() && !is_chosen {
+                shadows = ShadowSettings {
+                    technique: shadows.technique,
+                    frame_budget_ms: shadows.frame_budget_ms,
+                    ..quality.shadows()
+                };
+            }
+        }
+        ui.label("quality");
+    });
     choice(ui, "technique", &mut shadows.technique, &Technique::BY_NAME);
     let (technique, why) = scene.chosen_technique();
     let mut names = Technique::BY_NAME.iter();

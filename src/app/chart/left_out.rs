@@ -1,0 +1,220 @@
+//! What is left out of the scenes that ship, and what that costs in error: pictures against those of everything.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use anyhow::Result;
+use glam::DAffine3;
+use serde::{Deserialize, Serialize};
+
+use super::family::Chart;
+use super::figure::{Axis, Figure, Panel, Point, Rule, Series};
+use super::lab::Lab;
+use super::measured::rounded;
+use super::peers_table::{LIGHT_M, SIZE_PX, Stage, TORUS_CENTER_M, torus};
+use super::shots::{Shots, grey_frame};
+use crate::app::truth::changed_by;
+use crate::capture::Frame;
+use crate::geometry::camera::Intrinsics;
+use crate::render::{Renderer, Shown};
+use crate::scene::{Counting, Scene};
+
+/// By how many pixels silhouettes may move.
+const ERRORS_PX: [f64; 6] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
+const DEFAULT_PX: f64 = 0.5;
+const TRIANGLES: &str = "triangles";
+/// A torus of so many triangles over the table that shadow programs are compared on.
+const FINE_TORUS: &str = "torus of 100,000 triangles";
+const CAPS: &str = "caps and far sides";
+
+/// The chart.
+pub struct LeftOut;
+
+/// One thing left out of one recording, the mean of its key frames.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Row {
+    recording: String,
+    left_out: String,
+    max_silhouette_error_px: f64,
+    triangles: f64,
+    of_triangles: f64,
+    changed_px: f64,
+    /// Over the whole picture, levels of 255.
+    rms_levels: f64,
+    /// Over the changed pixels.
+    rms_changed_levels: f64,
+    largest_levels: f64,
+}
+
+/// A composite and the triangles in it.
+struct Drawn {
+    rgba: Vec<u8>,
+    triangles: f64,
+}
+
+/// A scene and the frames in which it is looked at.
+struct Looks {
+    scene: Scene,
+    intrinsics: Intrinsics,
+    frames: Vec<(Frame, Vec<Option<DAffine3>>)>,
+}
+
+impl Looks {
+    fn of(lab: &Lab<'_>, unit: &str) -> Result<Self> {
+        if unit == FINE_TORUS {
+            let stage = Stage::new(
+                vec![(torus(100_000, 1.0), TORUS_CENTER_M)],
+                &[LIGHT_M],
+                SIZE_PX,
+                4,
+            );
+            let frame = |turn| (grey_frame(SIZE_PX), stage.poses(turn));
+            return Ok(Self {
+                intrinsics: stage.intrinsics,
+                frames: [0, 20, 40].map(frame).to_vec(),
+                scene: stage.scene,
+            });
+        }
+        let recording = lab.recording(unit)?;
+        let scene = recording.load_scene()?;
+        let shots = Shots::of(&recording, &scene)?;
+        let frames = shots.shots.into_iter();
+        Ok(Self {
+            scene,
+            intrinsics: shots.intrinsics,
+            frames: frames
+                .map(|shot| (shot.frame, shot.camera_from_anchor))
+                .collect(),
+        })
+    }
+}
+
+fn draw(lab: &Lab<'_>, looks: &Looks) -> Result<Vec<Drawn>> {
+    let mut renderer = Renderer::new(Arc::clone(&lab.gpu()?), &looks.scene, looks.intrinsics)?;
+    let drawn = looks.frames.iter().map(|(frame, camera_from_anchor)| {
+        renderer.upload(frame)?;
+        renderer.draw(camera_from_anchor, Shown::Composite);
+        Ok(Drawn {
+            rgba: renderer.read_picture()?,
+            triangles: renderer.triangles() as f64,
+        })
+    });
+    drawn.collect()
+}
+
+impl Chart for LeftOut {
+    const NAME: &'static str = "left-out";
+    const FAMILY: &'static str = "choosing";
+    const SHOWS: &'static str = "What is not drawn, and what that changes: the key frames of the recordings, and a finely made torus over a table, with things as \
+        coarse as silhouettes may move, and with volumes counted without caps where that is safe (which changes nothing), \
+        against the same with all triangles and caps. The picture's error is the root mean square over all its pixels.";
+    type Row = Row;
+
+    fn inputs(&self, lab: &Lab<'_>) -> Result<Vec<PathBuf>> {
+        lab.recording_inputs()
+    }
+
+    fn units(&self, lab: &Lab<'_>) -> Result<Vec<String>> {
+        let mut names = lab.recording_names()?;
+        names.push(FINE_TORUS.to_owned());
+        Ok(names)
+    }
+
+    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
+        let mut looks = Looks::of(lab, unit)?;
+        let scene = &mut looks.scene;
+        scene.shadows.max_silhouette_error_px = 0.0;
+        scene.shadows.counting = Counting::DepthFail;
+        let all = draw(lab, &looks)?;
+        let mut ways = vec![(CAPS, 0.0, Counting::Auto)];
+        ways.extend(ERRORS_PX.map(|error_px| (TRIANGLES, error_px, Counting::DepthFail)));
+        let mut rows = Vec::new();
+        for (left_out, max_silhouette_error_px, counting) in ways {
+            if lab.is_stopped() {
+                return Ok(None);
+            }
+            let shadows = &mut looks.scene.shadows;
+            shadows.max_silhouette_error_px = max_silhouette_error_px;
+            shadows.counting = counting;
+            let drawn = draw(lab, &looks)?;
+            let changes: Vec<(usize, f64, u8)> = drawn
+                .iter()
+                .zip(&all)
+                .map(|(drawn, all)| changed_by(&drawn.rgba, &all.rgba))
+                .collect();
+            let count = changes.len().max(1) as f64;
+            let squares = changes.iter().map(|(px, rms, _)| *px as f64 * rms * rms);
+            let squares: f64 = squares.sum();
+            let changed: f64 = changes.iter().map(|(px, ..)| *px as f64).sum();
+            let [width, height] = looks.intrinsics.size_px.map(f64::from);
+            let triangles = |drawn: &[Drawn]| {
+                rounded(drawn.iter().map(|drawn| drawn.triangles).sum::<f64>() / count)
+            };
+            rows.push(Row {
+                recording: unit.to_owned(),
+                left_out: left_out.to_owned(),
+                max_silhouette_error_px,
+                triangles: triangles(&drawn),
+                of_triangles: triangles(&all),
+                changed_px: rounded(changed / count),
+                rms_levels: rounded((squares / (count * width * height)).sqrt()),
+                rms_changed_levels: rounded((squares / changed.max(1.0)).sqrt()),
+                largest_levels: changes
+                    .iter()
+                    .map(|(.., largest)| f64::from(*largest))
+                    .fold(0.0, f64::max),
+            });
+        }
+        Ok(Some(rows))
+    }
+
+    fn figure(&self, rows: &[Row]) -> Figure {
+        let mut recordings: Vec<&str> = rows.iter().map(|row| row.recording.as_str()).collect();
+        recordings.dedup();
+        type Metric = (&'static str, fn(&Row) -> f64);
+        let metrics: [Metric; 2] = [
+            ("triangles drawn, % of all", |row| {
+                100.0 * row.triangles / row.of_triangles.max(1.0)
+            }),
+            ("the picture's error, levels of 255", |row| row.rms_levels),
+        ];
+        let panels = metrics.map(|(name, value)| Panel {
+            title: name.to_owned(),
+            x: Axis::log("silhouettes may move by, px"),
+            y: Axis::from_zero(name),
+            series: recordings
+                .iter()
+                .enumerate()
+                .map(|(look, &recording)| Series {
+                    name: recording.to_owned(),
+                    look,
+                    joined: true,
+                    points: rows
+                        .iter()
+                        .filter(|row| row.recording == recording && row.left_out == TRIANGLES)
+                        .map(|row| Point::at(row.max_silhouette_error_px, value(row)))
+                        .collect(),
+                })
+                .collect(),
+            rules: vec![Rule {
+                upright: true,
+                at: DEFAULT_PX,
+                label: "balanced".to_owned(),
+            }],
+            ..Panel::default()
+        });
+        let at_default = rows
+            .iter()
+            .filter(|row| row.left_out == TRIANGLES && row.max_silhouette_error_px == DEFAULT_PX);
+        let error = at_default.map(|row| row.rms_levels).fold(0.0, f64::max);
+        Figure {
+            title: "What is left out, and what that costs".to_owned(),
+            reading: format!(
+                "At the dashed line, which is the default, the error is at most {error} levels of 255."
+            ),
+            columns: metrics.len(),
+            panel_size: [520.0, 340.0],
+            panels: panels.to_vec(),
+        }
+    }
+}

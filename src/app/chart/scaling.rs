@@ -1,0 +1,218 @@
+//! Scaling: how what a frame costs grows with what there is. The values of one sweep are drawn in turn.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use anyhow::{Context as _, Result};
+use glam::{DQuat, DVec3};
+use serde::{Deserialize, Serialize};
+
+use super::family::Chart;
+use super::figure::{Axis, Figure, Panel, Point, Series, power_law};
+use super::lab::Lab;
+use super::measured::rounded;
+use super::peers_table::{LIGHT_M, SIZE_PX, Stage, TORUS_CENTER_M, WARM_UP_FRAMES, torus};
+use super::shots::grey_frame;
+use crate::app::stats::quantile;
+use crate::app::stopwatch::Stopwatch;
+use crate::render::{Gpu, Renderer, Shown};
+
+/// The chart.
+pub struct Scaling;
+
+/// A stage of one size.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Row {
+    varied: String,
+    value: f64,
+    samples: u32,
+    frame_median_ms: f64,
+    frame_p90_ms: f64,
+    gpu_memory_mib: Option<f64>,
+}
+
+/// Of the caster where its size is not varied.
+const TRIANGLES: usize = 2_500;
+const SWEEPS: [&str; 4] = ["triangles", "lights", "casters", "pixels"];
+
+/// The sizes of a sweep with their stages: the peers' torus over the table, one thing varied.
+fn sweep(varied: &str, samples: u32, quick: bool) -> Vec<(f64, Stage)> {
+    let one = |triangles| vec![(torus(triangles, 1.0), TORUS_CENTER_M)];
+    let sizes: &[u32] = match varied {
+        "triangles" => &[100, 300, 1_000, 3_000, 10_000, 30_000, 100_000],
+        "lights" => &[1, 2, 3, 4, 6, 8],
+        "casters" => &[1, 2, 4, 8, 16, 32],
+        _ => &[240, 480, 720, 960, 1_080],
+    };
+    // For a look every other size does.
+    let sizes = sizes.iter().step_by(if quick { 2 } else { 1 });
+    let stage = |&size: &u32| match varied {
+        "triangles" => {
+            let stage = Stage::new(one(size as usize), &[LIGHT_M], SIZE_PX, samples);
+            (stage.triangles() as f64, stage)
+        }
+        "lights" => {
+            // A ring at the lamp's height, which it is the first of.
+            let around = |index: u32| DQuat::from_rotation_z(f64::from(index) * 0.7) * LIGHT_M;
+            let places: Vec<DVec3> = (0..size).map(around).collect();
+            let stage = Stage::new(one(TRIANGLES), &places, SIZE_PX, samples);
+            (f64::from(size), stage)
+        }
+        "casters" => {
+            let small = torus(TRIANGLES, 0.4);
+            let grid = (0..size).map(|index| {
+                let (column, row) = (f64::from(index % 8), f64::from(index / 8));
+                let place = DVec3::new(-0.21 + 0.06 * column, -0.09 + 0.06 * row, 0.04);
+                (small.clone(), place)
+            });
+            let stage = Stage::new(grid.collect(), &[LIGHT_M], SIZE_PX, samples);
+            (f64::from(size), stage)
+        }
+        _ => {
+            let size_px = [size * 4 / 3, size];
+            let stage = Stage::new(one(TRIANGLES), &[LIGHT_M], size_px, samples);
+            (f64::from(size_px[0]) * f64::from(size_px[1]), stage)
+        }
+    };
+    sizes.map(stage).collect()
+}
+
+impl Chart for Scaling {
+    const NAME: &'static str = "scaling";
+    const FAMILY: &'static str = "scaling";
+    const SHOWS: &'static str = "How the time for a frame with shadow volumes made anew grows with triangles of the caster, \
+        lights, casters and pixels, one varied at a time: a torus of 2,500 triangles that turns over a table under one \
+        lamp, 640 x 480 pixels (casters: smaller ones). Drawn and waited for, without video going up or a picture coming \
+        back. The number at a line is its slope, the exponent of growth over the upper half of its sizes. Memory is what \
+        the graphics driver has given to the program.";
+    type Row = Row;
+
+    fn inputs(&self, _: &Lab<'_>) -> Result<Vec<PathBuf>> {
+        Ok(Vec::new())
+    }
+
+    fn units(&self, _: &Lab<'_>) -> Result<Vec<String>> {
+        Ok(SWEEPS.map(str::to_owned).to_vec())
+    }
+
+    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
+        let gpu = lab.gpu()?;
+        let (warm_up, frames) = if lab.quick {
+            (2, 5)
+        } else {
+            (WARM_UP_FRAMES, 40)
+        };
+        let mut rows = Vec::new();
+        for samples in [1, 4] {
+            let stages = sweep(unit, samples, lab.quick);
+            let benches = stages.iter().map(|(_, stage)| Bench::new(&gpu, stage));
+            let mut benches = benches.collect::<Result<Vec<_>>>()?;
+            for frame in 0..warm_up + frames {
+                if lab.is_stopped() {
+                    return Ok(None);
+                }
+                for (bench, (_, stage)) in benches.iter_mut().zip(&stages) {
+                    let ms = bench.draw(stage, frame)?;
+                    if frame >= warm_up {
+                        bench.frames_ms.push(ms);
+                    }
+                }
+            }
+            for (bench, (value, _)) in benches.iter().zip(&stages) {
+                rows.push(Row {
+                    varied: unit.to_owned(),
+                    value: *value,
+                    samples,
+                    frame_median_ms: rounded(quantile(&bench.frames_ms, 0.5)),
+                    frame_p90_ms: rounded(quantile(&bench.frames_ms, 0.9)),
+                    gpu_memory_mib: bench.memory_mib.map(rounded),
+                });
+            }
+        }
+        Ok(Some(rows))
+    }
+
+    fn figure(&self, rows: &[Row]) -> Figure {
+        type Metric = (&'static str, fn(&Row) -> Option<f64>);
+        let metrics: [Metric; 2] = [
+            ("time per frame, ms", |row| Some(row.frame_median_ms)),
+            ("graphics memory, MiB", |row| row.gpu_memory_mib),
+        ];
+        let mut panels = Vec::new();
+        for (name, value) in metrics {
+            for varied in SWEEPS {
+                let series = [1, 4].into_iter().enumerate().map(|(look, samples)| {
+                    let here = rows
+                        .iter()
+                        .filter(|row| row.varied == varied && row.samples == samples);
+                    let at: Vec<[f64; 2]> = here
+                        .filter_map(|row| Some([row.value, value(row)?]))
+                        .collect();
+                    let slope = power_law(&at[at.len() / 2..]).map(|(exponent, _)| exponent);
+                    let last = at.len().saturating_sub(1);
+                    let points = at.iter().enumerate().map(|(index, &[x, y])| {
+                        let told = slope.filter(|_| index == last);
+                        let label = told.map_or(String::new(), |slope| format!("{slope:.2}"));
+                        Point::named(x, y, &label)
+                    });
+                    Series {
+                        name: format!("{samples} sample{}", if samples == 1 { "" } else { "s" }),
+                        look,
+                        joined: true,
+                        points: points.collect(),
+                    }
+                });
+                panels.push(Panel {
+                    title: varied.to_owned(),
+                    x: Axis::log(varied),
+                    y: Axis::log(name),
+                    series: series.collect(),
+                    ..Panel::default()
+                });
+            }
+        }
+        Figure {
+            title: "How the cost of shadow volumes grows".to_owned(),
+            reading: "Both axes are logarithmic; the number at a line's end is its slope: 1 grows in proportion.".to_owned(),
+            columns: SWEEPS.len(),
+            panel_size: [350.0, 300.0],
+            panels,
+        }
+    }
+}
+
+/// A renderer and what its frames took.
+struct Bench {
+    renderer: Renderer,
+    frames_ms: Vec<f64>,
+    memory_mib: Option<f64>,
+}
+
+impl Bench {
+    fn new(gpu: &Arc<Gpu>, stage: &Stage) -> Result<Self> {
+        let before = gpu.allocated_bytes();
+        let mut renderer = Renderer::new(Arc::clone(gpu), &stage.scene, stage.intrinsics)?;
+        renderer.upload(&grey_frame(stage.intrinsics.size_px))?;
+        renderer.draw(&stage.poses(0), Shown::Composite);
+        renderer.wait().context("the first frame")?;
+        let after = gpu.allocated_bytes();
+        let grown = before.zip(after);
+        Ok(Self {
+            renderer,
+            frames_ms: Vec::new(),
+            memory_mib: grown
+                .map(|(before, after)| after.saturating_sub(before) as f64 / 1024.0 / 1024.0),
+        })
+    }
+
+    /// Milliseconds of a frame.
+    fn draw(&mut self, stage: &Stage, frame: usize) -> Result<f64> {
+        let poses = stage.poses(frame);
+        let (waited, ms) = Stopwatch::time(|| {
+            self.renderer.draw(&poses, Shown::Composite);
+            self.renderer.wait()
+        });
+        waited?;
+        Ok(ms)
+    }
+}

@@ -1,0 +1,301 @@
+//! Shadows: time per frame against how far the picture is from what the camera would have seen, for each technique and
+//! its knobs. All draw the same frame in turn.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use anyhow::Result;
+use serde::{Deserialize, Serialize};
+
+use super::family::Chart;
+use super::figure::{Axis, Figure, Panel, Point, Rule, Series, pareto_front};
+use super::lab::Lab;
+use super::measured::rounded;
+use super::shots::{Shots, mean, mean_wrong_pct};
+use crate::app::stats::quantile;
+use crate::app::stopwatch::Stopwatch;
+use crate::app::truth::{Drawn, Picture};
+use crate::render::{Renderer, Shown};
+use crate::scene::{Counting, Quality, Scene, ShadowSettings, ShaftSettings, Technique};
+
+/// The chart.
+pub struct Shadows;
+
+/// One way to make the shadows of one recording.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Row {
+    recording: String,
+    technique: String,
+    setting: String,
+    /// None for what is no technique.
+    frame_median_ms: Option<f64>,
+    residual_real: f64,
+    residual_virtual: f64,
+    change_real: f64,
+    factor_rms: f64,
+    /// None where no light is a point or a direction.
+    wrong_shadow_pct: Option<f64>,
+    outline_levels: f64,
+}
+
+const VOLUMES_4: &str = "volumes, 4 samples";
+const SHAFTS: &str = "shafts, by sources";
+const VOLUMES_1: &str = "volumes, 1 sample";
+/// A series each, in the order of their colours.
+const TECHNIQUES: [&str; 3] = [VOLUMES_4, VOLUMES_1, SHAFTS];
+/// How many sources get a shadow each; `None`: all that are hidden.
+const SHAFT_SOURCES: [Option<u32>; 6] = [Some(5), Some(10), Some(20), Some(50), Some(100), None];
+const TRUTH: &str = "truth on the video";
+const BARE: &str = "bare video";
+
+/// A way to make shadows and the scene that asks for it.
+struct Way {
+    technique: &'static str,
+    setting: String,
+    scene: Scene,
+}
+
+/// What each technique has to set. Another one adds its ways here.
+fn ways(scene: &Scene) -> Vec<Way> {
+    let mut ways = Vec::new();
+    let mut add = |technique, setting: String, shadows: ShadowSettings| {
+        let mut scene = scene.clone();
+        scene.shadows = shadows;
+        ways.push(Way {
+            technique,
+            setting,
+            scene,
+        });
+    };
+    if scene.probe.is_some() {
+        for sources in SHAFT_SOURCES {
+            let setting = sources.map_or("all".to_owned(), |count| count.to_string());
+            let shadows = ShadowSettings {
+                technique: Technique::Shafts,
+                shafts: ShaftSettings {
+                    sources,
+                    ..ShaftSettings::default()
+                },
+                ..ShadowSettings::default()
+            };
+            add(SHAFTS, setting, shadows);
+        }
+    }
+    if scene.lights.is_empty() {
+        return ways;
+    }
+    for (name, quality) in Quality::BY_NAME {
+        let shadows = ShadowSettings {
+            technique: Technique::Volumes,
+            ..quality.shadows()
+        };
+        add(series(shadows.samples), name.to_owned(), shadows);
+    }
+    for (samples, max_silhouette_error_px, counting) in [
+        (1, 0.0, Counting::Auto),
+        (1, 0.0, Counting::DepthFail),
+        (1, 8.0, Counting::Auto),
+        (4, 0.0, Counting::DepthFail),
+        (4, 8.0, Counting::Auto),
+    ] {
+        let setting = match counting {
+            Counting::Auto => format!("{max_silhouette_error_px} px"),
+            Counting::DepthFail => "depth-fail".to_owned(),
+        };
+        let shadows = ShadowSettings {
+            technique: Technique::Volumes,
+            samples,
+            max_silhouette_error_px,
+            counting,
+            ..ShadowSettings::default()
+        };
+        add(series(samples), setting, shadows);
+    }
+    ways
+}
+
+fn series(samples: u32) -> &'static str {
+    match samples {
+        1 => VOLUMES_1,
+        _ => VOLUMES_4,
+    }
+}
+
+impl Chart for Shadows {
+    const NAME: &'static str = "shadows";
+    const FAMILY: &'static str = "shadows";
+    const SHOWS: &'static str = "Time to draw a frame at true poses against its error. Residual: the picture's error on real \
+        pixels that the virtual things change, over that of the bare video; what the video's own noise leaves, with the \
+        true change put on it, is the floor. Factor: rms error of what the shadow leaves of the light, 1 without a shadow. \
+        A setting is the samples per pixel and by how much coarser versions of things may move their silhouettes; \
+        `depth-fail` counts volumes that way everywhere. What is left of the error is light between surfaces and what the \
+        torus hides of the surroundings, which point lights do not have.";
+    type Row = Row;
+
+    fn inputs(&self, lab: &Lab<'_>) -> Result<Vec<PathBuf>> {
+        lab.recording_inputs()
+    }
+
+    fn units(&self, lab: &Lab<'_>) -> Result<Vec<String>> {
+        lab.recording_names()
+    }
+
+    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
+        const DRAWS: usize = 4;
+        let recording = lab.recording(unit)?;
+        let scene = recording.load_scene()?;
+        let shots = Shots::of(&recording, &scene)?;
+        let gpu = lab.gpu()?;
+        let ways = ways(&scene);
+        let mut rows = Vec::new();
+        for way in &ways {
+            if lab.is_stopped() {
+                return Ok(None);
+            }
+            let drawn = shots.draw(&gpu, &way.scene)?;
+            rows.push(row(unit, way.technique, &way.setting, &shots, &drawn)?);
+        }
+        let mut renderers = ways
+            .iter()
+            .map(|way| Renderer::new(Arc::clone(&gpu), &way.scene, shots.intrinsics))
+            .collect::<Result<Vec<_>, _>>()?;
+        // Of each frame the least of all draws: nothing takes less than it needs.
+        let mut least_ms = vec![vec![f64::INFINITY; shots.shots.len()]; ways.len()];
+        for _ in 0..DRAWS * lab.rounds().pow(2) {
+            for (index, shot) in shots.shots.iter().enumerate() {
+                if lab.is_stopped() {
+                    return Ok(None);
+                }
+                for (renderer, least_ms) in renderers.iter_mut().zip(&mut least_ms) {
+                    renderer.upload(&shot.frame)?;
+                    let (waited, ms) = Stopwatch::time(|| {
+                        renderer.draw(&shot.camera_from_anchor, Shown::Composite);
+                        renderer.wait()
+                    });
+                    waited?;
+                    least_ms[index] = least_ms[index].min(ms);
+                }
+            }
+        }
+        for (row, least_ms) in rows.iter_mut().zip(&least_ms) {
+            row.frame_median_ms = Some(rounded(quantile(least_ms, 0.5)));
+        }
+        let drawn = shots.draw(&gpu, &scene)?;
+        rows.push(row(unit, TRUTH, "", &shots, &with_truth(&shots, &drawn))?);
+        let bare: Vec<Drawn> = drawn.into_iter().map(without_anything).collect();
+        rows.push(row(unit, BARE, "", &shots, &bare)?);
+        Ok(Some(rows))
+    }
+
+    fn figure(&self, rows: &[Row]) -> Figure {
+        let mut recordings: Vec<&str> = rows.iter().map(|row| row.recording.as_str()).collect();
+        recordings.dedup();
+        type Metric = (&'static str, fn(&Row) -> f64);
+        let metrics: [Metric; 3] = [
+            ("residual on real pixels", |row| row.residual_real),
+            ("error of the factor, rms", |row| row.factor_rms),
+            ("outlines' error, levels of 255", |row| row.outline_levels),
+        ];
+        let mut panels = Vec::new();
+        for &recording in &recordings {
+            for (name, value) in metrics {
+                let here = || rows.iter().filter(move |row| row.recording == recording);
+                let measured = || {
+                    here().filter_map(move |row| Some((row, [row.frame_median_ms?, value(row)])))
+                };
+                let measured_somewhere =
+                    |technique: &&str| rows.iter().any(|row| row.technique == **technique);
+                let series = TECHNIQUES.iter().enumerate();
+                let series = series.filter(|(_, technique)| measured_somewhere(technique));
+                let series = series.map(|(look, &technique)| Series {
+                    name: technique.to_owned(),
+                    look,
+                    joined: false,
+                    points: measured()
+                        .filter(|(row, _)| row.technique == technique)
+                        .map(|(row, [x, y])| Point::named(x, y, &row.setting))
+                        .collect(),
+                });
+                let rule = |technique: &str| {
+                    let row = here().find(|row| row.technique == technique);
+                    row.map(|row| Rule {
+                        upright: false,
+                        at: value(row),
+                        label: technique.to_owned(),
+                    })
+                };
+                panels.push(Panel {
+                    title: format!("{recording}: {name}"),
+                    x: Axis::log("time per frame, ms"),
+                    y: Axis::log(name),
+                    series: series.collect(),
+                    rules: [rule(TRUTH), rule(BARE)].into_iter().flatten().collect(),
+                    front: pareto_front(measured().map(|(_, at)| at)),
+                });
+            }
+        }
+        Figure {
+            title: "Shadows: what a frame costs and how far it is from the truth".to_owned(),
+            reading: "The lower and the farther left the better. Labels: the qualities, or how far silhouettes may move.".to_owned(),
+            columns: metrics.len(),
+            panel_size: [520.0, 380.0],
+            panels,
+        }
+    }
+}
+
+fn row(
+    recording: &str,
+    technique: &str,
+    setting: &str,
+    shots: &Shots,
+    drawn: &[Drawn],
+) -> Result<Row> {
+    let errors = shots.errors(drawn)?;
+    let of = |of| rounded(mean(&errors, of));
+    Ok(Row {
+        recording: recording.to_owned(),
+        technique: technique.to_owned(),
+        setting: setting.to_owned(),
+        frame_median_ms: None,
+        residual_real: of(|e| e.residual_real),
+        residual_virtual: of(|e| e.residual_virtual),
+        change_real: of(|e| e.change_real),
+        factor_rms: of(|e| e.factor),
+        wrong_shadow_pct: mean_wrong_pct(&errors).map(rounded),
+        outline_levels: of(|e| e.outline_levels),
+    })
+}
+
+/// The best that anything could draw into the recorded video: the true change, and the true factor.
+fn with_truth(shots: &Shots, drawn: &[Drawn]) -> Vec<Drawn> {
+    let frames = shots.shots.iter().zip(drawn);
+    frames
+        .map(|(shot, drawn)| {
+            let width = shots.size_px()[0] as usize;
+            let change = shot.truth.with.minus(&shot.truth.without);
+            let out = Picture::from_rgba(width, &drawn.bare).plus(&change);
+            let mut with_truth = drawn.clone();
+            with_truth.out = out
+                .pixels
+                .iter()
+                .flat_map(|p| [p[0], p[1], p[2], 255.0].map(|level| level.round() as u8))
+                .collect();
+            let factor = &shot.truth.factor.pixels;
+            with_truth.layers.gain = factor.iter().map(|f| f.map(|part| part as f32)).collect();
+            let shadows = with_truth.layers.shadow.iter_mut();
+            for (bits, mask) in shadows.zip(&shot.truth.mask) {
+                bits.clone_from(mask);
+            }
+            with_truth
+        })
+        .collect()
+}
+
+/// The video as it is.
+fn without_anything(mut drawn: Drawn) -> Drawn {
+    drawn.out.clone_from(&drawn.bare);
+    drawn.layers.gain.fill([1.0; 3]);
+    drawn.layers.shadow.iter_mut().for_each(|bits| bits.fill(0));
+    drawn
+}

@@ -1,0 +1,108 @@
+//! Key frames of a recording with their true poses and what the camera would have seen.
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use glam::DAffine3;
+
+use super::lab::Recording;
+use crate::app::recording;
+use crate::app::truth::{Drawn, Errors, Truth, compare, draw, key_frames};
+use crate::capture::Frame;
+use crate::geometry::camera::Intrinsics;
+use crate::render::{Gpu, Renderer};
+use crate::scene::Scene;
+
+/// All key frames of one recording.
+pub struct Shots {
+    /// In their order.
+    pub shots: Vec<Shot>,
+    /// Of the camera.
+    pub intrinsics: Intrinsics,
+}
+
+/// A key frame.
+pub struct Shot {
+    /// As recorded.
+    pub frame: Frame,
+    /// True poses, by anchor.
+    pub camera_from_anchor: Vec<Option<DAffine3>>,
+    /// What the camera would have seen.
+    pub truth: Truth,
+}
+
+impl Shots {
+    /// Reads them.
+    ///
+    /// # Errors
+    /// A recording or a truth that is not there.
+    pub fn of(recording: &Recording, scene: &Scene) -> Result<Self> {
+        let (_, intrinsics) = recording::open(&scene.camera)?;
+        let frames = key_frames(&recording.folder, &scene.anchors)?.into_iter();
+        let shots = frames.map(|(frame, camera_from_anchor)| {
+            Ok(Shot {
+                truth: Truth::open(&recording.folder, frame.index)?,
+                frame,
+                camera_from_anchor,
+            })
+        });
+        Ok(Self {
+            shots: shots.collect::<Result<_>>()?,
+            intrinsics,
+        })
+    }
+
+    /// Width and height of the pictures.
+    pub fn size_px(&self) -> [u32; 2] {
+        self.intrinsics.size_px
+    }
+
+    /// Draws all at their true poses.
+    ///
+    /// # Errors
+    /// A device that failed.
+    pub fn draw(&self, gpu: &Arc<Gpu>, scene: &Scene) -> Result<Vec<Drawn>> {
+        let mut renderer = Renderer::new(Arc::clone(gpu), scene, self.intrinsics)?;
+        self.shots
+            .iter()
+            .map(|shot| draw(&mut renderer, &shot.frame, &shot.camera_from_anchor))
+            .collect()
+    }
+
+    /// The errors of what was drawn.
+    ///
+    /// # Errors
+    /// A truth that changes nothing.
+    pub fn errors(&self, drawn: &[Drawn]) -> Result<Vec<Errors>> {
+        self.shots
+            .iter()
+            .zip(drawn)
+            .map(|(shot, drawn)| compare(shot.frame.index, &shot.truth, drawn))
+            .collect()
+    }
+}
+
+/// The mean of one of the errors over the frames.
+pub fn mean(errors: &[Errors], of: fn(&Errors) -> f64) -> f64 {
+    errors.iter().map(of).sum::<f64>() / errors.len().max(1) as f64
+}
+
+/// The mean of the pixels with a wrong shadow, percent; `None` where no light has a shadow of its own.
+pub fn mean_wrong_pct(errors: &[Errors]) -> Option<f64> {
+    let shadows: Option<Vec<f64>> = errors
+        .iter()
+        .map(|error| Some(error.shadow?.wrong_pct))
+        .collect();
+    let shadows = shadows.filter(|shadows| !shadows.is_empty())?;
+    Some(shadows.iter().sum::<f64>() / shadows.len() as f64)
+}
+
+/// A frame without any picture.
+pub fn grey_frame(size_px: [u32; 2]) -> Frame {
+    Frame {
+        index: 0,
+        time_secs: 0.0,
+        size_px,
+        rgba: vec![128; 4 * (size_px[0] * size_px[1]) as usize],
+    }
+}

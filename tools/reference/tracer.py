@@ -1,0 +1,211 @@
+"""The scene in Mitsuba 3: light as it travels, and shadows of point-shaped lights pixel by pixel."""
+import glob
+import math
+import os
+
+if "DRJIT_LIBLLVM_PATH" not in os.environ:
+    # The newest one that is there: the dynamic loader alone may take one that is too old.
+    found = glob.glob("/usr/lib/*/libLLVM-1[7-9]*.so*") + glob.glob("/usr/lib/*/libLLVM.so.[12]*")
+    found += glob.glob("/usr/lib/llvm-1[7-9]/lib/libLLVM*.so*")
+    if found:
+        os.environ["DRJIT_LIBLLVM_PATH"] = sorted(found)[-1]
+
+import cv2
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from scene_file import SceneError
+
+mi.set_variant("llvm_ad_rgb")
+
+PAPER, INK = 0.82, 0.03
+# Prints lie so far above what they are glued to, metres.
+LIFT_M = 1e-4
+REAL, VIRTUAL = 100, 200
+IN_REAL_SHADOW, IN_VIRTUAL_SHADOW, FACES_AWAY = 1, 2, 4
+# Rays a batch: what fits into memory on small machines.
+BATCH = 2**21
+
+
+def colour(value):
+    return {"type": "rgb", "value": list(value)}
+
+
+def matrix(values):
+    return mi.ScalarTransform4f(np.asarray(values, float).tolist())
+
+
+def surface(thing):
+    albedo = thing.albedo or [0.5] * 3
+    if thing.roughness:
+        inner = {"type": "roughplastic", "diffuse_reflectance": colour(albedo), "alpha": float(thing.roughness) ** 2}
+    else:
+        inner = {"type": "diffuse", "reflectance": colour(albedo)}
+    return {"type": "twosided", "inner": inner}
+
+
+def rectangle(rect_m, world_from_object, lift_m=0.0):
+    (x0, y0, x1, y1) = rect_m
+    place = np.eye(4)
+    place[0, 0], place[1, 1] = (x1 - x0) / 2, (y1 - y0) / 2
+    place[:3, 3] = (x0 + x1) / 2, (y0 + y1) / 2, lift_m
+    return {"type": "rectangle", "to_world": matrix(world_from_object @ place)}
+
+
+def has_normals(path):
+    with open(path, errors="replace") as file:
+        return any(line.startswith("vn ") for line in file)
+
+
+def shape(thing, world_from_anchor):
+    place = world_from_anchor @ thing.anchor_from_object
+    if thing.rect_m is not None:
+        made = rectangle(thing.rect_m, place)
+    else:
+        flat = thing.real or not has_normals(thing.mesh)
+        made = {"type": "obj", "filename": str(thing.mesh), "to_world": matrix(place), "face_normals": flat}
+    return {**made, "bsdf": surface(thing)}
+
+
+def dictionary(family):
+    names = {"tag16h5": "DICT_APRILTAG_16h5", "tag25h9": "DICT_APRILTAG_25h9", "tag36h10": "DICT_APRILTAG_36h10",
+             "tag36h11": "DICT_APRILTAG_36h11"}
+    name = names.get(family, family)
+    if not hasattr(cv2.aruco, name):
+        raise SceneError(f"no marker family {family}")
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name)), name
+
+
+def print_of(marker, world_from_anchor):
+    """A square of white paper with the marker, a cell of margin around it."""
+    codes, name = dictionary(marker.family)
+    cells = codes.markerSize + 2 * marker.border_cells
+    bits = cv2.aruco.generateImageMarker(codes, marker.id, cells, borderBits=marker.border_cells)
+    if "APRILTAG" in name:
+        # OpenCV's pictures of these stand on their heads against those that people print.
+        bits = np.rot90(bits, 2)
+    bits = np.pad(bits, 1, constant_values=255)
+    print_ = np.where(np.kron(bits, np.ones((16, 16))) > 127, PAPER, INK).astype(np.float32)
+    # A texture's first row lies at the rectangle's lower edge.
+    texture = mi.Bitmap(np.ascontiguousarray(np.repeat(print_[::-1, :, None], 3, 2)))
+    half_m = marker.size_m * (cells + 2) / cells / 2
+    made = rectangle([-half_m, -half_m, half_m, half_m], world_from_anchor @ marker.anchor_from_marker, LIFT_M)
+    reflectance = {"type": "bitmap", "bitmap": texture, "raw": True, "filter_type": "nearest"}
+    return {**made, "bsdf": {"type": "twosided", "inner": {"type": "diffuse", "reflectance": reflectance}}}
+
+
+def emitter(light):
+    if light["kind"] == "point":
+        return {"type": "point", "position": light["position_m"], "intensity": colour(_three(light["intensity"]))}
+    if light["kind"] == "directional":
+        return {"type": "directional", "direction": light["direction"], "irradiance": colour(_three(light["irradiance"]))}
+    raise SceneError(f"a light of kind {light['kind']} is not known here; allowed: point, directional")
+
+
+def _three(value):
+    return [float(value)] * 3 if isinstance(value, (int, float)) else value
+
+
+class Set:
+    """The scene at one moment."""
+
+    def __init__(self, scene, moment):
+        self.scene, self.moment = scene, moment
+        self.lights = {f"light {k}": emitter(light) for k, light in enumerate(scene.lights)}
+        if any(scene.ambient):
+            self.lights["ambient"] = {"type": "constant", "radiance": colour(scene.ambient)}
+        self.real, self.virtual = {}, {}
+        casting = {True: {}, False: {}}
+        for thing in scene.things:
+            frame = moment.world_from_anchor.get(thing.anchor)
+            if frame is None:
+                continue
+            made = shape(thing, frame)
+            (self.real if thing.real else self.virtual)[thing.name] = made
+            if thing.casts:
+                casting[thing.real][thing.name] = made
+        for number, marker in enumerate(scene.markers):
+            if marker.anchor in moment.world_from_anchor:
+                self.real[f"print {number}"] = print_of(marker, moment.world_from_anchor[marker.anchor])
+        self.without = mi.load_dict({"type": "scene", **self.lights, **self.real})
+        self.casters = {real: mi.load_dict({"type": "scene", **made}) for real, made in casting.items()}
+
+    def with_virtual(self):
+        return mi.load_dict({"type": "scene", **self.lights, **self.real, **self.virtual})
+
+    def virtual_alone(self):
+        return mi.load_dict({"type": "scene", **self.virtual})
+
+
+def rays(camera, camera_from_world, x_px, y_px, distorted):
+    x = (x_px - camera.center_px[0]) / camera.focal_px[0]
+    y = (y_px - camera.center_px[1]) / camera.focal_px[1]
+    if distorted:
+        k1, k2, p1, p2, k3 = camera.distortion
+        target_x, target_y = x, y
+        for _ in range(10):
+            r2 = x * x + y * y
+            radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+            x, y = ((target_x - 2 * p1 * x * y - p2 * (r2 + 2 * x * x)) / radial,
+                    (target_y - p1 * (r2 + 2 * y * y) - 2 * p2 * x * y) / radial)
+    turn = camera_from_world[:3, :3].T
+    eye = -turn @ camera_from_world[:3, 3]
+    way = [float(turn[axis, 0]) * x + float(turn[axis, 1]) * y + float(turn[axis, 2]) for axis in range(3)]
+    return mi.RayDifferential3f(o=mi.Point3f(*eye.tolist()), d=dr.normalize(mi.Vector3f(*way)))
+
+
+def radiance(camera, scene, camera_from_world, samples, seed, distorted):
+    """Linear RGB, box-filtered over each pixel."""
+    width, height = camera.size_px
+    pixels = width * height
+    integrator = mi.load_dict({"type": "path", "max_depth": 5, "rr_depth": 100})
+    total = np.zeros((pixels, 3))
+    part = max(1, min(samples, BATCH // pixels))
+    parts = math.ceil(samples / part)
+    for number in range(parts):
+        sampler = mi.load_dict({"type": "independent"})
+        sampler.seed(seed * 10007 + number, pixels * part)
+        pixel = dr.arange(mi.UInt32, pixels * part) // part
+        jitter = sampler.next_2d()
+        seen = rays(camera, camera_from_world, mi.Float(pixel % width) + jitter.x - 0.5,
+                    mi.Float(pixel // width) + jitter.y - 0.5, distorted)
+        light, _, _ = integrator.sample(scene, sampler, seen)
+        total += np.stack([np.array(dr.block_sum(channel, part)) for channel in (light.x, light.y, light.z)], 1)
+    return (total / (part * parts)).reshape(height, width, 3)
+
+
+def centres(camera, camera_from_world):
+    width, height = camera.size_px
+    pixel = dr.arange(mi.UInt32, width * height)
+    return rays(camera, camera_from_world, mi.Float(pixel % width), mi.Float(pixel // width), False)
+
+
+def roles_and_shadows(camera, stage, camera_from_world):
+    """What is seen at each pixel's centre, and for each light who takes it away there."""
+    width, height = camera.size_px
+    seen = centres(camera, camera_from_world)
+    hit = stage.with_virtual().ray_intersect(seen)
+    nearest = stage.virtual_alone().ray_intersect(seen) if stage.virtual else None
+    valid = np.array(hit.is_valid())
+    seeming = np.zeros_like(valid)
+    if nearest is not None:
+        seeming = np.array(nearest.is_valid() & (nearest.t <= hit.t * (1 + 1e-5)))
+    roles = np.where(seeming, VIRTUAL, np.where(valid, REAL, 0)).astype(np.uint8)
+    masks = []
+    for light in stage.scene.lights:
+        if light["kind"] == "point":
+            to_light = mi.Point3f(*light["position_m"]) - hit.p
+            reach = dr.norm(to_light)
+            to_light /= reach
+        else:
+            to_light = dr.normalize(-mi.Vector3f(*light["direction"]))
+            reach = mi.Float(1e30)
+        away = dr.dot(hit.n, to_light) * dr.dot(hit.n, -seen.d) < 0
+        bits = FACES_AWAY * np.array(away).astype(np.uint8)
+        for real, bit in ((True, IN_REAL_SHADOW), (False, IN_VIRTUAL_SHADOW)):
+            ray = hit.spawn_ray(to_light)
+            ray.maxt = reach * (1 - 1e-4)
+            bits |= bit * np.array(stage.casters[real].ray_test(ray)).astype(np.uint8)
+        masks.append(np.where(valid, bits, 0).astype(np.uint8).reshape(height, width))
+    return roles.reshape(height, width), masks
