@@ -11,9 +11,12 @@ use common::random::Random;
 use glam::DVec3;
 use gnomon::app::authoring::{Edit, EditError, NewVirtual, SceneDocument, SceneNews, SceneWatch};
 use gnomon::app::stopwatch::Stopwatch;
+use gnomon::app::truth::{draw, key_frames};
 use gnomon::light::Light;
 use gnomon::render::Renderer;
-use gnomon::scene::{Counting, Placement, Scene, ShadowSettings, Technique};
+use gnomon::scene::{
+    Counting, Placement, Quality, Scene, ShadowSettings, ShaftSettings, Technique,
+};
 
 /// What is promised for the time from a saved file to its scene.
 const PROMISED_MS: f64 = 500.0;
@@ -383,6 +386,16 @@ mod edits {
                 },
                 max_silhouette_error_px: random.below(100) as f64 / 4.0,
                 frame_budget_ms: random.chance(0.5).then_some(12.5),
+                quality: match random.below(4) {
+                    grade @ 0..3 => Some(Quality::BY_NAME[grade].1),
+                    _ => None,
+                },
+                shafts: ShaftSettings {
+                    sources: random.chance(0.5).then(|| 1 + random.below(99) as u32),
+                    patches: 100 + random.below(900) as u32,
+                    map_px: 64 << random.below(3),
+                    ..ShaftSettings::default()
+                },
             }),
             6 => Edit::AnchorSize {
                 anchor: "table".to_owned(),
@@ -774,11 +787,11 @@ mod watch {
 fn what_is_hidden_leaves_the_picture_as_if_it_were_not_there() {
     let folder = common::project_file("recordings/lamp");
     let intrinsics = gnomon::capture::load_calibration(&folder.join("camera.toml")).unwrap();
-    let (frame, poses) = common::truth::key_frames(&folder, 1).remove(0);
     let whole = Scene::load(&common::project_file("config/lamp.toml")).unwrap();
+    let (frame, poses) = key_frames(&folder, &whole.anchors).unwrap().remove(0);
     let picture = |scene: &Scene| {
         let mut renderer = Renderer::new(common::gpu(), scene, intrinsics).unwrap();
-        common::truth::draw(&mut renderer, &frame, &poses)
+        draw(&mut renderer, &frame, &poses).unwrap()
     };
     let mut hidden = whole.clone();
     hidden.virtuals[0].visible = false;

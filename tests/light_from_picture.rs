@@ -6,9 +6,9 @@ mod common;
 use std::path::PathBuf;
 
 use common::random::Random;
-use common::truth::key_frames;
 use glam::{DAffine3, DVec2, DVec3};
 use gnomon::app::authoring::{FoundLight, PicturedThings, ShadowClick};
+use gnomon::app::truth::key_frames;
 use gnomon::capture::{Frame, load_calibration};
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::geometry::light_placing::{FarLight, Freedom, Sight};
@@ -179,7 +179,7 @@ fn the_lamp_is_found_from_clicks_that_are_off() {
     let scene = scene("lamp");
     let folder = common::project_file("recordings/lamp");
     let intrinsics = load_calibration(&folder.join("camera.toml")).expect("a calibration");
-    for key in key_frames(&folder, 1) {
+    for key in key_frames(&folder, &scene.anchors).expect("key frames") {
         let judged = rounds(&scene, intrinsics, &key, 1.5);
         assert_near(&format!("lamp {}", key.0.index), &judged);
     }
@@ -193,7 +193,7 @@ fn the_lamp_of_the_shared_session_is_found() {
     }
     let scene = scene("lamp");
     let intrinsics = load_calibration(&folder.join("session.json")).expect("a calibration");
-    for key in key_frames(&folder, 1) {
+    for key in key_frames(&folder, &scene.anchors).expect("key frames") {
         let judged = rounds(&scene, intrinsics, &key, 1.5);
         assert_near(&format!("session {}", key.0.index), &judged);
     }

@@ -8,7 +8,7 @@ use super::numbers::{ANGLE, DIRECTION, POSITION, PRINT, RATIO, number_of};
 use super::spliced::{Body, Spliced, bodies, parsed};
 use crate::light::Light;
 use crate::scene::{
-    Counting, Placement, Scene, ShadowSettings, ShaftSettings, Technique, unit_direction,
+    Counting, Placement, Quality, Scene, ShadowSettings, ShaftSettings, Technique, unit_direction,
 };
 
 /// Why an edit does not fit a text.
@@ -354,6 +354,9 @@ fn shadow_keys(old: &ShadowSettings, new: &ShadowSettings) -> Vec<(&'static str,
         quality,
     } = *new;
     let ratio = |number: f64| super::numbers::new_number(number, RATIO);
+    // Another quality gives other defaults: what it says itself goes, what it does not stands.
+    let regraded = quality != old.quality;
+    let given = quality.map_or_else(ShadowSettings::default, Quality::shadows);
     let mut all = shaft_keys(&old.shafts, &shafts);
     all.extend([
         (
@@ -366,16 +369,21 @@ fn shadow_keys(old: &ShadowSettings, new: &ShadowSettings) -> Vec<(&'static str,
             "technique",
             Some(quoted(word(&Technique::BY_NAME, technique))),
         ),
-        (samples != old.samples, "samples", Some(samples.to_string())),
+        (
+            regraded || samples != old.samples,
+            "samples",
+            (!regraded || samples != given.samples).then(|| samples.to_string()),
+        ),
         (
             counting != old.counting,
             "counting",
             Some(quoted(word(&Counting::BY_NAME, counting))),
         ),
         (
-            max_silhouette_error_px != old.max_silhouette_error_px,
+            regraded || max_silhouette_error_px != old.max_silhouette_error_px,
             "max_silhouette_error_px",
-            Some(ratio(max_silhouette_error_px)),
+            (!regraded || max_silhouette_error_px != given.max_silhouette_error_px)
+                .then(|| ratio(max_silhouette_error_px)),
         ),
         (
             frame_budget_ms != old.frame_budget_ms,
