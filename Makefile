@@ -2,7 +2,7 @@
 # Mesa's layer that asks the desktop for its favourite card complains on machines without a desktop; gnomon chooses itself.
 export NODEVICE_SELECT = 1
 
-.PHONY: demo test test-camera charts reference bench bench-volumes bench-tracking setup
+.PHONY: demo test test-camera soak charts reference bench bench-volumes bench-tracking setup
 
 demo: setup
 	cargo build --release
@@ -24,6 +24,10 @@ test: setup
 test-camera: setup
 	cargo build --release
 	tools/test_camera.sh
+
+# An hour's worth of frames through the live pipeline, as fast as they go; fails where memory grows.
+soak: setup
+	cargo test --release --test soak -- --ignored --nocapture
 
 # Speed against accuracy on this machine: charts/.
 charts: setup

@@ -40,3 +40,9 @@ fn in_real_shadow() -> @location(0) vec4f {
 fn in_virtual_shadow() -> @location(0) vec4f {
     return vec4f(2.0 / 255.0);
 }
+
+// Drawn where the stencil has one number; the pipelines' constant blends in that number.
+@fragment
+fn counted() -> @location(0) vec4f {
+    return vec4f(1.0);
+}

@@ -16,6 +16,7 @@ use gnomon::app::chart::{self, chart};
 use gnomon::app::check;
 use gnomon::app::first_look::first_look;
 use gnomon::app::layer_files::Layer;
+use gnomon::app::live;
 use gnomon::app::markers::{self, Paper, Sheet};
 use gnomon::app::probe::{self, exposure_of};
 use gnomon::app::record;
@@ -37,6 +38,11 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Opens a window on a camera, with the scene's virtual things in its picture.
+    #[command(
+        after_help = "Example:\n  gnomon live config/lamp.toml\n  gnomon live    # webcam:0, any marker"
+    )]
+    Live(LiveArgs),
     /// Plays a recording with the scene's virtual things in it.
     #[command(
         after_help = "Example:\n  gnomon replay config/lamp.toml --out out/lamp.mp4 --sheet out/lamp.png"
@@ -112,6 +118,21 @@ struct ChartArgs {
     /// Track the sessions of this folder too
     #[arg(long, value_name = "DIR")]
     sessions: Option<PathBuf>,
+    /// Graphics adapter, by a part of its name; the fastest kind without this
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+}
+
+#[derive(Args)]
+struct LiveArgs {
+    /// Scene file (.toml), webcam (webcam:0, webcam:NAME, /dev/video0), address (http://…, rtsp://…), or recording
+    #[arg(default_value = "webcam:0")]
+    source: PathBuf,
+    #[command(flatten)]
+    recording: RecordingArgs,
+    /// Folder for what the window's keys record: pictures, sessions, videos
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
     /// Graphics adapter, by a part of its name; the fastest kind without this
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
@@ -438,6 +459,7 @@ fn main() -> ExitCode {
 
 fn run(cli: Cli) -> Result<()> {
     match cli.command {
+        Command::Live(args) => run_live(args),
         Command::Replay(args) => run_replay(args),
         Command::Track(args) => run_track(args),
         Command::Board(args) => run_board(args),
@@ -459,6 +481,22 @@ fn run(cli: Cli) -> Result<()> {
             Ok(())
         }
     }
+}
+
+fn run_live(args: LiveArgs) -> Result<()> {
+    let stop = interrupts()?;
+    let input = if is_scene(&args.source) {
+        args.recording.refuse_beside(&args.source)?;
+        live::Input::Scene(args.source)
+    } else {
+        live::Input::Camera(camera_of(&args.source, &args.recording)?)
+    };
+    let request = live::Request {
+        input,
+        out: args.out,
+        adapter: args.adapter,
+    };
+    live::live(&request, &stop)
 }
 
 fn run_replay(args: ReplayArgs) -> Result<()> {

@@ -19,8 +19,12 @@ const FLOORS: [&str; 9] = [
 ];
 
 /// A word of code, and the only places (below `src/`) where it may stand.
-const HOMES: [(&str, &[&str]); 7] = [
-    ("wgpu", &["render/"]),
+const HOMES: [(&str, &[&str]); 10] = [
+    // The window shows a texture of the renderer's.
+    ("wgpu", &["render/", "app/live/screen.rs"]),
+    ("eframe", &["app/live/"]),
+    ("egui", &["app/live/"]),
+    ("egui_plot", &["app/live/"]),
     ("naga", &["render/"]),
     (
         "opencv",

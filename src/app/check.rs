@@ -120,7 +120,9 @@ fn quality_row(quality: Quality, shadows: &ShadowSettings) -> String {
 pub fn warnings(scene: &Scene) -> Vec<String> {
     let casters = scene.phantoms.iter().chain(&scene.virtuals);
     let closed: Vec<&Object> = casters
-        .filter(|object| object.casts && object.mesh_report.closed && object.anchor == 0)
+        .filter(|object| {
+            object.visible && object.casts && object.mesh_report.closed && object.anchor == 0
+        })
         .collect();
     let mut warnings = Vec::new();
     for (number, light) in scene.lights.iter().enumerate() {
@@ -233,6 +235,9 @@ fn object_row(object: &Object, anchors: &[Anchor], with_levels: bool) -> Row {
     }
     if object.anchor_from_object.matrix3.determinant() < 0.0 {
         notes.push("mirrored".to_owned());
+    }
+    if !object.visible {
+        notes.push("hidden".to_owned());
     }
     let casts = if object.casts {
         "casts"

@@ -41,9 +41,18 @@ pub enum Tapped<'a> {
     Frame(&'a Arc<Frame>),
 }
 
+/// A frame, and when it came.
+#[derive(Debug, Clone)]
+pub struct Arrived {
+    /// The frame.
+    pub frame: Arc<Frame>,
+    /// By the clock that the source is read with, seconds; in a recording that is not the frame's own time.
+    pub at_secs: f64,
+}
+
 /// A live source that is being read. Dropped, it stops within a moment, whatever the camera does.
 pub struct LiveCapture {
-    frames: Arc<Mailbox<Arc<Frame>>>,
+    frames: Arc<Mailbox<Arrived>>,
     events: Receiver<CaptureEvent>,
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
@@ -69,9 +78,9 @@ impl LiveCapture {
         });
         let thread = {
             let (frames, shared) = (Arc::clone(&frames), Arc::clone(&shared));
-            let source = LiveSource::open(source, options, now);
+            let source = LiveSource::open(source, options, Arc::clone(&now));
             thread::spawn(move || {
-                capture(source, &frames, &to_owner, &shared);
+                capture(source, &now, &frames, &to_owner, &shared);
                 frames.close();
             })
         };
@@ -84,7 +93,7 @@ impl LiveCapture {
     }
 
     /// Where the newest frame lies; closed when no more will come.
-    pub fn frames(&self) -> Arc<Mailbox<Arc<Frame>>> {
+    pub fn frames(&self) -> Arc<Mailbox<Arrived>> {
         Arc::clone(&self.frames)
     }
 
@@ -136,7 +145,8 @@ impl Drop for LiveCapture {
 /// Until the source ends or the owner stops it.
 fn capture(
     mut source: LiveSource,
-    frames: &Mailbox<Arc<Frame>>,
+    now: &Now,
+    frames: &Mailbox<Arrived>,
     to_owner: &Sender<CaptureEvent>,
     shared: &Shared,
 ) {
@@ -155,7 +165,11 @@ fn capture(
         let (event, is_last) = match event {
             None => continue,
             Some(LiveEvent::Frame(frame)) => {
-                shared.take(Arc::new(frame), frames);
+                let arrived = Arrived {
+                    frame: Arc::new(frame),
+                    at_secs: now(),
+                };
+                shared.take(arrived, frames);
                 continue;
             }
             Some(LiveEvent::Opened(opened)) => {
@@ -178,10 +192,10 @@ fn capture(
 }
 
 impl Shared {
-    fn take(&self, frame: Arc<Frame>, frames: &Mailbox<Arc<Frame>>) {
+    fn take(&self, arrived: Arrived, frames: &Mailbox<Arrived>) {
         self.captured.fetch_add(1, Ordering::Relaxed);
-        self.tap(Tapped::Frame(&frame));
-        frames.put(frame);
+        self.tap(Tapped::Frame(&arrived.frame));
+        frames.put(arrived);
     }
 
     fn tap(&self, tapped: Tapped) {
@@ -227,7 +241,7 @@ mod tests {
         let frames = capture.frames();
         let mut newest = None;
         // A slow reader.
-        while let Some(frame) = frames.take() {
+        while let Some(Arrived { frame, .. }) = frames.take() {
             assert!(newest < Some(frame.index));
             newest = Some(frame.index);
             thread::sleep(Duration::from_millis(150));

@@ -1,6 +1,7 @@
 //! The jobs: replay, live, record, track, board, calibrate, probe, markers, check, chart; their clock, files and progress.
 
 mod anchor_block;
+pub mod authoring;
 pub mod board;
 pub mod calibrate;
 mod calibration_file;
@@ -12,6 +13,7 @@ pub mod contact_sheet;
 pub mod detections_file;
 pub mod first_look;
 pub mod layer_files;
+pub mod live;
 pub mod live_capture;
 pub mod live_input;
 pub mod mailbox;

@@ -8,7 +8,7 @@ use std::time::Duration;
 use anyhow::{Result, bail};
 
 use super::capture_talk::say;
-use super::live_capture::{CaptureEvent, LiveCapture};
+use super::live_capture::{Arrived, CaptureEvent, LiveCapture};
 use super::live_input::LiveInput;
 use super::progress::Progress;
 use super::session_recorder::{Recorded, SessionRecorder};
@@ -101,7 +101,7 @@ fn watch(
                 _ => {}
             }
         }
-        let super::mailbox::Taken::New(frame) = frames.take_within(PATIENCE) else {
+        let super::mailbox::Taken::New(Arrived { frame, .. }) = frames.take_within(PATIENCE) else {
             continue;
         };
         progress.advance();

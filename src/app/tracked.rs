@@ -10,7 +10,7 @@ use std::time::Duration;
 use anyhow::{Context as _, Result};
 
 use super::capture_talk::say;
-use super::live_capture::{CaptureEvent, LiveCapture};
+use super::live_capture::{Arrived, CaptureEvent, LiveCapture};
 use super::mailbox::Taken;
 use super::mirror_watch::MirrorWatch;
 use super::poses_file::GivenPoses;
@@ -174,7 +174,7 @@ fn live_stage(
             }
         }
         match taken {
-            Taken::New(frame) => {
+            Taken::New(Arrived { frame, .. }) => {
                 check_frame_size(intrinsics, frame.size_px, "the camera")?;
                 let frame = Arc::unwrap_or_clone(frame);
                 if to_tracker.send((frame, None)).is_err() {

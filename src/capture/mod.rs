@@ -7,6 +7,7 @@ pub mod calibration;
 mod error;
 pub mod exposures;
 mod images;
+pub mod linear;
 pub mod live;
 mod pixels;
 mod times;

@@ -197,6 +197,13 @@ impl Caster {
         self.shallow(light, whole, most, false)
     }
 
+    /// The edges of the outline that a light sees, in the mesh's own space: where its shadow begins.
+    pub fn outline_edges(&self, light: LightPlace) -> Vec<[Vec3; 2]> {
+        let edges = self.silhouette(light, [1, 0]).edges;
+        let ends = |edge: [u32; 2]| edge.map(|index| self.positions[index as usize]);
+        edges.into_iter().map(ends).collect()
+    }
+
     /// How far above each triangle's plane the light is, as the sine of the angle for a distant one; exactly 0 where it
     /// sees the triangle edge-on.
     fn light_heights(&self, light: LightPlace) -> impl Iterator<Item = f64> {

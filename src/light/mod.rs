@@ -2,6 +2,7 @@
 
 pub mod bounce;
 pub mod brightest;
+pub mod contrast;
 pub(crate) mod cores;
 pub mod probe;
 pub mod probe_maps;

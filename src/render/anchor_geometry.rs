@@ -1,7 +1,6 @@
 //! The scene's meshes on the GPU, each with its levels of detail. Objects stand still on their anchor, so their vertices
 //! are kept in the anchor's space: one matrix per anchor draws all that it carries.
 
-use std::borrow::Cow;
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -11,7 +10,7 @@ use glam::{DVec3, Vec3};
 use wgpu::util::DeviceExt as _;
 
 use crate::geometry::bounds::Bounds;
-use crate::geometry::levels::levels;
+use crate::geometry::levels::{Level, levels};
 use crate::geometry::mesh::Mesh;
 use crate::geometry::outline_scale::largest_stretch;
 use crate::geometry::shadow_volume::Caster;
@@ -113,8 +112,24 @@ pub(super) struct AnchorGeometry {
     pub virtual_corners: Vec<(usize, VirtualCorners)>,
 }
 
+/// Coarser versions of meshes, which take long to make: each with the mesh that it is of.
+#[derive(Default)]
+pub(super) struct KnownLevels(Vec<(Mesh, Vec<Level>)>);
+
+impl KnownLevels {
+    /// The coarser versions of a mesh, made where they are not known.
+    fn of(&mut self, mesh: &Mesh) -> &[Level] {
+        let known = self.0.iter().position(|(known, _)| known == mesh);
+        let index = known.unwrap_or_else(|| {
+            self.0.push((mesh.clone(), levels(mesh)));
+            self.0.len() - 1
+        });
+        &self.0[index].1
+    }
+}
+
 impl AnchorGeometry {
-    pub fn new(device: &wgpu::Device, scene: &Scene) -> Self {
+    pub fn new(device: &wgpu::Device, scene: &Scene, known: &mut KnownLevels) -> Self {
         let ambient = (PI * scene.ambient_radiance).as_vec3();
         let mut geometry = Self {
             batches: Vec::new(),
@@ -127,9 +142,16 @@ impl AnchorGeometry {
         ] {
             for anchor in 0..scene.anchors.len() {
                 let mut shared = SharedCorners::default();
-                for object in objects.iter().filter(|object| object.anchor == anchor) {
+                let there = objects
+                    .iter()
+                    .filter(|object| object.visible && object.anchor == anchor);
+                for object in there {
                     let coarsest_px = scene.shadows.max_silhouette_error_px;
-                    let thing = thing(device, role, object, coarsest_px > 0.0, &mut shared);
+                    let coarser = match coarsest_px > 0.0 {
+                        true => known.of(&object.mesh),
+                        false => &[],
+                    };
+                    let thing = thing(device, role, object, coarser, &mut shared);
                     geometry.things.extend(thing);
                 }
                 if shared.triangles.is_empty() {
@@ -155,18 +177,14 @@ fn thing(
     device: &wgpu::Device,
     role: Role,
     object: &Object,
-    with_levels: bool,
+    coarser: &[Level],
     shared: &mut SharedCorners,
 ) -> Option<Thing> {
     let stretch = largest_stretch(&object.anchor_from_object);
-    let coarser = match with_levels {
-        true => levels(&object.mesh),
-        false => Vec::new(),
-    };
-    let itself = (Cow::Borrowed(&object.mesh), [0.0; 3]);
-    let coarser = coarser.into_iter().map(|level| {
+    let itself = (&object.mesh, [0.0; 3]);
+    let coarser = coarser.iter().map(|level| {
         let lengths_m = [level.max_error_m, level.mean_error_m, level.largest_facet_m];
-        (Cow::Owned(level.mesh), lengths_m)
+        (&level.mesh, lengths_m)
     });
     let in_anchor =
         |corners: [DVec3; 3]| corners.map(|p| object.anchor_from_object.transform_point3(p));
@@ -176,11 +194,11 @@ fn thing(
         .map(|(mesh, lengths_m)| {
             let [max_error_m, mean_error_m, largest_facet_m] =
                 lengths_m.map(|length_m| length_m * stretch);
-            let positions = positions_in_anchor(object, &mesh);
+            let positions = positions_in_anchor(object, mesh);
             let corner = |index: u32| positions[index as usize].as_dvec3();
             receivers = mesh.triangles.iter().map(|t| t.map(corner)).collect();
             let first = shared.triangles.len();
-            let corners = corners(object, &mesh);
+            let corners = corners(object, mesh);
             shared.add(&corners);
             let of_casting = || {
                 let caster = Caster::new(positions, mesh.triangles.clone());
@@ -196,7 +214,7 @@ fn thing(
                 }
             };
             ThingLevel {
-                holes: holes(&mesh).map(|holes| holes.into_iter().map(in_anchor).collect()),
+                holes: holes(mesh).map(|holes| holes.into_iter().map(in_anchor).collect()),
                 caster: object.casts.then(of_casting),
                 range: 3 * first as u32..3 * shared.triangles.len() as u32,
                 max_error_m,

@@ -49,6 +49,8 @@ pub enum RenderError {
 
 /// An opened adapter.
 pub struct Gpu {
+    instance: wgpu::Instance,
+    adapter: wgpu::Adapter,
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     pub(super) depth_format: wgpu::TextureFormat,
@@ -56,6 +58,19 @@ pub struct Gpu {
     pub(super) timestamp_period_ns: Option<f32>,
     description: String,
     failure: Arc<Mutex<Option<String>>>,
+}
+
+/// Handles on an opened adapter, for a window that shows what is drawn there.
+#[derive(Debug, Clone)]
+pub struct SharedDevice {
+    /// Where it was found.
+    pub instance: wgpu::Instance,
+    /// The adapter.
+    pub adapter: wgpu::Adapter,
+    /// The device.
+    pub device: wgpu::Device,
+    /// The device's queue.
+    pub queue: wgpu::Queue,
 }
 
 impl Gpu {
@@ -91,10 +106,13 @@ impl Gpu {
                     found: adapters.iter().map(name).collect::<Vec<_>>().join(", "),
                 })?,
         };
-        Self::from_adapter(adapter)
+        Self::from_adapter(&instance, adapter)
     }
 
-    fn from_adapter(adapter: &wgpu::Adapter) -> Result<Self, RenderError> {
+    fn from_adapter(
+        instance: &wgpu::Instance,
+        adapter: &wgpu::Adapter,
+    ) -> Result<Self, RenderError> {
         let info = adapter.get_info();
         let offered = adapter.features();
         let wished = wgpu::Features::DEPTH32FLOAT_STENCIL8 | wgpu::Features::TIMESTAMP_QUERY;
@@ -140,6 +158,8 @@ impl Gpu {
                 .contains(wgpu::Features::TIMESTAMP_QUERY)
                 .then(|| queue.get_timestamp_period()),
             description: format!("{} ({:?}, {})", info.name, info.backend, info.driver_info),
+            instance: instance.clone(),
+            adapter: adapter.clone(),
             device,
             queue,
             failure,
@@ -149,6 +169,16 @@ impl Gpu {
     /// The adapter's name, its interface and its driver.
     pub fn description(&self) -> &str {
         &self.description
+    }
+
+    /// What a window needs to show pictures of this device without a detour.
+    pub fn shared(&self) -> SharedDevice {
+        SharedDevice {
+            instance: self.instance.clone(),
+            adapter: self.adapter.clone(),
+            device: self.device.clone(),
+            queue: self.queue.clone(),
+        }
     }
 
     /// The first failure that the device reported, if any.

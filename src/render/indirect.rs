@@ -39,7 +39,7 @@ impl Indirect {
         }
         let on_anchor = |anchor: usize| {
             let all = scene.phantoms.iter().chain(&scene.virtuals);
-            all.filter(move |object| object.anchor == anchor)
+            all.filter(move |object| object.visible && object.anchor == anchor)
                 .flat_map(reflectors)
                 .collect::<Vec<_>>()
         };
@@ -60,6 +60,14 @@ impl Indirect {
             movers,
             point_of_corner,
             settled: false,
+        })
+    }
+
+    /// The same light for things that stand elsewhere; `None` where those are not the same things.
+    pub fn for_corners(self, (corners, _): &VirtualCorners) -> Option<Self> {
+        (self.point_of_corner.len() == corners.len()).then_some(Self {
+            settled: false,
+            ..self
         })
     }
 

@@ -5,7 +5,7 @@ use super::anchor_geometry::{CORNER_LAYOUT, Role};
 use super::gpu::{Gpu, RenderError};
 use super::readback::Readback;
 use super::shader;
-use super::stencil::SHADOW;
+use super::stencil::{COUNT, MOST_LAYERS, SHADOW};
 use super::surfaces::Sided;
 use super::volumes::Volumes;
 
@@ -42,6 +42,8 @@ pub(super) struct LayerPasses {
     volumes: Volumes,
     mark_real: wgpu::RenderPipeline,
     mark_virtual: wgpu::RenderPipeline,
+    /// Where the count is the stencil's reference, and where a batch was kept apart from it.
+    mark_counted: [wgpu::RenderPipeline; 2],
     role: wgpu::Texture,
     depth_m: wgpu::Texture,
     bits: wgpu::Texture,
@@ -107,13 +109,13 @@ impl LayerPasses {
             })
         };
         let no_bindings = shader::no_bindings(device);
-        let mark = |entry_point: &str| {
+        let mark = |entry_point: &str, compare, read_mask, src_factor| {
             let shadowed = wgpu::StencilFaceState {
-                compare: wgpu::CompareFunction::NotEqual,
+                compare,
                 ..Default::default()
             };
             let add = wgpu::BlendComponent {
-                src_factor: wgpu::BlendFactor::One,
+                src_factor,
                 dst_factor: wgpu::BlendFactor::One,
                 operation: wgpu::BlendOperation::Add,
             };
@@ -134,7 +136,7 @@ impl LayerPasses {
                     stencil: wgpu::StencilState {
                         front: shadowed,
                         back: shadowed,
-                        read_mask: SHADOW,
+                        read_mask,
                         write_mask: 0,
                     },
                     bias: wgpu::DepthBiasState::default(),
@@ -157,12 +159,21 @@ impl LayerPasses {
                 cache: None,
             })
         };
+        let in_shadow = |entry_point| {
+            let (differs, one) = (wgpu::CompareFunction::NotEqual, wgpu::BlendFactor::One);
+            mark(entry_point, differs, SHADOW, one)
+        };
         Self {
             real: Sided::both(surface("real")),
             seeming: Sided::both(surface("virtual_thing")),
             volumes: Volumes::new(device, layout, gpu.depth_format, 1, &[BITS_FORMAT]),
-            mark_real: mark("in_real_shadow"),
-            mark_virtual: mark("in_virtual_shadow"),
+            mark_real: in_shadow("in_real_shadow"),
+            mark_virtual: in_shadow("in_virtual_shadow"),
+            mark_counted: [
+                (wgpu::CompareFunction::Equal, COUNT),
+                (wgpu::CompareFunction::NotEqual, SHADOW & !COUNT),
+            ]
+            .map(|(compare, mask)| mark("counted", compare, mask, wgpu::BlendFactor::Constant)),
             depth_stencil: texture(
                 "layer depth and stencil",
                 gpu.depth_format,
@@ -235,6 +246,50 @@ impl LayerPasses {
             pass.set_pipeline(mark);
             pass.set_stencil_reference(0);
             pass.draw(0..3, 0..1);
+        }
+        self.bits_readback.copy_from(&mut encoder, &self.bits);
+        gpu.queue.submit([encoder.finish()]);
+        self.bits_readback.read(gpu)
+    }
+
+    /// How many of the volumes that `count_volumes` counts the visible surfaces lie in; those that it counts apart from
+    /// the rest are one.
+    pub fn counts(
+        &self,
+        gpu: &Gpu,
+        count_volumes: CountVolumes<'_>,
+    ) -> Result<Vec<u8>, RenderError> {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let counts = self.bits.create_view(&Default::default());
+        for role in [Role::Real, Role::Virtual] {
+            let mut color = cleared(&counts);
+            if role == Role::Virtual {
+                color.ops.load = wgpu::LoadOp::Load;
+            }
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("stencil counts"),
+                color_attachments: &[Some(color)],
+                depth_stencil_attachment: Some(self.depth_stencil(wgpu::LoadOp::Load)),
+                ..Default::default()
+            });
+            count_volumes(&mut pass, &self.volumes, role);
+            let [counted, kept] = &self.mark_counted;
+            let mut mark = |pipeline, reference: u32, number: u32| {
+                let number = f64::from(number) / 255.0;
+                pass.set_pipeline(pipeline);
+                pass.set_stencil_reference(reference);
+                pass.set_blend_constant(wgpu::Color {
+                    r: number,
+                    g: number,
+                    b: number,
+                    a: number,
+                });
+                pass.draw(0..3, 0..1);
+            };
+            for number in 1..=MOST_LAYERS {
+                mark(counted, number, number);
+            }
+            mark(kept, 0, 1);
         }
         self.bits_readback.copy_from(&mut encoder, &self.bits);
         gpu.queue.submit([encoder.finish()]);

@@ -27,7 +27,7 @@ mod touched;
 mod uniforms;
 mod volumes;
 
-pub use gpu::{Gpu, RenderError};
+pub use gpu::{Gpu, RenderError, SharedDevice};
 pub use gpu_clock::GpuTimes;
 pub use layers::{Layers, REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};
 pub use renderer::{Renderer, Shown};

@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
-use crate::scene::{Scene, Technique};
+use crate::light::Material;
+use crate::scene::{Object, Scene, ShadowSettings, Technique};
 
 use super::accumulation::{Accumulation, Targets};
 use super::anchor_geometry::Role;
@@ -63,6 +64,39 @@ pub struct Renderer {
     touched: Option<Touched>,
     /// Where the picture is not that of the video.
     stale: PixelRect,
+    made_for: Shape,
+}
+
+/// What of a scene a renderer cannot change.
+#[derive(PartialEq)]
+struct Shape {
+    technique: Technique,
+    shadows: ShadowSettings,
+    lights: usize,
+    ambient_radiance: DVec3,
+    anchors: usize,
+    /// Of each thing its name, its anchor, its mesh's triangles and whether it casts.
+    things: Vec<(String, usize, usize, bool)>,
+    materials: Vec<Material>,
+}
+
+impl Shape {
+    fn of(scene: &Scene) -> Self {
+        let things = || scene.phantoms.iter().chain(&scene.virtuals);
+        let shape = |thing: &Object| {
+            let triangles = thing.mesh.triangles.len();
+            (thing.name.clone(), thing.anchor, triangles, thing.casts)
+        };
+        Self {
+            technique: scene.chosen_technique().0,
+            shadows: scene.shadows,
+            lights: scene.lights.len(),
+            ambient_radiance: scene.ambient_radiance,
+            anchors: scene.anchors.len(),
+            things: things().map(shape).collect(),
+            materials: things().flat_map(|thing| thing.materials.clone()).collect(),
+        }
+    }
 }
 
 impl Renderer {
@@ -131,6 +165,7 @@ impl Renderer {
             shown: Shown::Bare,
             touched: None,
             stale: PixelRect::whole(size_px),
+            made_for: Shape::of(scene),
             size_px,
             intrinsics,
             samples,
@@ -140,6 +175,35 @@ impl Renderer {
             geometry_layout,
             gpu,
         })
+    }
+
+    /// Draws another state of its scene from now on, without delay: lights that shine otherwise, things that stand
+    /// elsewhere, are shown or hidden. Light that surroundings throw back is not gathered anew. False where more has
+    /// changed: that takes a new renderer.
+    pub fn follow(&mut self, scene: &Scene) -> bool {
+        // Shafts hold their own idea of what stands where.
+        let follows = self.shafts.is_none() && self.made_for == Shape::of(scene);
+        if follows {
+            self.stage.follow(&self.gpu, scene);
+            self.stale = PixelRect::whole(self.size_px);
+        }
+        follows
+    }
+
+    /// Puts other pixels (as [`Renderer::read_picture`] gives them) in the place of the picture, until the next one is
+    /// drawn.
+    pub fn replace_picture(&mut self, rgba: &[u8]) {
+        self.gpu.queue.write_texture(
+            self.picture.as_image_copy(),
+            rgba,
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(4 * self.size_px[0]),
+                rows_per_image: None,
+            },
+            self.picture.size(),
+        );
+        self.stale = PixelRect::whole(self.size_px);
     }
 
     /// Takes the recorded picture to the GPU.
@@ -238,6 +302,11 @@ impl Renderer {
         self.gpu.queue.submit([encoder.finish()]);
     }
 
+    /// The picture that is drawn: sRGB-encoded bytes, whatever the format says. It stays the same texture.
+    pub fn picture(&self) -> &wgpu::Texture {
+        &self.picture
+    }
+
     /// Triangles of the things that were drawn last, in the levels of detail that were chosen for them.
     pub fn triangles(&self) -> usize {
         self.stage.triangles()
@@ -317,6 +386,34 @@ impl Renderer {
             shadow,
             gain,
         })
+    }
+
+    /// How many shadow volumes, of all lights together, the surface at each pixel's centre lies in, in the frame that was
+    /// drawn last. Volumes that are counted apart from the rest are one.
+    ///
+    /// # Errors
+    /// The device failed since it was opened.
+    pub fn stencil_counts(&mut self) -> Result<Vec<u8>, RenderError> {
+        self.stage.cast_everywhere(&self.gpu);
+        let (gpu, stage, size_px) = (&self.gpu, &self.stage, self.size_px);
+        let passes = self
+            .layer_passes
+            .get_or_insert_with(|| LayerPasses::new(gpu, &self.geometry_layout, size_px));
+        let whole = PixelRect::whole(size_px);
+        let (roles, _) = passes.role_and_depth(gpu, &|pass, pipeline, role| {
+            stage.draw_surfaces(pass, pipeline, role, 0, whole);
+        })?;
+        let mut sums = vec![0_u8; roles.len()];
+        for light in 0..stage.light_count() {
+            let counts = passes.counts(gpu, &|pass, volumes, role| {
+                stage.count_volumes(pass, volumes, Among::All, role, light, whole);
+            })?;
+            // Where nothing is modelled nothing lies in a shadow.
+            for ((sum, count), &role) in sums.iter_mut().zip(counts).zip(&roles) {
+                *sum = sum.saturating_add(if role == 0 { 0 } else { count });
+            }
+        }
+        Ok(sums)
     }
 
     /// Haller et al. 2003, section 3.2, for one light and one sample: phantoms and lit virtual things into depth; *real

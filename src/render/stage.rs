@@ -8,7 +8,9 @@ use crate::light::Light;
 use crate::light::cores::on_all_cores;
 use crate::scene::{Scene, Technique};
 
-use super::anchor_geometry::{AnchorGeometry, Role, SurfaceBatch, Thing, VirtualCorners};
+use super::anchor_geometry::{
+    AnchorGeometry, KnownLevels, Role, SurfaceBatch, Thing, VirtualCorners,
+};
 use super::casters::{Casters, LitSides};
 use super::detail::chosen_levels;
 use super::gpu::Gpu;
@@ -42,6 +44,9 @@ pub(super) struct Stage {
     /// Layouts of groups 0 and 1 of every shader that draws geometry: the anchor's view, and a light.
     pub layouts: [wgpu::BindGroupLayout; 2],
     camera_from_anchor: Vec<Option<DAffine3>>,
+    /// Where things stand and which are there: phantoms, then virtual ones.
+    standing: Vec<(DAffine3, bool)>,
+    known_levels: KnownLevels,
 }
 
 impl Stage {
@@ -65,12 +70,15 @@ impl Stage {
         };
         let views = UniformRow::new::<View>(device, "views", scene.anchors.len());
         let light_sources = UniformRow::new::<LightSource>(device, "lights", scene.lights.len());
+        let mut known_levels = KnownLevels::default();
         let AnchorGeometry {
             batches,
             things,
             virtual_corners,
-        } = AnchorGeometry::new(device, scene);
+        } = AnchorGeometry::new(device, scene, &mut known_levels);
         Self {
+            standing: standing(scene),
+            known_levels,
             casters: Casters::new(
                 device,
                 things.len(),
@@ -102,6 +110,40 @@ impl Stage {
             views,
             light_sources,
         }
+    }
+
+    /// Takes another state of the same scene: lights otherwise, things elsewhere, shown or hidden. What surroundings throw
+    /// back stays as it was gathered, where the same corners are there to get it.
+    pub fn follow(&mut self, gpu: &Gpu, scene: &Scene) {
+        self.lights.clone_from(&scene.lights);
+        let standing = standing(scene);
+        if self.standing == standing {
+            return;
+        }
+        let AnchorGeometry {
+            batches,
+            things,
+            virtual_corners,
+        } = AnchorGeometry::new(&gpu.device, scene, &mut self.known_levels);
+        self.casters = Casters::new(
+            &gpu.device,
+            things.len(),
+            scene.lights.len(),
+            &self.layouts[1],
+            scene.shadows.counting,
+        );
+        let world_virtuals = virtual_corners.iter().find(|(anchor, _)| *anchor == 0);
+        self.indirect = self
+            .indirect
+            .take()
+            .zip(world_virtuals)
+            .and_then(|(gathered, (_, corners))| gathered.for_corners(corners));
+        self.virtual_corners = virtual_corners;
+        self.levels = vec![0; things.len()];
+        self.insides = vec![Insides::Anywhere; things.len()];
+        self.batches = batches;
+        self.things = things;
+        self.standing = standing;
     }
 
     /// Number of lights.
@@ -408,6 +450,13 @@ impl Stage {
         pass.set_vertex_buffer(1, batch.indirect.slice(..));
         pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
     }
+}
+
+/// Where a scene's things stand, and which are there.
+fn standing(scene: &Scene) -> Vec<(DAffine3, bool)> {
+    let things = scene.phantoms.iter().chain(&scene.virtuals);
+    let standing = things.map(|thing| (thing.anchor_from_object, thing.visible));
+    standing.collect()
 }
 
 /// Draws only where an inside can be seen through holes.

@@ -53,8 +53,7 @@ fn light(table: &Table) -> Result<Light, SceneError> {
             let direction = table.required("direction", what)?;
             let written =
                 DVec3::from_array(direction.numbers(&Numbers::between(f64::MIN, f64::MAX, ""))?);
-            // Scaled first, so that neither tiny nor huge numbers vanish in the squares.
-            let unit = (written / written.abs().max_element()).normalize_or_zero();
+            let unit = unit_direction(written);
             if unit == DVec3::ZERO {
                 return Err(direction.error("no direction; allowed: any length but zero"));
             }
@@ -68,6 +67,12 @@ fn light(table: &Table) -> Result<Light, SceneError> {
             })
         }
     }
+}
+
+/// A direction of unit length from one of any length; zero where it has none. Scaled first, so that neither tiny nor
+/// huge numbers vanish in the squares.
+pub fn unit_direction(written: DVec3) -> DVec3 {
+    (written / written.abs().max_element()).normalize_or_zero()
 }
 
 /// The radiance of the constant surrounding light; none where the scene has no `[ambient]`.

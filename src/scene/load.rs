@@ -1,6 +1,6 @@
 //! Reads a scene file from top to bottom; the first mistake ends it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use toml::de::DeTable;
 
@@ -14,37 +14,61 @@ const TABLES: [&str; 12] = [
     "shadows", "probe", "room",
 ];
 
+/// What reading a scene's text gave.
+#[derive(Debug)]
+pub struct Reading {
+    /// The scene, or its first mistake.
+    pub scene: Result<Scene, SceneError>,
+    /// Every other file or folder that was read, or looked for and not there: a change of any may give something else.
+    pub files: Vec<PathBuf>,
+}
+
 impl Scene {
     /// Reads a scene file and the meshes that it names. Relative paths in it start at its own folder, or else at that
     /// one's parent.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
+        Self::parse(path, &Self::read_text(path)?)
+    }
+
+    /// The text of a scene file.
+    pub fn read_text(path: &Path) -> Result<String, SceneError> {
         let bytes = std::fs::read(path).map_err(|error| {
             SceneError::of_file(path, format!("the scene cannot be read: {error}"))
         })?;
-        let text = match String::from_utf8(bytes) {
-            Ok(text) => text,
-            Err(error) => {
-                let valid = error.utf8_error().valid_up_to();
-                let text = String::from_utf8_lossy(error.as_bytes());
-                return Err(SceneError::at(
-                    path,
-                    &text,
-                    valid..valid + 1,
-                    "not UTF-8 text, which TOML has to be",
-                ));
-            }
-        };
-        Self::parse(path, &text)
+        String::from_utf8(bytes).map_err(|error| {
+            let valid = error.utf8_error().valid_up_to();
+            let text = String::from_utf8_lossy(error.as_bytes());
+            SceneError::at(
+                path,
+                &text,
+                valid..valid + 1,
+                "not UTF-8 text, which TOML has to be",
+            )
+        })
     }
 
     /// Reads a scene from its text; `path` is where it lies, for messages and relative paths.
     pub fn parse(path: &Path, text: &str) -> Result<Self, SceneError> {
-        let document = Document { path, text };
+        Self::read(path, text).scene
+    }
+
+    /// Reads a scene from its text as [`Scene::parse`] does, and tells which other files it depends on.
+    pub fn read(path: &Path, text: &str) -> Reading {
+        let document = Document::new(path, text);
+        let scene = Self::from_document(&document);
+        Reading {
+            scene,
+            files: document.consulted(),
+        }
+    }
+
+    fn from_document(document: &Document) -> Result<Self, SceneError> {
+        let text = document.text;
         let tree = DeTable::parse(text).map_err(|error| {
             let span = error.span().unwrap_or(text.len()..text.len());
             document.error(span, format!("not TOML: {}", error.message()))
         })?;
-        let root = Table::root(&document, &tree, &TABLES)?;
+        let root = Table::root(document, &tree, &TABLES)?;
         let camera = settings::camera(&root)?;
         let tracking = settings::tracking(&root)?;
         let anchors = anchors::anchors(&root, tracking.detector)?;

@@ -44,13 +44,20 @@ pub fn load(value: &Value, normals: Normals) -> Result<LoadedMesh, SceneError> {
     let bytes = std::fs::read(&path)
         .map_err(|error| value.error(format!("the mesh cannot be read: {error}")))?;
     // Only names and comments may be in another encoding, and nothing depends on them.
-    read(&path, &String::from_utf8_lossy(&bytes), normals).map_err(|mut error| {
+    let note_read = |path: &Path| value.note_consulted(path);
+    read(&path, &String::from_utf8_lossy(&bytes), normals, &note_read).map_err(|mut error| {
         error.message += &format!(" (a mesh of {})", value.location());
         error
     })
 }
 
-fn read(path: &Path, text: &str, normals: Normals) -> Result<LoadedMesh, SceneError> {
+/// `note_read` is told of every file that is looked for besides.
+fn read(
+    path: &Path,
+    text: &str,
+    normals: Normals,
+    note_read: &dyn Fn(&Path),
+) -> Result<LoadedMesh, SceneError> {
     let misread = |ScanError { span, message }| SceneError::at(path, text, span, message);
     if text.trim().is_empty() {
         return Err(SceneError::of_file(
@@ -65,7 +72,7 @@ fn read(path: &Path, text: &str, normals: Normals) -> Result<LoadedMesh, SceneEr
             "no faces; an OBJ mesh with f records is expected",
         ));
     }
-    let (models, mtl_materials) = read_with_tobj(path, &scanned)?;
+    let (models, mtl_materials) = read_with_tobj(path, &scanned, note_read)?;
 
     let mut builder = Builder::default();
     for model in &models {
@@ -98,6 +105,7 @@ fn read(path: &Path, text: &str, normals: Normals) -> Result<LoadedMesh, SceneEr
 fn read_with_tobj(
     path: &Path,
     scanned: &ScannedObj,
+    note_read: &dyn Fn(&Path),
 ) -> Result<(Vec<tobj::Model>, Vec<tobj::Material>), SceneError> {
     let options = tobj::LoadOptions {
         triangulate: true,
@@ -108,6 +116,7 @@ fn read_with_tobj(
     let mtl_error = RefCell::new(None);
     let load_mtl = |name: &Path| {
         let mtl_path = path.parent().unwrap_or(Path::new("")).join(name);
+        note_read(&mtl_path);
         checked_mtl(&mtl_path).map_or_else(
             |error| {
                 mtl_error.borrow_mut().get_or_insert(error);
@@ -240,7 +249,7 @@ mod tests {
     const SMOOTH: Normals = Normals::GivenOrMade { crease_rad: 0.5 };
 
     fn failure(text: &str) -> String {
-        read(Path::new("bad.obj"), text, SMOOTH)
+        read(Path::new("bad.obj"), text, SMOOTH, &|_| ())
             .unwrap_err()
             .to_string()
     }
@@ -249,7 +258,7 @@ mod tests {
     fn normals_come_from_the_file_where_it_has_them() {
         let text =
             "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvn 0 3 4\nvn 0 0 0\nf 1//1 2//2 3\nf 2 4 3//-2\n";
-        let loaded = read(Path::new("a.obj"), text, SMOOTH).unwrap();
+        let loaded = read(Path::new("a.obj"), text, SMOOTH, &|_| ()).unwrap();
         let given = Vec3::new(0.0, 0.6, 0.8);
         assert_eq!(
             loaded.mesh.corner_normals,
@@ -262,7 +271,7 @@ mod tests {
                 roughness: None
             }]
         );
-        let flat = read(Path::new("a.obj"), text, Normals::Flat).unwrap();
+        let flat = read(Path::new("a.obj"), text, Normals::Flat, &|_| ()).unwrap();
         assert_eq!(flat.mesh.corner_normals, [[Vec3::Z; 3]; 2]);
     }
 
@@ -282,7 +291,7 @@ mod tests {
             }
             text += "g side\nf -4 -3 -2 -1\n";
         }
-        let loaded = read(Path::new("box.obj"), &text, SMOOTH).unwrap();
+        let loaded = read(Path::new("box.obj"), &text, SMOOTH, &|_| ()).unwrap();
         assert_eq!(
             loaded.report,
             MeshReport {
@@ -317,7 +326,7 @@ mod tests {
             roughness: None,
         };
         assert_eq!(
-            read(&path, text, SMOOTH).unwrap().materials,
+            read(&path, text, SMOOTH, &|_| ()).unwrap().materials,
             [plain],
             "a missing file is no mistake"
         );
@@ -327,7 +336,7 @@ mod tests {
             "newmtl matt\nKd .25 .5 1\nKs 0 0 0\nNs 96\nnewmtl shiny\nKs 1 1 1\nNs 98\n",
         )
         .unwrap();
-        let loaded = read(&path, text, SMOOTH).unwrap();
+        let loaded = read(&path, text, SMOOTH, &|_| ()).unwrap();
         assert_eq!(loaded.mesh.triangle_materials, [0, 1, 2]);
         assert_eq!(
             loaded.materials[0],
@@ -340,7 +349,7 @@ mod tests {
         assert_eq!(loaded.materials[2], plain);
 
         std::fs::write(&mtl, "newmtl matt\nKd .25 .5\n").unwrap();
-        let message = read(&path, text, SMOOTH).unwrap_err().to_string();
+        let message = read(&path, text, SMOOTH, &|_| ()).unwrap_err().to_string();
         assert!(
             message.contains("a.mtl:2:1: Kd: 2 numbers; 3 are expected"),
             "{message}"

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use glam::{DAffine3, DVec2, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
 
 use crate::geometry::mesh::{Mesh, MeshReport};
 use crate::light::probe::Probe;
@@ -25,6 +25,8 @@ mod settings;
 pub use dictionary::Dictionary;
 pub use error::{Place, SceneError};
 pub use family::{Codes, Family};
+pub use lights::unit_direction;
+pub use load::Reading;
 pub use reader::{NAMES, is_name};
 
 /// What one scene file says, checked.
@@ -248,6 +250,42 @@ pub struct Object {
     pub anchor_from_object: DAffine3,
     /// Whether it takes light away from others.
     pub casts: bool,
+    /// Whether it is there at all: what is hidden neither shows, nor catches shadows, nor casts any.
+    pub visible: bool,
+}
+
+/// Where a thing stands, as a scene file says it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placement {
+    /// Of the object's origin in the anchor's frame, metres.
+    pub position_m: DVec3,
+    /// Turns about x, then y, then z of that frame, degrees.
+    pub rotation_deg: DVec3,
+    /// Before the turn; negative mirrors, no component is 0.
+    pub scale: DVec3,
+}
+
+impl Default for Placement {
+    fn default() -> Self {
+        Self {
+            position_m: DVec3::ZERO,
+            rotation_deg: DVec3::ZERO,
+            scale: DVec3::ONE,
+        }
+    }
+}
+
+impl Placement {
+    /// Scale, then turn about x, then y, then z, then move.
+    pub fn anchor_from_object(&self) -> DAffine3 {
+        let [x, y, z] = self.rotation_deg.to_array().map(f64::to_radians);
+        let rotation =
+            DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x);
+        DAffine3 {
+            matrix3: DMat3::from_quat(rotation) * DMat3::from_diagonal(self.scale),
+            translation: self.position_m,
+        }
+    }
 }
 
 /// The light that a probe saw, and the room that sent it.
@@ -308,6 +346,11 @@ pub enum Counting {
     Auto,
     /// Depth-fail everywhere.
     DepthFail,
+}
+
+impl Counting {
+    /// All of them, by the names that files use.
+    pub const BY_NAME: [(&str, Self); 2] = [("auto", Self::Auto), ("depth-fail", Self::DepthFail)];
 }
 
 /// A place on the measured front of speed against accuracy (`charts/shadows.csv`).

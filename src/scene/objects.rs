@@ -2,14 +2,14 @@
 
 use std::collections::HashMap;
 
-use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 
 use super::anchors::{ANGLE, unique_name};
 use super::error::{SceneError, suggestion};
 use super::lights::POSITION;
 use super::mesh_file::{self, DEFAULT_ALBEDO, LoadedMesh};
 use super::reader::{Numbers, Table, Value};
-use super::{Anchor, Object};
+use super::{Anchor, Object, Placement};
 use crate::geometry::mesh::{Mesh, RawTriangle};
 use crate::light::Material;
 
@@ -28,7 +28,7 @@ enum Kind {
 
 /// The phantoms, the table top first, and the virtual things.
 pub fn objects(root: &Table, anchors: &[Anchor]) -> Result<(Vec<Object>, Vec<Object>), SceneError> {
-    const KEYS: [&str; 10] = [
+    const KEYS: [&str; 11] = [
         "name",
         "mesh",
         "rect_m",
@@ -38,6 +38,7 @@ pub fn objects(root: &Table, anchors: &[Anchor]) -> Result<(Vec<Object>, Vec<Obj
         "scale",
         "material",
         "casts",
+        "visible",
         "smooth_deg",
     ];
     let shape_keys = |without: &str| {
@@ -62,7 +63,7 @@ pub fn objects(root: &Table, anchors: &[Anchor]) -> Result<(Vec<Object>, Vec<Obj
 }
 
 fn table_top(value: &Value) -> Result<Object, SceneError> {
-    let table = value.table(&["rect_m", "height_m", "albedo"])?;
+    let table = value.table(&["rect_m", "height_m", "albedo", "visible"])?;
     let rect = table.required("rect_m", "[x0, y0, x1, y1] in metres is expected")?;
     let albedo = table
         .optional("albedo")
@@ -83,6 +84,7 @@ fn table_top(value: &Value) -> Result<Object, SceneError> {
         anchor: 0,
         anchor_from_object: DAffine3::from_translation(DVec3::Z * height_m),
         casts: false,
+        visible: table.flag_or("visible", true)?,
     })
 }
 
@@ -96,8 +98,9 @@ fn object(
     let anchor = table
         .optional("on")
         .map_or(Ok(0), |on| anchor_index(&on, anchors))?;
-    let anchor_from_object = placement(table)?;
+    let anchor_from_object = placement(table)?.anchor_from_object();
     let casts = table.flag_or("casts", true)?;
+    let visible = table.flag_or("visible", true)?;
     let crease_deg = table.number_or("smooth_deg", DEFAULT_CREASE_DEG, &CREASE)?;
     let normals = match kind {
         // What a phantom's triangles catch and cast has to agree with how they face, so they are flat.
@@ -136,6 +139,7 @@ fn object(
         anchor,
         anchor_from_object,
         casts,
+        visible,
     })
 }
 
@@ -153,21 +157,15 @@ fn anchor_index(on: &Value, anchors: &[Anchor]) -> Result<usize, SceneError> {
         })
 }
 
-/// Scale, then turn about x, then y, then z, then move.
-pub fn placement(table: &Table) -> Result<DAffine3, SceneError> {
-    let position_m = table.vector_or("position_m", DVec3::ZERO, &POSITION)?;
-    let [x, y, z] = table
-        .vector_or("rotation_deg", DVec3::ZERO, &ANGLE)?
-        .to_array()
-        .map(f64::to_radians);
-    let scale = table
-        .optional("scale")
-        .map_or(Ok(DVec3::ONE), |value| scale(&value))?;
-    let rotation =
-        DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x);
-    Ok(DAffine3 {
-        matrix3: DMat3::from_quat(rotation) * DMat3::from_diagonal(scale),
-        translation: position_m,
+/// Where a thing stands.
+pub fn placement(table: &Table) -> Result<Placement, SceneError> {
+    let default = Placement::default();
+    Ok(Placement {
+        position_m: table.vector_or("position_m", default.position_m, &POSITION)?,
+        rotation_deg: table.vector_or("rotation_deg", default.rotation_deg, &ANGLE)?,
+        scale: table
+            .optional("scale")
+            .map_or(Ok(default.scale), |value| scale(&value))?,
     })
 }
 

@@ -99,7 +99,7 @@ fn piece(table: &Table, name_lines: &mut HashMap<String, usize>) -> Result<RoomP
         [_, Some(bounds), _] => box_piece(bounds, albedo)?,
         [.., corners] => corners_piece(corners.as_ref(), table, albedo)?,
     };
-    let world_from_piece = placement(table)?;
+    let world_from_piece = placement(table)?.anchor_from_object();
     for (triangle, _) in &mut piece.triangles {
         let place = |corner: Vec3| {
             world_from_piece

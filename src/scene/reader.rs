@@ -1,5 +1,7 @@
 //! Reads values from a TOML file's spanned tree; each mistake knows its place and what is allowed there.
 
+use std::cell::RefCell;
+use std::collections::BTreeSet;
 use std::fmt::Display;
 use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
@@ -14,9 +16,24 @@ use super::error::{Place, SceneError, suggestion};
 pub struct Document<'a> {
     pub path: &'a Path,
     pub text: &'a str,
+    /// Files that were read, or looked for, on the way.
+    consulted: RefCell<BTreeSet<PathBuf>>,
 }
 
-impl Document<'_> {
+impl<'a> Document<'a> {
+    pub fn new(path: &'a Path, text: &'a str) -> Self {
+        Self {
+            path,
+            text,
+            consulted: RefCell::default(),
+        }
+    }
+
+    /// Files that were read, or looked for, so far.
+    pub fn consulted(self) -> Vec<PathBuf> {
+        self.consulted.into_inner().into_iter().collect()
+    }
+
     /// A mistake at a span of the text.
     pub fn error(&self, span: Range<usize>, message: impl Into<String>) -> SceneError {
         SceneError::at(self.path, self.text, span, message)
@@ -401,9 +418,10 @@ impl<'a> Value<'a> {
             .unwrap_or_else(|_| self.document.path.to_owned());
         let folders = scene_file.ancestors().skip(1).take(2);
         let tried: Vec<PathBuf> = folders.map(|folder| folder.join(written)).collect();
-        let found = tried
-            .iter()
-            .find(|path| !written.is_empty() && path.exists());
+        let found = tried.iter().find(|path| {
+            self.note_consulted(path);
+            !written.is_empty() && path.exists()
+        });
         found.cloned().ok_or_else(|| {
             let mut tried: Vec<String> = tried
                 .iter()
@@ -415,6 +433,12 @@ impl<'a> Value<'a> {
                 tried.join(" and ")
             ))
         })
+    }
+
+    /// Remembers a file on which what the value means depends, whether it is there or not.
+    pub fn note_consulted(&self, path: &Path) {
+        let mut consulted = self.document.consulted.borrow_mut();
+        consulted.insert(path.to_owned());
     }
 
     fn wrong_type(&self, expected: &str) -> SceneError {

@@ -143,10 +143,6 @@ pub fn tracking(root: &Table) -> Result<TrackingSettings, SceneError> {
 }
 
 pub fn shadows(root: &Table, probe: Option<&ProbeScene>) -> Result<ShadowSettings, SceneError> {
-    const COUNTINGS: [(&str, Counting); 2] = [
-        ("auto", Counting::Auto),
-        ("depth-fail", Counting::DepthFail),
-    ];
     const KEYS: [&str; 12] = [
         "quality",
         "technique",
@@ -183,7 +179,7 @@ pub fn shadows(root: &Table, probe: Option<&ProbeScene>) -> Result<ShadowSetting
         samples @ (1 | 4) => Ok(samples),
         _ => Err(value.error("not a number of samples; allowed: 1, 4")),
     };
-    let counting = |value: Value| value.one_of("way of counting", &COUNTINGS);
+    let counting = |value: Value| value.one_of("way of counting", &Counting::BY_NAME);
     let budget = |value: Value| value.number(&Numbers::above(0.0, 1e6, "ms"));
     Ok(ShadowSettings {
         quality: default.quality,

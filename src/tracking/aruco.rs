@@ -8,6 +8,7 @@ use opencv::prelude::*;
 use super::apriltag;
 use super::conventions::{corners_from_aruco, quarter_turns_between};
 use super::{Detection, TrackingError};
+use crate::capture::Frame;
 use crate::scene::{ArucoRefinement, Codes, Dictionary, Family, TrackingSettings};
 
 /// OpenCV's detector for some dictionaries, each with the turn of its pictures against the prints.
@@ -60,7 +61,7 @@ impl ArucoDetector {
         for (family, quarter_turns, dictionary) in &self.dictionaries {
             let mut ids = Vector::<i32>::new();
             let mut corners = Vector::<Vector<Point2f>>::new();
-            dictionary.detect(&image, &mut corners, &mut ids)?;
+            dictionary.detect(&image, &mut corners, &mut ids, &mut Vector::new())?;
             for (id, corners) in ids.iter().zip(corners.iter()) {
                 let corners = corners
                     .iter()
@@ -81,6 +82,35 @@ impl ArucoDetector {
         }
         Ok(detections)
     }
+}
+
+/// Corners of a quadrilateral in a picture, pixels.
+pub type Quad = [DVec2; 4];
+
+/// Quadrilaterals in a picture that could be markers and are none of `family`: what a detector of OpenCV's throws away.
+pub fn rejected_quads(frame: &Frame, family: Family) -> Result<Vec<Quad>, TrackingError> {
+    let Some(codes) = installed_codes(family.codes()) else {
+        return Ok(Vec::new());
+    };
+    let mut grey = Vec::new();
+    super::grey_from_rgba(frame, &mut grey)?;
+    let border_cells = family.border_cells() as i32;
+    let dictionary = installed::Dictionary::new(codes, border_cells, 0, ArucoRefinement::None)?;
+    let mut rejected = Vector::<Vector<Point2f>>::new();
+    let image =
+        Mat::new_rows_cols_with_data(frame.size_px[1] as i32, frame.size_px[0] as i32, &grey)?;
+    dictionary.detect(
+        &image,
+        &mut Vector::new(),
+        &mut Vector::new(),
+        &mut rejected,
+    )?;
+    let quad = |corners: Vector<Point2f>| {
+        let corners = corners.iter();
+        let corners = corners.map(|corner| DVec2::new(f64::from(corner.x), f64::from(corner.y)));
+        <Quad>::try_from(corners.collect::<Vec<_>>()).ok()
+    };
+    Ok(rejected.iter().filter_map(quad).collect())
 }
 
 /// The cells of a marker as printed, rows from the top, true for white; black border included, white rim not. AprilTag's
@@ -188,7 +218,7 @@ fn white_cells(picture: &Mat) -> opencv::Result<Vec<bool>> {
 #[cfg(aruco_in_contrib)]
 mod installed {
     use opencv::aruco;
-    use opencv::core::{Mat, Point2f, Ptr, ToInputArray, Vector, no_array};
+    use opencv::core::{Mat, Point2f, Ptr, ToInputArray, Vector};
     use opencv::prelude::*;
 
     use super::{InstalledCodes, byte_list, refinement_number, white_cells};
@@ -230,6 +260,7 @@ mod installed {
             image: &impl ToInputArray,
             corners: &mut Vector<Vector<Point2f>>,
             ids: &mut Vector<i32>,
+            rejected: &mut Vector<Vector<Point2f>>,
         ) -> opencv::Result<()> {
             aruco::detect_markers(
                 image,
@@ -237,7 +268,7 @@ mod installed {
                 corners,
                 ids,
                 &self.parameters,
-                &mut no_array(),
+                rejected,
             )
         }
 
@@ -307,8 +338,9 @@ mod installed {
             image: &impl ToInputArray,
             corners: &mut Vector<Vector<Point2f>>,
             ids: &mut Vector<i32>,
+            rejected: &mut Vector<Vector<Point2f>>,
         ) -> opencv::Result<()> {
-            self.detector.detect_markers_def(image, corners, ids)
+            self.detector.detect_markers(image, corners, ids, rejected)
         }
 
         pub(super) fn cells(&self, id: i32, side: usize) -> opencv::Result<Vec<bool>> {

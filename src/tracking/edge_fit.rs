@@ -97,7 +97,7 @@ pub(super) fn fit_edge(
                 let [white, slope, blurring] = steps.whiteness(cells, across_scale, along_scale);
                 sums.add(
                     [1.0, white, -slope * across_scale, blurring],
-                    super::light::linear(*light),
+                    crate::capture::linear::linear(*light),
                 );
             }
             cells += to_cells.x_axis;

@@ -1,31 +1,14 @@
 //! A grey picture as light.
 
-use std::sync::LazyLock;
-
 use glam::DVec2;
 
-/// Linear light of each grey level (IEC 61966-2-1).
-static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| {
-    std::array::from_fn(|level| {
-        let encoded = level as f32 / 255.0;
-        if encoded <= 0.04045 {
-            encoded / 12.92
-        } else {
-            ((encoded + 0.055) / 1.055).powf(2.4)
-        }
-    })
-});
+use crate::capture::linear::linear;
 
 /// An 8-bit grey picture, rows from the top without padding.
 #[derive(Clone, Copy)]
 pub(super) struct Grey<'a> {
     pub levels: &'a [u8],
     pub size_px: [u32; 2],
-}
-
-/// Linear light of a grey level, 0 to 1.
-pub(super) fn linear(level: u8) -> f32 {
-    LINEAR[usize::from(level)]
 }
 
 impl<'a> Grey<'a> {
@@ -47,7 +30,7 @@ impl<'a> Grey<'a> {
             return None;
         }
         let share = place - corner;
-        let at = |x: usize, y: usize| f64::from(LINEAR[usize::from(self.levels[y * width + x])]);
+        let at = |x: usize, y: usize| f64::from(linear(self.levels[y * width + x]));
         let top = at(x, y) * (1.0 - share.x) + at(x + 1, y) * share.x;
         let bottom = at(x, y + 1) * (1.0 - share.x) + at(x + 1, y + 1) * share.x;
         Some(top * (1.0 - share.y) + bottom * share.y)

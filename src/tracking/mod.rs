@@ -30,9 +30,10 @@ mod undistort;
 
 use glam::DAffine3;
 
-pub use aruco::printed_cells;
+pub use aruco::{Quad, printed_cells, rejected_quads};
 pub use detector::{Detection, Detector};
 pub use tracker::{Tracker, grey_from_rgba};
+pub use undistort::undistorted_pixel;
 
 /// How far a pose can be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

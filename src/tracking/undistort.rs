@@ -8,7 +8,7 @@ use crate::geometry::camera::Intrinsics;
 ///
 /// OpenCV's `undistortPoints` stops after five rounds of a fixed-point iteration, tenths of a pixel short in a wide
 /// lens's corners.
-pub(super) fn undistorted_pixel(intrinsics: &Intrinsics, distorted_px: DVec2) -> Option<DVec2> {
+pub fn undistorted_pixel(intrinsics: &Intrinsics, distorted_px: DVec2) -> Option<DVec2> {
     const ROUNDS: usize = 30;
     const TOLERANCE: f64 = 1e-12;
     let target = intrinsics.plane_from_pixel(distorted_px);

@@ -96,6 +96,7 @@ pub fn object(name: &str, mesh: Mesh, albedo: DVec3, world_from_object: DAffine3
         anchor: 0,
         anchor_from_object: world_from_object,
         casts: true,
+        visible: true,
     }
 }
 

@@ -52,7 +52,12 @@ pub(super) struct PlacedCasters {
 
 impl ShaftCasters {
     pub fn new(scene: &Scene) -> Self {
-        let casting = || scene.virtuals.iter().filter(|object| object.casts);
+        let casting = || {
+            scene
+                .virtuals
+                .iter()
+                .filter(|object| object.visible && object.casts)
+        };
         let share = SURFELS / casting().count().max(1);
         let casters = casting().map(|object| caster(object, share.max(16)));
         Self {

@@ -11,7 +11,12 @@ use super::super::anchor_geometry::reflectors;
 
 /// Works the light of a scene's room out. Phantoms on moving anchors have no part in it.
 pub fn prepare(scene: &Scene, probe: &ProbeScene) -> Prepared {
-    let standing = || scene.phantoms.iter().filter(|object| object.anchor == 0);
+    let standing = || {
+        scene
+            .phantoms
+            .iter()
+            .filter(|object| object.visible && object.anchor == 0)
+    };
     let mut triangles: Vec<RoomTriangle> = Vec::new();
     for (piece, object) in (0..).zip(standing()) {
         triangles.extend(reflectors(object).map(|reflector| RoomTriangle {
@@ -29,7 +34,10 @@ pub fn prepare(scene: &Scene, probe: &ProbeScene) -> Prepared {
         };
         triangles.extend(part.triangles.iter().map(triangle));
     }
-    let virtuals = scene.virtuals.iter().filter(|object| object.anchor == 0);
+    let virtuals = scene
+        .virtuals
+        .iter()
+        .filter(|object| object.visible && object.anchor == 0);
     let things: Vec<Bounds> = standing()
         .filter(|object| object.casts)
         .chain(virtuals)

@@ -1,0 +1,210 @@
+//! What is drawn, and by which renderer. What takes long (a scene's coarser levels, the light its surroundings throw
+//! back, pipelines) is made in a thread of its own while the renderer at hand goes on, as far as it can follow.
+
+use std::sync::Arc;
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use glam::DAffine3;
+
+use super::eye::TrackedPicture;
+use super::false_colour;
+use super::pipeline::Wake;
+use super::views::View;
+use crate::app::mailbox::{Mailbox, Taken};
+use crate::geometry::camera::Intrinsics;
+use crate::render::{Gpu, RenderError, Renderer, Shown};
+use crate::scene::Scene;
+
+/// A renderer that is wanted.
+#[derive(Clone)]
+struct Order {
+    scene: Arc<Scene>,
+    intrinsics: Intrinsics,
+}
+
+struct Made {
+    order: Order,
+    renderer: Result<Renderer, RenderError>,
+}
+
+/// The picture of a scene that changes, through a camera that may change.
+pub struct Canvas {
+    gpu: Arc<Gpu>,
+    scene: Arc<Scene>,
+    /// `None` before the first picture.
+    current: Option<(Order, Renderer)>,
+    orders: Arc<Mailbox<Order>>,
+    made: Arc<Mailbox<Made>>,
+    /// Whether a renderer for the scene as it is has yet to come.
+    awaits: bool,
+    maker: Option<JoinHandle<()>>,
+}
+
+impl Canvas {
+    /// A canvas for a scene; `wake` is called when a better renderer is ready.
+    pub fn new(gpu: Arc<Gpu>, scene: Arc<Scene>, wake: Wake) -> Self {
+        let orders: Arc<Mailbox<Order>> = Arc::default();
+        let made: Arc<Mailbox<Made>> = Arc::default();
+        let maker = {
+            let (gpu, orders, made) = (Arc::clone(&gpu), Arc::clone(&orders), Arc::clone(&made));
+            thread::spawn(move || {
+                while let Some(order) = orders.take() {
+                    let renderer = Renderer::new(Arc::clone(&gpu), &order.scene, order.intrinsics);
+                    if !made.put(Made { order, renderer }) {
+                        return;
+                    }
+                    wake();
+                }
+            })
+        };
+        Self {
+            gpu,
+            scene,
+            current: None,
+            orders,
+            made,
+            awaits: false,
+            maker: Some(maker),
+        }
+    }
+
+    /// Another scene, or another state of it. `lasting`: it stays so for now, and deserves its own renderer.
+    pub fn set_scene(&mut self, scene: Arc<Scene>, lasting: bool) {
+        if let Some((order, renderer)) = &mut self.current {
+            let follows = renderer.follow(&scene);
+            if follows {
+                order.scene = Arc::clone(&scene);
+            }
+            if lasting || !follows {
+                self.orders.put(Order {
+                    scene: Arc::clone(&scene),
+                    intrinsics: order.intrinsics,
+                });
+                self.awaits = true;
+            }
+        }
+        self.scene = scene;
+    }
+
+    /// Whether the scene is shown as well as can be, or a better renderer has yet to come.
+    pub fn is_settled(&self) -> bool {
+        !self.awaits
+    }
+
+    /// Takes a better renderer if one is ready; tells whether.
+    ///
+    /// # Errors
+    /// It could not be made.
+    pub fn improve(&mut self) -> Result<bool, RenderError> {
+        let Taken::New(made) = self.made.take_within(Duration::ZERO) else {
+            return Ok(false);
+        };
+        let mut renderer = made.renderer?;
+        let is_of_now = Arc::ptr_eq(&made.order.scene, &self.scene);
+        // What was edited meanwhile, it may follow.
+        if !is_of_now && !renderer.follow(&self.scene) {
+            return Ok(false);
+        }
+        let fits = |(order, _): &(Order, Renderer)| order.intrinsics == made.order.intrinsics;
+        if !self.current.as_ref().is_some_and(fits) {
+            return Ok(false);
+        }
+        self.awaits = !is_of_now;
+        let order = Order {
+            scene: Arc::clone(&self.scene),
+            ..made.order
+        };
+        self.current = Some((order, renderer));
+        Ok(true)
+    }
+
+    /// Draws a picture; it is then the renderer's.
+    ///
+    /// # Errors
+    /// The device failed, or cannot hold a picture of that size.
+    pub fn draw(&mut self, picture: &TrackedPicture, view: View) -> Result<(), RenderError> {
+        let fits = |(order, _): &(Order, Renderer)| order.intrinsics == picture.intrinsics;
+        if !self.current.as_ref().is_some_and(fits) {
+            self.begin(picture.intrinsics)?;
+        }
+        let Some((order, renderer)) = &mut self.current else {
+            return Ok(());
+        };
+        renderer.upload(&picture.frame)?;
+        let anchors = &order.scene.anchors;
+        // Poses of other anchors than the scene's are none.
+        let (placed, visibility): (Vec<Option<DAffine3>>, Vec<f64>) =
+            match anchors[..] == picture.anchors[..] {
+                true => picture
+                    .poses
+                    .iter()
+                    .map(|pose| (pose.camera_from_anchor, pose.visibility))
+                    .unzip(),
+                false => (vec![None; anchors.len()], vec![0.0; anchors.len()]),
+            };
+        let shown = match view {
+            View::Bare => Shown::Bare,
+            _ => Shown::Composite,
+        };
+        renderer.draw_fading(&placed, &visibility, shown);
+        let size_px = picture.intrinsics.size_px;
+        let replaced = match view {
+            View::Composite | View::Bare | View::Silhouettes | View::Volumes => None,
+            View::StencilCount => {
+                let role = renderer.layers()?.role;
+                Some(false_colour::counts(&renderer.stencil_counts()?, &role))
+            }
+            View::Depth => Some(false_colour::depth(&renderer.layers()?.depth_m)),
+            View::Gain => Some(false_colour::gain(&renderer.layers()?.gain)),
+            View::Phantoms => {
+                let focal_px = picture.intrinsics.focal_px.x as f32;
+                renderer.draw(&placed, Shown::Bare);
+                let (layers, video) = (renderer.layers()?, renderer.read_picture()?);
+                Some(false_colour::phantoms(&video, &layers, size_px, focal_px))
+            }
+        };
+        if let Some(rgba) = replaced {
+            renderer.replace_picture(&rgba);
+        }
+        Ok(())
+    }
+
+    /// The renderer that drew last, and the pictures' size; `None` before the first picture.
+    pub fn renderer(&self) -> Option<(&Renderer, [u32; 2])> {
+        let (order, renderer) = self.current.as_ref()?;
+        Some((renderer, order.intrinsics.size_px))
+    }
+
+    /// Another camera: the video is shown at once, its things follow.
+    fn begin(&mut self, intrinsics: Intrinsics) -> Result<(), RenderError> {
+        let empty = Arc::new(Scene {
+            phantoms: Vec::new(),
+            virtuals: Vec::new(),
+            ..(*self.scene).clone()
+        });
+        let renderer = Renderer::new(Arc::clone(&self.gpu), &empty, intrinsics)?;
+        let order = Order {
+            scene: empty,
+            intrinsics,
+        };
+        self.current = Some((order, renderer));
+        self.orders.put(Order {
+            scene: Arc::clone(&self.scene),
+            intrinsics,
+        });
+        self.awaits = true;
+        Ok(())
+    }
+}
+
+impl Drop for Canvas {
+    fn drop(&mut self) {
+        self.orders.close();
+        self.made.close();
+        if let Some(maker) = self.maker.take() {
+            // A panic in it has been told on stderr.
+            _ = maker.join();
+        }
+    }
+}

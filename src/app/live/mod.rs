@@ -1,0 +1,140 @@
+//! Live: the tabletop demo at the webcam. Capture → tracking → drawing and window, a thread each but the last, joined by
+//! mailboxes in which the newest frame alone lies.
+//!
+//! [`studio`] is all of it but the window, which knows nothing that a test could not do; `window` and what it shows are
+//! the only home of egui.
+
+mod canvas;
+mod composite_video;
+mod demonstration;
+mod event_loop;
+mod eye;
+mod false_colour;
+mod fit;
+mod gizmo;
+mod keys;
+pub mod look;
+pub mod meters;
+pub mod notices;
+mod overlays;
+pub mod panel;
+pub mod pipeline;
+mod recorders;
+mod screen;
+mod selection;
+mod shadow_clicks;
+mod shadow_lines;
+pub mod studio;
+pub mod views;
+mod window;
+pub mod wish;
+
+pub use eye::{Plan, TrackedPicture};
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, PoisonError};
+
+use anyhow::{Context as _, Result, bail};
+use eframe::egui::ViewportBuilder;
+use winit::event_loop::EventLoop;
+
+use crate::app::stopwatch::Stopwatch;
+use crate::capture::live::Now;
+use crate::render::Gpu;
+use crate::scene::CameraSettings;
+use event_loop::{PassEnd, Timed};
+use screen::Screen;
+use studio::{Opening, Studio};
+use window::{Failure, Shared, Window};
+
+/// The window's size when it opens, points, and the smallest that it can be made.
+const WINDOW: [f32; 2] = [1180.0, 720.0];
+const SMALLEST_WINDOW: [f32; 2] = [240.0, 160.0];
+
+/// What the window opens on.
+#[derive(Debug, Clone)]
+pub enum Input {
+    /// A scene file.
+    Scene(PathBuf),
+    /// A camera or a recording that no scene describes: first use.
+    Camera(CameraSettings),
+}
+
+/// What is asked for.
+#[derive(Debug, Clone)]
+pub struct Request {
+    /// What the window opens on.
+    pub input: Input,
+    /// The folder for what its keys record.
+    pub out: PathBuf,
+    /// Part of the wanted graphics adapter's name.
+    pub adapter: Option<String>,
+}
+
+/// Opens the window, until somebody closes it or `stop` is set.
+///
+/// # Errors
+/// A scene that cannot be read, no adapter, no display, a camera that cannot be opened, or a recording that could not be
+/// written; all recordings are whole then.
+pub fn live(request: &Request, stop: &Arc<AtomicBool>) -> Result<()> {
+    let opening = match &request.input {
+        Input::Scene(path) => Opening::scene(path)?,
+        Input::Camera(camera) => Opening::camera(camera.clone())?,
+    };
+    let gpu = Arc::new(Gpu::open(request.adapter.as_deref())?);
+    let options = eframe::NativeOptions {
+        viewport: ViewportBuilder::default()
+            .with_inner_size(WINDOW)
+            .with_min_inner_size(SMALLEST_WINDOW)
+            .with_app_id("gnomon"),
+        wgpu_options: screen::on_device(&gpu),
+        // The camera's own noise dithers enough.
+        dithering: false,
+        ..eframe::NativeOptions::default()
+    };
+    let failure: Failure = Arc::default();
+    let is_open = Arc::new(AtomicBool::new(false));
+    let now: Now = Arc::new(Stopwatch::clock());
+    let pass_end = PassEnd::default();
+    let title = format!("{} – gnomon", opening.title());
+    let event_loop = EventLoop::<eframe::UserEvent>::with_user_event()
+        .build()
+        .context("the window cannot be opened (is there a display?)")?;
+    let shared = Shared {
+        stop: Arc::clone(stop),
+        failure: Arc::clone(&failure),
+        pass_end: pass_end.clone(),
+    };
+    let (opened, clock, out) = (Arc::clone(&is_open), Arc::clone(&now), request.out.clone());
+    let application = eframe::create_native(
+        &title,
+        options,
+        Box::new(move |creation| {
+            let context = creation.egui_ctx.clone();
+            let wake = Arc::new(move || context.request_repaint());
+            let state = creation.wgpu_render_state.as_ref();
+            let screen = Screen::new(state.ok_or("the window does not draw with wgpu")?);
+            let adapter = gpu.description().to_owned();
+            let studio = Studio::open(opening, gpu, &out, true, (clock, wake));
+            opened.store(true, Ordering::Relaxed);
+            Ok(Box::new(Window::new(studio, screen, adapter, shared)))
+        }),
+        &event_loop,
+    );
+    event_loop.run_app(&mut Timed {
+        application,
+        now,
+        pass_end,
+    })?;
+    if !is_open.load(Ordering::Relaxed) {
+        bail!(
+            "the window cannot be opened: the adapter does not draw on this display (--adapter NAME chooses another)"
+        );
+    }
+    let failed = failure
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .take();
+    failed.map_or(Ok(()), Err)
+}

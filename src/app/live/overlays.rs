@@ -1,0 +1,250 @@
+//! What lies over the picture: outlines, axes, lights, shadow edges and the handles of what is selected.
+
+use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Shape, Stroke, Vec2};
+use glam::{DAffine3, DVec2, DVec3};
+
+use super::eye::TrackedPicture;
+use super::fit::Fit;
+use super::gizmo::{Gizmo, Handle, Target, light_place_m};
+use super::look::Look;
+use super::shadow_clicks::ShadowClicks;
+use super::shadow_lines::ShadowLines;
+use super::views::View;
+use super::wish::Overlay;
+use crate::geometry::light_placing::Sight;
+use crate::scene::Scene;
+use crate::tracking::{Quad, Status, undistorted_pixel};
+
+const AXIS_COLOURS: [Color32; 3] = [
+    Color32::from_rgb(230, 70, 60),
+    Color32::from_rgb(90, 190, 70),
+    Color32::from_rgb(70, 130, 240),
+];
+const SEEN: Color32 = Color32::from_rgb(80, 220, 120);
+const REJECTED: Color32 = Color32::from_rgb(240, 130, 40);
+const LIGHT: Color32 = Color32::from_rgb(255, 225, 120);
+const REAL_EDGE: Color32 = Color32::from_rgb(90, 200, 255);
+const VIRTUAL_EDGE: Color32 = Color32::from_rgb(255, 120, 200);
+const GRIP: Color32 = Color32::from_rgb(255, 255, 255);
+
+/// Draws over a picture.
+pub struct Overlays<'a> {
+    /// Into the picture's place.
+    pub painter: &'a Painter,
+    /// Where that is.
+    pub fit: Fit,
+    /// What is seen there.
+    pub picture: &'a TrackedPicture,
+}
+
+impl Overlays<'_> {
+    /// Everything that `look` wants, without handles.
+    pub fn draw(&self, look: &Look, scene: Option<&Scene>, shadow_lines: &mut ShadowLines) {
+        if look.shows(Overlay::Rejected) {
+            for quad in &self.picture.rejected {
+                self.outline(quad, Stroke::new(1.0, REJECTED));
+            }
+        }
+        if look.shows(Overlay::Outlines) {
+            self.markers();
+        }
+        if let Some(scene) = scene {
+            if matches!(look.view, View::Silhouettes | View::Volumes) {
+                self.shadow_lines(scene, shadow_lines, look.view == View::Volumes);
+            }
+            if look.shows(Overlay::Lights) {
+                self.lights(scene);
+            }
+        }
+        if look.shows(Overlay::Axes) {
+            self.axes();
+        }
+    }
+
+    /// Markers that were seen, with their numbers.
+    pub fn markers(&self) {
+        for seen in &self.picture.detections {
+            self.outline(&seen.corners_px, Stroke::new(2.0, SEEN));
+            let middle = seen.corners_px.iter().sum::<DVec2>() / 4.0;
+            let Some(place) = self.place_of_distorted(middle) else {
+                continue;
+            };
+            self.label(place, &seen.id.to_string(), SEEN);
+        }
+    }
+
+    /// The handles of what is selected.
+    pub fn handles(&self, target: &Target, sight: &Sight) {
+        let Some(gizmo) = Gizmo::new(target, sight) else {
+            return;
+        };
+        let origin = self.fit.place_of(gizmo.origin_px());
+        self.painter.circle_filled(origin, 3.0, GRIP);
+        for (handle, line) in gizmo.handles() {
+            let points: Vec<Pos2> = line.iter().map(|&pixel| self.fit.place_of(pixel)).collect();
+            let colour = match handle {
+                Handle::Axis(axis) => AXIS_COLOURS[axis],
+                Handle::Plane | Handle::Turn => GRIP,
+                Handle::Scale => Color32::from_rgb(250, 200, 60),
+                Handle::Sphere => LIGHT,
+            };
+            match (handle, points[..].as_ref()) {
+                (Handle::Axis(_), [from, to]) => {
+                    self.painter
+                        .arrow(*from, *to - *from, Stroke::new(2.5, colour));
+                }
+                (_, [point]) => {
+                    let size = Vec2::splat(9.0);
+                    let square = eframe::egui::Rect::from_center_size(*point, size);
+                    match handle {
+                        Handle::Sphere => _ = self.painter.circle_filled(*point, 6.0, colour),
+                        _ => _ = self.painter.rect_filled(square, 1.0, colour),
+                    }
+                }
+                _ => {
+                    _ = self
+                        .painter
+                        .add(Shape::line(points, Stroke::new(2.0, colour)))
+                }
+            }
+        }
+    }
+
+    /// Corners of real things and the shadows that were clicked.
+    pub fn clicks(&self, clicks: &ShadowClicks) {
+        let stroke = Stroke::new(2.0, LIGHT);
+        for pair in clicks.pairs_px() {
+            let [vertex, shadow] = pair.map(|pixel| self.fit.place_of(pixel));
+            self.painter.line_segment([vertex, shadow], stroke);
+            self.painter.circle_filled(vertex, 4.0, LIGHT);
+            self.painter.circle_stroke(shadow, 5.0, stroke);
+        }
+        if let Some(vertex) = clicks.vertex() {
+            let place = self.fit.place_of(vertex.pixel);
+            self.painter.circle_filled(place, 5.0, LIGHT);
+            self.label(place - Vec2::new(0.0, 16.0), &vertex.phantom, LIGHT);
+        }
+    }
+
+    fn axes(&self) {
+        let anchors = self.picture.anchors.iter().zip(&self.picture.poses);
+        for (anchor, pose) in anchors {
+            let Some(camera_from_anchor) = pose.camera_from_anchor else {
+                continue;
+            };
+            let length_m = anchor.markers.first().map_or(0.05, |marker| marker.size_m);
+            let place = |point_m| self.place(&camera_from_anchor, point_m);
+            let Some(origin) = place(DVec3::ZERO) else {
+                continue;
+            };
+            for (axis, colour) in DVec3::AXES.into_iter().zip(AXIS_COLOURS) {
+                if let Some(tip) = place(axis * length_m) {
+                    self.painter
+                        .arrow(origin, tip - origin, Stroke::new(2.0, colour));
+                }
+            }
+            let colour = match pose.status {
+                Status::Tracked => SEEN,
+                Status::Predicted | Status::Ambiguous | Status::Lost => REJECTED,
+            };
+            self.label(origin + Vec2::new(0.0, 14.0), &anchor.name, colour);
+        }
+    }
+
+    fn lights(&self, scene: &Scene) {
+        let world = self.picture.poses.first();
+        let Some(camera_from_world) = world.and_then(|pose| pose.camera_from_anchor) else {
+            return;
+        };
+        for (index, light) in scene.lights.iter().enumerate() {
+            let at_m = light_place_m(light);
+            let foot_m = at_m.with_z(0.0);
+            let Some(place) = self.place(&camera_from_world, at_m) else {
+                continue;
+            };
+            if let Some(foot) = self.place(&camera_from_world, foot_m) {
+                let stroke = Stroke::new(1.0, LIGHT.gamma_multiply(0.6));
+                self.painter
+                    .extend(Shape::dashed_line(&[place, foot], stroke, 5.0, 4.0));
+            }
+            self.painter.circle_filled(place, 7.0, LIGHT);
+            self.painter
+                .circle_stroke(place, 8.0, Stroke::new(1.5, Color32::BLACK));
+            self.label(
+                place + Vec2::new(0.0, 18.0),
+                &format!("light {index}"),
+                LIGHT,
+            );
+        }
+    }
+
+    fn shadow_lines(&self, scene: &Scene, lines: &mut ShadowLines, with_sides: bool) {
+        let poses = &self.picture.poses;
+        let Some(camera_from_world) = poses.first().and_then(|pose| pose.camera_from_anchor) else {
+            return;
+        };
+        let world_from_camera = camera_from_world.inverse();
+        let world_from_anchor: Vec<Option<DAffine3>> = poses
+            .iter()
+            .map(|pose| Some(world_from_camera * pose.camera_from_anchor?))
+            .collect();
+        for line in lines.lines(scene, &world_from_anchor) {
+            let Some(camera_from_anchor) = poses[line.anchor].camera_from_anchor else {
+                continue;
+            };
+            let colour = match line.is_virtual {
+                true => VIRTUAL_EDGE,
+                false => REAL_EDGE,
+            };
+            let place = |point_m| self.place(&camera_from_anchor, point_m);
+            let [Some(a), Some(b)] = line.edge_m.map(place) else {
+                continue;
+            };
+            if let (true, [Some(far_a), Some(far_b)]) = (with_sides, line.shadow_m.map(place)) {
+                let fill = colour.gamma_multiply(0.12);
+                let side = vec![a, b, far_b, far_a];
+                self.painter
+                    .add(Shape::convex_polygon(side, fill, Stroke::NONE));
+                let stroke = Stroke::new(1.0, colour.gamma_multiply(0.5));
+                self.painter.line_segment([far_a, far_b], stroke);
+            }
+            self.painter.line_segment([a, b], Stroke::new(2.0, colour));
+        }
+    }
+
+    fn outline(&self, quad: &Quad, stroke: Stroke) {
+        let points: Option<Vec<Pos2>> = quad.iter().map(|&c| self.place_of_distorted(c)).collect();
+        if let Some(points) = points {
+            self.painter.add(Shape::closed_line(points, stroke));
+        }
+    }
+
+    fn label(&self, place: Pos2, text: &str, colour: Color32) {
+        let font = FontId::proportional(14.0);
+        for offset in [Vec2::new(1.0, 1.0), Vec2::new(-1.0, 0.0)] {
+            let behind = place + offset;
+            self.painter.text(
+                behind,
+                Align2::CENTER_CENTER,
+                text,
+                font.clone(),
+                Color32::BLACK,
+            );
+        }
+        self.painter
+            .text(place, Align2::CENTER_CENTER, text, font, colour);
+    }
+
+    /// The picture is shown without distortion, markers are found with it.
+    fn place_of_distorted(&self, pixel: DVec2) -> Option<Pos2> {
+        undistorted_pixel(&self.picture.intrinsics, pixel).map(|pixel| self.fit.place_of(pixel))
+    }
+
+    fn place(&self, camera_from_anchor: &DAffine3, point_m: DVec3) -> Option<Pos2> {
+        let sight = Sight {
+            intrinsics: self.picture.intrinsics,
+            camera_from_world: *camera_from_anchor,
+        };
+        sight.pixel(point_m).map(|pixel| self.fit.place_of(pixel))
+    }
+}

@@ -1,0 +1,98 @@
+//! Fields that change the scene: shown while they are dragged, made when they are let go.
+
+use eframe::egui::{DragValue, Response, Ui};
+use glam::DVec3;
+
+use crate::app::authoring::Edit;
+use crate::app::live::wish::Wish;
+
+/// An edit that is under way.
+#[derive(Debug, Default)]
+pub struct Editing {
+    dragged: Option<Edit>,
+}
+
+impl Editing {
+    /// A field has changed to what `edit` says.
+    pub fn changed(&mut self, ui: &Ui, edit: Edit, wishes: &mut Vec<Wish>) {
+        if is_held(ui) {
+            wishes.push(Wish::Preview(edit.clone()));
+            self.dragged = Some(edit);
+        } else {
+            self.dragged = None;
+            wishes.push(Wish::Commit(edit));
+        }
+    }
+
+    /// Makes the edit that was let go, at the end of a pass.
+    pub fn settle(&mut self, ui: &Ui, wishes: &mut Vec<Wish>) {
+        if !is_held(ui)
+            && let Some(edit) = self.dragged.take()
+        {
+            wishes.push(Wish::Commit(edit));
+        }
+    }
+}
+
+fn is_held(ui: &Ui) -> bool {
+    ui.input(|input| input.pointer.any_down())
+}
+
+/// A number with its name, that is taken when it is written out, or as it is dragged; whether it has changed.
+pub fn number(ui: &mut Ui, name: &str, value: &mut f64, speed: f64, unit: &str) -> bool {
+    ui.horizontal(|ui| {
+        let field = field(ui, value, speed, unit);
+        let label = ui.label(name);
+        field.labelled_by(label.id).changed()
+    })
+    .inner
+}
+
+/// Three numbers in a row.
+pub fn vector(ui: &mut Ui, name: &str, value: &mut DVec3, speed: f64, unit: &str) -> bool {
+    ui.horizontal(|ui| {
+        let [x, y, z] = value.as_mut();
+        let fields = [x, y, z].map(|component| field(ui, component, speed, unit));
+        let label = ui.label(name);
+        fields
+            .map(|field| field.labelled_by(label.id).changed())
+            .contains(&true)
+    })
+    .inner
+}
+
+/// A power of light as its strength and its colour; whether it has changed.
+pub fn power(ui: &mut Ui, name: &str, value: &mut DVec3) -> bool {
+    let mut strength = value.max_element();
+    let mut colour = match strength > 0.0 {
+        true => (*value / strength).as_vec3().to_array(),
+        false => [1.0; 3],
+    };
+    let changed = ui
+        .horizontal(|ui| {
+            let speed = 0.01 * strength.max(0.01);
+            let strength = field(ui, &mut strength, speed, "");
+            let colour = ui.color_edit_button_rgb(&mut colour);
+            let label = ui.label(name);
+            let fields = [strength, colour];
+            fields
+                .map(|field| field.labelled_by(label.id).changed())
+                .contains(&true)
+        })
+        .inner;
+    if changed {
+        *value = strength.clamp(0.0, 1e9) * DVec3::from_array(colour.map(f64::from));
+    }
+    changed
+}
+
+/// A number alone.
+pub fn field(ui: &mut Ui, value: &mut f64, speed: f64, unit: &str) -> Response {
+    ui.add(
+        DragValue::new(value)
+            .speed(speed)
+            .max_decimals(4)
+            .suffix(unit)
+            .update_while_editing(false),
+    )
+}

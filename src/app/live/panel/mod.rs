@@ -1,0 +1,161 @@
+//! The panel beside the picture. It is shown facts and gives back wishes; it changes nothing itself.
+
+mod editing;
+mod first_use;
+mod light_from_picture;
+mod lights;
+mod shadows;
+mod things;
+mod times;
+mod tracking;
+
+use std::path::Path;
+
+use eframe::egui::{CollapsingHeader, ScrollArea, Ui};
+
+use super::eye::TrackedPicture;
+use super::look::Look;
+use super::meters::Meters;
+use super::views::View;
+use super::wish::{Overlay, Wish};
+use crate::scene::{Placement, Scene};
+use editing::Editing;
+use first_use::FirstUse;
+
+/// Where a thing stands, in the numbers of the scene's file; `None` where it has none there.
+pub type Placements<'a> = dyn Fn(&str) -> Option<Placement> + 'a;
+
+/// What the panel shows.
+pub struct Facts<'a> {
+    /// The scene; `None` on first use.
+    pub scene: Option<&'a Scene>,
+    /// Its file.
+    pub path: Option<&'a Path>,
+    /// Whether it has yet to be saved.
+    pub unsaved: bool,
+    /// Where a thing stands, in the numbers of the scene's file.
+    pub placement: &'a Placements<'a>,
+    /// What would be taken back, and what made again.
+    pub history: [Option<&'a str>; 2],
+    /// The frame that is shown.
+    pub picture: Option<&'a TrackedPicture>,
+    /// What it costs.
+    pub meters: &'a Meters,
+    /// What the program's clock shows, seconds.
+    pub now_secs: f64,
+    /// Frames that came, and those that were not shown: tracking was busy, the window was, they came broken.
+    pub frames: (u64, [u64; 3]),
+    /// The camera, in words.
+    pub camera: &'a str,
+    /// What draws, in words.
+    pub adapter: &'a str,
+    /// Whether a session and a video are being recorded.
+    pub records: [bool; 2],
+    /// Where a light is being found in the picture: pairs that were clicked, and whether a shadow is to be clicked next.
+    pub clicks: Option<(usize, bool)>,
+}
+
+/// What the panel itself remembers.
+#[derive(Debug, Default)]
+pub struct Panel {
+    editing: Editing,
+    first_use: FirstUse,
+}
+
+impl Panel {
+    /// Shows it: what is wished for.
+    pub fn show(&mut self, ui: &mut Ui, facts: &Facts<'_>, look: &Look) -> Vec<Wish> {
+        let mut wishes = Vec::new();
+        ScrollArea::vertical()
+            .auto_shrink([false, false])
+            .show(ui, |ui| {
+                self.first_use.show(ui, facts, &mut wishes);
+                recording(ui, facts, &mut wishes);
+                let editing = &mut self.editing;
+                section(ui, "Tracking", true, |ui| {
+                    tracking::show(ui, facts, editing, &mut wishes);
+                });
+                if let Some(scene) = facts.scene {
+                    section(ui, "Things", true, |ui| {
+                        things::show(ui, (scene, facts.placement), look, editing, &mut wishes);
+                    });
+                    section(ui, "Lights", true, |ui| {
+                        lights::show(ui, scene, look, editing, &mut wishes);
+                        light_from_picture::show(ui, facts.clicks, &mut wishes);
+                    });
+                    section(ui, "Shadows", false, |ui| {
+                        shadows::show(ui, scene, editing, &mut wishes);
+                    });
+                    history(ui, facts, &mut wishes);
+                }
+                section(ui, "View", false, |ui| view(ui, look, &mut wishes));
+                section(ui, "Times", true, |ui| times::show(ui, facts));
+            });
+        self.editing.settle(ui, &mut wishes);
+        wishes
+    }
+}
+
+fn section(ui: &mut Ui, title: &str, open: bool, contents: impl FnOnce(&mut Ui)) {
+    CollapsingHeader::new(title)
+        .default_open(open)
+        .show(ui, contents);
+}
+
+fn recording(ui: &mut Ui, facts: &Facts<'_>, wishes: &mut Vec<Wish>) {
+    ui.label(facts.camera);
+    let [session, video] = facts.records;
+    ui.horizontal_wrapped(|ui| {
+        let mut button = |text: &str, hover: &str, wish| {
+            if ui.button(text).on_hover_text(hover).clicked() {
+                wishes.push(wish);
+            }
+        };
+        button("Picture", "save it as it is shown (S)", Wish::Screenshot);
+        let text = if session {
+            "End session"
+        } else {
+            "Record session"
+        };
+        button(text, "the camera, for replay (R)", Wish::ToggleSession);
+        let text = if video { "End video" } else { "Record video" };
+        button(text, "the composite (V)", Wish::ToggleVideo);
+    });
+}
+
+fn view(ui: &mut Ui, look: &Look, wishes: &mut Vec<Wish>) {
+    ui.horizontal_wrapped(|ui| {
+        for (name, view) in View::BY_NAME {
+            if ui.selectable_label(look.view == view, name).clicked() && look.view != view {
+                wishes.push(Wish::Show(view));
+            }
+        }
+    });
+    for (name, overlay) in Overlay::BY_NAME {
+        let mut shown = look.shows(overlay);
+        if ui.checkbox(&mut shown, name).changed() {
+            wishes.push(Wish::Toggle(overlay));
+        }
+    }
+}
+
+fn history(ui: &mut Ui, facts: &Facts<'_>, wishes: &mut Vec<Wish>) {
+    if let (Some(path), false) = (facts.path, facts.unsaved) {
+        ui.weak(format!("Edits are written into {}.", path.display()));
+    }
+    ui.horizontal_wrapped(|ui| {
+        for (verb, step, wish) in [
+            ("Undo", facts.history[0], Wish::Undo),
+            ("Redo", facts.history[1], Wish::Redo),
+        ] {
+            let text = match step {
+                Some(step) => format!("{verb}: {step}"),
+                None => verb.to_owned(),
+            };
+            let button = eframe::egui::Button::new(text);
+            if ui.add_enabled(step.is_some(), button).clicked() {
+                wishes.push(wish);
+            }
+        }
+    });
+}

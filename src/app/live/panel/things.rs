@@ -1,0 +1,86 @@
+//! Phantoms and virtual things: what is there, and where.
+
+use eframe::egui::Ui;
+
+use super::Placements;
+use super::editing::{Editing, vector};
+use crate::app::authoring::Edit;
+use crate::app::live::look::Look;
+use crate::app::live::wish::{Selected, Wish};
+use crate::scene::{Object, Placement, Scene};
+
+/// Metres, degrees and factors per point that a field is dragged.
+const SPEEDS: [f64; 3] = [0.0005, 0.5, 0.005];
+/// No thing is smaller than this part of itself: a scale of 0 would be none.
+const LEAST_SCALE: f64 = 1e-3;
+
+/// Shows them.
+pub fn show(
+    ui: &mut Ui,
+    (scene, placement): (&Scene, &Placements<'_>),
+    look: &Look,
+    editing: &mut Editing,
+    wishes: &mut Vec<Wish>,
+) {
+    for (kind, things) in [("phantoms", &scene.phantoms), ("virtual", &scene.virtuals)] {
+        if things.is_empty() {
+            continue;
+        }
+        ui.weak(kind);
+        for thing in things {
+            let placed = placement(&thing.name);
+            ui.push_id(&thing.name, |ui| {
+                row(ui, thing, placed.is_some(), look, wishes);
+                let selected = Selected::Thing(thing.name.clone());
+                if let (Some(placement), true) = (placed, look.selected == Some(selected)) {
+                    fields(ui, scene, thing, placement, editing, wishes);
+                }
+            });
+        }
+    }
+}
+
+/// Whether it is there, and its name.
+fn row(ui: &mut Ui, thing: &Object, can_move: bool, look: &Look, wishes: &mut Vec<Wish>) {
+    let selected = Selected::Thing(thing.name.clone());
+    let is_selected = look.selected.as_ref() == Some(&selected);
+    ui.horizontal(|ui| {
+        let mut visible = thing.visible;
+        // The table has no key for it.
+        let checkbox = eframe::egui::Checkbox::without_text(&mut visible);
+        let checkbox = ui.add_enabled(can_move, checkbox);
+        let name = ui.selectable_label(is_selected, &thing.name);
+        if name.clicked() && can_move {
+            wishes.push(Wish::Select((!is_selected).then_some(selected)));
+        }
+        if checkbox.labelled_by(name.id).changed() {
+            let thing = thing.name.clone();
+            wishes.push(Wish::Commit(Edit::Show { thing, visible }));
+        }
+    });
+}
+
+fn fields(
+    ui: &mut Ui,
+    scene: &Scene,
+    thing: &Object,
+    mut placement: Placement,
+    editing: &mut Editing,
+    wishes: &mut Vec<Wish>,
+) {
+    if let Some(anchor) = scene.anchors.get(thing.anchor) {
+        ui.weak(format!("on {}", anchor.name));
+    }
+    let [position, rotation, scale] = SPEEDS;
+    let moved = vector(ui, "m", &mut placement.position_m, position, "");
+    let turned = vector(ui, "turned", &mut placement.rotation_deg, rotation, "°");
+    let scaled = vector(ui, "scale", &mut placement.scale, scale, "");
+    if moved || turned || scaled {
+        for factor in placement.scale.as_mut() {
+            let sign = if factor.is_sign_negative() { -1.0 } else { 1.0 };
+            *factor = sign * factor.abs().max(LEAST_SCALE);
+        }
+        let thing = thing.name.clone();
+        editing.changed(ui, Edit::Place { thing, placement }, wishes);
+    }
+}

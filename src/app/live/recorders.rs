@@ -1,0 +1,165 @@
+//! What the window's keys record: the camera as a session, the composite as a video, a single picture.
+
+use std::path::{Path, PathBuf};
+
+use super::composite_video::CompositeVideo;
+use super::eye::TrackedPicture;
+use super::pipeline::Pipeline;
+use crate::app::output::OutputError;
+use crate::app::picture_files::write_rgb_png;
+use crate::app::session_recorder::SessionRecorder;
+use crate::app::session_writer::SessionHead;
+
+/// What is being recorded, and where to.
+pub struct Recorders {
+    folder: PathBuf,
+    session: Option<(PathBuf, SessionRecorder)>,
+    video: Option<CompositeVideo>,
+}
+
+impl Recorders {
+    /// Nothing is recorded yet; files will go into `folder`.
+    pub fn new(folder: PathBuf) -> Self {
+        Self {
+            folder,
+            session: None,
+            video: None,
+        }
+    }
+
+    /// Whether a session is being recorded.
+    pub fn records_session(&self) -> bool {
+        self.session.is_some()
+    }
+
+    /// Whether a video of the composite is.
+    pub fn records_video(&self) -> bool {
+        self.video.is_some()
+    }
+
+    /// Begins to record the camera as a session, or ends it. What was done, in words.
+    ///
+    /// # Errors
+    /// What kept it from being written; what was until then is whole.
+    pub fn toggle_session(
+        &mut self,
+        pipeline: &Pipeline,
+        head: SessionHead,
+    ) -> Result<String, OutputError> {
+        if self.session.is_some() {
+            return self.end_session(pipeline);
+        }
+        let path = next_free(&self.folder, "session", "");
+        let recorder = SessionRecorder::start(&path, head)?;
+        pipeline.set_tap(Some(recorder.tap()));
+        let said = format!("recording {}", path.display());
+        self.session = Some((path, recorder));
+        Ok(said)
+    }
+
+    /// Begins to record the composite, or ends it. What was done, in words.
+    ///
+    /// # Errors
+    /// As [`Recorders::toggle_session`].
+    pub fn toggle_video(&mut self, size_px: [u32; 2], fps: f64) -> Result<String, OutputError> {
+        if self.video.is_some() {
+            return self.end_video();
+        }
+        // Matroska alone is whole at every moment.
+        let path = next_free(&self.folder, "composite", ".mkv");
+        let video = CompositeVideo::start(&path, size_px, fps)?;
+        self.video = Some(video);
+        Ok(format!("recording {}", path.display()))
+    }
+
+    /// Writes a picture as it is shown.
+    ///
+    /// # Errors
+    /// What kept it from being written.
+    pub fn screenshot(&self, size_px: [u32; 2], rgba: &[u8]) -> Result<String, OutputError> {
+        let path = next_free(&self.folder, "picture", ".png");
+        write_rgb_png(&path, size_px, rgba)?;
+        Ok(format!("{} saved", path.display()))
+    }
+
+    /// A frame was tracked.
+    pub fn add_poses(&self, picture: &TrackedPicture) {
+        if let (Some((_, session)), true) = (&self.session, !picture.poses.is_empty()) {
+            let of = (picture.frame.index, picture.frame.time_secs);
+            session.add_poses(of, &picture.poses, Some(picture.track_ms));
+        }
+    }
+
+    /// A frame was drawn.
+    pub fn add_composite(&mut self, size_px: [u32; 2], time_secs: f64, rgba: Vec<u8>) {
+        if let Some(video) = &mut self.video {
+            video.add(size_px, time_secs, rgba);
+        }
+    }
+
+    /// Ends what has failed by itself: what it said.
+    pub fn take_failure(&mut self, pipeline: &Pipeline) -> Option<Result<String, OutputError>> {
+        if self.session.as_ref().is_some_and(|(_, s)| s.has_failed()) {
+            return Some(self.end_session(pipeline));
+        }
+        let has_failed = self.video.as_ref().is_some_and(CompositeVideo::has_failed);
+        has_failed.then(|| self.end_video())
+    }
+
+    /// Ends all recording: what there is to say of each.
+    pub fn finish(&mut self, pipeline: &Pipeline) -> Vec<Result<String, OutputError>> {
+        let session = self.session.is_some().then(|| self.end_session(pipeline));
+        let video = self.video.is_some().then(|| self.end_video());
+        session.into_iter().chain(video).collect()
+    }
+
+    fn end_session(&mut self, pipeline: &Pipeline) -> Result<String, OutputError> {
+        pipeline.set_tap(None);
+        let Some((path, recorder)) = self.session.take() else {
+            return Ok(String::new());
+        };
+        let recorded = recorder.finish()?;
+        let lost = match recorded.dropped {
+            0 => String::new(),
+            dropped => format!("; {dropped} more were dropped, the encoder was too slow"),
+        };
+        Ok(format!(
+            "{} frames in {}{lost}",
+            recorded.frames,
+            path.display()
+        ))
+    }
+
+    fn end_video(&mut self) -> Result<String, OutputError> {
+        let video = self.video.take();
+        video.map_or(Ok(String::new()), CompositeVideo::finish)
+    }
+}
+
+/// The first name with a number that nothing has yet: `stem-001.png`.
+fn next_free(folder: &Path, stem: &str, extension: &str) -> PathBuf {
+    let numbered = |number: u32| folder.join(format!("{stem}-{number:03}{extension}"));
+    (1..u32::MAX)
+        .map(numbered)
+        .find(|path| !path.exists())
+        .unwrap_or_else(|| numbered(0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_that_is_there_is_written_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let recorders = Recorders::new(folder.path().to_owned());
+        let pixels = [9, 8, 7, 255].repeat(6);
+        for number in 1..4 {
+            let said = recorders.screenshot([3, 2], &pixels).unwrap();
+            assert!(said.contains(&format!("picture-00{number}.png")), "{said}");
+        }
+        std::fs::remove_file(folder.path().join("picture-002.png")).unwrap();
+        let said = recorders.screenshot([3, 2], &pixels).unwrap();
+        assert!(said.contains("picture-002.png"), "{said}");
+    }
+}

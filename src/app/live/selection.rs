@@ -1,0 +1,68 @@
+//! What a click in the picture meets.
+
+use glam::{DVec2, Vec3};
+
+use super::eye::TrackedPicture;
+use super::gizmo::light_place_m;
+use super::wish::Selected;
+use crate::geometry::light_placing::Sight;
+use crate::geometry::ray_caster::RayCaster;
+use crate::scene::Scene;
+
+/// A light is met this near to where it is shown, pixels.
+const LIGHT_REACH_PX: f64 = 14.0;
+
+/// The light or the visible thing under a pixel of the undistorted picture, the nearest one; `selects` says which things
+/// may be selected: those that may not still hide what is behind them.
+pub fn selected_at(
+    scene: &Scene,
+    picture: &TrackedPicture,
+    pixel: DVec2,
+    with_lights: bool,
+    selects: impl Fn(&str) -> bool,
+) -> Option<Selected> {
+    if with_lights && let Some(light) = light_at(scene, picture, pixel) {
+        return Some(Selected::Light(light));
+    }
+    let mut corners = Vec::new();
+    let mut owners = Vec::new();
+    for thing in scene.phantoms.iter().chain(&scene.virtuals) {
+        let pose = picture.poses.get(thing.anchor);
+        let Some(camera_from_anchor) = pose.and_then(|pose| pose.camera_from_anchor) else {
+            continue;
+        };
+        if !thing.visible {
+            continue;
+        }
+        let camera_from_object = camera_from_anchor * thing.anchor_from_object;
+        let positions: Vec<Vec3> = thing
+            .mesh
+            .positions
+            .iter()
+            .map(|p| camera_from_object.transform_point3(p.as_dvec3()).as_vec3())
+            .collect();
+        for triangle in &thing.mesh.triangles {
+            corners.push(triangle.map(|index| positions[index as usize]));
+            owners.push(thing);
+        }
+    }
+    let direction = picture.intrinsics.plane_from_pixel(pixel).extend(1.0);
+    let hit = RayCaster::new(&corners).first_hit(Vec3::ZERO, direction.as_vec3(), f32::INFINITY)?;
+    let thing = &owners[hit.triangle].name;
+    selects(thing).then(|| Selected::Thing(thing.clone()))
+}
+
+fn light_at(scene: &Scene, picture: &TrackedPicture, pixel: DVec2) -> Option<usize> {
+    let sight = Sight {
+        intrinsics: picture.intrinsics,
+        camera_from_world: picture.poses.first()?.camera_from_anchor?,
+    };
+    let lights = scene.lights.iter().enumerate();
+    let (light, _) = lights
+        .filter_map(|(index, light)| {
+            let off_px = sight.pixel(light_place_m(light))?.distance(pixel);
+            (off_px <= LIGHT_REACH_PX).then_some((index, off_px))
+        })
+        .min_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    Some(light)
+}

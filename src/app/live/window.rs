@@ -1,0 +1,380 @@
+//! The window: picture, panel, keys, notices. It shows what the studio has and takes wishes to it.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use eframe::egui::{
+    Align2, Area, CentralPanel, Color32, Context, FontId, Frame, Grid, Id, PointerButton, Pos2,
+    Rect, Response, RichText, Sense, Ui, Vec2, ViewportCommand,
+};
+
+use super::event_loop::PassEnd;
+use super::fit::Fit;
+use super::gizmo::{Drag, Gizmo, Target};
+use super::keys::bindings;
+use super::look::Look;
+use super::notices::{CameraState, Weight};
+use super::overlays::Overlays;
+use super::panel::{Facts, Panel};
+use super::screen::Screen;
+use super::selection::selected_at;
+use super::shadow_lines::ShadowLines;
+use super::studio::Studio;
+use super::wish::{Clicks, Overlay, Selected, Wish};
+use crate::geometry::light_placing::Sight;
+
+/// The window looks at the world at least this often, even when no frame comes.
+const PULSE: Duration = Duration::from_millis(200);
+const PANEL_WIDTH: f32 = 330.0;
+const TROUBLE: Color32 = Color32::from_rgb(255, 190, 90);
+const RECORDING: Color32 = Color32::from_rgb(235, 60, 50);
+
+/// What ended the window before a person did.
+pub type Failure = Arc<Mutex<Option<anyhow::Error>>>;
+
+/// What the window and whoever opened it share.
+pub struct Shared {
+    /// Closes the window.
+    pub stop: Arc<AtomicBool>,
+    /// What goes wrong.
+    pub failure: Failure,
+    /// When the last pass ended.
+    pub pass_end: PassEnd,
+}
+
+/// The window's state.
+pub struct Window {
+    studio: Studio,
+    screen: Screen,
+    look: Look,
+    panel: Panel,
+    shadow_lines: ShadowLines,
+    drag: Option<Drag>,
+    adapter: String,
+    shared: Shared,
+    full_screen: bool,
+}
+
+impl Window {
+    /// A window on a studio.
+    pub fn new(studio: Studio, screen: Screen, adapter: String, shared: Shared) -> Self {
+        Self {
+            studio,
+            screen,
+            adapter,
+            shared,
+            look: Look::new(),
+            panel: Panel::default(),
+            shadow_lines: ShadowLines::default(),
+            drag: None,
+            full_screen: false,
+        }
+    }
+
+    fn fulfil(&mut self, ctx: &Context, wishes: Vec<Wish>) {
+        for wish in wishes {
+            if wish == Wish::Quit {
+                ctx.send_viewport_cmd(ViewportCommand::Close);
+            } else if !self.look.take(&wish) {
+                let removes = wish == Wish::RemoveSelected;
+                self.studio.fulfil(wish, &self.look);
+                if removes {
+                    self.look.selected = None;
+                }
+            }
+        }
+        if self.look.full_screen != self.full_screen {
+            self.full_screen = self.look.full_screen;
+            ctx.send_viewport_cmd(ViewportCommand::Fullscreen(self.full_screen));
+        }
+    }
+
+    fn side_panel(&mut self, ui: &mut Ui) -> Vec<Wish> {
+        let (studio, look, adapter) = (&self.studio, &self.look, &self.adapter);
+        let document = studio.document();
+        let camera = match &studio.notices.camera {
+            CameraState::Opening => "The camera is being opened …".to_owned(),
+            CameraState::Open(what) => what.clone(),
+            CameraState::Failed(_) => "No camera".to_owned(),
+            CameraState::Lost(_) => "The camera is gone".to_owned(),
+            CameraState::Ended => "The recording has ended".to_owned(),
+        };
+        let placement = |thing: &str| studio.placement(thing);
+        let facts = Facts {
+            scene: studio.scene(),
+            path: document.map(|document| document.path()),
+            unsaved: studio.is_unsaved(),
+            placement: &placement,
+            history: [
+                document.and_then(|document| document.next_undo()),
+                document.and_then(|document| document.next_redo()),
+            ],
+            picture: studio.picture(),
+            meters: &studio.meters,
+            now_secs: studio.now_secs(),
+            frames: studio.frames(),
+            camera: &camera,
+            adapter,
+            records: studio.records(),
+            clicks: studio
+                .clicks()
+                .map(|clicks| (clicks.pairs_px().len(), clicks.vertex().is_some())),
+        };
+        let panel = &mut self.panel;
+        eframe::egui::Panel::right("panel")
+            .default_size(PANEL_WIDTH)
+            .show(ui, |ui| panel.show(ui, &facts, look))
+            .inner
+    }
+
+    /// The picture in its place, with what lies over it.
+    fn picture(&mut self, ui: &mut Ui) -> Vec<Wish> {
+        let area = ui.max_rect();
+        let Some((renderer, size_px, number)) = self.studio.renderer() else {
+            self.say_in_the_middle(ui, area);
+            return Vec::new();
+        };
+        let texture = self.screen.texture(renderer, number);
+        let fit = Fit::within(area, size_px);
+        let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
+        ui.painter().image(texture, fit.rect, whole, Color32::WHITE);
+        let response = ui.interact(area, Id::unique("picture"), Sense::click_and_drag());
+        let wishes = self.point(&response, &fit);
+        let Some(picture) = self.studio.picture() else {
+            return wishes;
+        };
+        let painter = ui.painter_at(fit.rect);
+        let overlays = Overlays {
+            painter: &painter,
+            fit,
+            picture,
+        };
+        let scene = self.studio.scene();
+        overlays.draw(&self.look, scene, &mut self.shadow_lines);
+        if scene.is_none() {
+            overlays.markers();
+        }
+        if let Some(clicks) = self.studio.clicks() {
+            overlays.clicks(clicks);
+        } else if let Some((target, sight)) = self.target() {
+            overlays.handles(&target, &sight);
+        }
+        wishes
+    }
+
+    /// What the pointer does in the picture: it drags a handle, or selects.
+    fn point(&mut self, response: &Response, fit: &Fit) -> Vec<Wish> {
+        let Some(pointer) = response.interact_pointer_pos() else {
+            return Vec::new();
+        };
+        let pixel = fit.pixel(pointer);
+        if self.studio.clicks().is_some() {
+            let clicked = response.clicked();
+            let wish = clicked.then_some(Wish::Clicks(Clicks::At(pixel)));
+            return wish.into_iter().collect();
+        }
+        let left = PointerButton::Primary;
+        if response.drag_started_by(left) {
+            let pressed = response.ctx.input(|input| input.pointer.press_origin());
+            let at = pressed.map_or(pixel, |place| fit.pixel(place));
+            self.drag = self
+                .target()
+                .and_then(|(target, sight)| Gizmo::new(&target, &sight)?.grab(at));
+        }
+        let edit = self.drag.as_ref().and_then(|drag| {
+            let (_, sight) = self.target()?;
+            drag.edit(&sight, pixel)
+        });
+        if response.drag_stopped_by(left) {
+            return match (self.drag.take(), edit) {
+                (Some(_), Some(edit)) => vec![Wish::Commit(edit)],
+                (Some(_), None) => vec![Wish::EndPreview],
+                (None, _) => Vec::new(),
+            };
+        }
+        if let (true, Some(edit)) = (response.dragged_by(left), edit) {
+            return vec![Wish::Preview(edit)];
+        }
+        if response.clicked_by(left)
+            && let (Some(scene), Some(picture)) = (self.studio.scene(), self.studio.picture())
+        {
+            let can_move = |thing: &str| self.studio.placement(thing).is_some();
+            let with_lights = self.look.shows(Overlay::Lights);
+            let selected = selected_at(scene, picture, pixel, with_lights, can_move);
+            return vec![Wish::Select(selected)];
+        }
+        Vec::new()
+    }
+
+    /// What is selected, with the camera as its anchor sees it.
+    fn target(&self) -> Option<(Target, Sight)> {
+        let (scene, picture) = (self.studio.scene()?, self.studio.picture()?);
+        let (target, anchor) = match self.look.selected.as_ref()? {
+            Selected::Thing(name) => {
+                let mut things = scene.phantoms.iter().chain(&scene.virtuals);
+                let anchor = things.find(|thing| thing.name == *name)?.anchor;
+                let placement = self.studio.placement(name)?;
+                let name = name.clone();
+                (Target::Thing { name, placement }, anchor)
+            }
+            Selected::Light(index) => {
+                let light = *scene.lights.get(*index)?;
+                let index = *index;
+                (Target::Light { index, light }, 0)
+            }
+        };
+        let sight = Sight {
+            intrinsics: picture.intrinsics,
+            camera_from_world: picture.poses.get(anchor)?.camera_from_anchor?,
+        };
+        Some((target, sight))
+    }
+
+    fn say_in_the_middle(&self, ui: &Ui, area: Rect) {
+        let text = match &self.studio.notices.camera {
+            CameraState::Failed(why) => why.clone(),
+            CameraState::Ended => "The recording has no pictures.".to_owned(),
+            _ => "Waiting for the first picture …".to_owned(),
+        };
+        let painter = ui.painter();
+        let wrap = (area.width() - 40.0).max(40.0);
+        let galley = painter.layout(text, FontId::proportional(18.0), Color32::LIGHT_GRAY, wrap);
+        let place = area.center() - galley.size() / 2.0;
+        painter.galley(place, galley, Color32::LIGHT_GRAY);
+    }
+
+    fn notices(&self, ctx: &Context, area: Rect) {
+        let shown = self.studio.notices.shown(self.studio.now_secs());
+        let [session, video] = self.studio.records();
+        if shown.is_empty() && !session && !video {
+            return;
+        }
+        let place = area.left_top() + Vec2::splat(10.0);
+        Area::new(Id::unique("notices"))
+            .fixed_pos(place)
+            .interactable(false)
+            .show(ctx, |ui| {
+                ui.set_max_width((area.width() - 20.0).clamp(60.0, 620.0));
+                for (recording, what) in [(session, "the camera"), (video, "the composite")] {
+                    if recording {
+                        boxed(
+                            ui,
+                            RichText::new(format!("recording {what}")).color(RECORDING),
+                        );
+                    }
+                }
+                for (weight, text) in shown {
+                    let text = RichText::new(text);
+                    boxed(
+                        ui,
+                        match weight {
+                            Weight::Done => text.color(Color32::WHITE),
+                            Weight::Trouble => text.color(TROUBLE),
+                        },
+                    );
+                }
+            });
+    }
+
+    fn list_of_keys(&mut self, ctx: &Context) {
+        let mut open = self.look.keys;
+        eframe::egui::Window::new("Keys")
+            .open(&mut open)
+            .collapsible(false)
+            .resizable(false)
+            .anchor(Align2::CENTER_CENTER, Vec2::ZERO)
+            .show(ctx, |ui| {
+                Grid::new("keys")
+                    .num_columns(2)
+                    .striped(true)
+                    .show(ui, |ui| {
+                        for binding in bindings() {
+                            ui.strong(binding.name);
+                            ui.label(binding.does);
+                            ui.end_row();
+                        }
+                    });
+                ui.weak("Click a thing in the picture to select it, drag its handles to move it.");
+            });
+        self.look.keys = open;
+    }
+}
+
+fn boxed(ui: &mut Ui, text: RichText) {
+    Frame::new()
+        .fill(Color32::from_black_alpha(190))
+        .inner_margin(6.0)
+        .corner_radius(4.0)
+        .show(ui, |ui| ui.label(text));
+}
+
+/// The wishes of the keys that were pressed.
+fn pressed(ctx: &Context) -> Vec<Wish> {
+    if ctx.egui_wants_keyboard_input() {
+        return Vec::new();
+    }
+    let wish = |binding: super::keys::Binding| {
+        let pressed = ctx.input_mut(|input| input.consume_key(binding.modifiers, binding.key));
+        pressed.then_some(binding.wish)
+    };
+    bindings().into_iter().filter_map(wish).collect()
+}
+
+impl eframe::App for Window {
+    fn logic(&mut self, ctx: &Context, _: &mut eframe::Frame) {
+        ctx.request_repaint_after(PULSE);
+        if self.shared.stop.load(Ordering::Relaxed) {
+            ctx.send_viewport_cmd(ViewportCommand::Close);
+        }
+        let shown = self.studio.was_shown(self.shared.pass_end.secs());
+        if let Err(error) = shown.and_then(|()| self.studio.step(&self.look)) {
+            self.shared.fail(error);
+            ctx.send_viewport_cmd(ViewportCommand::Close);
+        }
+    }
+
+    fn ui(&mut self, ui: &mut Ui, _: &mut eframe::Frame) {
+        let ctx = ui.ctx().clone();
+        let mut wishes = pressed(&ctx);
+        if self.look.panel {
+            wishes.extend(self.side_panel(ui));
+        }
+        let area = CentralPanel::default()
+            .frame(Frame::NONE)
+            .show(ui, |ui| {
+                wishes.extend(self.picture(ui));
+                ui.max_rect()
+            })
+            .inner;
+        self.notices(&ctx, area);
+        if self.look.keys {
+            self.list_of_keys(&ctx);
+        }
+        self.fulfil(&ctx, wishes);
+    }
+
+    fn clear_color(&self, _: &eframe::egui::Visuals) -> [f32; 4] {
+        Color32::BLACK.to_normalized_gamma_f32()
+    }
+
+    fn on_exit(&mut self) {
+        for said in self.studio.finish() {
+            match said {
+                Ok(text) => eprintln!("{text}"),
+                Err(error) => self.shared.fail(error.into()),
+            }
+        }
+        if let CameraState::Failed(why) = &self.studio.notices.camera {
+            self.shared.fail(anyhow::anyhow!("{why}"));
+        }
+    }
+}
+
+impl Shared {
+    /// The first thing that goes wrong is the one that is told.
+    fn fail(&self, error: anyhow::Error) {
+        let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
+        failure.get_or_insert(error);
+    }
+}

@@ -1,0 +1,188 @@
+//! The panel of the live window, driven as a person does: what is clicked and dragged becomes what is wished for.
+
+use eframe::egui::accesskit::Role;
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
+use gnomon::app::authoring::Edit;
+use gnomon::app::live::look::Look;
+use gnomon::app::live::meters::Meters;
+use gnomon::app::live::panel::{Facts, Panel};
+use gnomon::app::live::views::View;
+use gnomon::app::live::wish::{Clicks, Overlay, Selected, Wish};
+use gnomon::light::Light;
+use gnomon::scene::{Placement, Scene};
+
+/// A panel on a scene, and all that was wished for.
+struct Desk {
+    panel: Panel,
+    scene: Option<Scene>,
+    look: Look,
+    wishes: Vec<Wish>,
+}
+
+fn desk(scene: Option<Scene>, selected: Option<Selected>) -> Harness<'static, Desk> {
+    let look = Look {
+        selected,
+        ..Look::new()
+    };
+    let desk = Desk {
+        panel: Panel::default(),
+        scene,
+        look,
+        wishes: Vec::new(),
+    };
+    Harness::builder()
+        .with_size([330.0, 1400.0])
+        .build_ui_state(
+            |ui, desk: &mut Desk| {
+                let meters = Meters::default();
+                let facts = Facts {
+                    scene: desk.scene.as_ref(),
+                    path: None,
+                    unsaved: false,
+                    placement: &|thing| (thing != "table").then(Placement::default),
+                    history: [Some("place \"torus\""), None],
+                    picture: None,
+                    meters: &meters,
+                    now_secs: 0.0,
+                    frames: (0, [0; 3]),
+                    camera: "a camera",
+                    adapter: "an adapter",
+                    records: [false, true],
+                    clicks: None,
+                };
+                let wishes = desk.panel.show(ui, &facts, &desk.look);
+                desk.wishes.extend(wishes);
+            },
+            desk,
+        )
+}
+
+fn lamp() -> Scene {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("config/lamp.toml");
+    Scene::load(&path).expect("the demo's scene")
+}
+
+/// Clicks on what has this label: what is wished for then.
+fn clicked(harness: &mut Harness<'_, Desk>, label: &str) -> Vec<Wish> {
+    harness.run();
+    harness.state_mut().wishes.clear();
+    // A field that is named by a button has the same label.
+    let button = harness.query_by_role_and_label(Role::Button, label);
+    button
+        .unwrap_or_else(|| harness.get_by_label(label))
+        .click();
+    harness.run();
+    std::mem::take(&mut harness.state_mut().wishes)
+}
+
+#[test]
+fn buttons_wish_for_what_they_say() {
+    let mut harness = desk(Some(lamp()), None);
+    assert_eq!(clicked(&mut harness, "Picture"), [Wish::Screenshot]);
+    assert_eq!(
+        clicked(&mut harness, "Record session"),
+        [Wish::ToggleSession]
+    );
+    assert_eq!(clicked(&mut harness, "End video"), [Wish::ToggleVideo]);
+    assert_eq!(clicked(&mut harness, "Undo: place \"torus\""), [Wish::Undo]);
+    assert_eq!(
+        clicked(&mut harness, "Redo"),
+        [],
+        "there is nothing to redo"
+    );
+    let select = |selected| [Wish::Select(Some(selected))];
+    assert_eq!(
+        clicked(&mut harness, "torus"),
+        select(Selected::Thing("torus".to_owned()))
+    );
+    assert_eq!(
+        clicked(&mut harness, "table"),
+        [],
+        "that one cannot be moved"
+    );
+    assert_eq!(
+        clicked(&mut harness, "light 0 (point)"),
+        select(Selected::Light(0))
+    );
+    assert_eq!(
+        clicked(&mut harness, "Find the light in the picture"),
+        [Wish::Clicks(Clicks::Begin)]
+    );
+    assert_eq!(
+        clicked(&mut harness, "remove"),
+        [Wish::Commit(Edit::RemoveLight(0))]
+    );
+}
+
+#[test]
+fn views_and_overlays_are_behind_their_heading() {
+    let mut harness = desk(Some(lamp()), None);
+    assert_eq!(clicked(&mut harness, "View"), []);
+    assert_eq!(clicked(&mut harness, "depth"), [Wish::Show(View::Depth)]);
+    assert_eq!(
+        clicked(&mut harness, "composite"),
+        [],
+        "that is shown already"
+    );
+    assert_eq!(
+        clicked(&mut harness, "marker outlines"),
+        [Wish::Toggle(Overlay::Outlines)]
+    );
+}
+
+#[test]
+fn the_knobs_of_the_technique_are_edits() {
+    let mut harness = desk(Some(lamp()), None);
+    assert_eq!(clicked(&mut harness, "Shadows"), []);
+    let wishes = clicked(&mut harness, "1");
+    let [Wish::Commit(Edit::Shadows(shadows))] = wishes[..] else {
+        panic!("{wishes:?}");
+    };
+    assert_eq!(shadows.samples, 1);
+    assert_eq!(shadows.technique, lamp().shadows.technique);
+}
+
+#[test]
+fn a_dragged_field_is_shown_while_it_is_held_and_made_when_it_is_let_go() {
+    let mut harness = desk(Some(lamp()), Some(Selected::Light(0)));
+    harness.run();
+    // The first number of the light's place.
+    let field = harness.get_by_value("-0.260").rect().center();
+    harness.drag_at(field);
+    harness.step();
+    for moved in 1..=4 {
+        harness.hover_at(field + eframe::egui::Vec2::new(10.0 * moved as f32, 0.0));
+        harness.step();
+    }
+    let held = std::mem::take(&mut harness.state_mut().wishes);
+    assert!(!held.is_empty(), "it is shown while it is dragged");
+    for wish in &held {
+        let Wish::Preview(Edit::Light { index: 0, light }) = wish else {
+            panic!("{wish:?}");
+        };
+        let Light::Point { position_m, .. } = light else {
+            panic!("{light:?}");
+        };
+        assert!(position_m.x > -0.26, "to the right is more");
+    }
+    harness.drop_at(field + eframe::egui::Vec2::new(40.0, 0.0));
+    harness.run();
+    let made = std::mem::take(&mut harness.state_mut().wishes);
+    assert!(
+        matches!(made[..], [Wish::Commit(Edit::Light { index: 0, .. })]),
+        "{made:?}"
+    );
+}
+
+#[test]
+fn without_a_scene_it_asks_for_a_marker() {
+    let mut harness = desk(None, None);
+    harness.run();
+    assert!(harness.query_by_label("First use").is_some());
+    assert!(
+        harness.query_by_label_contains("gnomon markers").is_some(),
+        "how to print one"
+    );
+    assert!(harness.query_by_label("Lights").is_none());
+}

@@ -1,0 +1,202 @@
+//! The window itself, where this machine can show one (Xvfb): it opens, obeys keys where there is xdotool, and ends with
+//! whole files when it is told to. Passed over in one line elsewhere.
+
+#![cfg(target_os = "linux")]
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test may stop where its own files fail"
+)]
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use gnomon::capture::FrameSource;
+
+const SOON: Duration = Duration::from_secs(90);
+
+/// An X server without a screen.
+struct Display {
+    server: Child,
+    name: String,
+}
+
+impl Display {
+    /// `None`, with a word about it, where there is no Xvfb.
+    fn open() -> Option<Self> {
+        let server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-screen", "0", "900x600x24"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn();
+        let Ok(mut server) = server else {
+            eprintln!("skipped: there is no Xvfb");
+            return None;
+        };
+        let mut number = String::new();
+        let mut said = std::io::BufReader::new(server.stdout.take()?);
+        std::io::BufRead::read_line(&mut said, &mut number).unwrap();
+        let name = format!(":{}", number.trim());
+        Some(Self { server, name })
+    }
+
+    fn gnomon(&self, arguments: &[&str]) -> Child {
+        Command::new(env!("CARGO_BIN_EXE_gnomon"))
+            .arg("live")
+            .args(arguments)
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            .env("DISPLAY", &self.name)
+            .env_remove("WAYLAND_DISPLAY")
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap()
+    }
+
+    /// What xdotool does; `None` where there is none.
+    fn xdotool(&self, arguments: &[&str]) -> Option<Output> {
+        let run = Command::new("xdotool")
+            .args(arguments)
+            .env("DISPLAY", &self.name)
+            .output();
+        run.ok()
+    }
+
+    /// Waits for the window; `None` where there is no xdotool.
+    fn window(&self) -> Option<String> {
+        let began = Instant::now();
+        while began.elapsed() < SOON {
+            let found = self.xdotool(&["search", "--onlyvisible", "--name", "gnomon"])?;
+            let found = String::from_utf8_lossy(&found.stdout).into_owned();
+            if let Some(window) = found.lines().next() {
+                return Some(window.to_owned());
+            }
+            thread::sleep(Duration::from_millis(100));
+        }
+        panic!("no window opened");
+    }
+}
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        _ = self.server.kill();
+        _ = self.server.wait();
+    }
+}
+
+/// Waits until something is there.
+fn wait_for(what: &str, holds: impl Fn() -> bool) {
+    let began = Instant::now();
+    while !holds() {
+        assert!(began.elapsed() < SOON, "not in time: {what}");
+        thread::sleep(Duration::from_millis(50));
+    }
+}
+
+fn ended(child: Child) -> Output {
+    let id = child.id();
+    let (sender, receiver) = std::sync::mpsc::channel();
+    thread::spawn(move || sender.send(child.wait_with_output()));
+    match receiver.recv_timeout(SOON) {
+        Ok(output) => output.unwrap(),
+        Err(_) => {
+            _ = Command::new("kill").args(["-9", &id.to_string()]).status();
+            panic!("it did not end");
+        }
+    }
+}
+
+fn interrupt(child: &Child) {
+    let id = child.id().to_string();
+    let sent = Command::new("kill").args(["-INT", &id]).status().unwrap();
+    assert!(sent.success());
+}
+
+fn frames_of(recording: &Path) -> usize {
+    let mut source = FrameSource::open(recording.to_str().unwrap()).unwrap();
+    let mut frames = 0;
+    while source.next_frame().unwrap().is_some() {
+        frames += 1;
+    }
+    frames
+}
+
+#[test]
+fn keys_record_and_an_interrupt_leaves_whole_files() {
+    let Some(display) = Display::open() else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let window = display.gnomon(&["config/lamp.toml", "--out", out]);
+    let Some(shown) = display.window() else {
+        eprintln!("skipped in part: there is no xdotool");
+        thread::sleep(Duration::from_secs(5));
+        interrupt(&window);
+        assert!(ended(window).status.success());
+        return;
+    };
+    // No window manager gives it the keyboard.
+    let press = |key: &str| {
+        display.xdotool(&["windowfocus", &shown, "key", key]);
+    };
+    let written = |name: &str| -> PathBuf { folder.path().join(name) };
+    // Before the first picture there is none to save.
+    wait_for("a screenshot", || {
+        press("s");
+        thread::sleep(Duration::from_millis(400));
+        written("picture-001.png").is_file()
+    });
+    press("r");
+    wait_for("a session", || written("session-001/video.mkv").is_file());
+    press("v");
+    wait_for("a video", || written("composite-001.mkv").is_file());
+    for key in ["p", "question", "3", "7", "1", "m", "a", "f"] {
+        press(key);
+        thread::sleep(Duration::from_millis(150));
+    }
+    thread::sleep(Duration::from_secs(2));
+    interrupt(&window);
+    let output = ended(window);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{said}");
+    assert!(
+        said.contains("session-001") && said.contains("composite-001"),
+        "{said}"
+    );
+    assert!(frames_of(&written("session-001")) > 10);
+    assert!(frames_of(&written("composite-001.mkv")) > 10);
+    let picture = image::open(written("picture-001.png")).unwrap();
+    assert_eq!((picture.width(), picture.height()), (640, 480));
+}
+
+#[test]
+fn a_camera_that_is_not_there_is_said_and_no_success() {
+    let Some(display) = Display::open() else {
+        return;
+    };
+    let window = display.gnomon(&["webcam:no such camera"]);
+    thread::sleep(Duration::from_secs(4));
+    interrupt(&window);
+    let output = ended(window);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!output.status.success(), "{said}");
+    assert!(said.contains("camera"), "{said}");
+}
+
+#[test]
+fn without_a_display_there_is_a_message() {
+    let output = Command::new(env!("CARGO_BIN_EXE_gnomon"))
+        .args(["live", "config/lamp.toml"])
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!output.status.success());
+    assert!(
+        said.starts_with("gnomon: the window cannot be opened"),
+        "{said}"
+    );
+}
