@@ -132,8 +132,11 @@ fn help_shows_examples() {
             .unwrap();
         assert!(output.status.success(), "{command}");
         let help = String::from_utf8(output.stdout).unwrap();
-        let example = format!("Example:\n  gnomon {command} ");
-        assert!(help.contains(&example), "{command}: {help}");
+        let shows = ["Example", "Examples"].map(|title| format!("{title}:\n  gnomon {command} "));
+        assert!(
+            shows.iter().any(|example| help.contains(example)),
+            "{command}: {help}"
+        );
     }
 }
 

@@ -111,7 +111,7 @@ mod tests {
             Vec3::new(self.unit(), self.unit(), self.unit()) * size
         }
         fn bounds(&mut self) -> BoxM {
-            let min = self.point(4.0);
+            let min = self.point(3.0);
             let flat = Vec3::from_array([0; 3].map(|_| f32::from(self.unit() > 0.3)));
             BoxM {
                 min,

@@ -35,7 +35,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError};
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Result, anyhow, bail};
 use eframe::egui::ViewportBuilder;
 use winit::event_loop::EventLoop;
 
@@ -100,7 +100,12 @@ pub fn live(request: &Request, stop: &Arc<AtomicBool>) -> Result<()> {
     let title = format!("{} – gnomon", opening.title());
     let event_loop = EventLoop::<eframe::UserEvent>::with_user_event()
         .build()
-        .context("the window cannot be opened (is there a display?)")?;
+        .map_err(|error| {
+            // What comes before its last part is where in winit's source it arose.
+            let error = error.to_string();
+            let reason = error.rsplit(": ").next().unwrap_or_default();
+            anyhow!("the window cannot be opened (is there a display?): {reason}")
+        })?;
     let shared = Shared {
         stop: Arc::clone(stop),
         failure: Arc::clone(&failure),
