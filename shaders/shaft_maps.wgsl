@@ -1,5 +1,5 @@
 // What each source sees of the casters: a tile of the atlas for each. Red: 1 where a caster is; green: how far, from the
-// nearest to the farthest that casters can be; both averaged in the coarser levels.
+// nearest to the farthest that casters can be; blue: its square; all averaged in the coarser levels.
 //!include "source.wgsl"
 
 @group(0) @binding(0) var<storage, read> sources: array<Source>;
@@ -30,5 +30,6 @@ fn see(@location(0) point_in_world: vec3f, @builtin(instance_index) index: u32) 
 
 @fragment
 fn seen(seen: Seen) -> @location(0) vec4f {
-    return vec4f(1.0, (seen.depth - seen.range.x) / seen.range.y, 0.0, 0.0);
+    let depth = (seen.depth - seen.range.x) / seen.range.y;
+    return vec4f(1.0, depth, depth * depth, 0.0);
 }

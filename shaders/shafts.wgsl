@@ -21,10 +21,8 @@ struct Frame {
 @group(2) @binding(6) var map_sampler: sampler;
 
 
-
-
-// `same_part` of surfaces that are casters themselves.
-const SAME_PART: f32 = 0.02;
+// Least variance of depths in a map: a surface hides itself by no more than its own slope.
+const LEAST_SPREAD: f32 = 0.0004;
 
 struct PatchCorner {
     @location(0) position: vec3f,
@@ -73,8 +71,8 @@ fn place_depth(@location(0) position: vec3f) -> @invariant @builtin(position) ve
 }
 
 // Part of a source's light that casters hide from a place, 0 to 1: percentage-closer soft shadows (Fernando 2005) on averaged
-// maps. What lies no farther behind a caster than `same_part` of the map's range is that caster.
-fn hidden(index: u32, point_in_world: vec3f, same_part: f32) -> f32 {
+// maps. Nothing that a map shows lies behind a real surface; a caster is shown itself, with what lies beside and behind it.
+fn hidden(index: u32, point_in_world: vec3f, is_caster: bool) -> f32 {
     let placed = sources[index].map_from_world * vec4f(point_in_world, 1.0);
     let depth = placed.w;
     if depth <= sources[index].near_m {
@@ -85,25 +83,39 @@ fn hidden(index: u32, point_in_world: vec3f, same_part: f32) -> f32 {
         return 0.0;
     }
     let source = sources[index];
-    let blockers = map_at(source, in_tile, source.near_m, depth);
-    if blockers.x < 1e-3 {
+    let around = map_at(source, in_tile, source.near_m, depth);
+    if around.x < 1e-3 {
         return 0.0;
     }
-    let blocker = source.near_m + source.range_m * blockers.y / blockers.x;
-    let behind = (depth - blocker) / source.range_m;
-    if behind <= same_part {
+    let mean = around.y / around.x;
+    let behind = (depth - source.near_m) / source.range_m - mean;
+    if behind <= 0.0 {
         return 0.0;
     }
-    return map_at(source, in_tile, blocker, depth).x * smoothstep(same_part, 2.0 * same_part + 1e-3, behind);
+    if !is_caster {
+        return map_at(source, in_tile, source.near_m + source.range_m * mean, depth).x;
+    }
+    // What lies before the place, as if all else lay at its depth (Yang et al. 2010).
+    let blocker = max(mean - spread_of(around) / behind, 0.0);
+    let seen = map_at(source, in_tile, source.near_m + source.range_m * blocker, depth);
+    let behind_seen = max((depth - source.near_m) / source.range_m - seen.y / max(seen.x, 1e-3), 0.0);
+    let squared = behind_seen * behind_seen;
+    return seen.x * squared / (squared + spread_of(seen));
+}
+
+// Variance of the depths in a map.
+fn spread_of(seen: vec3f) -> f32 {
+    let mean = seen.y / max(seen.x, 1e-3);
+    return max(seen.z / max(seen.x, 1e-3) - mean * mean, LEAST_SPREAD);
 }
 
 // The map around a place, averaged over what the source's extent sees through a caster at a depth.
-fn map_at(source: Source, in_tile: vec2f, caster: f32, depth: f32) -> vec2f {
+fn map_at(source: Source, in_tile: vec2f, caster: f32, depth: f32) -> vec3f {
     let texels = source.spread_m * (depth - caster) / (depth * caster) * source.focal_texels;
     let level = clamp(log2(2.0 * texels), 0.0, log2(source.tile_px));
     let margin = 0.5 * exp2(level) / source.tile_px;
     let inside = clamp(in_tile, vec2f(margin), vec2f(1.0 - margin));
-    return textureSampleLevel(maps, map_sampler, source.tile_corner + inside * source.tile_side, level).xy;
+    return textureSampleLevel(maps, map_sampler, source.tile_corner + inside * source.tile_side, level).xyz;
 }
 
 fn transfer(row: u32, source: u32) -> vec3f {
@@ -117,7 +129,7 @@ fn light_on_patch(surface: PatchSurface) -> Light {
     var taken = -surface.thrown_back;
     for (var place = 0u; place < surface.list.y; place++) {
         let index = lists[surface.list.x + place];
-        let hidden = hidden(index, surface.point_in_world, 0.0);
+        let hidden = hidden(index, surface.point_in_world, false);
         if hidden > 0.0 {
             let arriving = weights.x * transfer(surface.rows.x, index)
                 + weights.y * transfer(surface.rows.y, index)
@@ -142,7 +154,7 @@ fn light_on_virtual(surface: Surface, @builtin(front_facing) outside: bool) -> L
         let distance_squared = dot(way, way);
         let facing = dot(normal, way);
         if facing > 0.0 {
-            let hidden = hidden(index, point_in_world, SAME_PART);
+            let hidden = hidden(index, point_in_world, true);
             let spread = 2.0 * sources[index].spread_m * sources[index].spread_m;
             taken += hidden * sources[index].intensity * facing * inverseSqrt(distance_squared) / (distance_squared + spread);
         }

@@ -195,11 +195,11 @@ impl Prepared {
 
     /// Irradiance of a place that surfels cover, from patches of which `left` knows the part of their light that the
     /// casters' shadows leave.
-    pub fn hidden_among(
+    pub fn hidden_among<'a>(
         &self,
         place: Vec3,
         normal: Vec3,
-        surfels: &[LitSurfel],
+        surfels: impl IntoIterator<Item = &'a LitSurfel>,
         left: &[Option<f32>],
     ) -> Vec3 {
         let start = place + normal * SURFEL_OFFSET_M;
@@ -213,7 +213,7 @@ impl Prepared {
                 None => Vec3::ZERO,
             }
         };
-        surfels.iter().map(covered).sum()
+        surfels.into_iter().map(covered).sum()
     }
 
     /// For patches with their middle in a ball the part of their light that `caster` leaves them, `None` for others.

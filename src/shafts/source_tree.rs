@@ -42,6 +42,12 @@ impl BoxM {
         self.min.cmple(other.max).all() && self.max.cmpge(other.min).all()
     }
 
+    /// How far the two are apart; 0 where they touch.
+    pub fn distance(&self, other: &Self) -> f32 {
+        let apart = (self.min - other.max).max(other.min - self.max);
+        apart.max(Vec3::ZERO).length()
+    }
+
     /// Length of the diagonal.
     pub fn diagonal(&self) -> f32 {
         self.min.distance(self.max)

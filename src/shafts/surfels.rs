@@ -6,6 +6,12 @@ use std::f32::consts::PI;
 use glam::Vec3;
 
 use super::light_of_room::points_on;
+use super::source_tree::BoxM;
+
+/// Neighbours in a group.
+const GROUP: usize = 8;
+/// A group is seen as one disc from so many of its radii.
+const SEEN_AS_ONE: f32 = 5.0;
 
 /// Cells along a side of the octahedron's map of all directions.
 const CELLS: usize = 8;
@@ -72,6 +78,75 @@ impl LitSurfel {
         match part > 0.0 && is_open(self.open, place - self.surfel.position) {
             true => part,
             false => 0.0,
+        }
+    }
+}
+
+/// Surfels, and discs that stand for groups of neighbours where they are seen from afar.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroupedSurfels {
+    surfels: Vec<LitSurfel>,
+    groups: Vec<Group>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Group {
+    whole: LitSurfel,
+    radius: f32,
+}
+
+impl GroupedSurfels {
+    /// Groups surfels that lie beside each other in their order.
+    pub fn new(surfels: Vec<LitSurfel>) -> Self {
+        let groups = surfels.chunks(GROUP).map(Group::new).collect();
+        Self { surfels, groups }
+    }
+
+    /// All of them.
+    pub fn all(&self) -> &[LitSurfel] {
+        &self.surfels
+    }
+
+    /// What gives all places in a box about the light that all of them give.
+    pub fn seen_from(&self, bounds: BoxM) -> impl Iterator<Item = &LitSurfel> {
+        let chunks = self.surfels.chunks(GROUP).zip(&self.groups);
+        chunks.flat_map(move |(surfels, group)| {
+            let middle = group.whole.surfel.position;
+            let distance = bounds.distance(&BoxM::around([middle]));
+            match distance > SEEN_AS_ONE * group.radius {
+                true => std::slice::from_ref(&group.whole),
+                false => surfels,
+            }
+        })
+    }
+}
+
+impl Group {
+    fn new(surfels: &[LitSurfel]) -> Self {
+        let area: f32 = surfels.iter().map(|lit| lit.surfel.area).sum();
+        let mean = |of: &dyn Fn(&LitSurfel) -> Vec3| {
+            let sum: Vec3 = surfels.iter().map(|lit| of(lit) * lit.surfel.area).sum();
+            sum / area.max(f32::MIN_POSITIVE)
+        };
+        let position = mean(&|lit| lit.surfel.position);
+        let normal = mean(&|lit| lit.surfel.normal);
+        let farthest = surfels
+            .iter()
+            .map(|lit| lit.surfel.position.distance(position))
+            .fold(0.0, f32::max);
+        Self {
+            whole: LitSurfel {
+                surfel: Surfel {
+                    position,
+                    normal: normal.normalize_or_zero(),
+                    // Discs that look apart show less of themselves.
+                    area: area * normal.length(),
+                    albedo: mean(&|lit| lit.surfel.albedo),
+                },
+                open: surfels.iter().fold(0, |open, lit| open | lit.open),
+                radiance: mean(&|lit| lit.radiance),
+            },
+            radius: farthest + (area / surfels.len() as f32 / PI).sqrt(),
         }
     }
 }

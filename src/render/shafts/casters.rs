@@ -11,14 +11,14 @@ use crate::scene::{Object, Scene};
 use crate::shafts::prepared::Prepared;
 use crate::shafts::selection::Representative;
 use crate::shafts::source_tree::BoxM;
-use crate::shafts::surfels::{LitSurfel, Surfel, open_directions, surfels};
+use crate::shafts::surfels::{GroupedSurfels, LitSurfel, Surfel, open_directions, surfels};
 
 use super::maps::Ball;
 
 /// How far outlines may move for fewer triangles, in parts of a thing's size.
 const COARSE_PART: f64 = 0.004;
 /// Surfels of all things together.
-const SURFELS: usize = 128;
+const SURFELS: usize = 512;
 /// Rays that gather the light of a surfel.
 const RAYS: usize = 48;
 
@@ -149,7 +149,7 @@ impl PlacedCasters {
         room: &Prepared,
         sources: &[(Representative, Vec3)],
         left: &[Option<f32>],
-    ) -> Vec<LitSurfel> {
+    ) -> GroupedSurfels {
         let caster = &self.caster;
         let hides = |start, direction| caster.is_hidden(start, direction, f32::INFINITY);
         let shares = on_all_cores(self.surfels.len(), |range| {
@@ -163,21 +163,14 @@ impl PlacedCasters {
             };
             self.surfels[range].iter().map(lit).collect::<Vec<_>>()
         });
-        shares.into_iter().flatten().collect()
+        GroupedSurfels::new(shares.concat())
     }
 
     /// Into how many parts a patch's edges are to be cut, so that what the casters throw on it is smooth within each part.
     pub fn parts(&self, corners: [Vec3; 3]) -> u32 {
         let patch = BoxM::around(corners);
-        let distance = |bounds: &BoxM| {
-            let apart = (bounds.min - patch.max).max(patch.min - bounds.max);
-            apart.max(Vec3::ZERO).length()
-        };
-        let nearest = self
-            .boxes
-            .iter()
-            .map(distance)
-            .fold(f32::INFINITY, f32::min);
+        let distances = self.boxes.iter().map(|bounds| bounds.distance(&patch));
+        let nearest = distances.fold(f32::INFINITY, f32::min);
         let part = (PART_OF_DISTANCE * nearest).max(SMALLEST_PART_M);
         ((patch.diagonal() / part).ceil() as u32).clamp(1, MOST_PARTS)
     }

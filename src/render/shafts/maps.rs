@@ -8,10 +8,10 @@ use crate::shafts::selection::Representative;
 use super::super::shader;
 use super::data::{PLACE_LAYOUT, Source};
 
-/// How far a caster covers, and how much of it there is.
-const MAP_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg16Float;
+/// Whether there is a caster, how far off, and that squared.
+const MAP_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-/// Side of the largest atlas, pixels: 64 MiB with its levels and 64 of depth.
+/// Side of the largest atlas, pixels: 171 MiB with its levels and 64 of depth.
 const LARGEST_ATLAS_PX: u32 = 4096;
 /// Penumbras reach at most this many times the casters' size beyond their outline in a map.
 const WIDEST_MARGIN: f32 = 2.0;

@@ -4,6 +4,7 @@
 //! What depends on where things are in the world is worked out when they move, not when the camera does.
 
 mod casters;
+mod corners;
 mod data;
 mod maps;
 mod pipelines;
@@ -22,13 +23,14 @@ use crate::shafts::patches::PatchVertex;
 use crate::shafts::prepared::Prepared;
 use crate::shafts::selection::{Representative, representatives};
 use crate::shafts::source_tree::BoxM;
-use crate::shafts::surfels::{LitSurfel, thrown_back, thrown_on_caster};
+use crate::shafts::surfels::{GroupedSurfels, thrown_back, thrown_on_caster};
 
 use super::anchor_geometry::Role;
 use super::gpu::Gpu;
 use super::stage::Stage;
 use casters::{PlacedCasters, ShaftCasters};
-use data::{Frame, PatchCorner, Source, packed};
+use corners::{Notice, Noticing};
+use data::{Frame, Source, packed};
 use maps::{Maps, Tiling, source};
 use pipelines::Pipelines;
 
@@ -74,7 +76,7 @@ struct Hidden {
     boxes: Vec<BoxM>,
     noticing: BoxM,
     /// What the casters throw back.
-    surfels: Vec<LitSurfel>,
+    surfels: GroupedSurfels,
     /// Whether the maps show it.
     is_drawn: bool,
 }
@@ -153,7 +155,7 @@ impl Shafts {
                 .map(|placed| self.hide(gpu, &placed));
             let volume = &self.room.volume;
             stage.set_indirect(&gpu.queue, &world_from_anchor, |place, normal| {
-                let surfels = self.hidden.iter().flat_map(|hidden| &hidden.surfels[..]);
+                let surfels = self.hidden.iter().flat_map(|hidden| hidden.surfels.all());
                 volume.radiance(place).irradiance(normal) + thrown_on_caster(place, normal, surfels)
             });
             self.world_from_anchor = world_from_anchor;
@@ -257,7 +259,6 @@ impl Shafts {
         let among_m = NEAREST_SOURCE * placed.ball.radius;
         let left = room.left_by(&placed.caster, placed.ball.center, among_m);
         let surfels = placed.lit_surfels(room, &detailed, &left);
-        let row_of = |vertex: u32| vertices.binary_search(&vertex).unwrap_or(0) as u32;
         let irradiances: Vec<Vec4> = vertices
             .iter()
             .map(|&vertex| room.irradiance[vertex as usize].extend(0.0))
@@ -268,48 +269,22 @@ impl Shafts {
             .map(|(left, patch)| {
                 let (place, normal) = (room.patches.center(patch), room.patches.normal(patch));
                 let before = room.irradiance[patch.vertices[0] as usize].element_sum();
-                let back = || thrown_back(place, normal, &surfels).element_sum();
+                let seen = || surfels.seen_from(BoxM::around([place]));
+                let back = || thrown_back(place, normal, seen()).element_sum();
                 left.map(|left| (left + back() / before.max(f32::MIN_POSITIVE)).min(1.0))
             })
             .collect();
         let lost_nearby = lost_nearby(room, &vertices, &surfels, &refilled);
-        let mut lists: Vec<u32> = Vec::new();
-        let mut corners: Vec<PatchCorner> = Vec::new();
-        for &patch in &noticing {
-            let patch = &room.patches.patches[patch];
-            let rows = patch.vertices.map(row_of);
-            let places = room.patches.corners(patch);
-            let normal = room.patches.normal(patch);
-            let first = lists.len();
-            lists.extend((0..sources.len()).filter_map(|index| {
-                let arrives =
-                    |&row: &u32| transfers[row as usize * sources.len() + index] != [0, 0];
-                let may_fall = rows.iter().any(arrives) && sources[index].may_shade(places);
-                may_fall.then_some(index as u32)
-            }));
-            let list = [first as u32, (lists.len() - first) as u32];
-            let before = corners.len();
-            corners.extend(parts(placed.parts(places)).map(|weights| {
-                let [a, b] = weights;
-                let c = 1.0 - a - b;
-                let position = places[0] * a + places[1] * b + places[2] * c;
-                let [at_a, at_b, at_c] = rows.map(|row| lost_nearby[row as usize]);
-                let lost = at_a * a + at_b * b + at_c * c;
-                PatchCorner {
-                    position,
-                    rows,
-                    weights,
-                    list,
-                    thrown_back: thrown_back(position, normal, &surfels) - lost,
-                }
-            }));
-            let least = rows.map(|row| irradiances[row as usize].truncate() * LEAST_WEIGHT);
-            let least = least.into_iter().fold(Vec3::MAX, Vec3::min);
-            let gains = |corner: &PatchCorner| corner.thrown_back.abs().cmpgt(least).any();
-            if list[1] == 0 && !corners[before..].iter().any(gains) {
-                corners.truncate(before);
-            }
+        let Noticing { corners, lists } = Notice {
+            room,
+            casters: placed,
+            vertices: &vertices,
+            sources: &sources,
+            transfers: &transfers,
+            surfels: &surfels,
+            lost_nearby: &lost_nearby,
         }
+        .noticing(&noticing);
 
         let device = &gpu.device;
         // A binding cannot be empty.
@@ -425,33 +400,18 @@ impl Shafts {
 fn lost_nearby(
     room: &Prepared,
     vertices: &[u32],
-    surfels: &[LitSurfel],
+    surfels: &GroupedSurfels,
     left: &[Option<f32>],
 ) -> Vec<Vec3> {
     let shares = on_all_cores(vertices.len(), |range| {
         let hidden = |&vertex: &u32| {
             let PatchVertex { position, normal } = room.patches.vertices[vertex as usize];
-            room.hidden_among(position, normal, surfels, left) + room.lost_at(vertex, left)
+            let seen = surfels.seen_from(BoxM::around([position]));
+            room.hidden_among(position, normal, seen, left) + room.lost_at(vertex, left)
         };
         vertices[range].iter().map(hidden).collect::<Vec<_>>()
     });
     shares.concat()
-}
-
-/// Cuts a triangle's edges into parts and returns the corners of all small triangles, three each, as the weights of its
-/// first two corners.
-fn parts(count: u32) -> impl Iterator<Item = [f32; 2]> {
-    let corner = move |column: u32, row: u32| [column, row].map(|at| at as f32 / count as f32);
-    let cell = move |row: u32, column: u32| {
-        let upright = [[column, row], [column + 1, row], [column, row + 1]];
-        let turned = [[column + 1, row], [column + 1, row + 1], [column, row + 1]];
-        let fits = column + row + 1 < count;
-        let corners = upright
-            .into_iter()
-            .chain(turned.into_iter().filter(move |_| fits));
-        corners.map(move |[column, row]| corner(column, row))
-    };
-    (0..count).flat_map(move |row| (0..count - row).flat_map(move |column| cell(row, column)))
 }
 
 /// For each vertex and each representative the irradiance that hidden sources would take, packed.

@@ -1,0 +1,174 @@
+//! The patches that may notice the casters, cut finely enough for what the casters throw on them.
+
+use glam::Vec3;
+
+use crate::light::cores::on_all_cores;
+use crate::shafts::prepared::Prepared;
+use crate::shafts::source_tree::BoxM;
+use crate::shafts::surfels::{GroupedSurfels, LitSurfel, thrown_back};
+
+use super::LEAST_WEIGHT;
+use super::casters::PlacedCasters;
+use super::data::{PatchCorner, Source};
+
+/// What patches are told of the casters.
+pub(super) struct Notice<'a> {
+    pub room: &'a Prepared,
+    pub casters: &'a PlacedCasters,
+    /// Of all patches that may notice, sorted: the rows of what follows.
+    pub vertices: &'a [u32],
+    pub sources: &'a [Source],
+    /// Light from each source at each vertex, packed; rows of as many as there are sources.
+    pub transfers: &'a [[u32; 2]],
+    pub surfels: &'a GroupedSurfels,
+    /// Irradiance that each vertex loses from patches among the casters.
+    pub lost_nearby: &'a [Vec3],
+}
+
+/// Patches that do notice.
+#[derive(Default)]
+pub(super) struct Noticing {
+    /// Three for each part of a patch.
+    pub corners: Vec<PatchCorner>,
+    /// Numbers of sources, which the corners refer to.
+    pub lists: Vec<u32>,
+}
+
+impl Notice<'_> {
+    /// The corners of some patches, those left out that neither a shadow reaches nor light that shows.
+    pub fn noticing(&self, patches: &[usize]) -> Noticing {
+        let shares = on_all_cores(patches.len(), |range| {
+            let mut share = Noticing::default();
+            for &patch in &patches[range] {
+                self.add(patch, &mut share);
+            }
+            share
+        });
+        let mut all = Noticing::default();
+        for share in shares {
+            let first = all.lists.len() as u32;
+            all.lists.extend(share.lists);
+            all.corners
+                .extend(share.corners.into_iter().map(|corner| PatchCorner {
+                    list: [first + corner.list[0], corner.list[1]],
+                    ..corner
+                }));
+        }
+        all
+    }
+
+    fn add(&self, patch: usize, to: &mut Noticing) {
+        let room = self.room;
+        let patch = &room.patches.patches[patch];
+        let row = |vertex: u32| self.vertices.binary_search(&vertex).unwrap_or(0) as u32;
+        let rows = patch.vertices.map(row);
+        let places = room.patches.corners(patch);
+        let normal = room.patches.normal(patch);
+        let first = to.lists.len();
+        let count = self.sources.len();
+        to.lists.extend((0..count).filter_map(|index| {
+            let arrives = |&row: &u32| self.transfers[row as usize * count + index] != [0, 0];
+            let may_fall = rows.iter().any(arrives) && self.sources[index].may_shade(places);
+            may_fall.then_some(index as u32)
+        }));
+        let list = [first as u32, (to.lists.len() - first) as u32];
+        let lost = rows.map(|row| self.lost_nearby[row as usize]);
+        let seen = self.surfels.seen_from(BoxM::around(places));
+        let surfels: Vec<LitSurfel> = seen.copied().collect();
+        let grid = Grid {
+            count: self.casters.parts(places),
+        };
+        let corners: Vec<PatchCorner> = grid
+            .weights()
+            .map(|[a, b]| {
+                let c = 1.0 - a - b;
+                let mean = |[at_a, at_b, at_c]: [Vec3; 3]| at_a * a + at_b * b + at_c * c;
+                let position = mean(places);
+                PatchCorner {
+                    position,
+                    rows,
+                    weights: [a, b],
+                    list,
+                    thrown_back: thrown_back(position, normal, &surfels) - mean(lost),
+                }
+            })
+            .collect();
+        let least = patch
+            .vertices
+            .map(|vertex| room.irradiance[vertex as usize] * LEAST_WEIGHT);
+        let least = least.into_iter().fold(Vec3::MAX, Vec3::min);
+        let gains = |corner: &PatchCorner| corner.thrown_back.abs().cmpgt(least).any();
+        if list[1] > 0 || corners.iter().any(gains) {
+            let triangles = grid.triangles().flatten();
+            to.corners.extend(triangles.map(|index| corners[index]));
+        }
+    }
+}
+
+/// A triangle whose edges are cut into parts.
+struct Grid {
+    count: u32,
+}
+
+impl Grid {
+    /// The weights of the triangle's first two corners at all points, row by row.
+    fn weights(&self) -> impl Iterator<Item = [f32; 2]> {
+        let count = self.count;
+        let point = move |column: u32, row: u32| [column, row].map(|at| at as f32 / count as f32);
+        (0..=count).flat_map(move |row| (0..=count - row).map(move |column| point(column, row)))
+    }
+
+    /// The points of all small triangles, wound as the large one.
+    fn triangles(&self) -> impl Iterator<Item = [usize; 3]> {
+        let count = self.count as usize;
+        // The rows above have one point more each than the one below them.
+        let index = move |column: usize, row: usize| {
+            row * (count + 1) - row * row.saturating_sub(1) / 2 + column
+        };
+        let cell = move |row: usize, column: usize| {
+            let upright = [
+                index(column, row),
+                index(column + 1, row),
+                index(column, row + 1),
+            ];
+            let turned = (column + row + 1 < count).then(|| {
+                [
+                    index(column + 1, row),
+                    index(column + 1, row + 1),
+                    index(column, row + 1),
+                ]
+            });
+            std::iter::once(upright).chain(turned)
+        };
+        (0..count).flat_map(move |row| (0..count - row).flat_map(move |column| cell(row, column)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cut_triangle_is_covered_once_by_parts_wound_as_itself() {
+        for count in 1..7 {
+            let grid = Grid { count };
+            let weights: Vec<[f32; 2]> = grid.weights().collect();
+            assert_eq!(weights.len() as u32, (count + 1) * (count + 2) / 2);
+            let triangles: Vec<[usize; 3]> = grid.triangles().collect();
+            assert_eq!(triangles.len() as u32, count * count);
+            let mut middles: Vec<[i64; 2]> = triangles
+                .iter()
+                .map(|triangle| {
+                    let [a, b, c] = triangle.map(|index| weights[index]);
+                    let doubled = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+                    let cell = 1.0 / (count * count) as f32;
+                    assert!((doubled - cell).abs() < 1e-5, "{count} {doubled}");
+                    [0, 1].map(|axis| ((a[axis] + b[axis] + c[axis]) * count as f32).round() as i64)
+                })
+                .collect();
+            middles.sort_unstable();
+            middles.dedup();
+            assert_eq!(middles.len(), triangles.len());
+        }
+    }
+}
