@@ -68,9 +68,9 @@ fn hold_room(folder: &Path) {
             assert!(e.change_real <= change_real, "{sources:?}: shadow: {e:?}");
             assert!(e.factor <= factor * 4.0 / 3.0, "{sources:?}: factor: {e:?}");
             assert!(e.residual_virtual <= 0.2, "{sources:?}: shading: {e:?}");
-            // Faint light from everywhere leaves little alone.
+            // Faint shadows reach everywhere, but they are faint.
             assert!(
-                e.untouched_wrong == 0 && e.untouched_pct > 1.0,
+                e.alone_wrong_pct <= 0.05 && e.untouched_wrong == 0,
                 "{sources:?}: what nothing virtual touches: {e:?}"
             );
         }

@@ -15,6 +15,8 @@ use crate::scene::Anchor;
 pub const FACES_AWAY: u8 = 4;
 /// Pixels that the truth changes by more than this many levels count as changed.
 const CHANGED_LEVELS: f64 = 2.0;
+/// Pixels that the truth changes by less than this many levels are left alone.
+const ALONE_LEVELS: f64 = 0.5;
 /// A true factor below this darkens.
 const DARKENED: f64 = 0.995;
 
@@ -43,6 +45,8 @@ pub struct Errors {
     pub untouched_pct: f64,
     /// How many of them changed.
     pub untouched_wrong: usize,
+    /// Real pixels that change by more than two levels, percent of those that the truth leaves alone.
+    pub alone_wrong_pct: f64,
 }
 
 /// The errors of one light's shadow.
@@ -180,11 +184,13 @@ pub fn compare(frame: u32, truth: &Truth, drawn: &Drawn) -> Result<Errors> {
     let out = Picture::from_rgba(width, &drawn.out);
     let bare = Picture::from_rgba(width, &drawn.bare);
     let change = truth.with.minus(&truth.without);
-    let changed: Vec<bool> = change
-        .pixels
-        .iter()
-        .map(|pixel| pixel.iter().any(|value| value.abs() > CHANGED_LEVELS))
-        .collect();
+    let largest = |pixel: &[f64; 3]| {
+        pixel
+            .iter()
+            .fold(0.0_f64, |most, value| most.max(value.abs()))
+    };
+    let changed = change.pixels.iter().map(largest);
+    let changed: Vec<bool> = changed.map(|levels| levels > CHANGED_LEVELS).collect();
     let inner_real = inner(&real, width);
     let on_real = both(&inner_real, &changed);
     let on_virtual = both(&inner(&seeming, width), &changed);
@@ -220,6 +226,12 @@ pub fn compare(frame: u32, truth: &Truth, drawn: &Drawn) -> Result<Errors> {
         .collect();
     let pixel = |rgba: &[u8], i: usize| [rgba[4 * i], rgba[4 * i + 1], rgba[4 * i + 2]];
     let has_changed = |&&i: &&usize| pixel(&drawn.out, i) != pixel(&drawn.bare, i);
+    let alone: Vec<usize> = (0..count)
+        .filter(|&i| real[i] && largest(&change.pixels[i]) < ALONE_LEVELS)
+        .collect();
+    let drawn_change = out.minus(&bare);
+    let moves = |&&i: &&usize| largest(&drawn_change.pixels[i]) > CHANGED_LEVELS;
+    let alone_wrong = alone.iter().filter(moves).count();
     Ok(Errors {
         frame,
         role_pct: 100.0 * role_wrong as f64 / either.max(1) as f64,
@@ -234,6 +246,7 @@ pub fn compare(frame: u32, truth: &Truth, drawn: &Drawn) -> Result<Errors> {
             .with_context(|| format!("frame {frame}: the truth shows no virtual thing"))?,
         untouched_pct: 100.0 * untouched.len() as f64 / count as f64,
         untouched_wrong: untouched.iter().filter(has_changed).count(),
+        alone_wrong_pct: 100.0 * alone_wrong as f64 / alone.len().max(1) as f64,
     })
 }
 
