@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use glam::DVec3;
 
+use crate::app::check_room::{self, room_lines};
 use crate::geometry::levels::{Level, levels};
 use crate::geometry::mesh::MeshReport;
 use crate::geometry::outline_scale::largest_stretch;
@@ -65,6 +66,13 @@ pub fn summary(scene: &Scene) -> String {
         "ambient",
         &format!("radiance {}", vector(scene.ambient_radiance)),
     );
+    for (label, told) in scene
+        .probe
+        .iter()
+        .flat_map(|probe| room_lines(scene, probe))
+    {
+        line(&mut text, label, &told);
+    }
     let (technique, reason) = scene.chosen_technique();
     line(
         &mut text,
@@ -124,7 +132,7 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
             object.visible && object.casts && object.mesh_report.closed && object.anchor == 0
         })
         .collect();
-    let mut warnings = Vec::new();
+    let mut warnings = check_room::warnings(scene);
     for (number, light) in scene.lights.iter().enumerate() {
         let Light::Point { position_m, .. } = light else {
             continue;

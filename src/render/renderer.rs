@@ -21,7 +21,6 @@ use super::gpu_clock::{GpuClock, GpuTimes, Stretch};
 use super::layers::{LayerPasses, Layers};
 use super::readback::Readback;
 use super::shafts::Shafts;
-use super::shafts::room::prepare;
 use super::stage::Stage;
 use super::touched::Touched;
 use super::volumes::{Among, set_scissor};
@@ -129,13 +128,10 @@ impl Renderer {
             let mut materials = object.materials.iter();
             materials.any(|material| material.roughness.is_some())
         });
-        let room = match (scene.chosen_technique().0, &scene.probe) {
-            (Technique::Shafts, Some(probe)) => Some(Arc::new(prepare(scene, probe))),
-            _ => None,
-        };
-        let shafts = room.map(|room| {
+        let is_shafts = scene.chosen_technique().0 == Technique::Shafts;
+        let shafts = scene.probe.as_ref().filter(|_| is_shafts).map(|probe| {
             let targets = Targets::new(&gpu, &background, samples);
-            (Shafts::new(&gpu, scene, room, &stage), targets)
+            (Shafts::new(&gpu, scene, probe, &stage), targets)
         });
         let is_direct = samples == 1 && scene.lights.len() == 1 && shafts.is_none();
         Ok(Self {
@@ -181,8 +177,9 @@ impl Renderer {
     /// elsewhere, are shown or hidden. Light that surroundings throw back is not gathered anew. False where more has
     /// changed: that takes a new renderer.
     pub fn follow(&mut self, scene: &Scene) -> bool {
-        // Shafts hold their own idea of what stands where.
-        let follows = self.shafts.is_none() && self.made_for == Shape::of(scene);
+        let same_room = |(shafts, _): &mut (Shafts, Targets)| shafts.follow(scene);
+        let follows =
+            self.made_for == Shape::of(scene) && self.shafts.as_mut().is_none_or(same_room);
         if follows {
             self.stage.follow(&self.gpu, scene);
             self.stale = PixelRect::whole(self.size_px);

@@ -4,9 +4,10 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 /// Radiance over all directions: coefficients of the real harmonics of degree 0, 1 and 2.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Radiance9(pub [Vec3; 9]);
 
 /// The real harmonics in a unit direction.

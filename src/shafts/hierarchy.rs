@@ -1,17 +1,19 @@
 //! The hierarchy of shafts (Gibson et al. 2003, sections 6 and 6.1): which sources a box may hide from which receivers.
 
+use serde::{Deserialize, Serialize};
+
 use super::receiver_tree::ReceiverTree;
 use super::shaft::{ShaftPlane, planes};
 use super::source_tree::{BoxM, SourceTree};
 
 /// All shafts, each followed by those that it is cut into.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Hierarchy {
     shafts: Vec<Shaft>,
     planes: Vec<ShaftPlane>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Shaft {
     source: u32,
     receiver: u32,

@@ -4,6 +4,7 @@
 use std::f32::consts::PI;
 
 use glam::{UVec3, Vec3};
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::ray_caster::RayCaster;
 use crate::light::cores::on_all_cores;
@@ -20,7 +21,7 @@ const MOST_POINTS: u32 = 16;
 const MOST_BACKS: f32 = 0.25;
 
 /// The grid.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct IrradianceVolume {
     bounds: BoxM,
     points: UVec3,
@@ -62,6 +63,14 @@ impl IrradianceVolume {
         );
         self.bounds.min
             + (self.bounds.max - self.bounds.min) * place.as_vec3() / (self.points - 1).as_vec3()
+    }
+
+    /// Whether all of a box lies within.
+    pub fn holds(&self, bounds: &BoxM) -> bool {
+        let holds = |corner: Vec3| {
+            self.bounds.min.cmple(corner).all() && self.bounds.max.cmpge(corner).all()
+        };
+        holds(bounds.min) && holds(bounds.max)
     }
 
     /// Radiance around a place, between the points of the grid; beyond it that of its edge.

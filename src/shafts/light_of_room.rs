@@ -5,6 +5,7 @@
 use std::f32::consts::{PI, TAU};
 
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::ray_caster::RayCaster;
 use crate::light::cores::on_all_cores;
@@ -49,7 +50,7 @@ impl PlacedProbe<'_> {
 }
 
 /// Light that a patch sends out, and what it reflects.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PatchLight {
     /// Linear RGB.
     pub radiance: Vec3,

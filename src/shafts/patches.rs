@@ -3,6 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::bounds::Bounds;
 
@@ -18,7 +19,7 @@ pub struct RoomTriangle {
 }
 
 /// A corner of patches: of all those that share its place, normal and piece.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PatchVertex {
     /// Metres.
     pub position: Vec3,
@@ -27,7 +28,7 @@ pub struct PatchVertex {
 }
 
 /// A triangle that sends and receives light as one.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Patch {
     /// Indices of its corners among the vertices, counter-clockwise.
     pub vertices: [u32; 3],
@@ -38,7 +39,7 @@ pub struct Patch {
 }
 
 /// The room in patches. Neighbours meet in whole edges: there is no gap between them.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Patches {
     /// Shared corners.
     pub vertices: Vec<PatchVertex>,

@@ -3,6 +3,7 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::bounds::Bounds;
 use crate::geometry::ray_caster::RayCaster;
@@ -34,6 +35,7 @@ pub struct Options {
 }
 
 /// What is known of a room.
+#[derive(Serialize, Deserialize)]
 pub struct Prepared {
     /// The room, the table and the phantoms.
     pub patches: Patches,
@@ -56,7 +58,12 @@ pub struct Prepared {
     /// The light where virtual things may be.
     pub volume: IrradianceVolume,
     /// The patches' triangles.
+    #[serde(skip, default = "no_triangles")]
     pub caster: RayCaster,
+}
+
+fn no_triangles() -> RayCaster {
+    RayCaster::new(&[])
 }
 
 /// Spacing of the irradiance volume's grid, metres.
@@ -122,13 +129,7 @@ impl Prepared {
         let receivers = ReceiverTree::new(&patches, options.receivers_per_leaf);
         let hierarchy = Hierarchy::new(&sources, &receivers, &arriving, options.least_part as f32);
         let radiance: Vec<Vec3> = light.iter().map(|light| light.radiance).collect();
-        let volume = IrradianceVolume::new(
-            around(things, VOLUME_MARGIN_M),
-            VOLUME_SPACING_M,
-            &patches,
-            &caster,
-            &radiance,
-        );
+        let volume = volume_around(things, &patches, &caster, &radiance);
         Self {
             source_radiance: sender_radiance[..source_count].to_vec(),
             patches,
@@ -142,6 +143,22 @@ impl Prepared {
             volume,
             caster,
         }
+    }
+
+    /// Ready for rays again, after it was read.
+    pub fn with_caster(self) -> Self {
+        let patches = self.patches.patches.iter();
+        let corners: Vec<[Vec3; 3]> = patches.map(|patch| self.patches.corners(patch)).collect();
+        Self {
+            caster: RayCaster::new(&corners),
+            ..self
+        }
+    }
+
+    /// The light where other things are, or are now.
+    pub fn gather_volume(&mut self, things: &[Bounds]) {
+        let radiance: Vec<Vec3> = self.light.iter().map(|light| light.radiance).collect();
+        self.volume = volume_around(things, &self.patches, &self.caster, &radiance);
     }
 
     /// Marks what things in boxes may hide, and who may notice.
@@ -369,6 +386,16 @@ fn source_set(
     });
     let others = order.split_off(enough.count());
     (order, others)
+}
+
+fn volume_around(
+    things: &[Bounds],
+    patches: &Patches,
+    caster: &RayCaster,
+    radiance: &[Vec3],
+) -> IrradianceVolume {
+    let bounds = around(things, VOLUME_MARGIN_M);
+    IrradianceVolume::new(bounds, VOLUME_SPACING_M, patches, caster, radiance)
 }
 
 fn around(things: &[Bounds], margin_m: f64) -> BoxM {

@@ -1,12 +1,13 @@
 //! The receivers of light in an octree with several patches to a leaf (Gibson et al. 2003, section 6).
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use super::patches::Patches;
 use super::source_tree::BoxM;
 
 /// A node: the patches `first..last` in the tree's order.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReceiverNode {
     pub first: u32,
     pub last: u32,
@@ -18,7 +19,7 @@ pub struct ReceiverNode {
 }
 
 /// The tree; the root is node 0.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ReceiverTree {
     /// Children come after their parents.
     pub nodes: Vec<ReceiverNode>,

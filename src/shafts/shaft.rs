@@ -1,9 +1,11 @@
 //! A shaft: all lines from one box to another (Haines & Wallace 1994, Haines 2000).
 
+use serde::{Deserialize, Serialize};
+
 use super::source_tree::BoxM;
 
 /// A plane along one axis: the points where `normal · (u, v) + offset >= 0` may lie in the shaft.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ShaftPlane {
     /// The axis that the plane is parallel to: 0 x, 1 y, 2 z.
     pub axis: u32,

@@ -1,6 +1,7 @@
 //! The sources of light in a kd-tree down to one patch (Gibson et al. 2003, section 6).
 
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 
 /// A source of light before it has its place in the tree.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,7 +17,7 @@ pub struct Source {
 }
 
 /// A box, metres.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BoxM {
     /// Smallest coordinates.
     pub min: Vec3,
@@ -55,7 +56,7 @@ impl BoxM {
 }
 
 /// A node: the sources `first..last` in the tree's order.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SourceNode {
     /// First source.
     pub first: u32,
@@ -68,7 +69,7 @@ pub struct SourceNode {
 }
 
 /// The tree; the root is node 0.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct SourceTree {
     /// All nodes; children come after their parents.
     pub nodes: Vec<SourceNode>,

@@ -3,6 +3,7 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::ray_caster::RayCaster;
 use crate::light::cores::on_all_cores;
@@ -20,7 +21,7 @@ const RAYS_PER_FORM_FACTOR: f32 = 4000.0;
 const INSET_M: f32 = 5e-4;
 
 /// Visible form factors from receiver vertices to senders.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Transfers {
     sender_count: usize,
     /// Row by row, a row for each vertex.

@@ -19,6 +19,8 @@ use super::maps::Ball;
 const COARSE_PART: f64 = 0.004;
 /// Surfels of all things together.
 const SURFELS: usize = 512;
+/// Surfels of each thing at least.
+const LEAST_SURFELS: usize = 16;
 /// Rays that gather the light of a surfel.
 const RAYS: usize = 48;
 
@@ -29,15 +31,21 @@ const MOST_PARTS: u32 = 10;
 
 /// A virtual thing that hides light.
 struct Caster {
+    /// Simplified, in its own space, with albedos.
+    coarse: Vec<([Vec3; 3], Vec3)>,
     anchor: usize,
-    /// In the anchor's space.
+    /// In the anchor's space; none while it is not visible.
     triangles: Vec<[Vec3; 3]>,
     surfels: Vec<Surfel>,
 }
 
-/// All virtual things that hide light.
+/// All virtual things that hide light when they are visible.
 pub(super) struct ShaftCasters {
     casters: Vec<Caster>,
+}
+
+fn casting(scene: &Scene) -> impl Iterator<Item = &Object> {
+    scene.virtuals.iter().filter(|object| object.casts)
 }
 
 /// The casters where they are in a frame, world space.
@@ -52,16 +60,19 @@ pub(super) struct PlacedCasters {
 
 impl ShaftCasters {
     pub fn new(scene: &Scene) -> Self {
-        let casting = || {
-            scene
-                .virtuals
-                .iter()
-                .filter(|object| object.visible && object.casts)
+        let mut casters = Self {
+            casters: casting(scene).map(Caster::new).collect(),
         };
-        let share = SURFELS / casting().count().max(1);
-        let casters = casting().map(|object| caster(object, share.max(16)));
-        Self {
-            casters: casters.collect(),
+        casters.follow(scene);
+        casters
+    }
+
+    /// Takes the places of the same things anew.
+    pub fn follow(&mut self, scene: &Scene) {
+        let shown = casting(scene).filter(|object| object.visible).count();
+        let surfel_count = (SURFELS / shown.max(1)).max(LEAST_SURFELS);
+        for (caster, object) in self.casters.iter_mut().zip(casting(scene)) {
+            caster.place(object, surfel_count);
         }
     }
 
@@ -78,7 +89,8 @@ impl ShaftCasters {
             surfels: Vec::new(),
         };
         for caster in &self.casters {
-            let Some(pose) = world_from_anchor[caster.anchor] else {
+            let pose = world_from_anchor[caster.anchor];
+            let Some(pose) = pose.filter(|_| !caster.triangles.is_empty()) else {
                 continue;
             };
             let point = |point: Vec3| pose.transform_point3(point.as_dvec3()).as_vec3();
@@ -111,33 +123,46 @@ impl ShaftCasters {
     }
 }
 
-fn caster(object: &Object, surfel_count: usize) -> Caster {
-    let size = BoxM::around(object.mesh.positions.iter().copied()).diagonal();
-    let coarser = levels(&object.mesh);
-    let coarse_enough = coarser
-        .into_iter()
-        .rfind(|level| level.max_error_m <= COARSE_PART * f64::from(size));
-    let mesh = coarse_enough.map_or_else(|| object.mesh.clone(), |level| level.mesh);
-    let place = |position: Vec3| {
-        let place = object
-            .anchor_from_object
-            .transform_point3(position.as_dvec3());
-        place.as_vec3()
-    };
-    let triangles: Vec<[Vec3; 3]> = mesh
-        .triangles
-        .iter()
-        .map(|triangle| triangle.map(|index| place(mesh.positions[index as usize])))
-        .collect();
-    let albedos = mesh
-        .triangle_materials
-        .iter()
-        .map(|&material| object.materials[material as usize].albedo.as_vec3());
-    let with_albedo: Vec<([Vec3; 3], Vec3)> = triangles.iter().copied().zip(albedos).collect();
-    Caster {
-        anchor: object.anchor,
-        surfels: surfels(&with_albedo, surfel_count),
-        triangles,
+impl Caster {
+    fn new(object: &Object) -> Self {
+        let size = BoxM::around(object.mesh.positions.iter().copied()).diagonal();
+        let coarser = levels(&object.mesh);
+        let coarse_enough = coarser
+            .into_iter()
+            .rfind(|level| level.max_error_m <= COARSE_PART * f64::from(size));
+        let mesh = coarse_enough.map_or_else(|| object.mesh.clone(), |level| level.mesh);
+        let corners = mesh
+            .triangles
+            .iter()
+            .map(|triangle| triangle.map(|index| mesh.positions[index as usize]));
+        let albedos = mesh
+            .triangle_materials
+            .iter()
+            .map(|&material| object.materials[material as usize].albedo.as_vec3());
+        Self {
+            coarse: corners.zip(albedos).collect(),
+            anchor: object.anchor,
+            triangles: Vec::new(),
+            surfels: Vec::new(),
+        }
+    }
+
+    fn place(&mut self, object: &Object, surfel_count: usize) {
+        if !object.visible {
+            self.triangles.clear();
+            self.surfels.clear();
+            return;
+        }
+        let place = |corner: Vec3| {
+            let placed = object
+                .anchor_from_object
+                .transform_point3(corner.as_dvec3());
+            placed.as_vec3()
+        };
+        let placed = |(corners, albedo): &([Vec3; 3], Vec3)| (corners.map(place), *albedo);
+        let with_albedo: Vec<([Vec3; 3], Vec3)> = self.coarse.iter().map(placed).collect();
+        self.surfels = surfels(&with_albedo, surfel_count);
+        self.triangles = with_albedo.iter().map(|(corners, _)| *corners).collect();
     }
 }
 

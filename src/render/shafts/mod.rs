@@ -6,19 +6,19 @@
 mod casters;
 mod corners;
 mod data;
+pub mod kept_rooms;
 mod maps;
 mod pipelines;
 pub mod room;
 
-use std::sync::Arc;
-
 use glam::{DAffine3, Vec3, Vec4};
 use wgpu::util::DeviceExt as _;
 
+use crate::geometry::bounds::Bounds;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::{self, PixelRect};
 use crate::light::cores::on_all_cores;
-use crate::scene::{Scene, ShaftSettings};
+use crate::scene::{ProbeScene, Scene, ShaftSettings};
 use crate::shafts::patches::PatchVertex;
 use crate::shafts::prepared::Prepared;
 use crate::shafts::selection::{Representative, representatives};
@@ -33,6 +33,7 @@ use corners::{Notice, Noticing};
 use data::{Frame, Source, packed};
 use maps::{Maps, Tiling, source};
 use pipelines::Pipelines;
+use room::Room;
 
 /// Nodes of sources that give receivers less than this part of their light on the average are not cut: less than a level
 /// of 255.
@@ -47,7 +48,9 @@ const NEAREST_SOURCE: f32 = 3.0;
 
 /// What shafts need from frame to frame.
 pub(super) struct Shafts {
-    room: Arc<Prepared>,
+    room: Prepared,
+    /// Of the room that `room` was worked out from.
+    surfaces_key: u64,
     settings: ShaftSettings,
     casters: ShaftCasters,
     pipelines: Pipelines,
@@ -82,7 +85,11 @@ struct Hidden {
 }
 
 impl Shafts {
-    pub fn new(gpu: &Gpu, scene: &Scene, room: Arc<Prepared>, stage: &Stage) -> Self {
+    /// Works the light of the scene's room out, or takes it from where it was kept.
+    pub fn new(gpu: &Gpu, scene: &Scene, probe: &ProbeScene, stage: &Stage) -> Self {
+        let parts = Room::of(scene, probe);
+        let surfaces_key = parts.surfaces_key();
+        let room = kept_rooms::ready(&parts, kept_rooms::folder().as_deref()).prepared;
         let device = &gpu.device;
         let buffer = |label, contents: &[u8], usage| {
             device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -129,8 +136,28 @@ impl Shafts {
             world_from_anchor: Vec::new(),
             hidden: None,
             settings,
+            surfaces_key,
             room,
         }
+    }
+
+    /// Takes the places of virtual things from another state of its scene. False where the room is another one.
+    pub fn follow(&mut self, scene: &Scene) -> bool {
+        let Some(probe) = &scene.probe else {
+            return false;
+        };
+        let parts = Room::of(scene, probe);
+        if parts.surfaces_key() != self.surfaces_key {
+            return false;
+        }
+        let corners = |bounds: Bounds| [bounds.low, bounds.high].map(|corner| corner.as_vec3());
+        let is_held = |bounds| self.room.volume.holds(&BoxM::around(corners(bounds)));
+        if !room::virtual_bounds(scene).all(is_held) {
+            self.room.gather_volume(&parts.things);
+        }
+        self.casters.follow(scene);
+        self.world_from_anchor.clear();
+        true
     }
 
     /// Works out what is hidden where things are now. Returns the pixels that it can change, `None` if none.
