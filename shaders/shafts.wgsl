@@ -6,7 +6,9 @@
 struct Frame {
     world_from_camera: mat4x4f,
     source_count: u32,
-    padding: vec3u,
+    padding_1: u32,
+    padding_2: u32,
+    padding_3: u32,
 }
 
 @group(2) @binding(0) var<uniform> frame: Frame;

@@ -177,6 +177,7 @@ pub(super) fn uniform_entry(binding: u32, dynamic: bool) -> wgpu::BindGroupLayou
 mod tests {
     use super::*;
     use crate::render::shader;
+    use crate::render::shafts::data::{Frame, Source};
     use std::mem::offset_of;
 
     /// Members of a WGSL struct as (name, offset), and the struct's size.
@@ -216,6 +217,32 @@ mod tests {
         assert_twins!(common, LightSource, place_in_camera, power);
         let volumes = shader::source(include_str!("../../shaders/volumes.wgsl"));
         assert_twins!(&volumes, CastingLight, place_in_anchor, end_in_anchor);
+        let source = include_str!("../../shaders/source.wgsl");
+        assert_twins!(
+            source,
+            Source,
+            map_from_world,
+            position,
+            spread_m,
+            intensity,
+            focal_texels,
+            tile_corner,
+            tile_side,
+            near_m,
+            range_m,
+            tile_px,
+            padding
+        );
+        let shafts = shader::source(include_str!("../../shaders/shafts.wgsl"));
+        assert_twins!(
+            &shafts,
+            Frame,
+            world_from_camera,
+            source_count,
+            padding_1,
+            padding_2,
+            padding_3
+        );
         let video = include_str!("../../shaders/video.wgsl");
         assert_twins!(
             video, Lens, focal_px, center_px, distortion, size_px, k3, padding

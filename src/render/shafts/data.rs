@@ -7,7 +7,7 @@ use half::f16;
 /// Twin of `Source` in source.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(super) struct Source {
+pub struct Source {
     pub map_from_world: Mat4,
     pub position: Vec3,
     pub spread_m: f32,
@@ -42,11 +42,12 @@ impl Source {
 /// Twin of `Frame` in shafts.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(super) struct Frame {
+pub struct Frame {
     pub world_from_camera: Mat4,
     pub source_count: u32,
-    pub padding: [u32; 3],
-    pub end: [u32; 4],
+    pub padding_1: u32,
+    pub padding_2: u32,
+    pub padding_3: u32,
 }
 
 /// Twin of `PatchCorner` in shafts.wgsl.

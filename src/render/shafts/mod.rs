@@ -5,12 +5,13 @@
 
 mod casters;
 mod corners;
-mod data;
+pub(super) mod data;
 pub mod kept_rooms;
 mod maps;
 mod pipelines;
 pub mod room;
 
+use bytemuck::Zeroable;
 use glam::{DAffine3, Vec3, Vec4};
 use wgpu::util::DeviceExt as _;
 
@@ -191,8 +192,7 @@ impl Shafts {
         let frame = Frame {
             world_from_camera: glam::DMat4::from(world_from_camera).as_mat4(),
             source_count: hidden.source_count,
-            padding: [0; 3],
-            end: [0; 4],
+            ..Zeroable::zeroed()
         };
         gpu.queue
             .write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));

@@ -1,0 +1,252 @@
+//! Shafts held against closed forms, brute force and what light has to do: rooms, hierarchies, and pictures of the room that
+//! ships. How near pictures come to the truth is in accuracy.rs.
+
+mod common;
+
+use std::f32::consts::PI;
+use std::path::Path;
+use std::sync::OnceLock;
+
+use common::{gpu, project_file, random::Random};
+use glam::{DAffine3, DVec3, Vec3};
+use gnomon::app::truth::key_frames;
+use gnomon::capture::{Frame, load_calibration};
+use gnomon::geometry::bounds::Bounds;
+use gnomon::light::probe::Probe;
+use gnomon::render::{Layers, Renderer, Room, Shown, VIRTUAL};
+use gnomon::scene::Scene;
+use gnomon::shafts::patches::RoomTriangle;
+use gnomon::shafts::prepared::{Options, PlacedProbe, Prepared};
+use gnomon::shafts::source_tree::BoxM;
+
+const OPTIONS: Options = Options {
+    patches: 600,
+    source_power: 1.0,
+    receivers_per_leaf: 8,
+    least_part: 0.02,
+};
+
+/// The faces of a box, seen from within.
+fn inside_of(low: Vec3, high: Vec3, albedo: f32) -> Vec<RoomTriangle> {
+    let corner = |x: usize, y: usize, z: usize| {
+        let pick = |index: usize, axis: usize| [low, high][index][axis];
+        Vec3::new(pick(x, 0), pick(y, 1), pick(z, 2))
+    };
+    let quads = [
+        [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)],
+        [(0, 0, 1), (0, 1, 1), (1, 1, 1), (1, 0, 1)],
+        [(0, 0, 0), (0, 0, 1), (1, 0, 1), (1, 0, 0)],
+        [(0, 1, 0), (1, 1, 0), (1, 1, 1), (0, 1, 1)],
+        [(0, 0, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)],
+        [(1, 0, 0), (1, 0, 1), (1, 1, 1), (1, 1, 0)],
+    ];
+    let triangles = (0..).zip(quads).flat_map(|(piece, quad)| {
+        let [a, b, c, d] = quad.map(|(x, y, z)| corner(x, y, z));
+        [[a, b, c], [a, c, d]].map(|corners| RoomTriangle {
+            corners,
+            albedo: Some(Vec3::splat(albedo)),
+            piece,
+        })
+    });
+    triangles.collect()
+}
+
+fn bounds(low: DVec3, high: DVec3) -> Bounds {
+    Bounds { low, high }
+}
+
+#[test]
+fn a_room_of_one_brightness_lights_every_place_with_pi_times_it() {
+    let color = Vec3::new(1.0, 0.5, 0.25);
+    let probe = Probe::new([64, 32], vec![color; 64 * 32]).expect("a probe");
+    let room = Room {
+        triangles: inside_of(Vec3::new(-1.0, -1.2, -0.5), Vec3::new(1.1, 1.0, 1.3), 0.4),
+        things: vec![bounds(DVec3::splat(-0.1), DVec3::splat(0.1))],
+        options: OPTIONS,
+        probe: PlacedProbe {
+            probe: &probe,
+            position_m: DVec3::ZERO,
+            exposure: 2.0,
+        },
+    };
+    let prepared = room.prepare();
+    let expected = color * 2.0 * PI;
+    for (vertex, irradiance) in prepared.patches.vertices.iter().zip(&prepared.irradiance) {
+        let error = (*irradiance / expected - 1.0).abs().max_element();
+        assert!(error < 0.02, "{}: {irradiance}", vertex.position);
+    }
+    let mut random = Random::new(3);
+    for _ in 0..50 {
+        let mut part = |size: f64| random.between(-size, size) as f32;
+        let place = Vec3::new(part(0.2), part(0.2), part(0.2));
+        let normal = Vec3::new(part(1.0), part(1.0), part(1.0)).normalize();
+        let irradiance = prepared.volume.radiance(place).irradiance(normal);
+        let error = (irradiance / expected - 1.0).abs().max_element();
+        assert!(error < 0.01, "{place} {normal}: {irradiance}");
+    }
+}
+
+/// The room that ships, coarsely.
+fn coarse_scene() -> Scene {
+    let mut scene = Scene::load(&project_file("config/room.toml")).expect("the room");
+    scene.shadows.shafts.patches = 600;
+    scene
+}
+
+fn coarse_room() -> &'static Prepared {
+    static ROOM: OnceLock<Prepared> = OnceLock::new();
+    ROOM.get_or_init(|| {
+        let scene = coarse_scene();
+        Room::of(&scene, scene.probe.as_ref().expect("a probe")).prepare()
+    })
+}
+
+#[test]
+fn no_source_that_a_box_hides_and_no_receiver_that_notices_is_missed() {
+    let room = coarse_room();
+    let mut random = Random::new(17);
+    let center = |patch: u32| room.patches.center(&room.patches.patches[patch as usize]);
+    let mut hidden = 0;
+    for _ in 0..30 {
+        let mut part = |low: f64, high: f64| random.between(low, high) as f32;
+        let low = Vec3::new(part(-0.4, 0.4), part(-0.4, 0.4), part(0.0, 0.4));
+        let high = low + Vec3::new(part(0.01, 0.2), part(0.01, 0.2), part(0.01, 0.2));
+        let tested = BoxM::around([low, high]);
+        let marks = room.mark(&[tested]);
+        let sources = marks.sources(&room.sources);
+        let receivers = marks.receivers(&room.receivers);
+        for (patch, receiver) in room.patches.patches.iter().enumerate() {
+            for &vertex in &receiver.vertices {
+                let to = room.patches.vertices[vertex as usize].position;
+                let row = room.transfers.row(vertex as usize);
+                for (source, &from) in room.sources.patches.iter().enumerate() {
+                    if row[source] > 0.0 && crosses(center(from), to, &tested) {
+                        hidden += 1;
+                        assert!(
+                            sources[source] && receivers[patch],
+                            "{tested:?}: {source} {patch}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+    assert!(hidden > 1000, "{hidden}");
+    let outside = BoxM::around([Vec3::splat(3.0), Vec3::splat(3.5)]);
+    let marks = room.mark(&[outside]);
+    assert!(!marks.sources(&room.sources).contains(&true));
+    assert!(!marks.receivers(&room.receivers).contains(&true));
+}
+
+fn crosses(a: Vec3, b: Vec3, bounds: &BoxM) -> bool {
+    let (mut first, mut last) = (0.0_f32, 1.0_f32);
+    for axis in 0..3 {
+        let way = b[axis] - a[axis];
+        let [one, other] = [bounds.min, bounds.max].map(|face| (face[axis] - a[axis]) / way);
+        first = first.max(one.min(other));
+        last = last.min(one.max(other));
+    }
+    first <= last
+}
+
+struct Seen {
+    picture: Vec<u8>,
+    layers: Layers,
+}
+
+impl Seen {
+    /// Mean of the gain's green over real pixels that it darkens.
+    fn darkest(&self) -> f32 {
+        let real = self.layers.gain.iter().zip(&self.layers.role);
+        let gains = real.filter(|(_, role)| **role != VIRTUAL);
+        gains.map(|(gain, _)| gain[1]).fold(1.0, f32::min)
+    }
+
+    /// Mean level of green on virtual pixels.
+    fn virtual_level(&self) -> f64 {
+        let pixels = self.picture.chunks_exact(4).zip(&self.layers.role);
+        let levels = pixels.filter(|(_, role)| **role == VIRTUAL);
+        let levels: Vec<f64> = levels.map(|(pixel, _)| f64::from(pixel[1])).collect();
+        levels.iter().sum::<f64>() / levels.len() as f64
+    }
+}
+
+fn frame() -> &'static (Frame, Vec<Option<DAffine3>>) {
+    static FRAME: OnceLock<(Frame, Vec<Option<DAffine3>>)> = OnceLock::new();
+    FRAME.get_or_init(|| {
+        let folder = project_file("recordings/room");
+        let mut keys = key_frames(&folder, &coarse_scene().anchors).expect("key frames");
+        keys.swap_remove(0)
+    })
+}
+
+fn renderer(scene: &Scene) -> Renderer {
+    let calibration = project_file("recordings/room/camera.toml");
+    let intrinsics = load_calibration(Path::new(&calibration)).expect("the calibration");
+    let mut renderer = Renderer::new(gpu(), scene, intrinsics).expect("a renderer");
+    renderer.upload(&frame().0).expect("an uploaded frame");
+    renderer
+}
+
+fn seen(renderer: &mut Renderer) -> Seen {
+    renderer.draw(&frame().1, Shown::Composite);
+    Seen {
+        picture: renderer.read_picture().expect("a picture"),
+        layers: renderer.layers().expect("layers"),
+    }
+}
+
+#[test]
+fn what_rests_is_drawn_the_same_bit_for_bit_also_after_it_moved_and_came_back() {
+    let scene = coarse_scene();
+    let mut renderer = renderer(&scene);
+    let first = seen(&mut renderer).picture;
+    assert!(first == seen(&mut renderer).picture);
+    let mut moved = scene.clone();
+    moved.virtuals[0].anchor_from_object.translation.x += 0.03;
+    assert!(renderer.follow(&moved));
+    let there = seen(&mut renderer).picture;
+    assert!(there != first);
+    // As if it had always stood there, but for patches that are cut by where things first stood.
+    let anew = seen(&mut self::renderer(&moved)).picture;
+    let differences = there.iter().zip(&anew).map(|(a, b)| a.abs_diff(*b));
+    let far = differences.filter(|difference| *difference > 8).count();
+    assert!(far < there.len() / 1000, "{far} of {}", there.len());
+    assert!(renderer.follow(&scene));
+    assert!(first == seen(&mut renderer).picture);
+    // Another light is another room.
+    let mut brighter = scene.clone();
+    brighter.probe.as_mut().expect("a probe").exposure *= 2.0;
+    assert!(!renderer.follow(&brighter));
+}
+
+#[test]
+fn a_thing_that_is_lifted_from_the_table_takes_its_shadow_along() {
+    let mut scene = coarse_scene();
+    scene.virtuals.truncate(1);
+    let mut renderer = renderer(&scene);
+    let mut before = 0.0;
+    for height_m in [0.0, 0.02, 0.06, 0.15] {
+        let mut lifted = scene.clone();
+        lifted.virtuals[0].anchor_from_object.translation.z += height_m;
+        assert!(renderer.follow(&lifted));
+        let darkest = seen(&mut renderer).darkest();
+        assert!(darkest > before, "{height_m} m: {darkest} after {before}");
+        before = darkest;
+    }
+    assert!(before > 0.8, "{before}");
+}
+
+#[test]
+fn a_virtual_ball_is_darker_under_a_real_desk() {
+    let mut scene = coarse_scene();
+    scene.virtuals.remove(0);
+    let open = seen(&mut renderer(&scene)).virtual_level();
+    // The house's walls as a desk over the ball, seen past its edge.
+    let desk = &mut scene.phantoms[2];
+    assert_eq!(desk.name, "house");
+    let to_desk = DAffine3::from_scale(DVec3::new(5.0, 4.0, 0.2));
+    desk.anchor_from_object = DAffine3::from_translation(DVec3::new(-0.03, 0.055, 0.05)) * to_desk;
+    let covered = seen(&mut renderer(&scene)).virtual_level();
+    assert!(covered < 0.8 * open, "{covered} under it, {open} without");
+}
