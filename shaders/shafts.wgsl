@@ -30,12 +30,21 @@ struct PatchCorner {
     @location(0) position: vec3f,
     // Rows of the patch's three vertices.
     @location(1) rows: vec3u,
-    // Weights of the first two there; those of a patch's own corners are 0 and 1.
+    // Weights of the first two there: 0 and 1.
     @location(2) weights: vec2f,
     // First of the patch's sources in `lists`, and their number.
     @location(3) list: vec2u,
+}
+
+struct ThrownCorner {
+    @location(0) position: vec3f,
     // Irradiance from virtual things.
-    @location(4) thrown_back: vec3f,
+    @location(1) irradiance: vec3f,
+}
+
+struct ThrownSurface {
+    @builtin(position) clip: vec4f,
+    @location(0) @interpolate(perspective, centroid) irradiance: vec3f,
 }
 
 struct PatchSurface {
@@ -44,7 +53,6 @@ struct PatchSurface {
     @location(1) @interpolate(perspective, centroid) weights: vec2f,
     @location(2) @interpolate(flat) rows: vec3u,
     @location(3) @interpolate(flat) list: vec2u,
-    @location(4) @interpolate(perspective, centroid) thrown_back: vec3f,
 }
 
 struct Light {
@@ -63,8 +71,12 @@ fn place_patch(corner: PatchCorner) -> PatchSurface {
         corner.weights,
         corner.rows,
         corner.list,
-        corner.thrown_back,
     );
+}
+
+@vertex
+fn place_thrown(corner: ThrownCorner) -> ThrownSurface {
+    return ThrownSurface(clip_from_point(view, vec4f(corner.position, 1.0)), corner.irradiance);
 }
 
 @vertex
@@ -128,7 +140,7 @@ fn transfer(row: u32, source: u32) -> vec3f {
 @fragment
 fn light_on_patch(surface: PatchSurface) -> Light {
     let weights = vec3f(surface.weights, 1.0 - surface.weights.x - surface.weights.y);
-    var taken = -surface.thrown_back;
+    var taken = vec3f(0.0);
     for (var place = 0u; place < surface.list.y; place++) {
         let index = lists[surface.list.x + place];
         let hidden = hidden(index, surface.point_in_world, false);
@@ -143,6 +155,12 @@ fn light_on_patch(surface: PatchSurface) -> Light {
         + weights.y * irradiances[surface.rows.y]
         + weights.z * irradiances[surface.rows.z];
     return Light(vec4f(reaching, 1.0), vec4f(taken, 0.0));
+}
+
+// Added to what sources take.
+@fragment
+fn thrown_back(surface: ThrownSurface) -> @location(1) vec4f {
+    return vec4f(-surface.irradiance, 0.0);
 }
 
 @fragment

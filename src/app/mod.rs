@@ -3,6 +3,7 @@
 mod anchor_block;
 pub mod authoring;
 pub mod board;
+mod budget_words;
 pub mod calibrate;
 mod calibration_file;
 pub mod cameras;

@@ -12,10 +12,11 @@ use anyhow::{Context as _, Result, bail};
 
 use crate::capture::{Frame, FrameSource};
 use crate::geometry::camera::Intrinsics;
-use crate::render::{Gpu, Layers, Renderer, Shown};
+use crate::render::{Governed, Gpu, Layers, Renderer, Shown};
 use crate::scene::Scene;
 use crate::tracking::{AnchorPose, Tracker};
 
+use super::budget_words::budget_words;
 use super::check;
 use super::contact_sheet::ContactSheet;
 use super::layer_files::{Layer, write_layers};
@@ -99,6 +100,7 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
         poses: PosesText::new(),
         tally: Tally::new(scene.anchors.len()),
         drawn: 0,
+        governed: None,
     };
     let adapter = drawing
         .as_ref()
@@ -128,6 +130,10 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
         return Err(failure);
     }
     let mut remarks = Vec::new();
+    let render = run.tally.log.summary().remove("render");
+    if let (Some(governed), Some(times)) = (&run.governed, render) {
+        remarks.push(budget_words(governed, times.p95_ms));
+    }
     if run.tally.lost[0] > 0 {
         remarks.push(format!(
             "the world's anchor was not found in {} of them; there the video is shown alone",
@@ -193,6 +199,8 @@ struct Run<'a> {
     poses: PosesText,
     tally: Tally,
     drawn: u32,
+    /// What the frame budget has led to so far.
+    governed: Option<Governed>,
 }
 
 impl Run<'_> {
@@ -296,6 +304,8 @@ impl Run<'_> {
         self.tally.log.add("gpu_wait", wait_ms);
         self.tally.log.add("readback", readback_ms);
         self.tally.log.add("render", render_ms);
+        renderer.spent(render_ms);
+        self.governed = renderer.governed().cloned();
         let gpu = renderer.gpu_times()?;
         if let Some(ms) = gpu.shadows_ms {
             self.tally.log.add("shadows", ms);

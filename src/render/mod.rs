@@ -11,6 +11,8 @@ mod composite;
 mod detail;
 mod direct;
 mod fade;
+mod governed;
+mod governor;
 mod gpu;
 mod gpu_clock;
 mod indirect;
@@ -27,6 +29,7 @@ mod touched;
 mod uniforms;
 mod volumes;
 
+pub use governed::{Governed, Setting};
 pub use gpu::{Gpu, RenderError, SharedDevice};
 pub use gpu_clock::GpuTimes;
 pub use layers::{Layers, REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};

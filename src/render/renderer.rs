@@ -16,6 +16,7 @@ use super::background::{Background, PICTURE_FORMAT, extent};
 use super::composite::GAIN_FORMAT;
 use super::direct::Direct;
 use super::fade::{self, Fade};
+use super::governed::{Governed, Setting};
 use super::gpu::{Gpu, RenderError};
 use super::gpu_clock::{GpuClock, GpuTimes, Stretch};
 use super::layers::{LayerPasses, Layers};
@@ -49,6 +50,8 @@ pub struct Renderer {
     direct: Option<Direct>,
     /// Otherwise; beside it for the `gain` layer alone.
     accumulation: Option<Accumulation>,
+    /// Keeps to the scene's frame budget.
+    governed: Option<Governed>,
     /// Where the light comes from a room, with the targets that it is added to.
     shafts: Option<(Shafts, Targets)>,
     picture: wgpu::Texture,
@@ -138,6 +141,7 @@ impl Renderer {
             direct: is_direct.then(|| Direct::new(&gpu, &stage.layouts, &background, glossy)),
             accumulation: (!is_direct && shafts.is_none())
                 .then(|| Accumulation::new(&gpu, &geometry_layout, &background, samples, glossy)),
+            governed: Governed::new(scene),
             shafts,
             picture: device.create_texture(&wgpu::TextureDescriptor {
                 label: Some("picture"),
@@ -185,6 +189,29 @@ impl Renderer {
             self.stale = PixelRect::whole(self.size_px);
         }
         follows
+    }
+
+    /// Takes note of what the last frame took to draw, milliseconds: a scene with a frame budget is drawn with fewer
+    /// sources, or coarser outlines, where that keeps to it.
+    pub fn spent(&mut self, frame_ms: f64) {
+        let Some(governed) = &mut self.governed else {
+            return;
+        };
+        if governed.spent(frame_ms) {
+            match governed.setting() {
+                Setting::Sources(sources) => {
+                    if let Some((shafts, _)) = &mut self.shafts {
+                        shafts.set_sources(sources);
+                    }
+                }
+                Setting::SilhouettesPx(error_px) => self.stage.set_detail(error_px),
+            }
+        }
+    }
+
+    /// What the scene's frame budget has led to; `None` without one.
+    pub fn governed(&self) -> Option<&Governed> {
+        self.governed.as_ref()
     }
 
     /// Puts other pixels (as [`Renderer::read_picture`] gives them) in the place of the picture, until the next one is

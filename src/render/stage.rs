@@ -146,6 +146,11 @@ impl Stage {
         self.standing = standing;
     }
 
+    /// Outlines may be off by so much from now on, pixels.
+    pub fn set_detail(&mut self, max_silhouette_error_px: f64) {
+        self.max_silhouette_error_px = max_silhouette_error_px;
+    }
+
     /// Number of lights.
     pub fn light_count(&self) -> usize {
         self.lights.len()

@@ -176,11 +176,19 @@ impl Canvas {
         Some((renderer, order.intrinsics.size_px))
     }
 
+    /// Takes note of what the last picture took to draw, milliseconds, for the scene's frame budget.
+    pub fn spent(&mut self, frame_ms: f64) {
+        if let Some((_, renderer)) = &mut self.current {
+            renderer.spent(frame_ms);
+        }
+    }
+
     /// Another camera: the video is shown at once, its things follow.
     fn begin(&mut self, intrinsics: Intrinsics) -> Result<(), RenderError> {
         let empty = Arc::new(Scene {
             phantoms: Vec::new(),
             virtuals: Vec::new(),
+            probe: None,
             ..(*self.scene).clone()
         });
         let renderer = Renderer::new(Arc::clone(&self.gpu), &empty, intrinsics)?;

@@ -277,9 +277,11 @@ impl Studio {
             true => (self.now)(),
             false => handed_over_secs,
         };
+        let draw_ms = (shown_secs - pending.begun_secs) * 1e3;
+        self.canvas.spent(draw_ms);
         self.meters.push(Sample {
             shown_secs,
-            draw_ms: (shown_secs - pending.begun_secs) * 1e3,
+            draw_ms,
             latency_ms: (shown_secs - pending.arrived_secs) * 1e3,
             ..pending.sample
         });

@@ -1,4 +1,4 @@
-//! The patches that may notice the casters, cut finely enough for what the casters throw on them.
+//! The patches that may notice the casters; and what the casters throw on them, for which they are cut more finely.
 
 use glam::Vec3;
 
@@ -9,7 +9,7 @@ use crate::shafts::surfels::{GroupedSurfels, LitSurfel, thrown_back};
 
 use super::LEAST_WEIGHT;
 use super::casters::PlacedCasters;
-use super::data::{PatchCorner, Source};
+use super::data::{PatchCorner, Source, ThrownCorner};
 
 /// What patches are told of the casters.
 pub(super) struct Notice<'a> {
@@ -28,8 +28,10 @@ pub(super) struct Notice<'a> {
 /// Patches that do notice.
 #[derive(Default)]
 pub(super) struct Noticing {
-    /// Three for each part of a patch.
+    /// Three for each patch that a source's shadow may reach.
     pub corners: Vec<PatchCorner>,
+    /// Three for each part of a patch that something is thrown on.
+    pub thrown: Vec<ThrownCorner>,
     /// Numbers of sources, which the corners refer to.
     pub lists: Vec<u32>,
 }
@@ -48,6 +50,7 @@ impl Notice<'_> {
         for share in shares {
             let first = all.lists.len() as u32;
             all.lists.extend(share.lists);
+            all.thrown.extend(share.thrown);
             all.corners
                 .extend(share.corners.into_iter().map(|corner| PatchCorner {
                     list: [first + corner.list[0], corner.list[1]],
@@ -72,24 +75,30 @@ impl Notice<'_> {
             may_fall.then_some(index as u32)
         }));
         let list = [first as u32, (to.lists.len() - first) as u32];
+        if list[1] > 0 {
+            let own = [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]];
+            to.corners.extend((0..3).map(|corner| PatchCorner {
+                position: places[corner],
+                rows,
+                weights: own[corner],
+                list,
+            }));
+        }
         let lost = rows.map(|row| self.lost_nearby[row as usize]);
         let seen = self.surfels.seen_from(BoxM::around(places));
         let surfels: Vec<LitSurfel> = seen.copied().collect();
         let grid = Grid {
             count: self.casters.parts(places),
         };
-        let corners: Vec<PatchCorner> = grid
+        let corners: Vec<ThrownCorner> = grid
             .weights()
             .map(|[a, b]| {
                 let c = 1.0 - a - b;
                 let mean = |[at_a, at_b, at_c]: [Vec3; 3]| at_a * a + at_b * b + at_c * c;
                 let position = mean(places);
-                PatchCorner {
+                ThrownCorner {
                     position,
-                    rows,
-                    weights: [a, b],
-                    list,
-                    thrown_back: thrown_back(position, normal, &surfels) - mean(lost),
+                    irradiance: thrown_back(position, normal, &surfels) - mean(lost),
                 }
             })
             .collect();
@@ -97,10 +106,10 @@ impl Notice<'_> {
             .vertices
             .map(|vertex| room.irradiance[vertex as usize] * LEAST_WEIGHT);
         let least = least.into_iter().fold(Vec3::MAX, Vec3::min);
-        let gains = |corner: &PatchCorner| corner.thrown_back.abs().cmpgt(least).any();
-        if list[1] > 0 || corners.iter().any(gains) {
+        let gains = |corner: &ThrownCorner| corner.irradiance.abs().cmpgt(least).any();
+        if corners.iter().any(gains) {
             let triangles = grid.triangles().flatten();
-            to.corners.extend(triangles.map(|index| corners[index]));
+            to.thrown.extend(triangles.map(|index| corners[index]));
         }
     }
 }

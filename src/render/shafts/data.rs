@@ -58,8 +58,23 @@ pub(super) struct PatchCorner {
     pub rows: [u32; 3],
     pub weights: [f32; 2],
     pub list: [u32; 2],
-    pub thrown_back: Vec3,
 }
+
+/// Twin of `ThrownCorner` in shafts.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(super) struct ThrownCorner {
+    pub position: Vec3,
+    pub irradiance: Vec3,
+}
+
+/// Vertex layout of [`ThrownCorner`].
+pub(super) const THROWN_CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> =
+    wgpu::VertexBufferLayout {
+        array_stride: size_of::<ThrownCorner>() as u64,
+        step_mode: wgpu::VertexStepMode::Vertex,
+        attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3],
+    };
 
 /// Vertex layout of [`PatchCorner`].
 pub(super) const PATCH_CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> =
@@ -67,7 +82,7 @@ pub(super) const PATCH_CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> =
         array_stride: size_of::<PatchCorner>() as u64,
         step_mode: wgpu::VertexStepMode::Vertex,
         attributes: &wgpu::vertex_attr_array![
-            0 => Float32x3, 1 => Uint32x3, 2 => Float32x2, 3 => Uint32x2, 4 => Float32x3
+            0 => Float32x3, 1 => Uint32x3, 2 => Float32x2, 3 => Uint32x2
         ],
     };
 

@@ -72,9 +72,11 @@ struct Hidden {
     source_count: u32,
     casters: wgpu::Buffer,
     caster_vertices: u32,
-    /// Corners of the patches that may notice.
+    /// Corners of the patches that sources light, and of the parts that something is thrown on.
     corners: wgpu::Buffer,
     corner_count: u32,
+    thrown: wgpu::Buffer,
+    thrown_count: u32,
     group: wgpu::BindGroup,
     /// Around the casters, and around all that may notice.
     boxes: Vec<BoxM>,
@@ -159,6 +161,12 @@ impl Shafts {
         self.casters.follow(scene);
         self.world_from_anchor.clear();
         true
+    }
+
+    /// So many sources at most get a shadow from now on; `None`: all.
+    pub fn set_sources(&mut self, sources: Option<u32>) {
+        self.settings.sources = sources;
+        self.world_from_anchor.clear();
     }
 
     /// Works out what is hidden where things are now. Returns the pixels that it can change, `None` if none.
@@ -302,7 +310,11 @@ impl Shafts {
             })
             .collect();
         let lost_nearby = lost_nearby(room, &vertices, &surfels, &refilled);
-        let Noticing { corners, lists } = Notice {
+        let Noticing {
+            corners,
+            thrown,
+            lists,
+        } = Notice {
             room,
             casters: placed,
             vertices: &vertices,
@@ -374,7 +386,18 @@ impl Shafts {
                 wgpu::BufferUsages::VERTEX,
             ),
             corner_count: corners.len() as u32,
-            noticing: BoxM::around(corners.iter().map(|corner| corner.position)),
+            thrown: buffer(
+                "thrown back",
+                bytemuck::cast_slice(&thrown),
+                wgpu::BufferUsages::VERTEX,
+            ),
+            thrown_count: thrown.len() as u32,
+            noticing: BoxM::around(
+                corners
+                    .iter()
+                    .map(|corner| corner.position)
+                    .chain(thrown.iter().map(|corner| corner.position)),
+            ),
             boxes: placed.boxes.clone(),
             surfels,
             sources: source_buffer,
@@ -419,6 +442,9 @@ impl Shafts {
         pass.set_pipeline(&self.pipelines.light_on_patch);
         pass.set_vertex_buffer(0, hidden.corners.slice(..));
         pass.draw(0..hidden.corner_count, 0..1);
+        pass.set_pipeline(&self.pipelines.thrown_back);
+        pass.set_vertex_buffer(0, hidden.thrown.slice(..));
+        pass.draw(0..hidden.thrown_count, 0..1);
     }
 }
 

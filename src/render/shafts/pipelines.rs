@@ -4,7 +4,13 @@ use super::super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT};
 use super::super::gpu::Gpu;
 use super::super::shader;
 use super::super::surfaces::{LIGHT_FORMAT, Sided};
-use super::data::{PATCH_CORNER_LAYOUT, PLACE_LAYOUT};
+use super::data::{PATCH_CORNER_LAYOUT, PLACE_LAYOUT, THROWN_CORNER_LAYOUT};
+
+const SUM: wgpu::BlendComponent = wgpu::BlendComponent {
+    src_factor: wgpu::BlendFactor::One,
+    dst_factor: wgpu::BlendFactor::One,
+    operation: wgpu::BlendOperation::Add,
+};
 
 /// The pipelines, and the layout of their group 2.
 pub(super) struct Pipelines {
@@ -15,8 +21,10 @@ pub(super) struct Pipelines {
     pub depth_of_real: Sided,
     /// Virtual things: depth and light.
     pub light_on_virtual: Sided,
-    /// Patches that lose light, where they are seen.
+    /// Patches that sources light, where they are seen.
     pub light_on_patch: wgpu::RenderPipeline,
+    /// Adds what virtual things throw back on patches.
+    pub thrown_back: wgpu::RenderPipeline,
 }
 
 impl Pipelines {
@@ -75,17 +83,23 @@ impl Pipelines {
                      buffers: &[Option<wgpu::VertexBufferLayout<'static>>],
                      fragment: Option<&str>,
                      writes_depth: bool,
+                     adds: bool,
                      bias: wgpu::DepthBiasState| {
             let targets = [LIGHT_FORMAT; 2].map(|format| {
                 Some(wgpu::ColorTargetState {
                     format,
-                    blend: None,
+                    blend: adds.then_some(wgpu::BlendState {
+                        color: SUM,
+                        alpha: SUM,
+                    }),
                     write_mask: match fragment {
                         Some(_) => wgpu::ColorWrites::ALL,
                         None => wgpu::ColorWrites::empty(),
                     },
                 })
             });
+            let [reaching, change] = targets;
+            let targets = [reaching.filter(|_| !adds), change];
             let constants = [("GLOSSY", f64::from(glossy))];
             device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(fragment.unwrap_or(vertex)),
@@ -124,7 +138,7 @@ impl Pipelines {
                 cache: None,
             })
         };
-        // Patches are cut finer than where their depth comes from, and land on it but for rounding.
+        // What is thrown back is cut finer than where depth comes from, and lands on it but for rounding.
         let flush = wgpu::DepthBiasState::default();
         let nearer = wgpu::DepthBiasState {
             constant: 16,
@@ -133,13 +147,21 @@ impl Pipelines {
         };
         let corners = [Some(CORNER_LAYOUT), Some(INDIRECT_LAYOUT)];
         Self {
-            depth_of_room: build("place_depth", &[Some(PLACE_LAYOUT)], None, true, flush),
-            depth_of_real: Sided::both(build("place", &corners, None, true, flush)),
+            depth_of_room: build(
+                "place_depth",
+                &[Some(PLACE_LAYOUT)],
+                None,
+                true,
+                false,
+                flush,
+            ),
+            depth_of_real: Sided::both(build("place", &corners, None, true, false, flush)),
             light_on_virtual: Sided::both(build(
                 "place",
                 &corners,
                 Some("light_on_virtual"),
                 true,
+                false,
                 flush,
             )),
             light_on_patch: build(
@@ -147,6 +169,15 @@ impl Pipelines {
                 &[Some(PATCH_CORNER_LAYOUT)],
                 Some("light_on_patch"),
                 false,
+                false,
+                nearer,
+            ),
+            thrown_back: build(
+                "place_thrown",
+                &[Some(THROWN_CORNER_LAYOUT)],
+                Some("thrown_back"),
+                false,
+                true,
                 nearer,
             ),
             layout,
