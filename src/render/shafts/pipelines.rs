@@ -99,7 +99,17 @@ impl Pipelines {
                 })
             });
             let [reaching, change] = targets;
-            let targets = [reaching.filter(|_| !adds), change];
+            // What is added leaves `reaching` as it is.
+            let left_alone = |target| wgpu::ColorTargetState {
+                blend: None,
+                write_mask: wgpu::ColorWrites::empty(),
+                ..target
+            };
+            let reaching = match adds {
+                true => reaching.map(left_alone),
+                false => reaching,
+            };
+            let targets = [reaching, change];
             let constants = [("GLOSSY", f64::from(glossy))];
             device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(fragment.unwrap_or(vertex)),
