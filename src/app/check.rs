@@ -116,9 +116,12 @@ fn quality_row(quality: Quality, shadows: &ShadowSettings) -> String {
     if shadows.max_silhouette_error_px != meant.max_silhouette_error_px {
         others.push("max_silhouette_error_px");
     }
+    if shadows.shafts.sources != meant.shafts.sources {
+        others.push("sources");
+    }
     let name = quality.name();
     match others.is_empty() {
-        true => format!("{name}: samples and detail are what it means"),
+        true => format!("{name}: samples, detail and sources are what it means"),
         false => format!("{name}, but the scene sets {}", others.join(" and ")),
     }
 }

@@ -382,15 +382,20 @@ impl Quality {
 
     /// What it means where nothing else is said.
     pub fn shadows(self) -> ShadowSettings {
-        let (samples, max_silhouette_error_px) = match self {
-            Self::Fast => (1, 2.0),
-            Self::Balanced => (4, 0.5),
-            Self::Accurate => (4, 0.0),
+        let balanced = ShaftSettings::default().sources;
+        let (samples, max_silhouette_error_px, sources) = match self {
+            Self::Fast => (1, 2.0, Some(10)),
+            Self::Balanced => (4, 0.5, balanced),
+            Self::Accurate => (4, 0.0, None),
         };
         ShadowSettings {
             quality: Some(self),
             samples,
             max_silhouette_error_px,
+            shafts: ShaftSettings {
+                sources,
+                ..ShaftSettings::default()
+            },
             ..ShadowSettings::default()
         }
     }

@@ -358,6 +358,15 @@ fn shadow_keys(old: &ShadowSettings, new: &ShadowSettings) -> Vec<(&'static str,
     let regraded = quality != old.quality;
     let given = quality.map_or_else(ShadowSettings::default, Quality::shadows);
     let mut all = shaft_keys(&old.shafts, &shafts);
+    let all_sources = || quoted("all");
+    all.push((
+        regraded || shafts.sources != old.shafts.sources,
+        "sources",
+        (!regraded || shafts.sources != given.shafts.sources).then(|| {
+            let count = |count: u32| count.to_string();
+            shafts.sources.map_or_else(all_sources, count)
+        }),
+    ));
     all.extend([
         (
             quality != old.quality,
@@ -403,7 +412,8 @@ fn shaft_keys(
     new: &ShaftSettings,
 ) -> Vec<(bool, &'static str, Option<String>)> {
     let ShaftSettings {
-        sources,
+        // A quality has its say in it.
+        sources: _,
         patches,
         source_power,
         receivers_per_leaf,
@@ -412,13 +422,7 @@ fn shaft_keys(
     } = *new;
     let ratio = |number: f64| Some(super::numbers::new_number(number, RATIO));
     let count = |number: u32| Some(number.to_string());
-    let all = || Some(quoted("all"));
     vec![
-        (
-            sources != old.sources,
-            "sources",
-            sources.map_or_else(all, count),
-        ),
         (patches != old.patches, "patches", count(patches)),
         (
             source_power != old.source_power,

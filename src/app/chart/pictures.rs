@@ -8,12 +8,14 @@ use plotters::prelude::DrawingBackend;
 use super::AnyChart;
 use super::canvas::{Anchor, Canvas, Drawing, INK, PIXELS_PER_UNIT, bitmap};
 use super::lab::Lab;
-use super::shots::{Shot, Shots};
+use super::shots::{Shot, Shots, mean};
 use crate::app::picture_files::write_rgb_png;
 use crate::app::progress::Progress;
+use crate::app::stats::quantile;
+use crate::app::stopwatch::Stopwatch;
 use crate::app::truth::{Drawn, Picture};
-use crate::render::VIRTUAL;
-use crate::scene::{Quality, ShadowSettings};
+use crate::render::{Renderer, Shown, VIRTUAL};
+use crate::scene::{Quality, Scene, ShadowSettings, Technique};
 
 const NAME: &str = "shadow-pictures";
 /// Each pixel is drawn as a square of so many.
@@ -54,8 +56,8 @@ impl AnyChart for Pictures {
     }
 
     fn shows(&self) -> &'static str {
-        "The qualities beside the truth, in the middle key frame of each recording (the part that the virtual things change, \
-         enlarged twice). Below each its error, four times stronger about a middle grey: of virtual surfaces as they are, of real ones by \
+        "The qualities, or numbers of sources, beside the truth, in the middle key frame of each recording (the part that the virtual \
+         things change, enlarged twice), with the time of a frame and the rms error of the shadow's factor. Below each its error, four times stronger about a middle grey: of virtual surfaces as they are, of real ones by \
          what changes on them."
     }
 
@@ -76,15 +78,14 @@ impl AnyChart for Pictures {
             shots.shots = shots.shots.drain(middle..).take(1).collect();
             let technique = scene.chosen_technique().0.name();
             let mut drawn = Vec::new();
-            for (name, quality) in Quality::BY_NAME {
+            for (name, shadows) in ways(&scene) {
                 let mut scene = scene.clone();
-                scene.shadows = ShadowSettings {
-                    technique: scene.shadows.technique,
-                    ..quality.shadows()
-                };
-                for picture in shots.draw(&lab.gpu()?, &scene)? {
-                    drawn.push((format!("{technique}, {name}"), picture));
-                }
+                scene.shadows = shadows;
+                let took_ms = frame_ms(lab, &shots, &scene)?;
+                let pictures = shots.draw(&lab.gpu()?, &scene)?;
+                let factor = mean(&shots.errors(&pictures)?, |errors| errors.factor);
+                let label = format!("{technique}, {name}: {took_ms:.0} ms, factor ±{factor:.3}");
+                drawn.extend(pictures.into_iter().map(|picture| (label.clone(), picture)));
             }
             if let Some(shot) = shots.shots.first() {
                 let width = shots.size_px()[0] as usize;
@@ -100,6 +101,53 @@ impl AnyChart for Pictures {
         write_rgb_png(&out.join(format!("{NAME}.png")), size_px, &rgba)?;
         Ok(true)
     }
+}
+
+/// What the technique of a scene has to offer: the qualities, or so many sources (Gibson et al. 2003, fig. 9).
+fn ways(scene: &Scene) -> Vec<(String, ShadowSettings)> {
+    let technique = scene.shadows.technique;
+    if scene.chosen_technique().0 != Technique::Shafts {
+        let qualities = Quality::BY_NAME.into_iter();
+        return qualities
+            .map(|(name, quality)| {
+                let shadows = ShadowSettings {
+                    technique,
+                    ..quality.shadows()
+                };
+                (name.to_owned(), shadows)
+            })
+            .collect();
+    }
+    let sources = [Some(10), Some(20), Some(50), None].into_iter();
+    sources
+        .map(|sources| {
+            let name = sources.map_or("all".to_owned(), |count: u32| count.to_string());
+            let mut shadows = scene.shadows;
+            shadows.shafts.sources = sources;
+            (format!("{name} sources"), shadows)
+        })
+        .collect()
+}
+
+/// What the first of the frames takes to draw once all is made, milliseconds: the middle of some.
+fn frame_ms(lab: &Lab<'_>, shots: &Shots, scene: &Scene) -> Result<f64> {
+    const FRAMES: usize = 5;
+    let Some(shot) = shots.shots.first() else {
+        return Ok(0.0);
+    };
+    let mut renderer = Renderer::new(lab.gpu()?, scene, shots.intrinsics)?;
+    renderer.upload(&shot.frame)?;
+    let mut frames_ms = Vec::new();
+    for _ in 0..=FRAMES {
+        let (waited, ms) = Stopwatch::time(|| {
+            renderer.draw(&shot.camera_from_anchor, Shown::Composite);
+            renderer.wait()
+        });
+        waited?;
+        frames_ms.push(ms);
+    }
+    // The first one makes what later ones keep.
+    Ok(quantile(&frames_ms[1..], 0.5))
 }
 
 /// The pictures of a frame, and their errors.

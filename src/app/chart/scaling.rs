@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result};
-use glam::{DQuat, DVec3};
+use glam::{DAffine3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::family::Chart;
@@ -12,10 +12,12 @@ use super::figure::{Axis, Figure, Panel, Point, Series, power_law};
 use super::lab::Lab;
 use super::measured::rounded;
 use super::peers_table::{LIGHT_M, SIZE_PX, Stage, TORUS_CENTER_M, WARM_UP_FRAMES, torus};
-use super::shots::grey_frame;
+use super::shots::{Shots, grey_frame};
 use crate::app::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
+use crate::geometry::camera::Intrinsics;
 use crate::render::{Gpu, Renderer, Shown};
+use crate::scene::Scene;
 
 /// The chart.
 pub struct Scaling;
@@ -33,7 +35,53 @@ pub struct Row {
 
 /// Of the caster where its size is not varied.
 const TRIANGLES: usize = 2_500;
-const SWEEPS: [&str; 4] = ["triangles", "lights", "casters", "pixels"];
+const SWEEPS: [&str; 5] = ["triangles", "lights", "casters", "pixels", SOURCES];
+const SOURCES: &str = "sources";
+/// Where shafts are drawn.
+const ROOM: &str = "room";
+const SOURCE_COUNTS: [u32; 7] = [1, 3, 10, 20, 50, 100, 200];
+
+/// What is drawn.
+struct Setup {
+    scene: Scene,
+    intrinsics: Intrinsics,
+    /// By frame.
+    poses: Box<dyn Fn(usize) -> Vec<Option<DAffine3>>>,
+}
+
+impl From<Stage> for Setup {
+    fn from(stage: Stage) -> Self {
+        Self {
+            scene: stage.scene.clone(),
+            intrinsics: stage.intrinsics,
+            poses: Box::new(move |frame| stage.poses(frame)),
+        }
+    }
+}
+
+/// The room that ships with rising numbers of sources; none where there is no such recording.
+fn rooms(lab: &Lab<'_>, samples: u32) -> Result<Vec<(f64, Setup)>> {
+    if !lab.recording_names()?.iter().any(|name| name == ROOM) {
+        return Ok(Vec::new());
+    }
+    let recording = lab.recording(ROOM)?;
+    let scene = recording.load_scene()?;
+    let shots = Shots::of(&recording, &scene)?;
+    let counts = SOURCE_COUNTS.iter().step_by(if lab.quick { 3 } else { 1 });
+    let setup = |&count: &u32| {
+        let mut scene = scene.clone();
+        scene.shadows.samples = samples;
+        scene.shadows.shafts.sources = Some(count);
+        let poses = shots.shots[0].camera_from_anchor.clone();
+        let setup = Setup {
+            scene,
+            intrinsics: shots.intrinsics,
+            poses: Box::new(move |_| poses.clone()),
+        };
+        (f64::from(count), setup)
+    };
+    Ok(counts.map(setup).collect())
+}
 
 /// The sizes of a sweep with their stages: the peers' torus over the table, one thing varied.
 fn sweep(varied: &str, samples: u32, quick: bool) -> Vec<(f64, Stage)> {
@@ -83,12 +131,15 @@ impl Chart for Scaling {
     const SHOWS: &'static str = "How the time for a frame with shadow volumes made anew grows with triangles of the caster, \
         lights, casters and pixels, one varied at a time: a torus of 2,500 triangles that turns over a table under one \
         lamp, 640 x 480 pixels (casters: smaller ones). Drawn and waited for, without video going up or a picture coming \
-        back. The number at a line is its slope, the exponent of growth over the upper half of its sizes. Memory is what \
+        back. Sources: soft shadows by shafts in the room that ships, where nothing \
+        moves but the camera. The number at a line is its slope, the exponent of growth over the upper half of its sizes. Memory is what \
         the graphics driver has given to the program.";
     type Row = Row;
 
-    fn inputs(&self, _: &Lab<'_>) -> Result<Vec<PathBuf>> {
-        Ok(Vec::new())
+    fn inputs(&self, lab: &Lab<'_>) -> Result<Vec<PathBuf>> {
+        let recordings = lab.recordings()?.into_iter();
+        let rooms = recordings.filter(|recording| recording.name == ROOM);
+        Ok(rooms.flat_map(|room| [room.folder, room.scene]).collect())
     }
 
     fn units(&self, _: &Lab<'_>) -> Result<Vec<String>> {
@@ -104,7 +155,18 @@ impl Chart for Scaling {
         };
         let mut rows = Vec::new();
         for samples in [1, 4] {
-            let stages = sweep(unit, samples, lab.quick);
+            let stages: Vec<(f64, Setup)> = match unit {
+                SOURCES => rooms(lab, samples)?,
+                _ => {
+                    let stages = sweep(unit, samples, lab.quick).into_iter();
+                    stages.map(|(value, stage)| (value, stage.into())).collect()
+                }
+            };
+            let frames = if unit == SOURCES {
+                frames / 4 + 1
+            } else {
+                frames
+            };
             let benches = stages.iter().map(|(_, stage)| Bench::new(&gpu, stage));
             let mut benches = benches.collect::<Result<Vec<_>>>()?;
             for frame in 0..warm_up + frames {
@@ -172,7 +234,7 @@ impl Chart for Scaling {
             }
         }
         Figure {
-            title: "How the cost of shadow volumes grows".to_owned(),
+            title: "How the cost of shadows grows".to_owned(),
             reading: "Both axes are logarithmic; the number at a line's end is its slope: 1 grows in proportion.".to_owned(),
             columns: SWEEPS.len(),
             panel_size: [350.0, 300.0],
@@ -189,11 +251,11 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(gpu: &Arc<Gpu>, stage: &Stage) -> Result<Self> {
+    fn new(gpu: &Arc<Gpu>, stage: &Setup) -> Result<Self> {
         let before = gpu.allocated_bytes();
         let mut renderer = Renderer::new(Arc::clone(gpu), &stage.scene, stage.intrinsics)?;
         renderer.upload(&grey_frame(stage.intrinsics.size_px))?;
-        renderer.draw(&stage.poses(0), Shown::Composite);
+        renderer.draw(&(stage.poses)(0), Shown::Composite);
         renderer.wait().context("the first frame")?;
         let after = gpu.allocated_bytes();
         let grown = before.zip(after);
@@ -206,8 +268,8 @@ impl Bench {
     }
 
     /// Milliseconds of a frame.
-    fn draw(&mut self, stage: &Stage, frame: usize) -> Result<f64> {
-        let poses = stage.poses(frame);
+    fn draw(&mut self, stage: &Setup, frame: usize) -> Result<f64> {
+        let poses = (stage.poses)(frame);
         let (waited, ms) = Stopwatch::time(|| {
             self.renderer.draw(&poses, Shown::Composite);
             self.renderer.wait()
