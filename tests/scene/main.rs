@@ -19,7 +19,7 @@ use gnomon::geometry::mesh::Mesh;
 use gnomon::light::{Light, Material};
 use gnomon::scene::{
     ArucoRefinement, Codes, Counting, DetectorKind, Family, Object, Quality, Scene, SceneError,
-    ShadowSettings, Technique,
+    ShadowSettings, ShaftSettings, Technique,
 };
 use tempfile::TempDir;
 
@@ -304,7 +304,11 @@ frame_budget_ms = 16
             counting: Counting::DepthFail,
             max_silhouette_error_px: 0.0,
             frame_budget_ms: Some(16.0),
-            shafts: Default::default(),
+            // All of them: what this quality means.
+            shafts: ShaftSettings {
+                sources: None,
+                ..ShaftSettings::default()
+            },
         }
     );
 }
@@ -312,11 +316,16 @@ frame_budget_ms = 16
 #[test]
 fn a_quality_is_told_by_the_settings_that_it_means() {
     let settings = |shadows: &str| load(&format!("[shadows]\n{shadows}\n")).unwrap().shadows;
-    let meant = [("fast", 1, 2.0), ("balanced", 4, 0.5), ("accurate", 4, 0.0)];
-    for (name, samples, error_px) in meant {
+    let meant = [
+        ("fast", 1, 2.0, Some(10)),
+        ("balanced", 4, 0.5, Some(50)),
+        ("accurate", 4, 0.0, None),
+    ];
+    for (name, samples, error_px, sources) in meant {
         let found = settings(&format!("quality = {name:?}"));
         let told = (found.samples, found.max_silhouette_error_px);
         assert_eq!(told, (samples, error_px), "{name}");
+        assert_eq!(found.shafts.sources, sources, "{name}");
         assert_eq!(found.quality.map(Quality::name), Some(name));
         // What is said beside it goes before it.
         let other = settings(&format!("quality = {name:?}\nmax_silhouette_error_px = 7"));

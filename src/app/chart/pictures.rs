@@ -76,7 +76,6 @@ impl AnyChart for Pictures {
             let mut shots = Shots::of(&recording, &scene)?;
             let middle = shots.shots.len() / 2;
             shots.shots = shots.shots.drain(middle..).take(1).collect();
-            let technique = scene.chosen_technique().0.name();
             let mut drawn = Vec::new();
             for (name, shadows) in ways(&scene) {
                 let mut scene = scene.clone();
@@ -84,7 +83,7 @@ impl AnyChart for Pictures {
                 let took_ms = frame_ms(lab, &shots, &scene)?;
                 let pictures = shots.draw(&lab.gpu()?, &scene)?;
                 let factor = mean(&shots.errors(&pictures)?, |errors| errors.factor);
-                let label = format!("{technique}, {name}: {took_ms:.0} ms, factor ±{factor:.3}");
+                let label = format!("{name}: {took_ms:.0} ms, ±{factor:.3}");
                 drawn.extend(pictures.into_iter().map(|picture| (label.clone(), picture)));
             }
             if let Some(shot) = shots.shots.first() {
@@ -290,7 +289,7 @@ impl Drawing for Sheet {
     fn draw<B: DrawingBackend>(&self, canvas: &Canvas<'_, B>) -> Result<()> {
         let title = "Shadows beside the truth";
         canvas.text(title, [GAP, 24.0], 22.0, INK, Anchor::Start)?;
-        let reading = "Below each picture its error, four times stronger; grey is none.";
+        let reading = "Above each picture the time of a frame and the rms error of its shadows; below it its error, four times stronger.";
         canvas.text(reading, [GAP, 50.0], 15.5, INK, Anchor::Start)?;
         for ([x, y], cell) in self.placed() {
             let above = [x, y - LABEL / 2.0];
