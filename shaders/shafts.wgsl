@@ -21,6 +21,10 @@ struct Frame {
 @group(2) @binding(4) var<storage, read> lists: array<u32>;
 @group(2) @binding(5) var maps: texture_2d<f32>;
 @group(2) @binding(6) var map_sampler: sampler;
+// The probe's light as glossy surfaces mirror it, latitude-longitude; the square root of their roughness rises evenly with
+// the level.
+@group(2) @binding(7) var environment: texture_2d<f32>;
+@group(2) @binding(8) var environment_sampler: sampler;
 
 
 // Least variance of depths in a map: a surface hides itself by no more than its own slope.
@@ -180,7 +184,28 @@ fn light_on_virtual(surface: Surface, @builtin(front_facing) outside: bool) -> L
         }
     }
     let arriving = max(surface.indirect - taken, vec3f(0.0));
-    return Light(vec4f(0.0), vec4f(surface.material.rgb / PI * arriving, 1.0));
+    let diffuse = surface.material.rgb / PI * arriving;
+    if !GLOSSY || surface.material.a <= 0.0 {
+        return Light(vec4f(0.0), vec4f(diffuse, 1.0));
+    }
+    let to_camera = normalize(frame.world_from_camera[3].xyz - point_in_world);
+    let cos_camera = max(dot(normal, to_camera), 1e-3);
+    // What hides light hides it from the layer as well; more is not known of where it comes from.
+    let left = arriving / max(surface.indirect, vec3f(1e-6));
+    let mirrored = mirrored(reflect(-to_camera, normal), sqrt(surface.material.a), cos_camera) * left;
+    return Light(vec4f(0.0), vec4f(diffuse * (1.0 - fresnel(cos_camera)) + mirrored, 1.0));
+}
+
+// Radiance that the glossy layer mirrors of the environment (Karis 2013: a mean over the lobe times what the layer reflects
+// of light from everywhere, here as fitted by Karis 2014).
+fn mirrored(direction: vec3f, evenness: f32, cos_camera: f32) -> vec3f {
+    let place = vec2f(atan2(direction.y, direction.x) / (2.0 * PI) + 0.5, acos(clamp(direction.z, -1.0, 1.0)) / PI);
+    let level = evenness * f32(textureNumLevels(environment) - 1u);
+    let mean = textureSampleLevel(environment, environment_sampler, place, level).rgb;
+    let fit = evenness * vec4f(-1.0, -0.0275, -0.572, 0.022) + vec4f(1.0, 0.0425, 1.04, -0.04);
+    let grazing = min(fit.x * fit.x, exp2(-9.28 * cos_camera)) * fit.x + fit.y;
+    let reflected = vec2f(-1.04, 1.04) * grazing + fit.zw;
+    return mean * (0.04 * reflected.x + reflected.y);
 }
 
 // For what is drawn into depth alone.

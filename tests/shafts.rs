@@ -4,6 +4,7 @@
 mod common;
 
 use std::f32::consts::PI;
+use std::f64::consts::{FRAC_PI_2, TAU};
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -13,6 +14,7 @@ use gnomon::app::truth::key_frames;
 use gnomon::capture::{Frame, load_calibration};
 use gnomon::geometry::bounds::Bounds;
 use gnomon::light::probe::Probe;
+use gnomon::light::{Material, reflectance};
 use gnomon::render::{Layers, Renderer, Room, Shown, VIRTUAL};
 use gnomon::scene::Scene;
 use gnomon::shafts::patches::RoomTriangle;
@@ -235,6 +237,62 @@ fn a_thing_that_is_lifted_from_the_table_takes_its_shadow_along() {
         before = darkest;
     }
     assert!(before > 0.8, "{before}");
+}
+
+#[test]
+fn gloss_in_a_room_of_one_brightness_is_what_the_brdf_makes_of_it() {
+    // All around the same radiance, which the camera's exposure makes 0.5.
+    let mut scene = coarse_scene();
+    let probe = scene.probe.as_mut().expect("a probe");
+    probe.probe = Probe::new([64, 32], vec![Vec3::ONE; 64 * 32]).expect("a probe");
+    probe.exposure = 0.5;
+    // A ball high above the table, in nobody's way.
+    scene.virtuals.remove(0);
+    scene.phantoms.retain(|phantom| phantom.name == "table");
+    scene.phantoms[0].materials[0].albedo = DVec3::ONE;
+    let ball = &mut scene.virtuals[0];
+    ball.anchor_from_object.translation.z = 0.12;
+    ball.casts = false;
+    for roughness in [0.05, 0.3, 1.0] {
+        let material = Material {
+            albedo: DVec3::new(0.6, 0.3, 0.1),
+            roughness: Some(roughness),
+        };
+        scene.virtuals[0].materials = vec![material];
+        let (frame, poses) = frame();
+        let seen = seen(&mut renderer(&scene));
+        let camera_from_world = poses[0].expect("a pose");
+        let center =
+            camera_from_world.transform_point3(scene.virtuals[0].anchor_from_object.translation);
+        // Where the line from the camera to the ball's middle meets it, it faces the camera.
+        let [x, y] = load_calibration(&project_file("recordings/room/camera.toml"))
+            .map(|it| (it.focal_px * center.truncate() / center.z + it.center_px).to_array())
+            .expect("the calibration")
+            .map(|at| at.round() as usize);
+        let pixel = 4 * (y * frame.size_px[0] as usize + x);
+        let level = |channel: usize| f64::from(seen.picture[pixel + channel]) / 255.0;
+        let linear = DVec3::from_array(
+            [0, 1, 2].map(|channel| ((level(channel) + 0.055) / 1.055).powf(2.4)),
+        );
+        let expected = 0.5 * reflected_of_everywhere(&material);
+        let error = (linear / expected - 1.0).abs().max_element();
+        assert!(error < 0.06, "{roughness}: {linear}, not {expected}");
+    }
+}
+
+/// What a surface that faces the camera sends there of light 1 from everywhere.
+fn reflected_of_everywhere(material: &Material) -> DVec3 {
+    let steps = 600;
+    let mut sum = DVec3::ZERO;
+    for i in 0..steps {
+        let polar = (f64::from(i) + 0.5) / f64::from(steps) * FRAC_PI_2;
+        let (sine, cosine) = polar.sin_cos();
+        let to_light = DVec3::new(sine, 0.0, cosine);
+        // Seen straight on, the azimuth does not matter.
+        let ring = TAU * sine * FRAC_PI_2 / f64::from(steps);
+        sum += reflectance(material, DVec3::Z, to_light, DVec3::Z) * cosine * ring;
+    }
+    sum
 }
 
 #[test]

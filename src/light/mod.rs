@@ -4,6 +4,7 @@ pub mod bounce;
 pub mod brightest;
 pub mod contrast;
 pub(crate) mod cores;
+pub mod prefiltered;
 pub mod probe;
 pub mod probe_maps;
 pub mod radiance_picture;

@@ -29,8 +29,9 @@ const SMALLEST_PART_M: f32 = 0.004;
 const PART_OF_DISTANCE: f32 = 0.3;
 const MOST_PARTS: u32 = 10;
 
-/// A virtual thing that hides light.
+/// A virtual thing, which hides light if it casts.
 struct Caster {
+    casts: bool,
     /// Simplified, in its own space, with albedos.
     coarse: Vec<([Vec3; 3], Vec3)>,
     anchor: usize,
@@ -39,13 +40,9 @@ struct Caster {
     surfels: Vec<Surfel>,
 }
 
-/// All virtual things that hide light when they are visible.
+/// All virtual things.
 pub(super) struct ShaftCasters {
     casters: Vec<Caster>,
-}
-
-fn casting(scene: &Scene) -> impl Iterator<Item = &Object> {
-    scene.virtuals.iter().filter(|object| object.casts)
 }
 
 /// The casters where they are in a frame, world space.
@@ -53,6 +50,8 @@ pub(super) struct PlacedCasters {
     pub triangles: Vec<[Vec3; 3]>,
     /// Around each caster.
     pub boxes: Vec<BoxM>,
+    /// Around each thing that is seen, casters or not.
+    pub seen: Vec<BoxM>,
     pub ball: Ball,
     pub caster: RayCaster,
     surfels: Vec<Surfel>,
@@ -61,7 +60,7 @@ pub(super) struct PlacedCasters {
 impl ShaftCasters {
     pub fn new(scene: &Scene) -> Self {
         let mut casters = Self {
-            casters: casting(scene).map(Caster::new).collect(),
+            casters: scene.virtuals.iter().map(Caster::new).collect(),
         };
         casters.follow(scene);
         casters
@@ -69,18 +68,20 @@ impl ShaftCasters {
 
     /// Takes the places of the same things anew.
     pub fn follow(&mut self, scene: &Scene) {
-        let shown = casting(scene).filter(|object| object.visible).count();
+        let casts = |object: &&Object| object.visible && object.casts;
+        let shown = scene.virtuals.iter().filter(casts).count();
         let surfel_count = (SURFELS / shown.max(1)).max(LEAST_SURFELS);
-        for (caster, object) in self.casters.iter_mut().zip(casting(scene)) {
+        for (caster, object) in self.casters.iter_mut().zip(&scene.virtuals) {
             caster.place(object, surfel_count);
         }
     }
 
-    /// The casters whose anchors have a pose; `None` where none has.
+    /// The things whose anchors have a pose; `None` where none has.
     pub fn place(&self, world_from_anchor: &[Option<DAffine3>]) -> Option<PlacedCasters> {
         let mut placed = PlacedCasters {
             triangles: Vec::new(),
             boxes: Vec::new(),
+            seen: Vec::new(),
             ball: Ball {
                 center: Vec3::ZERO,
                 radius: 0.0,
@@ -95,10 +96,14 @@ impl ShaftCasters {
             };
             let point = |point: Vec3| pose.transform_point3(point.as_dvec3()).as_vec3();
             let triangles = caster.triangles.iter().map(|corners| corners.map(point));
-            let first = placed.triangles.len();
+            let triangles: Vec<[Vec3; 3]> = triangles.collect();
+            let bounds = BoxM::around(triangles.iter().flatten().copied());
+            placed.seen.push(bounds);
+            if !caster.casts {
+                continue;
+            }
             placed.triangles.extend(triangles);
-            let corners = placed.triangles[first..].iter().flatten();
-            placed.boxes.push(BoxM::around(corners.copied()));
+            placed.boxes.push(bounds);
             placed
                 .surfels
                 .extend(caster.surfels.iter().map(|surfel| Surfel {
@@ -110,7 +115,7 @@ impl ShaftCasters {
         placed.caster = RayCaster::new(&placed.triangles);
         let all = BoxM::around(
             placed
-                .boxes
+                .seen
                 .iter()
                 .flat_map(|bounds| [bounds.min, bounds.max]),
         );
@@ -119,7 +124,7 @@ impl ShaftCasters {
         placed.ball.radius = corners
             .map(|corner| corner.distance(placed.ball.center))
             .fold(0.0, f32::max);
-        (!placed.triangles.is_empty()).then_some(placed)
+        (!placed.seen.is_empty()).then_some(placed)
     }
 }
 
@@ -140,6 +145,7 @@ impl Caster {
             .iter()
             .map(|&material| object.materials[material as usize].albedo.as_vec3());
         Self {
+            casts: object.casts,
             coarse: corners.zip(albedos).collect(),
             anchor: object.anchor,
             triangles: Vec::new(),
@@ -161,7 +167,10 @@ impl Caster {
         };
         let placed = |(corners, albedo): &([Vec3; 3], Vec3)| (corners.map(place), *albedo);
         let with_albedo: Vec<([Vec3; 3], Vec3)> = self.coarse.iter().map(placed).collect();
-        self.surfels = surfels(&with_albedo, surfel_count);
+        self.surfels = match self.casts {
+            true => surfels(&with_albedo, surfel_count),
+            false => Vec::new(),
+        };
         self.triangles = with_albedo.iter().map(|(corners, _)| *corners).collect();
     }
 }

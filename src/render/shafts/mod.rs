@@ -6,6 +6,7 @@
 mod casters;
 mod corners;
 pub(super) mod data;
+mod environment;
 pub mod kept_rooms;
 mod maps;
 mod pipelines;
@@ -32,6 +33,7 @@ use super::stage::Stage;
 use casters::{PlacedCasters, ShaftCasters};
 use corners::{Notice, Noticing};
 use data::{Frame, Source, packed};
+use environment::Environment;
 use maps::{Maps, Tiling, source};
 use pipelines::Pipelines;
 use room::Room;
@@ -61,6 +63,7 @@ pub(super) struct Shafts {
     place_count: u32,
     frame: wgpu::Buffer,
     sampler: wgpu::Sampler,
+    environment: Environment,
     /// Where the casters' anchors were when `hidden` was worked out.
     world_from_anchor: Vec<Option<DAffine3>>,
     hidden: Option<Hidden>,
@@ -78,9 +81,9 @@ struct Hidden {
     thrown: wgpu::Buffer,
     thrown_count: u32,
     group: wgpu::BindGroup,
-    /// Around the casters, and around all that may notice.
-    boxes: Vec<BoxM>,
-    noticing: BoxM,
+    /// Around the virtual things, and around all that notices, if anything does.
+    seen: Vec<BoxM>,
+    noticing: Option<BoxM>,
     /// What the casters throw back.
     surfels: GroupedSurfels,
     /// Whether the maps show it.
@@ -136,6 +139,11 @@ impl Shafts {
                 mipmap_filter: wgpu::MipmapFilterMode::Linear,
                 ..Default::default()
             }),
+            environment: Environment::new(
+                device,
+                &gpu.queue,
+                glossy.then_some((&probe.probe, probe.exposure as f32)),
+            ),
             world_from_anchor: Vec::new(),
             hidden: None,
             settings,
@@ -214,7 +222,7 @@ impl Shafts {
             });
             reach::covered(&corners, &camera_from_world, intrinsics)
         };
-        let all = hidden.boxes.iter().chain([&hidden.noticing]);
+        let all = hidden.seen.iter().chain(&hidden.noticing);
         let pixels = all.map(covered).fold(PixelRect::NONE, PixelRect::union);
         (!pixels.is_empty()).then_some(pixels)
     }
@@ -367,6 +375,16 @@ impl Shafts {
             binding: 6,
             resource: wgpu::BindingResource::Sampler(&self.sampler),
         });
+        entries.extend([
+            wgpu::BindGroupEntry {
+                binding: 7,
+                resource: wgpu::BindingResource::TextureView(&self.environment.view),
+            },
+            wgpu::BindGroupEntry {
+                binding: 8,
+                resource: wgpu::BindingResource::Sampler(&self.environment.sampler),
+            },
+        ]);
         Hidden {
             group: device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("shafts"),
@@ -392,13 +410,11 @@ impl Shafts {
                 wgpu::BufferUsages::VERTEX,
             ),
             thrown_count: thrown.len() as u32,
-            noticing: BoxM::around(
-                corners
-                    .iter()
-                    .map(|corner| corner.position)
-                    .chain(thrown.iter().map(|corner| corner.position)),
-            ),
-            boxes: placed.boxes.clone(),
+            noticing: (!corners.is_empty() || !thrown.is_empty()).then(|| {
+                let lit = corners.iter().map(|corner| corner.position);
+                BoxM::around(lit.chain(thrown.iter().map(|corner| corner.position)))
+            }),
+            seen: placed.seen.clone(),
             surfels,
             sources: source_buffer,
             is_drawn: false,

@@ -47,6 +47,12 @@ impl Pipelines {
             min_binding_size: None,
         };
         let storage = || buffer(wgpu::BufferBindingType::Storage { read_only: true });
+        let texture = || wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Float { filterable: true },
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        };
+        let sampler = || wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("shafts"),
             entries: &[
@@ -55,18 +61,10 @@ impl Pipelines {
                 entry(2, storage()),
                 entry(3, storage()),
                 entry(4, storage()),
-                entry(
-                    5,
-                    wgpu::BindingType::Texture {
-                        sample_type: wgpu::TextureSampleType::Float { filterable: true },
-                        view_dimension: wgpu::TextureViewDimension::D2,
-                        multisampled: false,
-                    },
-                ),
-                entry(
-                    6,
-                    wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
-                ),
+                entry(5, texture()),
+                entry(6, sampler()),
+                entry(7, texture()),
+                entry(8, sampler()),
             ],
         });
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
