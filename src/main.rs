@@ -24,6 +24,7 @@ use gnomon::app::replay::{self, replay};
 use gnomon::app::report::Report;
 use gnomon::app::track::{self, is_scene, track};
 use gnomon::calibration::{Target, TargetMarkers};
+use gnomon::capture::live::is_live;
 use gnomon::light::probe_maps::Circle;
 use gnomon::scene::{CameraSettings, Family, PixelFormat, Scene, TrackingSettings, WantedFormat};
 use gnomon::tracking::mapping::MapSettings;
@@ -59,10 +60,11 @@ enum Command {
         after_help = "Example:\n  gnomon board --from walk.mp4 --calibration camera.toml --size-mm 40 --out table.toml"
     )]
     Board(BoardArgs),
-    /// Calibrates a camera from a video or pictures of a printed target.
+    /// Calibrates a camera from a video or pictures of a printed target, or live.
     #[command(
         after_help = "Example:\n  gnomon calibrate walk.mp4 --chessboard 9x6 --square-mm 25 --out camera.toml --coverage out/coverage.png\n  \
-                      gnomon calibrate stills/ --charuco 10x7 --square-mm 25 --marker-mm 18 --out camera.toml"
+                      gnomon calibrate stills/ --charuco 10x7 --square-mm 25 --marker-mm 18 --out camera.toml\n  \
+                      gnomon calibrate webcam:0 --charuco 10x7 --square-mm 25 --marker-mm 18 --out camera.toml"
     )]
     Calibrate(CalibrateArgs),
     /// Makes sheets to print: markers, boards, calibration targets.
@@ -231,7 +233,8 @@ struct BoardArgs {
 #[derive(Args)]
 #[command(group = clap::ArgGroup::new("pattern").required(true).args(["chessboard", "charuco"]))]
 struct CalibrateArgs {
-    /// Videos, pictures, folders of pictures or sessions that show the target from all around, by one camera at one size
+    /// Videos, pictures, folders of pictures or sessions that show the target from all around, by one camera at one size;
+    /// or a camera (webcam:N, http://…): a window says where to hold the target
     #[arg(required = true)]
     source: Vec<String>,
     #[command(flatten)]
@@ -245,6 +248,14 @@ struct CalibrateArgs {
     /// The camera mirrors its pictures: turn them back first
     #[arg(long)]
     mirror: bool,
+    /// Play a video in the window as if it were a camera
+    #[arg(long)]
+    watch: bool,
+    #[command(flatten)]
+    wanted: WantedArgs,
+    /// Graphics adapter of the window, by a part of its name; the fastest kind without this
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
 }
 
 /// What a camera is calibrated with.
@@ -352,6 +363,13 @@ struct RecordingArgs {
     /// libapriltag searches pictures shrunk by this: 2 without it, 1 finds smaller markers
     #[arg(long, value_name = "FACTOR")]
     decimation: Option<f64>,
+    #[command(flatten)]
+    wanted: WantedArgs,
+}
+
+/// What a webcam is asked for.
+#[derive(Args)]
+struct WantedArgs {
     /// Ask a webcam for pictures of this size; without it the calibration's
     #[arg(long, value_name = "WxH", value_parser = size_of)]
     size: Option<[u32; 2]>,
@@ -363,14 +381,22 @@ struct RecordingArgs {
     format: Option<PixelFormat>,
 }
 
+impl WantedArgs {
+    fn wanted(&self) -> WantedFormat {
+        WantedFormat {
+            size_px: self.size,
+            fps: self.fps,
+            pixels: self.format,
+        }
+    }
+}
+
 impl RecordingArgs {
     fn is_given(&self) -> bool {
         self.calibration.is_some()
             || self.decimation.is_some()
             || self.mirror
-            || self.size.is_some()
-            || self.fps.is_some()
-            || self.format.is_some()
+            || self.wanted.wanted() != WantedFormat::default()
     }
 }
 
@@ -584,7 +610,13 @@ fn run_markers(args: MarkersArgs) -> Result<()> {
 
 fn run_calibrate(args: CalibrateArgs) -> Result<()> {
     let stop = interrupts()?;
+    let live = |source: &String| is_live(source);
+    let watch = (args.watch || args.source.iter().any(live)).then(|| calibrate::Watch {
+        wanted: args.wanted.wanted(),
+        adapter: args.adapter,
+    });
     let request = calibrate::Request {
+        watch,
         sources: args.source,
         target: args.target.target()?,
         mirror: args.mirror,
@@ -866,11 +898,7 @@ fn camera_of(source: &Path, args: &RecordingArgs) -> Result<CameraSettings> {
         source: source.to_owned(),
         calibration: args.calibration.clone(),
         mirror: args.mirror,
-        wanted: WantedFormat {
-            size_px: args.size,
-            fps: args.fps,
-            pixels: args.format,
-        },
+        wanted: args.wanted.wanted(),
     })
 }
 

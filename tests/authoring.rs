@@ -15,7 +15,7 @@ use gnomon::app::truth::{draw, key_frames};
 use gnomon::light::Light;
 use gnomon::render::Renderer;
 use gnomon::scene::{
-    Counting, Placement, Quality, Scene, ShadowSettings, ShaftSettings, Technique,
+    Counting, Difference, Placement, Quality, Scene, ShadowSettings, ShaftSettings, Technique,
 };
 
 /// What is promised for the time from a saved file to its scene.
@@ -394,6 +394,8 @@ mod edits {
                     sources: random.chance(0.5).then(|| 1 + random.below(99) as u32),
                     patches: 100 + random.below(900) as u32,
                     map_px: 64 << random.below(3),
+                    difference: [Difference::Ratio, Difference::Subtract, Difference::Encoded]
+                        [random.below(3)],
                     ..ShaftSettings::default()
                 },
             }),

@@ -16,7 +16,7 @@ use gnomon::geometry::bounds::Bounds;
 use gnomon::light::probe::Probe;
 use gnomon::light::{Material, reflectance};
 use gnomon::render::{Layers, Renderer, Room, Shown, VIRTUAL};
-use gnomon::scene::Scene;
+use gnomon::scene::{Difference, Scene};
 use gnomon::shafts::patches::RoomTriangle;
 use gnomon::shafts::prepared::{Options, PlacedProbe, Prepared};
 use gnomon::shafts::source_tree::BoxM;
@@ -278,6 +278,75 @@ fn gloss_in_a_room_of_one_brightness_is_what_the_brdf_makes_of_it() {
         let error = (linear / expected - 1.0).abs().max_element();
         assert!(error < 0.06, "{roughness}: {linear}, not {expected}");
     }
+}
+
+#[test]
+fn the_ways_to_take_light_away_agree_where_the_video_is_what_the_model_says() {
+    // All around the same radiance, which the camera's exposure makes 0.5, and all that is real is as bright.
+    let mut scene = coarse_scene();
+    let probe = scene.probe.as_mut().expect("a probe");
+    probe.probe = Probe::new([64, 32], vec![Vec3::ONE; 64 * 32]).expect("a probe");
+    probe.exposure = 0.5;
+    scene.phantoms.retain(|phantom| phantom.name == "table");
+    scene.phantoms[0].materials[0].albedo = DVec3::ONE;
+    // Above the table, and black: it throws nothing back.
+    scene.virtuals.truncate(1);
+    scene.virtuals[0].anchor_from_object.translation.z += 0.03;
+    for material in &mut scene.virtuals[0].materials {
+        material.albedo = DVec3::ZERO;
+    }
+    // Where a pixel is in part virtual, levels and light have different means.
+    scene.shadows.samples = 1;
+    let (frame, _) = frame();
+    let recorded = Frame {
+        rgba: frame.rgba.iter().map(|_| 188).collect(),
+        ..frame.clone()
+    };
+    let mut seen_with = |difference| {
+        scene.shadows.shafts.difference = difference;
+        let mut renderer = renderer(&scene);
+        renderer.upload(&recorded).expect("an uploaded frame");
+        seen(&mut renderer)
+    };
+    let ratio = seen_with(Difference::Ratio);
+    // The levels that the shadow takes, and how far another way is beside what is expected of it where those are taken.
+    let held_against = |other: &Seen, expected: fn(f64) -> [f64; 2]| {
+        let pixels = ratio
+            .picture
+            .chunks_exact(4)
+            .zip(other.picture.chunks_exact(4));
+        let real = pixels
+            .zip(&ratio.layers.role)
+            .filter(|(_, role)| **role != VIRTUAL);
+        let shaded: Vec<(f64, f64)> = real
+            .filter(|((pixel, _), _)| pixel[1] < 180)
+            .map(|((pixel, other), _)| {
+                let level = f64::from(pixel[1]);
+                let [low, high] = expected(level);
+                let other = f64::from(other[1]);
+                (188.0 - level, other - other.clamp(low, high))
+            })
+            .collect();
+        assert!(shaded.len() > 1000, "{}", shaded.len());
+        let rms = |of: fn(&(f64, f64)) -> f64| {
+            let squares = shaded.iter().map(|both| of(both).powi(2));
+            (squares.sum::<f64>() / shaded.len() as f64).sqrt()
+        };
+        (rms(|both| both.0), rms(|both| both.1))
+    };
+    let (taken, off) = held_against(&seen_with(Difference::Subtract), |level| [level; 2]);
+    assert!(off < 0.6, "of {taken} levels {off} are off");
+    // Each set's transfers lead from all light down: at the slope of the encoding there if there are few of them, and to half
+    // of it if all light can be hidden.
+    let by_transfers = |level: f64| {
+        let encoded = |linear: f64| 255.0 * (1.055 * linear.powf(1.0 / 2.4) - 0.055);
+        let hidden = 0.5 - ((level / 255.0 + 0.055) / 1.055).powf(2.4);
+        let to_half = 2.0 * (hidden / 0.5) * (encoded(0.5) - encoded(0.25));
+        let at_slope = hidden * 255.0 * 1.055 / 2.4 * 0.5_f64.powf(1.0 / 2.4 - 1.0);
+        [188.0 - to_half, 188.0 - at_slope]
+    };
+    let (taken, off) = held_against(&seen_with(Difference::Encoded), by_transfers);
+    assert!(off < 1.0, "of {taken} levels {off} are off");
 }
 
 /// What a surface that faces the camera sends there of light 1 from everywhere.

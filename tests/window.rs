@@ -7,12 +7,16 @@
     reason = "a test may stop where its own files fail"
 )]
 
+mod common;
+
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use gnomon::capture::FrameSource;
+use common::prints::{BENT_CAMERA, CHESSBOARD, Photographer, Print, good_poses};
+use gnomon::app::video_writer::{Codec, Naming, VideoWriter};
+use gnomon::capture::{FrameSource, load_calibration};
 
 const SOON: Duration = Duration::from_secs(90);
 
@@ -43,11 +47,11 @@ impl Display {
 
     fn gnomon(&self, arguments: &[&str]) -> Child {
         Command::new(env!("CARGO_BIN_EXE_gnomon"))
-            .arg("live")
             .args(arguments)
             .current_dir(env!("CARGO_MANIFEST_DIR"))
             .env("DISPLAY", &self.name)
             .env_remove("WAYLAND_DISPLAY")
+            .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
             .unwrap()
@@ -128,7 +132,7 @@ fn keys_record_and_an_interrupt_leaves_whole_files() {
     };
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
-    let window = display.gnomon(&["config/lamp.toml", "--out", out]);
+    let window = display.gnomon(&["live", "config/lamp.toml", "--out", out]);
     let Some(shown) = display.window() else {
         eprintln!("skipped in part: there is no xdotool");
         thread::sleep(Duration::from_secs(5));
@@ -170,12 +174,76 @@ fn keys_record_and_an_interrupt_leaves_whole_files() {
     assert_eq!((picture.width(), picture.height()), (640, 480));
 }
 
+/// A film of a target that is held still here and there.
+fn film(path: &Path) {
+    const FPS: f64 = 10.0;
+    const FRAMES_A_VIEW: usize = 12;
+    let print = Print::chessboard();
+    let size_px = BENT_CAMERA.size_px;
+    let mut writer = VideoWriter::create(path, Codec::Ffv1, size_px, FPS, Naming::AtOnce).unwrap();
+    for pose in good_poses(print) {
+        let grey = Photographer::bent().photograph(print, &pose, 1.0);
+        let rgba: Vec<u8> = grey
+            .into_iter()
+            .flat_map(|level| [level, level, level, 255])
+            .collect();
+        for _ in 0..FRAMES_A_VIEW {
+            writer.push(size_px, &rgba).unwrap();
+        }
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn a_target_that_is_held_to_the_camera_calibrates_it() {
+    let Some(display) = Display::open() else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let recorded = folder.path().join("film.mkv");
+    film(&recorded);
+    let written = folder.path().join("camera.toml");
+    let mut arguments = vec!["calibrate", recorded.to_str().unwrap(), "--watch"];
+    arguments.extend(CHESSBOARD.split_whitespace());
+    arguments.extend(["--out", written.to_str().unwrap()]);
+    let mut window = display.gnomon(&arguments);
+    let Some(shown) = display.window() else {
+        eprintln!("skipped: there is no xdotool");
+        interrupt(&window);
+        assert!(!ended(window).status.success());
+        assert!(!written.exists(), "given up");
+        return;
+    };
+    let press = |key: &str| {
+        display.xdotool(&["windowfocus", &shown, "key", key]);
+    };
+    // Too early: it says so, and goes on.
+    press("Return");
+    let seconds = good_poses(Print::chessboard()).len() as f64 * 1.2;
+    thread::sleep(Duration::from_secs_f64(seconds + 3.0));
+    assert!(window.try_wait().unwrap().is_none(), "it ended by itself");
+    let began = Instant::now();
+    while window.try_wait().unwrap().is_none() {
+        assert!(began.elapsed() < SOON, "Enter does not end it");
+        press("Return");
+        thread::sleep(Duration::from_millis(300));
+    }
+    let output = ended(window);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{said}");
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(printed.contains("focal length"), "{printed}");
+    let found = load_calibration(&written).unwrap();
+    let off = (found.focal_px / BENT_CAMERA.focal_px - 1.0).abs();
+    assert!(off.max_element() < 5e-3, "{found:?}\n{printed}");
+}
+
 #[test]
 fn a_camera_that_is_not_there_is_said_and_no_success() {
     let Some(display) = Display::open() else {
         return;
     };
-    let window = display.gnomon(&["webcam:no such camera"]);
+    let window = display.gnomon(&["live", "webcam:no such camera"]);
     thread::sleep(Duration::from_secs(4));
     interrupt(&window);
     let output = ended(window);

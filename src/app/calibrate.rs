@@ -2,15 +2,19 @@
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context as _, Result, bail};
 
+use super::live::calibrating;
 use super::picture_files::{write_rgb_png, write_text};
 use super::progress::Progress;
 use super::recording::refuse_to_overwrite;
 use crate::calibration::{Calibration, Lack, Target, Views, coverage_picture, solve};
+use crate::capture::live::{LiveOptions, is_live};
 use crate::capture::{FrameSource, Notice, calibration_text};
+use crate::scene::WantedFormat;
 use crate::tracking::grey_from_rgba;
 
 /// What a calibration is made of.
@@ -26,6 +30,17 @@ pub struct Request {
     pub out: PathBuf,
     /// Where to write the picture of coverage (PNG).
     pub coverage: Option<PathBuf>,
+    /// A camera, or a video as if it were one, in a window; `None`: recordings, all frames that differ.
+    pub watch: Option<Watch>,
+}
+
+/// How the window is opened.
+#[derive(Debug, Clone, Default)]
+pub struct Watch {
+    /// What a webcam is asked for.
+    pub wanted: WantedFormat,
+    /// Part of the wanted graphics adapter's name.
+    pub adapter: Option<String>,
 }
 
 /// What a calibration gave.
@@ -48,24 +63,15 @@ const MOST_RMS_PX: f64 = 1.0;
 ///
 /// # Errors
 /// Pictures that cannot be read or give no calibration, files that cannot be written.
-pub fn calibrate(request: &Request, stop: &AtomicBool) -> Result<Done> {
+pub fn calibrate(request: &Request, stop: &Arc<AtomicBool>) -> Result<Done> {
     let out = &request.out;
     if out.extension().is_none_or(|extension| extension != "toml") {
         bail!("{}: a calibration is written as .toml", out.display());
     }
-    let mut pictures = Pictures {
-        views: Views::new(request.target)?,
-        names: Vec::new(),
-        notices: Vec::new(),
+    let pictures = match &request.watch {
+        Some(watch) => watched(request, watch, stop)?,
+        None => Pictures::of_recordings(request, stop)?,
     };
-    for name in &request.sources {
-        let source = FrameSource::open(name)?.mirrored(request.mirror);
-        for written in [Some(out), request.coverage.as_ref()] {
-            refuse_to_overwrite(&source, written.map(PathBuf::as_path))?;
-        }
-        let is_only_source = request.sources.len() == 1;
-        pictures.look_at(source, is_only_source, stop)?;
-    }
     let calibration = solve(&pictures.views)?;
     let summary = pictures.summary(&calibration);
     if let Some(path) = &request.coverage {
@@ -87,6 +93,46 @@ pub fn calibrate(request: &Request, stop: &AtomicBool) -> Result<Done> {
     })
 }
 
+/// What somebody holds to a camera.
+fn watched(request: &Request, watch: &Watch, stop: &Arc<AtomicBool>) -> Result<Pictures> {
+    let [source] = &request.sources[..] else {
+        bail!(
+            "a camera is calibrated alone, in a window; several recordings together without --watch"
+        );
+    };
+    if !is_live(source) {
+        request.refuse_to_overwrite(&FrameSource::open(source)?)?;
+    }
+    let options = LiveOptions {
+        wanted: watch.wanted,
+        mirror: request.mirror,
+        repeats: false,
+    };
+    let held = calibrating::views(
+        source,
+        &options,
+        request.target,
+        watch.adapter.as_deref(),
+        stop,
+    )?;
+    Ok(Pictures {
+        views: held.views,
+        names: held
+            .times_secs
+            .iter()
+            .map(|at_secs| format!("at {at_secs:.1} s"))
+            .collect(),
+        notices: Vec::new(),
+    })
+}
+
+impl Request {
+    fn refuse_to_overwrite(&self, source: &FrameSource) -> Result<()> {
+        refuse_to_overwrite(source, Some(&self.out))?;
+        refuse_to_overwrite(source, self.coverage.as_deref())
+    }
+}
+
 /// The pictures of all sources, numbered as they come.
 struct Pictures {
     views: Views,
@@ -96,6 +142,21 @@ struct Pictures {
 }
 
 impl Pictures {
+    fn of_recordings(request: &Request, stop: &AtomicBool) -> Result<Self> {
+        let mut pictures = Self {
+            views: Views::new(request.target)?,
+            names: Vec::new(),
+            notices: Vec::new(),
+        };
+        for name in &request.sources {
+            let source = FrameSource::open(name)?.mirrored(request.mirror);
+            request.refuse_to_overwrite(&source)?;
+            let is_only_source = request.sources.len() == 1;
+            pictures.look_at(source, is_only_source, stop)?;
+        }
+        Ok(pictures)
+    }
+
     fn look_at(&mut self, mut source: FrameSource, is_only: bool, stop: &AtomicBool) -> Result<()> {
         let path = source.path().to_owned();
         let count = source.frame_count();

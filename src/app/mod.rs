@@ -5,7 +5,6 @@ pub mod authoring;
 pub mod board;
 mod budget_words;
 pub mod calibrate;
-mod calibration_file;
 pub mod cameras;
 mod capture_talk;
 pub mod chart;

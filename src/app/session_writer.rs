@@ -6,12 +6,11 @@ use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use super::calibration_file::calibration_text;
 use super::output_error::OutputError;
 use super::poses_file::PosesText;
 use super::scene_copy::copy_scene;
 use super::video_writer::{Codec, Naming, VideoWriter};
-use crate::capture::{Frame, check_frame_size};
+use crate::capture::{Frame, calibration_text, check_frame_size};
 use crate::geometry::camera::Intrinsics;
 use crate::scene::Anchor;
 use crate::tracking::AnchorPose;

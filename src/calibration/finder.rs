@@ -32,6 +32,8 @@ type MarkerPairs = [(DVec2, DVec2); 4];
 const SOFTNESS_PX: f64 = 1.0;
 /// How far around a chessboard's corner is looked at, as a part of the way to its neighbours: farther is no better.
 const REACH: f64 = 0.4;
+/// A layout whose markers are off by less than this part of the other's squares fits better.
+const DISTINCT: f64 = 0.5;
 /// A homography from fewer corners is none to trust.
 const FEWEST_CORNERS: usize = 6;
 
@@ -185,7 +187,12 @@ fn charuco_corners(
             .map(|axis| (at(target_m + axis * clear_m) - guess_px).length())
             .into_iter()
             .fold(f64::INFINITY, f64::min);
-        if let Some(pixel) = saddle_point(soft, guess_px, clear_px)? {
+        // In the middle of what is one colour each.
+        let quarters_px = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+            .map(|way| at(target_m + DVec2::from(way) * (0.6 * clear_m)));
+        if let Some(pixel) = saddle_point(soft, guess_px, clear_px)?
+            && alternates(soft, quarters_px)?
+        {
             corners.push(Corner { target_m, pixel });
         }
     }
@@ -222,7 +229,9 @@ fn placed_markers(
             (mapped(&picture_from_target, target_m) - pixel).length_squared()
         };
         let misfit = pairs.iter().map(squared).sum::<f64>();
-        if best.as_ref().is_none_or(|(least, _)| misfit < *least) {
+        // Without its first or last column a board of one layout is one of the other: the corners are the same.
+        let fits_better = |(least, _): &(f64, Vec<MarkerPairs>)| misfit < DISTINCT * least;
+        if best.as_ref().is_none_or(fits_better) {
             best = Some((misfit, placed));
         }
     }
@@ -280,6 +289,20 @@ fn saddle_point(soft: &Mat, guess_px: DVec2, clear_px: f64) -> opencv::Result<Op
     // Where it runs away OpenCV gives the guess back.
     let moved_px = found_px.distance(guess_px);
     Ok((moved_px > 0.0 && moved_px < reach_px).then_some(found_px))
+}
+
+/// Whether four places around a corner are dark and bright by turns; not so at the board's rim.
+fn alternates(soft: &Mat, quarters_px: [DVec2; 4]) -> opencv::Result<bool> {
+    let mut levels = [0_u8; 4];
+    for (level, place) in levels.iter_mut().zip(quarters_px) {
+        let [column, row] = place.round().to_array().map(|at| at as i32);
+        if !(0..soft.cols()).contains(&column) || !(0..soft.rows()).contains(&row) {
+            return Ok(false);
+        }
+        *level = *soft.at_2d::<u8>(row, column)?;
+    }
+    let [a, b, c, d] = levels;
+    Ok(a.max(c) < b.min(d) || b.max(d) < a.min(c))
 }
 
 fn vector(point: Point2f) -> DVec2 {

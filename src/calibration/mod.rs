@@ -9,6 +9,7 @@ mod deviations;
 mod finder;
 mod homography;
 mod solve;
+mod taker;
 mod target;
 mod views;
 
@@ -20,6 +21,7 @@ pub use coverage::Coverage;
 pub use coverage_picture::{CoveragePicture, coverage_picture};
 pub use finder::TargetFinder;
 pub use solve::{Calibration, FittedView, LensTerms, solve};
+pub use taker::{Moment, Taker};
 pub use target::{Target, TargetError, TargetMarkers};
 pub use views::{FEWEST_VIEWS, Lack, Look, View, Views};
 

@@ -108,6 +108,20 @@ impl Views {
         grey: &[u8],
         size_px: [u32; 2],
     ) -> Result<Look, CalibrateError> {
+        let view = self.see(picture, grey, size_px)?;
+        Ok(view.map_or(Look::NoTarget, |view| self.take(view)))
+    }
+
+    /// Looks for the target in a picture as [`Views::look`] does, and takes nothing yet; `None` where it is not found.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn see(
+        &mut self,
+        picture: u32,
+        grey: &[u8],
+        size_px: [u32; 2],
+    ) -> Result<Option<View>, CalibrateError> {
         let expected_px = *self.size_px.get_or_insert(size_px);
         if size_px != expected_px {
             return Err(CalibrateError::OtherSize {
@@ -117,24 +131,55 @@ impl Views {
         }
         self.looked += 1;
         let corners = self.finder.find(grey, size_px)?;
-        let Some(view) = View::new(picture, corners, self.finder.target())? else {
-            return Ok(Look::NoTarget);
-        };
-        self.found += 1;
+        let view = View::new(picture, corners, self.finder.target())?;
+        self.found += u32::from(view.is_some());
+        Ok(view)
+    }
+
+    /// Takes a view that was seen.
+    pub fn take(&mut self, view: View) -> Look {
+        let size_px = self.size_px.unwrap_or_default();
         let alike = self
             .kept
             .iter_mut()
             .find(|kept| kept.distance(&view, size_px) < ALIKE);
         let Some(kept) = alike else {
             self.kept.push(view);
-            return Ok(Look::Kept);
+            return Look::Kept;
         };
         // The lens bends both alike: what differs is blur and noise.
         let better = (view.corners.len(), -view.misfit_px) > (kept.corners.len(), -kept.misfit_px);
         if better {
             *kept = view;
         }
-        Ok(Look::Alike)
+        Look::Alike
+    }
+
+    /// Forgets the view that was taken last; false where there is none.
+    pub fn drop_last(&mut self) -> bool {
+        self.kept.pop().is_some()
+    }
+
+    /// Whether a view differs from all that were taken by this part of the picture's diagonal (root mean square distance
+    /// of the target's own four corners) or more.
+    pub(super) fn is_new(&self, view: &View, by: f64) -> bool {
+        let size_px = self.size_px.unwrap_or_default();
+        let mut kept = self.kept.iter();
+        kept.all(|kept| kept.distance(view, size_px) >= by)
+    }
+
+    /// Whether a view would make less of something that the set lacks.
+    pub(super) fn helps(&self, view: &View) -> bool {
+        let (Some(coverage), Some(size_px)) = (self.coverage(), self.size_px) else {
+            return true;
+        };
+        self.lacks().iter().any(|lack| match lack {
+            Lack::Views { .. } => true,
+            Lack::Coverage { .. } => coverage.fresh(view.pixels()) > 0,
+            Lack::Tilt { .. } => view
+                .rough_tilt_rad(size_px)
+                .is_some_and(|tilt_rad| tilt_rad > TILTED_RAD),
+        })
     }
 
     /// What is looked for.
@@ -256,7 +301,7 @@ pub(super) fn lacks_of(views: usize, coverage: &Coverage, tilted: usize) -> Vec<
 
 impl View {
     /// `None` where the corners determine no plane.
-    fn new(
+    pub(super) fn new(
         picture: u32,
         corners: Vec<Corner>,
         target: &Target,
@@ -294,9 +339,14 @@ impl View {
         self.corners.iter().map(|corner| corner.pixel)
     }
 
+    /// The corners of the whole target, in its order, as a plain homography puts them; pixels.
+    pub fn outline_px(&self) -> [DVec2; 4] {
+        self.outline_px
+    }
+
     /// How far two views put the target's outline apart, as a part of the picture's diagonal. A chessboard looks the same
     /// when turned by 180°.
-    fn distance(&self, other: &Self, size_px: [u32; 2]) -> f64 {
+    pub(super) fn distance(&self, other: &Self, size_px: [u32; 2]) -> f64 {
         let [width, height] = size_px.map(f64::from);
         let turned = |turn: usize| {
             let squared: f64 = (0..4)

@@ -113,25 +113,21 @@ pub(super) fn load_calibration_or_fill(
     calibration.into_intrinsics(path, size_px)
 }
 
-/// A calibration in gnomon's own format, which [`load_calibration`] reads from a `.toml` file.
+/// A calibration in gnomon's own format, which [`load_calibration`] reads from a `.toml` file to the bit.
 pub fn calibration_text(intrinsics: &Intrinsics) -> String {
-    /// As many decimals as any lens is known to, and some more.
-    fn list<const N: usize>(numbers: [f64; N]) -> String {
-        // Adding 0 turns -0 into 0.
-        let rounded = numbers.map(|number| ((number * 1e8).round() / 1e8 + 0.0).to_string());
-        rounded.join(", ")
-    }
     let Intrinsics {
         size_px: [width, height],
         focal_px,
         center_px,
-        distortion,
+        distortion: [k1, k2, p1, p2, k3],
     } = intrinsics;
+    // `?` writes as many digits as tell the number from its neighbours, and a point in each.
     format!(
-        "size_px = [{width}, {height}]\nfocal_px = [{}]\ncenter_px = [{}]\ndistortion = [{}]\n",
-        list(focal_px.to_array()),
-        list(center_px.to_array()),
-        list(*distortion)
+        "size_px = [{width}, {height}]\n\
+         focal_px = [{:?}, {:?}]\n\
+         center_px = [{:?}, {:?}]\n\
+         distortion = [{k1:?}, {k2:?}, {p1:?}, {p2:?}, {k3:?}]    # k1, k2, p1, p2, k3\n",
+        focal_px.x, focal_px.y, center_px.x, center_px.y
     )
 }
 
@@ -608,21 +604,17 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_back() {
+    fn what_is_written_is_read_to_the_bit() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("camera.toml");
         let camera = Intrinsics {
             size_px: [1280, 720],
-            focal_px: DVec2::new(900.123_456_789, 901.0),
+            focal_px: DVec2::new(2701.1 / 3.0, 901.0),
             center_px: DVec2::new(639.5, -1e-12),
-            distortion: [-0.3, 1e-7, 0.0, -0.000_123_46, 0.0],
+            distortion: [0.1 + 0.2, -0.19, 1.0 / 3e9, 0.0, 5e-324],
         };
         std::fs::write(&path, calibration_text(&camera)).unwrap();
-        let read = load_calibration(&path).unwrap();
-        assert_eq!(read.size_px, camera.size_px);
-        assert!((read.focal_px - camera.focal_px).length() < 1e-8);
-        assert!((read.center_px - camera.center_px).length() < 1e-8);
-        assert_eq!(read.distortion, camera.distortion);
+        assert_eq!(load_calibration(&path).unwrap(), camera);
     }
 
     #[test]

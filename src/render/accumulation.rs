@@ -5,6 +5,7 @@ use super::composite::Composite;
 use super::gpu::Gpu;
 use super::surfaces::{LIGHT_FORMAT, Surfaces};
 use super::volumes::Volumes;
+use crate::scene::Difference;
 
 /// The targets that light is added to, and the composite that reads them.
 pub(super) struct Targets {
@@ -16,7 +17,7 @@ pub(super) struct Targets {
 }
 
 impl Targets {
-    pub fn new(gpu: &Gpu, background: &Background, samples: u32) -> Self {
+    pub fn new(gpu: &Gpu, background: &Background, samples: u32, difference: Difference) -> Self {
         let device = &gpu.device;
         let target = |label, format, usage| {
             device
@@ -36,7 +37,13 @@ impl Targets {
         let reaching = target("reaching", LIGHT_FORMAT, read);
         let change = target("change", LIGHT_FORMAT, read);
         Self {
-            composite: Composite::new(device, samples, background, [&reaching, &change]),
+            composite: Composite::new(
+                device,
+                samples,
+                difference,
+                background,
+                [&reaching, &change],
+            ),
             depth_stencil: target(
                 "depth and stencil",
                 gpu.depth_format,
@@ -73,7 +80,7 @@ impl Accumulation {
                 samples,
                 &[LIGHT_FORMAT, LIGHT_FORMAT],
             ),
-            targets: Targets::new(gpu, background, samples),
+            targets: Targets::new(gpu, background, samples, Difference::Ratio),
         }
     }
 }

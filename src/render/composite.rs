@@ -3,6 +3,7 @@
 
 use super::background::{Background, PICTURE_FORMAT};
 use super::shader;
+use crate::scene::Difference;
 
 /// Format of the gain layer.
 pub(super) const GAIN_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
@@ -19,6 +20,7 @@ impl Composite {
     pub fn new(
         device: &wgpu::Device,
         samples: u32,
+        difference: Difference,
         background: &Background,
         [reaching, change]: [&wgpu::TextureView; 2],
     ) -> Self {
@@ -60,6 +62,14 @@ impl Composite {
         let constants = [
             ("SAMPLES", f64::from(samples)),
             ("DISTORTS", f64::from(background.distorts)),
+            (
+                "DIFFERENCE",
+                match difference {
+                    Difference::Ratio => 0.0,
+                    Difference::Subtract => 1.0,
+                    Difference::Encoded => 2.0,
+                },
+            ),
         ];
         let build = |entry_point, format: wgpu::TextureFormat| {
             shader::whole_picture(

@@ -133,7 +133,8 @@ impl Renderer {
         });
         let is_shafts = scene.chosen_technique().0 == Technique::Shafts;
         let shafts = scene.probe.as_ref().filter(|_| is_shafts).map(|probe| {
-            let targets = Targets::new(&gpu, &background, samples);
+            let difference = scene.shadows.shafts.difference;
+            let targets = Targets::new(&gpu, &background, samples, difference);
             (Shafts::new(&gpu, scene, probe, &stage), targets)
         });
         let is_direct = samples == 1 && scene.lights.len() == 1 && shafts.is_none();

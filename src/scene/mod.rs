@@ -436,6 +436,26 @@ pub struct ShaftSettings {
     pub least_part: f64,
     /// Side of a source's shadow map, pixels.
     pub map_px: u32,
+    /// How what is hidden is taken out of the video.
+    pub difference: Difference,
+}
+
+/// How what virtual things hide of a room's light is taken out of the video.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Difference {
+    /// Of the pixel's linear light as large a part as of the modelled light: the video keeps its texture, and the model's
+    /// reflectances do not matter.
+    Ratio,
+    /// The radiance that the model says is missing (Gibson et al. 2003, section 7; Debevec 1998).
+    Subtract,
+    /// Intensity transfers, from the encoded pixel (Gibson et al. 2003, section 7.1): for the record, as it was done where
+    /// pictures could not be added in linear light.
+    Encoded,
+}
+
+impl Difference {
+    /// The two in linear light, by the names that files use for `difference`.
+    pub const BY_NAME: [(&str, Self); 2] = [("ratio", Self::Ratio), ("subtract", Self::Subtract)];
 }
 
 impl Default for ShaftSettings {
@@ -447,6 +467,7 @@ impl Default for ShaftSettings {
             receivers_per_leaf: 8,
             least_part: 0.02,
             map_px: 256,
+            difference: Difference::Ratio,
         }
     }
 }

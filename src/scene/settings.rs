@@ -3,8 +3,8 @@
 use super::error::SceneError;
 use super::reader::{Numbers, Table, Value};
 use super::{
-    ArucoRefinement, CameraSettings, Counting, DetectorKind, PixelFormat, ProbeScene, Quality,
-    Search, ShadowSettings, ShaftSettings, Technique, TrackingSettings, WantedFormat,
+    ArucoRefinement, CameraSettings, Counting, DetectorKind, Difference, PixelFormat, ProbeScene,
+    Quality, Search, ShadowSettings, ShaftSettings, Technique, TrackingSettings, WantedFormat,
 };
 use crate::geometry::outline_scale::LARGEST_MOVE_PX;
 
@@ -143,7 +143,7 @@ pub fn tracking(root: &Table) -> Result<TrackingSettings, SceneError> {
 }
 
 pub fn shadows(root: &Table, probe: Option<&ProbeScene>) -> Result<ShadowSettings, SceneError> {
-    const KEYS: [&str; 12] = [
+    const KEYS: [&str; 14] = [
         "quality",
         "technique",
         "sources",
@@ -152,6 +152,8 @@ pub fn shadows(root: &Table, probe: Option<&ProbeScene>) -> Result<ShadowSetting
         "receivers_per_leaf",
         "least_part",
         "map_px",
+        "difference",
+        "compositing",
         "samples",
         "counting",
         "max_silhouette_error_px",
@@ -248,5 +250,26 @@ fn shaft_settings(shadows: &Table, default: ShaftSettings) -> Result<ShaftSettin
             .map(map_px)
             .transpose()?
             .unwrap_or(default.map_px),
+        difference: difference(shadows)?.unwrap_or(default.difference),
     })
+}
+
+/// `compositing` decides in which light, `difference` how within the linear one.
+fn difference(shadows: &Table) -> Result<Option<Difference>, SceneError> {
+    const COMPOSITING: [(&str, bool); 2] = [("float", false), ("ldr", true)];
+    let named = shadows
+        .optional("difference")
+        .map(|value| value.one_of("way to take light away", &Difference::BY_NAME))
+        .transpose()?;
+    let Some(compositing) = shadows.optional("compositing") else {
+        return Ok(named);
+    };
+    let in_levels = compositing.one_of("way to composite", &COMPOSITING)?;
+    match (in_levels, named) {
+        (true, Some(_)) => Err(compositing.error(
+            "difference is of float compositing; ldr always takes encoded levels away: leave one of the two out",
+        )),
+        (true, None) => Ok(Some(Difference::Encoded)),
+        (false, named) => Ok(named.or(Some(Difference::Ratio))),
+    }
 }

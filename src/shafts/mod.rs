@@ -4,6 +4,7 @@
 mod form_factor;
 mod harmonics;
 pub mod hierarchy;
+pub mod intensity_transfers;
 pub mod irradiance_volume;
 mod light_of_room;
 pub mod patches;

@@ -3,6 +3,7 @@
 
 pub mod judge;
 pub mod photographs;
+pub mod prints;
 pub mod random;
 pub mod shapes;
 pub mod sheets;

@@ -8,7 +8,8 @@ use super::numbers::{ANGLE, DIRECTION, POSITION, PRINT, RATIO, number_of};
 use super::spliced::{Body, Spliced, bodies, parsed};
 use crate::light::Light;
 use crate::scene::{
-    Counting, Placement, Quality, Scene, ShadowSettings, ShaftSettings, Technique, unit_direction,
+    Counting, Difference, Placement, Quality, Scene, ShadowSettings, ShaftSettings, Technique,
+    unit_direction,
 };
 
 /// Why an edit does not fit a text.
@@ -419,7 +420,14 @@ fn shaft_keys(
         receivers_per_leaf,
         least_part,
         map_px,
+        difference,
     } = *new;
+    let differs = difference != old.difference;
+    let (named, compositing) = match difference {
+        Difference::Ratio => (None, None),
+        Difference::Subtract => (Some(quoted("subtract")), None),
+        Difference::Encoded => (None, Some(quoted("ldr"))),
+    };
     let ratio = |number: f64| Some(super::numbers::new_number(number, RATIO));
     let count = |number: u32| Some(number.to_string());
     vec![
@@ -440,6 +448,8 @@ fn shaft_keys(
             ratio(least_part),
         ),
         (map_px != old.map_px, "map_px", count(map_px)),
+        (differs, "difference", named),
+        (differs, "compositing", compositing),
     ]
 }
 

@@ -2,6 +2,7 @@
 
 mod axis;
 mod canvas;
+mod compositing;
 mod displacement;
 mod drawing;
 mod family;
@@ -11,10 +12,12 @@ mod lab;
 mod left_out;
 mod marker_view;
 mod measured;
+mod moved;
 pub mod peers_table;
 mod pictures;
 mod scaling;
 mod shadows;
+mod sheet;
 mod shots;
 mod stability;
 mod tracking;
@@ -61,11 +64,13 @@ trait AnyChart {
 }
 
 /// All charts, in the order in which they are made and read.
-fn all() -> [Box<dyn AnyChart>; 9] {
+fn all() -> [Box<dyn AnyChart>; 11] {
     [
         Box::new(tracking::Tracking),
         Box::new(shadows::Shadows),
         Box::new(pictures::Pictures),
+        Box::new(moved::Moved),
+        Box::new(compositing::Compositing),
         Box::new(left_out::LeftOut),
         Box::new(scaling::Scaling),
         Box::new(stability::Stability),
@@ -203,8 +208,11 @@ fn readme(out: &Path) -> String {
         let shows = chart.shows();
         text += &format!("\n## {name}\n![{name}]({name}.png)\n\n{shows}\n\n");
         if out.join(format!("{name}.csv")).is_file() {
-            text +=
-                &format!("Figures: [{name}.csv]({name}.csv), also as [{name}.svg]({name}.svg). ");
+            let svg = match out.join(format!("{name}.svg")).is_file() {
+                true => format!(", also as [{name}.svg]({name}.svg)"),
+                false => String::new(),
+            };
+            text += &format!("Figures: [{name}.csv]({name}.csv){svg}. ");
         }
         text += &format!("Made by `gnomon chart --only {name}`.\n");
     }

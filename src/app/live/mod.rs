@@ -4,6 +4,7 @@
 //! [`studio`] is all of it but the window, which knows nothing that a test could not do; `window` and what it shows are
 //! the only home of egui.
 
+pub mod calibrating;
 mod canvas;
 mod composite_video;
 mod demonstration;
@@ -16,6 +17,7 @@ mod keys;
 pub mod look;
 pub mod meters;
 pub mod notices;
+mod opening;
 mod overlays;
 pub mod panel;
 pub mod pipeline;
@@ -35,9 +37,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError};
 
-use anyhow::{Result, anyhow, bail};
-use eframe::egui::ViewportBuilder;
-use winit::event_loop::EventLoop;
+use anyhow::Result;
 
 use crate::app::stopwatch::Stopwatch;
 use crate::capture::live::Now;
@@ -47,10 +47,6 @@ use event_loop::{PassEnd, Timed};
 use screen::Screen;
 use studio::{Opening, Studio};
 use window::{Failure, Shared, Window};
-
-/// The window's size when it opens, points, and the smallest that it can be made.
-const WINDOW: [f32; 2] = [1180.0, 720.0];
-const SMALLEST_WINDOW: [f32; 2] = [240.0, 160.0];
 
 /// What the window opens on.
 #[derive(Debug, Clone)]
@@ -83,29 +79,13 @@ pub fn live(request: &Request, stop: &Arc<AtomicBool>) -> Result<()> {
         Input::Camera(camera) => Opening::camera(camera.clone())?,
     };
     let gpu = Arc::new(Gpu::open(request.adapter.as_deref())?);
-    let options = eframe::NativeOptions {
-        viewport: ViewportBuilder::default()
-            .with_inner_size(WINDOW)
-            .with_min_inner_size(SMALLEST_WINDOW)
-            .with_app_id("gnomon"),
-        wgpu_options: screen::on_device(&gpu),
-        // The camera's own noise dithers enough.
-        dithering: false,
-        ..eframe::NativeOptions::default()
-    };
+    let options = opening::options(&gpu);
     let failure: Failure = Arc::default();
     let is_open = Arc::new(AtomicBool::new(false));
     let now: Now = Arc::new(Stopwatch::clock());
     let pass_end = PassEnd::default();
     let title = format!("{} – gnomon", opening.title());
-    let event_loop = EventLoop::<eframe::UserEvent>::with_user_event()
-        .build()
-        .map_err(|error| {
-            // What comes before its last part is where in winit's source it arose.
-            let error = error.to_string();
-            let reason = error.rsplit(": ").next().unwrap_or_default();
-            anyhow!("the window cannot be opened (is there a display?): {reason}")
-        })?;
+    let event_loop = opening::event_loop()?;
     let shared = Shared {
         stop: Arc::clone(stop),
         failure: Arc::clone(&failure),
@@ -132,11 +112,7 @@ pub fn live(request: &Request, stop: &Arc<AtomicBool>) -> Result<()> {
         now,
         pass_end,
     })?;
-    if !is_open.load(Ordering::Relaxed) {
-        bail!(
-            "the window cannot be opened: the adapter does not draw on this display (--adapter NAME chooses another)"
-        );
-    }
+    opening::assure(&is_open)?;
     let failed = failure
         .lock()
         .unwrap_or_else(PoisonError::into_inner)

@@ -1,8 +1,12 @@
 //! The patches that may notice the casters; and what the casters throw on them, for which they are cut more finely.
 
+use std::f32::consts::FRAC_1_PI;
+
 use glam::Vec3;
 
 use crate::light::cores::on_all_cores;
+use crate::scene::Difference;
+use crate::shafts::intensity_transfers::encoded;
 use crate::shafts::prepared::Prepared;
 use crate::shafts::source_tree::BoxM;
 use crate::shafts::surfels::{GroupedSurfels, LitSurfel, thrown_back};
@@ -23,6 +27,7 @@ pub(super) struct Notice<'a> {
     pub surfels: &'a GroupedSurfels,
     /// Irradiance that each vertex loses from patches among the casters.
     pub lost_nearby: &'a [Vec3],
+    pub difference: Difference,
 }
 
 /// Patches that do notice.
@@ -62,6 +67,7 @@ impl Notice<'_> {
 
     fn add(&self, patch: usize, to: &mut Noticing) {
         let room = self.room;
+        let albedo = room.light[patch].albedo;
         let patch = &room.patches.patches[patch];
         let row = |vertex: u32| self.vertices.binary_search(&vertex).unwrap_or(0) as u32;
         let rows = patch.vertices.map(row);
@@ -90,9 +96,10 @@ impl Notice<'_> {
         let grid = Grid {
             count: self.casters.parts(places),
         };
-        let corners: Vec<ThrownCorner> = grid
-            .weights()
-            .map(|[a, b]| {
+        let weights: Vec<[f32; 2]> = grid.weights().collect();
+        let corners: Vec<ThrownCorner> = weights
+            .iter()
+            .map(|&[a, b]| {
                 let c = 1.0 - a - b;
                 let mean = |[at_a, at_b, at_c]: [Vec3; 3]| at_a * a + at_b * b + at_c * c;
                 let position = mean(places);
@@ -107,9 +114,29 @@ impl Notice<'_> {
             .map(|vertex| room.irradiance[vertex as usize] * LEAST_WEIGHT);
         let least = least.into_iter().fold(Vec3::MAX, Vec3::min);
         let gains = |corner: &ThrownCorner| corner.irradiance.abs().cmpgt(least).any();
+        // What the camera sees of an irradiance.
+        let seen = |irradiance: Vec3| irradiance * albedo * FRAC_1_PI;
+        let light = |index: usize| {
+            let [a, b] = weights[index];
+            let of = patch
+                .vertices
+                .map(|vertex| room.irradiance[vertex as usize]);
+            of[0] * a + of[1] * b + of[2] * (1.0 - a - b)
+        };
+        let in_terms = |index: usize| match (self.difference, corners[index].irradiance) {
+            (Difference::Ratio, thrown) => thrown,
+            (Difference::Subtract, thrown) => seen(thrown),
+            // The paper has shadows alone; without what the casters throw back they are far too dark.
+            (Difference::Encoded, thrown) => {
+                encoded(seen(light(index) + thrown)) - encoded(seen(light(index)))
+            }
+        };
         if corners.iter().any(gains) {
             let triangles = grid.triangles().flatten();
-            to.thrown.extend(triangles.map(|index| corners[index]));
+            to.thrown.extend(triangles.map(|index| ThrownCorner {
+                irradiance: in_terms(index),
+                ..corners[index]
+            }));
         }
     }
 }

@@ -6,6 +6,7 @@
 mod casters;
 mod corners;
 pub(super) mod data;
+mod difference;
 mod environment;
 pub mod kept_rooms;
 mod maps;
@@ -33,6 +34,7 @@ use super::stage::Stage;
 use casters::{PlacedCasters, ShaftCasters};
 use corners::{Notice, Noticing};
 use data::{Frame, Source, packed};
+use difference::Given;
 use environment::Environment;
 use maps::{Maps, Tiling, source};
 use pipelines::Pipelines;
@@ -284,7 +286,16 @@ impl Shafts {
         });
         self.maps.resize(&gpu.device, tiling);
 
-        let transfers = transfers(room, &vertices, &chosen, &may_be_hidden);
+        let vertex_light = vertices
+            .iter()
+            .map(|&vertex| room.irradiance[vertex as usize]);
+        let given = Given {
+            light: vertex_light.collect(),
+            by_source: given(room, &vertices, &chosen, &may_be_hidden),
+            source_count: chosen.len(),
+        }
+        .in_terms_of(self.settings.difference, room, &vertices);
+        let transfers: Vec<[u32; 2]> = given.by_source.into_iter().map(packed).collect();
         let detailed: Vec<(Representative, Vec3)> = representatives(
             &room.sources,
             &weighed,
@@ -302,10 +313,8 @@ impl Shafts {
         let among_m = NEAREST_SOURCE * placed.ball.radius;
         let left = room.left_by(&placed.caster, placed.ball.center, among_m);
         let surfels = placed.lit_surfels(room, &detailed, &left);
-        let irradiances: Vec<Vec4> = vertices
-            .iter()
-            .map(|&vertex| room.irradiance[vertex as usize].extend(0.0))
-            .collect();
+        let light = given.light.into_iter();
+        let irradiances: Vec<Vec4> = light.map(|light| light.extend(0.0)).collect();
         let refilled: Vec<Option<f32>> = left
             .iter()
             .zip(&room.patches.patches)
@@ -330,6 +339,7 @@ impl Shafts {
             transfers: &transfers,
             surfels: &surfels,
             lost_nearby: &lost_nearby,
+            difference: self.settings.difference,
         }
         .noticing(&noticing);
 
@@ -483,13 +493,13 @@ fn lost_nearby(
     shares.concat()
 }
 
-/// For each vertex and each representative the irradiance that hidden sources would take, packed.
-fn transfers(
+/// For each vertex and each representative the irradiance that hidden sources would take.
+fn given(
     room: &Prepared,
     vertices: &[u32],
     chosen: &[Representative],
     may_be_hidden: &[bool],
-) -> Vec<[u32; 2]> {
+) -> Vec<Vec3> {
     let radiance: Vec<Vec3> = room
         .source_radiance
         .iter()
@@ -500,16 +510,18 @@ fn transfers(
         })
         .collect();
     let shares = on_all_cores(vertices.len(), |range| {
-        let mut packed_rows = Vec::with_capacity(range.len() * chosen.len());
+        let mut rows: Vec<Vec3> = Vec::with_capacity(range.len() * chosen.len());
         for &vertex in &vertices[range] {
             let row = room.transfers.row(vertex as usize);
-            packed_rows.extend(chosen.iter().map(|one| {
+            rows.extend(chosen.iter().map(|one| {
                 let sources = one.first as usize..one.last as usize;
                 let arriving = row[sources.clone()].iter().zip(&radiance[sources]);
-                packed(arriving.map(|(&part, &radiance)| radiance * part).sum())
+                arriving
+                    .map(|(&part, &radiance)| radiance * part)
+                    .sum::<Vec3>()
             }));
         }
-        packed_rows
+        rows
     });
     shares.concat()
 }

@@ -6,7 +6,9 @@ use super::editing::{Editing, number};
 use crate::app::authoring::Edit;
 use crate::app::live::wish::Wish;
 use crate::geometry::outline_scale::LARGEST_MOVE_PX;
-use crate::scene::{Counting, Quality, Scene, ShadowSettings, ShaftSettings, Technique};
+use crate::scene::{
+    Counting, Difference, Quality, Scene, ShadowSettings, ShaftSettings, Technique,
+};
 
 /// Samples per pixel that there are.
 const SAMPLES: [u32; 2] = [1, 4];
@@ -86,6 +88,16 @@ fn shaft_knobs(ui: &mut Ui, shafts: &mut ShaftSettings) {
                 ui.selectable_value(&mut shafts.map_px, side_px, side_px.to_string());
             }
         });
+    choice(
+        ui,
+        "how light is taken away",
+        &mut shafts.difference,
+        &[
+            ("as a part of the light", Difference::Ratio),
+            ("as radiance", Difference::Subtract),
+            ("from encoded levels", Difference::Encoded),
+        ],
+    );
 }
 
 fn whole(ui: &mut Ui, name: &str, value: &mut u32, range: std::ops::RangeInclusive<u32>) {
