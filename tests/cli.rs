@@ -167,6 +167,29 @@ fn check_names_the_anchors_of_each_scene() {
 }
 
 #[test]
+fn check_tells_what_a_frame_budget_means_on_this_machine() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = lamp_scene_with(folder.path(), &project_file("recordings/lamp"));
+    let written = text(PathBuf::from(&scene));
+    // No machine does anything in a microsecond, or takes a quarter of an hour.
+    for (budget_ms, meant) in [
+        ("0.001", "outlines within 8 px"),
+        ("1000000", "outlines within 0.5 px"),
+    ] {
+        let budget = format!("{written}\n[shadows]\nframe_budget_ms = {budget_ms}\n");
+        std::fs::write(&scene, budget).unwrap();
+        let output = gnomon(folder.path())
+            .args(["check", &scene])
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", stderr(&output));
+        let said = String::from_utf8(output.stdout).unwrap();
+        let line = said.lines().find(|line| line.starts_with("budget"));
+        assert!(line.is_some_and(|line| line.contains(meant)), "{said}");
+    }
+}
+
+#[test]
 fn check_points_at_a_typo() {
     let folder = tempfile::tempdir().unwrap();
     let good = lamp_scene_with(folder.path(), &project_file("recordings/lamp"));

@@ -9,8 +9,9 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
+use gnomon::app::live::beginning::Opening;
 use gnomon::app::live::look::Look;
-use gnomon::app::live::studio::{Opening, Studio};
+use gnomon::app::live::studio::Studio;
 use gnomon::app::live::views::View;
 use gnomon::app::live::wish::Wish;
 use gnomon::app::stopwatch::Stopwatch;

@@ -8,7 +8,7 @@ const HELD: f64 = 1.1;
 /// A sentence for people. `p95_ms` is what 95 % of the frames kept.
 pub fn budget_words(governed: &Governed, p95_ms: f64) -> String {
     let budget_ms = governed.budget_ms();
-    let lowest = words(governed.lowest());
+    let lowest = setting_words(governed.lowest());
     if p95_ms <= HELD * budget_ms {
         return format!(
             "the frame budget of {budget_ms} ms was held: 95 % of the frames took at most {p95_ms:.1} ms, with {lowest} at \
@@ -25,7 +25,8 @@ pub fn budget_words(governed: &Governed, p95_ms: f64) -> String {
     )
 }
 
-fn words(setting: Setting) -> String {
+/// A setting, for people.
+pub fn setting_words(setting: Setting) -> String {
     match setting {
         Setting::Sources(Some(1)) => "1 source".to_owned(),
         Setting::Sources(Some(count)) => format!("{count} sources"),

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use glam::DVec3;
 
+use crate::app::check_budget::budget_line;
 use crate::app::check_room::{self, room_lines};
 use crate::geometry::levels::{Level, levels};
 use crate::geometry::mesh::MeshReport;
@@ -82,18 +83,13 @@ pub fn summary(scene: &Scene) -> String {
     if let Some(quality) = scene.shadows.quality {
         line(&mut text, "quality", &quality_row(quality, &scene.shadows));
     }
-    let budget = scene
-        .shadows
-        .frame_budget_ms
-        .map(|budget_ms| format!(", frame budget {budget_ms} ms"));
+    if let Some(budget) = budget_line(scene) {
+        line(&mut text, "budget", &budget);
+    }
     line(
         &mut text,
         "samples",
-        &format!(
-            "{} per pixel{}",
-            scene.shadows.samples,
-            budget.unwrap_or_default()
-        ),
+        &format!("{} per pixel", scene.shadows.samples),
     );
     let detail = match scene.shadows.max_silhouette_error_px {
         0.0 => "all triangles at any distance".to_owned(),

@@ -9,6 +9,7 @@ pub mod cameras;
 mod capture_talk;
 pub mod chart;
 pub mod check;
+mod check_budget;
 mod check_room;
 pub mod contact_sheet;
 pub mod detections_file;

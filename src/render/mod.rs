@@ -5,6 +5,7 @@
 
 mod accumulation;
 mod anchor_geometry;
+mod attachments;
 mod background;
 mod casters;
 mod composite;

@@ -17,15 +17,20 @@ use crate::app::truth::changed_by;
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
 use crate::render::{Renderer, Shown};
-use crate::scene::{Counting, Scene};
+use crate::scene::{Counting, Scene, Technique};
 
 /// By how many pixels silhouettes may move.
 const ERRORS_PX: [f64; 6] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
 const DEFAULT_PX: f64 = 0.5;
 const TRIANGLES: &str = "triangles";
+/// The recording with soft shadows.
+const ROOM: &str = "room";
 /// A torus of so many triangles over the table that shadow programs are compared on.
 const FINE_TORUS: &str = "torus of 100,000 triangles";
 const CAPS: &str = "caps and far sides";
+const SOURCES: &str = "sources";
+/// How many sources get a shadow each.
+const SOURCE_COUNTS: [u32; 5] = [5, 10, 20, 50, 100];
 
 /// The chart.
 pub struct LeftOut;
@@ -36,6 +41,8 @@ pub struct Row {
     recording: String,
     left_out: String,
     max_silhouette_error_px: f64,
+    /// Of soft shadows; none: all, or no such shadows.
+    sources: Option<u32>,
     triangles: f64,
     of_triangles: f64,
     changed_px: f64,
@@ -107,7 +114,8 @@ impl Chart for LeftOut {
     const FAMILY: &'static str = "choosing";
     const SHOWS: &'static str = "What is not drawn, and what that changes: the key frames of the recordings, and a finely made torus over a table, with things as \
         coarse as silhouettes may move, and with volumes counted without caps where that is safe (which changes nothing), \
-        against the same with all triangles and caps. The picture's error is the root mean square over all its pixels.";
+        against the same with all triangles and caps; and in the room, where shadows are soft, the sources that get none of \
+        their own, against all. The picture's error is the root mean square over all its pixels.";
     type Row = Row;
 
     fn inputs(&self, lab: &Lab<'_>) -> Result<Vec<PathBuf>> {
@@ -125,17 +133,25 @@ impl Chart for LeftOut {
         let scene = &mut looks.scene;
         scene.shadows.max_silhouette_error_px = 0.0;
         scene.shadows.counting = Counting::DepthFail;
+        scene.shadows.shafts.sources = None;
+        let is_soft = scene.chosen_technique().0 == Technique::Shafts;
         let all = draw(lab, &looks)?;
-        let mut ways = vec![(CAPS, 0.0, Counting::Auto)];
-        ways.extend(ERRORS_PX.map(|error_px| (TRIANGLES, error_px, Counting::DepthFail)));
+        let mut ways = vec![(CAPS, 0.0, Counting::Auto, None)];
+        ways.extend(ERRORS_PX.map(|error_px| (TRIANGLES, error_px, Counting::DepthFail, None)));
+        if is_soft {
+            let few = |count| (SOURCES, 0.0, Counting::DepthFail, Some(count));
+            ways = ways.split_off(1);
+            ways.extend(SOURCE_COUNTS.map(few));
+        }
         let mut rows = Vec::new();
-        for (left_out, max_silhouette_error_px, counting) in ways {
+        for (left_out, max_silhouette_error_px, counting, sources) in ways {
             if lab.is_stopped() {
                 return Ok(None);
             }
             let shadows = &mut looks.scene.shadows;
             shadows.max_silhouette_error_px = max_silhouette_error_px;
             shadows.counting = counting;
+            shadows.shafts.sources = sources;
             let drawn = draw(lab, &looks)?;
             let changes: Vec<(usize, f64, u8)> = drawn
                 .iter()
@@ -154,6 +170,7 @@ impl Chart for LeftOut {
                 recording: unit.to_owned(),
                 left_out: left_out.to_owned(),
                 max_silhouette_error_px,
+                sources,
                 triangles: triangles(&drawn),
                 of_triangles: triangles(&all),
                 changed_px: rounded(changed / count),
@@ -178,27 +195,54 @@ impl Chart for LeftOut {
             }),
             ("the picture's error, levels of 255", |row| row.rms_levels),
         ];
-        let panels = metrics.map(|(name, value)| Panel {
-            title: name.to_owned(),
-            x: Axis::log("silhouettes may move by, px"),
+        let mut panels = metrics
+            .map(|(name, value)| Panel {
+                title: name.to_owned(),
+                x: Axis::log("silhouettes may move by, px"),
+                y: Axis::from_zero(name),
+                series: recordings
+                    .iter()
+                    .enumerate()
+                    .map(|(look, &recording)| Series {
+                        name: recording.to_owned(),
+                        look,
+                        joined: true,
+                        points: rows
+                            .iter()
+                            .filter(|row| row.recording == recording && row.left_out == TRIANGLES)
+                            .map(|row| Point::at(row.max_silhouette_error_px, value(row)))
+                            .collect(),
+                    })
+                    .collect(),
+                rules: vec![Rule {
+                    upright: true,
+                    at: DEFAULT_PX,
+                    label: "balanced".to_owned(),
+                }],
+                ..Panel::default()
+            })
+            .to_vec();
+        let few = rows.iter().filter(|row| row.left_out == SOURCES);
+        let few = few.filter_map(|row| Some((row, f64::from(row.sources?))));
+        let (name, value) = metrics[1];
+        panels.push(Panel {
+            title: format!("few sources: {name}"),
+            x: Axis::log("sources with a shadow each"),
             y: Axis::from_zero(name),
-            series: recordings
-                .iter()
-                .enumerate()
-                .map(|(look, &recording)| Series {
-                    name: recording.to_owned(),
-                    look,
-                    joined: true,
-                    points: rows
-                        .iter()
-                        .filter(|row| row.recording == recording && row.left_out == TRIANGLES)
-                        .map(|row| Point::at(row.max_silhouette_error_px, value(row)))
-                        .collect(),
-                })
-                .collect(),
+            series: vec![Series {
+                name: ROOM.to_owned(),
+                look: recordings
+                    .iter()
+                    .position(|name| *name == ROOM)
+                    .unwrap_or(0),
+                joined: true,
+                points: few
+                    .map(|(row, count)| Point::at(count, value(row)))
+                    .collect(),
+            }],
             rules: vec![Rule {
                 upright: true,
-                at: DEFAULT_PX,
+                at: 50.0,
                 label: "balanced".to_owned(),
             }],
             ..Panel::default()
@@ -210,11 +254,11 @@ impl Chart for LeftOut {
         Figure {
             title: "What is left out, and what that costs".to_owned(),
             reading: format!(
-                "At the dashed line, which is the default, the error is at most {error} levels of 255."
+                "At the dashed lines, which are the default, less than a level of 255: at most {error} by triangles."
             ),
-            columns: metrics.len(),
-            panel_size: [520.0, 340.0],
-            panels: panels.to_vec(),
+            columns: panels.len(),
+            panel_size: [440.0, 320.0],
+            panels,
         }
     }
 }

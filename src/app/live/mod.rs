@@ -4,6 +4,7 @@
 //! [`studio`] is all of it but the window, which knows nothing that a test could not do; `window` and what it shows are
 //! the only home of egui.
 
+pub mod beginning;
 pub mod calibrating;
 mod canvas;
 mod composite_video;
@@ -43,9 +44,10 @@ use crate::app::stopwatch::Stopwatch;
 use crate::capture::live::Now;
 use crate::render::Gpu;
 use crate::scene::CameraSettings;
+use beginning::Opening;
 use event_loop::{PassEnd, Timed};
 use screen::Screen;
-use studio::{Opening, Studio};
+use studio::Studio;
 use window::{Failure, Shared, Window};
 
 /// What the window opens on.

@@ -7,9 +7,10 @@ use std::time::Duration;
 
 use anyhow::{Context as _, Result};
 
+use super::beginning::{Opening, plan_of, same_camera};
 use super::canvas::Canvas;
 use super::demonstration::{self, Demonstration};
-use super::eye::{Plan, TrackedPicture};
+use super::eye::TrackedPicture;
 use super::look::Look;
 use super::meters::{Meters, Sample};
 use super::notices::{CameraState, Notices, Weight};
@@ -20,7 +21,6 @@ use super::views::View;
 use super::wish::{Clicks, Overlay, Selected, Wish};
 use crate::app::authoring::{Edit, SceneDocument, SceneNews, SceneWatch};
 use crate::app::live_capture::CaptureEvent;
-use crate::app::live_input::LiveInput;
 use crate::app::mailbox::Taken;
 use crate::app::output::OutputError;
 use crate::app::session_writer::SessionHead;
@@ -34,52 +34,6 @@ use crate::scene::{CameraSettings, Placement, Scene};
 const ASSUMED_FPS: f64 = 30.0;
 /// A wait that is no shorter was one, milliseconds.
 const INSTANT_MS: f64 = 0.5;
-
-/// A scene or a camera that was read, before anything is opened.
-pub struct Opening {
-    /// `None` on first use.
-    document: Option<SceneDocument>,
-    camera: CameraSettings,
-    input: LiveInput,
-}
-
-impl Opening {
-    /// A scene file says all.
-    ///
-    /// # Errors
-    /// A scene or a calibration that cannot be read.
-    pub fn scene(path: &Path) -> Result<Self> {
-        let document = SceneDocument::open(path)?;
-        let camera = document.scene().camera.clone();
-        Self::with(Some(document), camera)
-    }
-
-    /// A camera or a recording alone: first use.
-    ///
-    /// # Errors
-    /// A calibration that cannot be read.
-    pub fn camera(camera: CameraSettings) -> Result<Self> {
-        Self::with(None, camera)
-    }
-
-    fn with(document: Option<SceneDocument>, camera: CameraSettings) -> Result<Self> {
-        Ok(Self {
-            input: LiveInput::of(&camera)?,
-            document,
-            camera,
-        })
-    }
-
-    /// What it is, for a title.
-    pub fn title(&self) -> String {
-        let path = self.document.as_ref().map(SceneDocument::path);
-        let name = path.and_then(Path::file_name);
-        name.map_or_else(
-            || self.camera.source.clone(),
-            |name| name.to_string_lossy().into_owned(),
-        )
-    }
-}
 
 /// A frame that was drawn, and not yet seen to be on the screen.
 struct Pending {
@@ -601,19 +555,4 @@ impl Studio {
             CameraState::Ended | CameraState::Failed(_)
         )
     }
-}
-
-fn plan_of(document: Option<&SceneDocument>) -> Plan {
-    document.map_or(Plan::Look, |document| {
-        let scene = document.scene();
-        Plan::Follow {
-            settings: scene.tracking.clone(),
-            anchors: scene.anchors.clone().into(),
-        }
-    })
-}
-
-fn same_camera(a: &CameraSettings, b: &CameraSettings) -> bool {
-    (&a.source, &a.calibration, a.mirror, a.wanted)
-        == (&b.source, &b.calibration, b.mirror, b.wanted)
 }

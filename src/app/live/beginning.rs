@@ -1,0 +1,73 @@
+//! What the live program begins with: a scene's file, or a camera alone.
+
+use std::path::Path;
+
+use anyhow::Result;
+
+use super::eye::Plan;
+use crate::app::authoring::SceneDocument;
+use crate::app::live_input::LiveInput;
+use crate::scene::CameraSettings;
+
+/// A scene or a camera that was read, before anything is opened.
+pub struct Opening {
+    /// `None` on first use.
+    pub(super) document: Option<SceneDocument>,
+    pub(super) camera: CameraSettings,
+    pub(super) input: LiveInput,
+}
+
+impl Opening {
+    /// A scene file says all.
+    ///
+    /// # Errors
+    /// A scene or a calibration that cannot be read.
+    pub fn scene(path: &Path) -> Result<Self> {
+        let document = SceneDocument::open(path)?;
+        let camera = document.scene().camera.clone();
+        Self::with(Some(document), camera)
+    }
+
+    /// A camera or a recording alone: first use.
+    ///
+    /// # Errors
+    /// A calibration that cannot be read.
+    pub fn camera(camera: CameraSettings) -> Result<Self> {
+        Self::with(None, camera)
+    }
+
+    fn with(document: Option<SceneDocument>, camera: CameraSettings) -> Result<Self> {
+        Ok(Self {
+            input: LiveInput::of(&camera)?,
+            document,
+            camera,
+        })
+    }
+
+    /// What it is, for a title.
+    pub fn title(&self) -> String {
+        let path = self.document.as_ref().map(SceneDocument::path);
+        let name = path.and_then(Path::file_name);
+        name.map_or_else(
+            || self.camera.source.clone(),
+            |name| name.to_string_lossy().into_owned(),
+        )
+    }
+}
+
+/// What is looked for in a scene's frames.
+pub(super) fn plan_of(document: Option<&SceneDocument>) -> Plan {
+    document.map_or(Plan::Look, |document| {
+        let scene = document.scene();
+        Plan::Follow {
+            settings: scene.tracking.clone(),
+            anchors: scene.anchors.clone().into(),
+        }
+    })
+}
+
+/// Whether two settings mean one camera, asked for the same.
+pub(super) fn same_camera(a: &CameraSettings, b: &CameraSettings) -> bool {
+    (&a.source, &a.calibration, a.mirror, a.wanted)
+        == (&b.source, &b.calibration, b.mirror, b.wanted)
+}
