@@ -1,0 +1,619 @@
+//! What can be typed: commands, options, and how their values are read.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result, bail};
+use clap::{Args, Parser, Subcommand};
+
+use gnomon::app::board::Distance;
+use gnomon::app::chart;
+use gnomon::app::layer_files::Layer;
+use gnomon::app::probe::exposure_of;
+use gnomon::calibration::{Target, TargetMarkers};
+use gnomon::light::probe_maps::Circle;
+use gnomon::scene::{Family, PixelFormat, TrackingSettings, WantedFormat};
+
+/// Virtual things on a real table, lit and shadowed as if they stood there.
+#[derive(Parser)]
+#[command(version, arg_required_else_help = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Subcommand)]
+pub enum Command {
+    /// Opens a window on a camera, with the scene's virtual things in its picture.
+    #[command(
+        after_help = "Example:\n  gnomon live config/lamp.toml\n  gnomon live    # webcam:0, any marker"
+    )]
+    Live(LiveArgs),
+    /// Plays a recording with the scene's virtual things in it.
+    #[command(
+        after_help = "Example:\n  gnomon replay config/lamp.toml --out out/lamp.mp4 --sheet out/lamp.png"
+    )]
+    Replay(ReplayArgs),
+    /// Finds where the markers are, without drawing: poses as a file. Needs no GPU.
+    #[command(
+        after_help = "Example:\n  gnomon track config/lamp.toml --poses out/lamp.csv\n  gnomon track walk.mp4 \
+                      --calibration camera.toml --size-mm 40 --poses out/walk.csv"
+    )]
+    Track(TrackArgs),
+    /// Learns from a recording where markers lie about a table.
+    #[command(
+        after_help = "Example:\n  gnomon board --from walk.mp4 --calibration camera.toml --size-mm 40 --out table.toml"
+    )]
+    Board(BoardArgs),
+    /// Calibrates a camera from a video or pictures of a printed target, or live.
+    #[command(
+        after_help = "Example:\n  gnomon calibrate walk.mp4 --chessboard 9x6 --square-mm 25 --out camera.toml --coverage out/coverage.png\n  \
+                      gnomon calibrate stills/ --charuco 10x7 --square-mm 25 --marker-mm 18 --out camera.toml\n  \
+                      gnomon calibrate webcam:0 --charuco 10x7 --square-mm 25 --marker-mm 18 --out camera.toml"
+    )]
+    Calibrate(CalibrateArgs),
+    /// Makes sheets to print: markers, boards, calibration targets.
+    #[command(
+        after_help = "Example:\n  gnomon markers --board 3x2 --size-mm 45 --gap-mm 40 --landscape --out table.pdf\n  \
+                      gnomon markers --ids 17,18 --size-mm 36 --out cards.pdf\n  \
+                      gnomon markers --chessboard 9x6 --square-mm 25 --landscape --out chessboard.pdf\n  \
+                      gnomon markers --charuco 10x7 --square-mm 25 --marker-mm 18 --landscape --out charuco.pdf"
+    )]
+    Markers(MarkersArgs),
+    /// Records a camera as a session that replay and track take up, until Ctrl-C.
+    #[command(
+        after_help = "Example:\n  gnomon record webcam:0 --calibration camera.toml --out out/session --seconds 20"
+    )]
+    Record(RecordArgs),
+    /// Makes a light probe from exposures of a mirror ball, an angular map or a panorama.
+    #[command(
+        after_help = "Examples:\n  gnomon probe ball-*.jpg --kind ball --out probe.hdr --preview out/probe.png\n  \
+                      gnomon probe a.png b.png c.png --exposures 1/4,1/30,1/250 --kind ball --reflectance 0.65 --out probe.hdr\n  \
+                      gnomon probe room_angmap.hdr --kind angular --turn-deg 90 --out probe.hdr"
+    )]
+    Probe(ProbeArgs),
+    /// Lists the cameras and their formats.
+    #[command(
+        after_help = "Example:\n  gnomon cameras    # and then: gnomon record webcam:0 --out out/session"
+    )]
+    Cameras,
+    /// Reads a scene, says what is wrong with it or what is in it.
+    #[command(after_help = "Example:\n  gnomon check config/lamp.toml")]
+    Check {
+        /// Scene file (TOML)
+        scene: PathBuf,
+    },
+    /// Measures speed against accuracy on this machine, and draws it.
+    #[command(
+        after_help = "Example:\n  gnomon chart --quick --only tracking\n\nIt runs in the project's folder. \
+                      What has been measured is not measured again by the same program from the same recordings: after \
+                      an interrupt it goes on where it was."
+    )]
+    Chart(ChartArgs),
+}
+
+#[derive(Args)]
+pub struct ChartArgs {
+    /// Folder for the charts; charts without this, charts/quick with --quick
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', help = format!("Make these alone: {}", chart::names().join(", ")))]
+    pub only: Vec<String>,
+    /// Fewer rounds: rougher times in a tenth of the time
+    #[arg(long)]
+    pub quick: bool,
+    /// Track the sessions of this folder too
+    #[arg(long, value_name = "DIR")]
+    pub sessions: Option<PathBuf>,
+    /// Graphics adapter, by a part of its name; the fastest kind without this
+    #[arg(long, value_name = "NAME")]
+    pub adapter: Option<String>,
+}
+
+#[derive(Args)]
+pub struct LiveArgs {
+    /// Scene file (.toml), webcam (webcam:0, webcam:NAME, /dev/video0), address (http://…, rtsp://…), or recording
+    #[arg(default_value = "webcam:0")]
+    pub source: PathBuf,
+    #[command(flatten)]
+    pub recording: RecordingArgs,
+    /// Folder for what the window's keys record: pictures, sessions, videos
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub out: PathBuf,
+    /// Graphics adapter, by a part of its name; the fastest kind without this
+    #[arg(long, value_name = "NAME")]
+    pub adapter: Option<String>,
+}
+
+#[derive(Args)]
+pub struct ReplayArgs {
+    /// Scene file (TOML)
+    pub scene: PathBuf,
+    /// Video (.mp4, .mov: H.264; .mkv, .avi: lossless FFV1), or a folder for PNGs named by frame
+    #[arg(long, value_name = "FILE|DIR")]
+    pub out: Option<PathBuf>,
+    /// Layers to write beside the PNGs
+    #[arg(long, value_name = "LAYER,…", value_delimiter = ',')]
+    pub layers: Vec<Layer>,
+    /// Draw these frames alone, by their index in the recording
+    #[arg(long, value_name = "N,…", value_delimiter = ',')]
+    pub frames: Option<Vec<u32>>,
+    /// Show no virtual thing: the undistorted video alone
+    #[arg(long)]
+    pub bare: bool,
+    /// Write the poses of all anchors (CSV)
+    #[arg(long, value_name = "FILE")]
+    pub poses: Option<PathBuf>,
+    /// Take the poses from such a file instead of tracking
+    #[arg(long, value_name = "FILE")]
+    pub poses_from: Option<PathBuf>,
+    /// Write times per stage, frames, adapter and memory (JSON)
+    #[arg(long, value_name = "FILE")]
+    pub stats: Option<PathBuf>,
+    /// Write small pictures of the whole replay on one sheet (PNG)
+    #[arg(long, value_name = "FILE")]
+    pub sheet: Option<PathBuf>,
+    /// Graphics adapter, by a part of its name; the fastest kind without this
+    #[arg(long, value_name = "NAME")]
+    pub adapter: Option<String>,
+}
+
+#[derive(Args)]
+pub struct TrackArgs {
+    /// Scene file (.toml), session, video, picture or folder of pictures, webcam (webcam:0) or address (http://…)
+    pub source: PathBuf,
+    #[command(flatten)]
+    pub recording: RecordingArgs,
+    /// Track the anchors of this scene, with its settings, in another recording
+    #[arg(long, value_name = "SCENE")]
+    pub anchors: Option<PathBuf>,
+    /// Track every marker that is seen, each on its own: the side of their black squares
+    #[arg(long, value_name = "MM", conflicts_with = "anchors")]
+    pub size_mm: Option<f64>,
+    #[command(flatten)]
+    pub family: FamilyArgs,
+    /// Write the poses (CSV)
+    #[arg(long, value_name = "FILE")]
+    pub poses: Option<PathBuf>,
+    /// Write every marker that the detector sees, with its corners (CSV)
+    #[arg(long, value_name = "FILE")]
+    pub markers: Option<PathBuf>,
+    /// Write times per stage, frames and memory (JSON)
+    #[arg(long, value_name = "FILE")]
+    pub stats: Option<PathBuf>,
+}
+
+#[derive(Args)]
+pub struct BoardArgs {
+    /// Scene file (.toml), session, video or folder of pictures that show the markers from all around
+    #[arg(long, value_name = "SOURCE")]
+    pub from: PathBuf,
+    #[command(flatten)]
+    pub recording: RecordingArgs,
+    /// Side of the markers' black squares (of the gauge's with --sizes estimate)
+    #[arg(long, value_name = "MM")]
+    pub size_mm: f64,
+    /// Whether all markers have that size, or the others' are to be learnt
+    #[arg(long, value_enum, default_value = "given")]
+    pub sizes: Sizes,
+    /// Marker whose centre is the origin, its right the board's x; the lowest id without this
+    #[arg(long, value_name = "ID")]
+    pub gauge: Option<u32>,
+    /// Distance measured between two markers' centres: a better scale than a marker's size
+    #[arg(long, value_name = "ID:ID:MM", value_parser = distance_of)]
+    pub distance: Option<Distance>,
+    /// What a marker may lie off the plane of the others
+    #[arg(long, value_name = "MM", default_value = "2")]
+    pub plane_tolerance_mm: f64,
+    #[command(flatten)]
+    pub family: FamilyArgs,
+    /// Name of the board
+    #[arg(long, value_name = "NAME", default_value = "table")]
+    pub name: String,
+    /// Write the [[board]] to a file rather than to stdout
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Args)]
+#[command(group = clap::ArgGroup::new("pattern").required(true).args(["chessboard", "charuco"]))]
+pub struct CalibrateArgs {
+    /// Videos, pictures, folders of pictures or sessions that show the target from all around, by one camera at one size;
+    /// or a camera (webcam:N, http://…): a window says where to hold the target
+    #[arg(required = true)]
+    pub source: Vec<String>,
+    #[command(flatten)]
+    pub target: TargetArgs,
+    /// Write the calibration (TOML)
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Write a picture of where the corners lie, how far they are off, and where there are none (PNG)
+    #[arg(long, value_name = "FILE")]
+    pub coverage: Option<PathBuf>,
+    /// The camera mirrors its pictures: turn them back first
+    #[arg(long)]
+    pub mirror: bool,
+    /// Play a video in the window as if it were a camera
+    #[arg(long)]
+    pub watch: bool,
+    #[command(flatten)]
+    pub wanted: WantedArgs,
+    /// Graphics adapter of the window, by a part of its name; the fastest kind without this
+    #[arg(long, value_name = "NAME")]
+    pub adapter: Option<String>,
+}
+
+/// What a camera is calibrated with.
+#[derive(Args)]
+pub struct TargetArgs {
+    /// A chessboard of so many inner corners, where four squares meet
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = counts_of, requires = "square_mm")]
+    pub chessboard: Option<[u32; 2]>,
+    /// A ChArUco board of so many squares, markers in the white ones; parts of it will do
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = counts_of, requires_all = ["square_mm", "marker_mm"])]
+    pub charuco: Option<[u32; 2]>,
+    /// Side of the target's squares
+    #[arg(long, value_name = "MM")]
+    pub square_mm: Option<f64>,
+    /// Side of the black squares of a ChArUco board's markers
+    #[arg(long, value_name = "MM", requires = "charuco")]
+    pub marker_mm: Option<f64>,
+    /// Family of a ChArUco board's markers: DICT_4X4_50, DICT_6X6_250, tag36h11, …, or a dictionary's file (.yml)
+    #[arg(long, value_name = "NAME", default_value = "DICT_5X5_100", value_parser = family_of, requires = "charuco")]
+    pub dictionary: Family,
+}
+
+#[derive(Args)]
+#[command(group = clap::ArgGroup::new("sheet").required(true).args(["board", "ids", "chessboard", "charuco"]))]
+pub struct MarkersArgs {
+    /// The sheet: .pdf (true size), .svg or .png; what a scene file takes is written beside it as .toml
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// A board of so many columns and rows of markers, which are one anchor
+    #[arg(long, value_name = "COLUMNSxROWS", value_parser = counts_of, requires_all = ["size_mm", "gap_mm"])]
+    pub board: Option<[u32; 2]>,
+    /// Markers to be cut out, each on its own
+    #[arg(long, value_name = "ID,…", value_delimiter = ',', requires = "size_mm")]
+    pub ids: Option<Vec<u32>>,
+    #[command(flatten)]
+    pub target: TargetArgs,
+    /// Side of the markers' black squares
+    #[arg(long, value_name = "MM")]
+    pub size_mm: Option<f64>,
+    /// White between the markers of a board
+    #[arg(long, value_name = "MM")]
+    pub gap_mm: Option<f64>,
+    /// Id of the board's upper left marker; the others follow row by row
+    #[arg(long, value_name = "ID", default_value = "0")]
+    pub first_id: u32,
+    /// Name of the board
+    #[arg(long, value_name = "NAME", default_value = "table")]
+    pub name: String,
+    #[command(flatten)]
+    pub family: FamilyArgs,
+    /// Paper to print on
+    #[arg(long, value_enum, default_value = "a4")]
+    pub page: PageSize,
+    /// The paper lies on its side
+    #[arg(long)]
+    pub landscape: bool,
+    /// Pixels per inch of a PNG
+    #[arg(long, value_name = "DPI", default_value = "300")]
+    pub dpi: f64,
+}
+
+/// Sizes of paper.
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+pub enum PageSize {
+    /// 210 x 297 mm
+    A4,
+    /// 297 x 420 mm
+    A3,
+    /// 8.5 x 11 inches
+    Letter,
+}
+
+/// Where markers' sizes come from.
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+pub enum Sizes {
+    /// All are --size-mm
+    Given,
+    /// The gauge's is --size-mm, the others are learnt
+    Estimate,
+}
+
+#[derive(Args)]
+pub struct RecordArgs {
+    /// Scene file (.toml), webcam (webcam:0, webcam:NAME, /dev/video0), address (http://…, rtsp://…), or recording
+    pub source: PathBuf,
+    #[command(flatten)]
+    pub recording: RecordingArgs,
+    /// The session's folder: a new one
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// End after this many seconds of frames
+    #[arg(long, value_name = "N", value_parser = seconds_of)]
+    pub seconds: Option<f64>,
+}
+
+/// A recording or a camera that no scene describes.
+#[derive(Args)]
+pub struct RecordingArgs {
+    /// Calibration of the camera; without it the one that the recording carries
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<PathBuf>,
+    /// The camera mirrors its pictures: turn them back first
+    #[arg(long)]
+    pub mirror: bool,
+    /// libapriltag searches pictures shrunk by this: 2 without it, 1 finds smaller markers
+    #[arg(long, value_name = "FACTOR")]
+    pub decimation: Option<f64>,
+    #[command(flatten)]
+    pub wanted: WantedArgs,
+}
+
+/// What a webcam is asked for.
+#[derive(Args)]
+pub struct WantedArgs {
+    /// Ask a webcam for pictures of this size; without it the calibration's
+    #[arg(long, value_name = "WxH", value_parser = size_of)]
+    pub size: Option<[u32; 2]>,
+    /// Ask a webcam for this rate
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub fps: Option<u32>,
+    /// Ask a webcam for this format: MJPEG, YUYV, NV12, GREY, RGB, BGR
+    #[arg(long, value_name = "NAME", value_parser = pixel_format_of)]
+    pub format: Option<PixelFormat>,
+}
+
+impl WantedArgs {
+    pub fn wanted(&self) -> WantedFormat {
+        WantedFormat {
+            size_px: self.size,
+            fps: self.fps,
+            pixels: self.format,
+        }
+    }
+}
+
+impl RecordingArgs {
+    pub fn is_given(&self) -> bool {
+        self.calibration.is_some()
+            || self.decimation.is_some()
+            || self.mirror
+            || self.wanted.wanted() != WantedFormat::default()
+    }
+}
+
+#[derive(Args)]
+pub struct ProbeArgs {
+    /// Exposures of one view; or one picture in linear radiance (.hdr, .exr)
+    #[arg(required = true)]
+    pub pictures: Vec<PathBuf>,
+    /// What they show
+    #[arg(long, value_enum)]
+    pub kind: ProbeKindArg,
+    /// Exposure times in the pictures' order, or a file with a picture's name and its time a line; from EXIF without this
+    #[arg(long, value_name = "S,…|FILE")]
+    pub exposures: Option<String>,
+    /// Outline of the ball or the map, pixels from the upper left corner; a ball is found without this
+    #[arg(long, value_name = "X,Y,RADIUS", value_parser = circle_of, allow_hyphen_values = true)]
+    pub crop: Option<Circle>,
+    /// From the camera to the ball's middle, in radii of the ball; far away without this
+    #[arg(long, value_name = "RADII", value_parser = ball_distance_of)]
+    pub ball_distance: Option<f64>,
+    /// Part of the light that the ball reflects: 0.6 to 0.7 for chrome
+    #[arg(long, value_name = "PART", value_parser = reflectance_of, default_value = "1")]
+    pub reflectance: f64,
+    /// The camera was turned so far to the left from looking along the world's +y
+    #[arg(long, value_name = "DEG", value_parser = degrees_of, default_value = "0", allow_negative_numbers = true)]
+    pub turn_deg: f64,
+    /// It was tilted downward by so much
+    #[arg(long, value_name = "DEG", value_parser = degrees_of, default_value = "0", allow_negative_numbers = true)]
+    pub tilt_deg: f64,
+    /// It was rolled clockwise by so much
+    #[arg(long, value_name = "DEG", value_parser = degrees_of, default_value = "0", allow_negative_numbers = true)]
+    pub roll_deg: f64,
+    /// Move the exposures on to each other first: the camera was held by hand
+    #[arg(long)]
+    pub align: bool,
+    /// The camera's response, as --save-response wrote it, instead of estimating it
+    #[arg(long, value_name = "FILE")]
+    pub response: Option<PathBuf>,
+    /// Write the camera's response (CSV)
+    #[arg(long, value_name = "FILE")]
+    pub save_response: Option<PathBuf>,
+    /// Exposure at which radiance 1 is white; the middle picture's without this
+    #[arg(long, value_name = "S", value_parser = exposure_of)]
+    pub white_at: Option<f64>,
+    /// Columns of the probe, which has half as many rows; as fine as the pictures, up to 1024, without this
+    #[arg(long, value_name = "PX", value_parser = probe_width_of)]
+    pub width_px: Option<usize>,
+    /// The probe: .hdr (Radiance) or .exr (OpenEXR), latitude-longitude
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Write a picture of the probe with rings around its brightest lights (PNG)
+    #[arg(long, value_name = "FILE")]
+    pub preview: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+pub enum ProbeKindArg {
+    /// A mirror ball
+    Ball,
+    /// Debevec's angular map
+    Angular,
+    /// All directions, twice as wide as high
+    Panorama,
+}
+
+/// Markers that no scene describes.
+#[derive(Args)]
+pub struct FamilyArgs {
+    /// Family of the markers: tag16h5, tag25h9, tag36h10, tag36h11, DICT_4X4_50, …, or a dictionary's file (.yml)
+    #[arg(long, value_name = "NAME", default_value = "tag36h11", value_parser = family_of, requires = "size_mm")]
+    pub family: Family,
+    /// Width of the markers' black border, cells: 1, or 2 as on Kalibr's AprilGrids
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=2), requires = "size_mm")]
+    pub border_cells: u32,
+}
+
+impl TargetArgs {
+    pub fn target(&self) -> Result<Target> {
+        let metres = |length_mm: Option<f64>| length_mm.unwrap_or(f64::NAN) / 1000.0;
+        let square_m = metres(self.square_mm);
+        let markers = TargetMarkers {
+            family: self.dictionary,
+            size_m: metres(self.marker_mm),
+        };
+        match (self.chessboard, self.charuco) {
+            (Some(corners), _) => Ok(Target::chessboard(corners, square_m)?),
+            (_, Some(squares)) => Ok(Target::charuco(squares, square_m, markers)?),
+            (None, None) => bail!("give --chessboard or --charuco"),
+        }
+    }
+}
+
+/// Columns and rows, "9x6".
+fn counts_of(text: &str) -> Result<[u32; 2], String> {
+    let counts = text.split_once('x').and_then(|(columns, rows)| {
+        Some([columns.trim().parse().ok()?, rows.trim().parse().ok()?])
+    });
+    counts
+        .filter(|counts| counts.iter().all(|&count| (1..=1000).contains(&count)))
+        .ok_or_else(|| "columns and rows are expected, as in 9x6".to_owned())
+}
+
+fn distance_of(text: &str) -> Result<Distance, String> {
+    let parts: Vec<&str> = text.split(':').collect();
+    let parsed = match parts[..] {
+        [a, b, mm] => (a.parse().ok()).zip(b.parse().ok()).zip(mm.parse().ok()),
+        _ => None,
+    };
+    let expected = "two ids and the millimetres between their centres are expected, like 0:7:412.5";
+    match parsed {
+        Some(((a, b), mm)) if a != b && (1e-3..1e6).contains(&mm) => Ok(Distance {
+            ids: [a, b],
+            distance_m: mm * 1e-3,
+        }),
+        _ => Err(expected.to_owned()),
+    }
+}
+
+fn circle_of(written: &str) -> Result<Circle, String> {
+    let numbers: Option<Vec<f64>> = written
+        .split(',')
+        .map(|number| {
+            number
+                .trim()
+                .parse()
+                .ok()
+                .filter(|number: &f64| number.is_finite())
+        })
+        .collect();
+    match numbers.as_deref() {
+        Some([x, y, radius_px]) if *radius_px >= 2.0 => Ok(Circle {
+            center_px: glam::DVec2::new(*x, *y),
+            radius_px: *radius_px,
+        }),
+        _ => Err(
+            "three numbers are expected, like 640,360,210: the middle, and a radius of at least 2"
+                .to_owned(),
+        ),
+    }
+}
+
+fn number_between(written: &str, allowed: std::ops::RangeInclusive<f64>) -> Result<f64, String> {
+    let number = written.parse().ok();
+    number
+        .filter(|number| allowed.contains(number))
+        .ok_or_else(|| {
+            format!(
+                "out of range; allowed: {} to {}",
+                allowed.start(),
+                allowed.end()
+            )
+        })
+}
+
+fn ball_distance_of(written: &str) -> Result<f64, String> {
+    number_between(written, 1.5..=1e6)
+}
+
+fn reflectance_of(written: &str) -> Result<f64, String> {
+    number_between(written, 0.01..=1.0)
+}
+
+fn degrees_of(written: &str) -> Result<f64, String> {
+    number_between(written, -360.0..=360.0)
+}
+
+fn probe_width_of(written: &str) -> Result<usize, String> {
+    let width_px = written.parse().ok();
+    width_px
+        .filter(|width_px| (16..=8192).contains(width_px) && width_px % 2 == 0)
+        .ok_or_else(|| "an even number from 16 to 8192 is expected".to_owned())
+}
+
+fn seconds_of(written: &str) -> Result<f64, String> {
+    let seconds = written.parse().ok();
+    seconds
+        .filter(|seconds: &f64| *seconds > 0.0 && seconds.is_finite())
+        .ok_or_else(|| "not a time; a number above 0 is expected".to_owned())
+}
+
+impl RecordingArgs {
+    pub fn decimation(&self) -> f64 {
+        self.decimation
+            .unwrap_or(TrackingSettings::default().decimation)
+    }
+
+    /// A scene says all of this itself.
+    pub fn refuse_beside(&self, scene: &Path) -> Result<()> {
+        if self.is_given() {
+            bail!(
+                "{} is a scene, which says itself which camera; --calibration, --mirror, --decimation, --size, --fps \
+                 and --format go with a recording or a camera",
+                scene.display()
+            );
+        }
+        Ok(())
+    }
+}
+
+impl FamilyArgs {
+    pub fn family(&self) -> Result<Family> {
+        self.family.with_border(self.border_cells).with_context(|| {
+            format!(
+                "--border-cells {}: no marker is printed so",
+                self.border_cells
+            )
+        })
+    }
+}
+
+fn family_of(name: &str) -> Result<Family, String> {
+    if Family::is_file_name(name) {
+        return Family::from_file(Path::new(name)).map_err(|error| error.to_string());
+    }
+    Family::from_name(name).ok_or_else(|| {
+        let known: Vec<&str> = Family::all_names().collect();
+        format!("unknown family; allowed: {}", known.join(", "))
+    })
+}
+
+fn size_of(written: &str) -> Result<[u32; 2], String> {
+    let side = |side: &str| side.parse().ok().filter(|side| (1..=32768).contains(side));
+    written
+        .split_once('x')
+        .and_then(|(width, height)| Some([side(width)?, side(height)?]))
+        .ok_or_else(|| "not a size; write WIDTHxHEIGHT, as 1280x720".to_owned())
+}
+
+fn pixel_format_of(name: &str) -> Result<PixelFormat, String> {
+    let mut known = PixelFormat::BY_NAME.into_iter();
+    let found = known.find(|(known, _)| known.eq_ignore_ascii_case(name));
+    found.map(|(_, format)| format).ok_or_else(|| {
+        let allowed: Vec<&str> = PixelFormat::BY_NAME.iter().map(|(name, _)| *name).collect();
+        format!("unknown format; allowed: {}", allowed.join(", "))
+    })
+}
