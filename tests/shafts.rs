@@ -365,6 +365,79 @@ fn reflected_of_everywhere(material: &Material) -> DVec3 {
 }
 
 #[test]
+fn a_probe_without_a_room_lights_from_afar() {
+    // As bright all around, and ten degrees about a direction far brighter.
+    let to_light = DVec3::new(0.6, 0.0, 0.8);
+    let size_px = [256_u32, 128];
+    let texel = |index: u32| {
+        let (column, row) = (index % size_px[0], index / size_px[0]);
+        let polar = (f64::from(row) + 0.5) / f64::from(size_px[1]) * std::f64::consts::PI;
+        let azimuth = (f64::from(column) + 0.5) / f64::from(size_px[0]) * TAU - TAU / 2.0;
+        let direction = DVec3::new(
+            polar.sin() * azimuth.cos(),
+            polar.sin() * azimuth.sin(),
+            polar.cos(),
+        );
+        let is_bright = direction.dot(to_light) > 10_f64.to_radians().cos();
+        Vec3::splat(if is_bright { 40.0 } else { 1.0 })
+    };
+    let pixels = (0..size_px[0] * size_px[1]).map(texel).collect();
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = std::fs::read_to_string(project_file("config/room.toml")).expect("the room");
+    let (without_room, _) = text.split_once("\n[[room]]").expect("a room");
+    let root = env!("CARGO_MANIFEST_DIR");
+    let text = without_room
+        .replace("\"recordings/", &format!("\"{root}/recordings/"))
+        .replace("\"models/", &format!("\"{root}/models/"));
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, text).expect("a scene");
+    let mut scene = Scene::load(&path).expect("a scene without a room");
+    scene.shadows.shafts.patches = 2000;
+    let probe = scene.probe.as_mut().expect("a probe");
+    assert!(probe.is_far);
+    let size = size_px.map(|side| side as usize);
+    probe.probe = Probe::new(size, pixels).expect("a probe");
+    scene.phantoms.retain(|phantom| phantom.name == "table");
+    scene.virtuals.retain(|thing| thing.name == "ball");
+    let ball_m = DVec3::new(0.0, 0.0, 0.05);
+    scene.virtuals[0].anchor_from_object.translation = ball_m;
+
+    let room = Room::of(&scene, scene.probe.as_ref().expect("a probe")).prepare();
+    let exposure = scene.probe.as_ref().expect("a probe").exposure;
+    // What a table sees of both: the sky, and a disc of a bright one.
+    let disc = 39.0 * TAU / 2.0 * 10_f64.to_radians().sin().powi(2) * to_light.z;
+    let expected = exposure * (TAU / 2.0 + disc);
+    let near = room.patches.vertices.iter().zip(&room.irradiance);
+    let near = near.filter(|(vertex, _)| vertex.position.length() < 0.2 && vertex.normal.z > 0.9);
+    let near: Vec<f32> = near.map(|(_, irradiance)| irradiance.x).collect();
+    assert!(near.len() > 3);
+    for irradiance in near {
+        let error = (f64::from(irradiance) / expected - 1.0).abs();
+        assert!(error < 0.1, "{irradiance}, not {expected}");
+    }
+
+    let layers = seen(&mut renderer(&scene)).layers;
+    let (frame, poses) = frame();
+    let camera_from_world = poses[0].expect("a pose");
+    let intrinsics = load_calibration(&project_file("recordings/room/camera.toml"));
+    let intrinsics = intrinsics.expect("the calibration");
+    let gain_at = |place: DVec3| {
+        let place = camera_from_world.transform_point3(place);
+        let pixel = intrinsics.focal_px * place.truncate() / place.z + intrinsics.center_px;
+        let [x, y] = pixel.to_array().map(|at| at.round() as usize);
+        layers.gain[y * frame.size_px[0] as usize + x][1]
+    };
+    let aside = DVec3::new(0.6 / 0.8 * ball_m.z, 0.0, 0.0);
+    let in_shadow = gain_at(-aside);
+    let lit = gain_at(aside + DVec3::X * 0.03);
+    let left = 1.0 - disc / (TAU / 2.0 + disc);
+    assert!(
+        f64::from(in_shadow) < left + 0.15 && lit > 0.85,
+        "{in_shadow} and {lit}; without the disc {left} is left"
+    );
+}
+
+#[test]
 fn a_virtual_ball_is_darker_under_a_real_desk() {
     let mut scene = coarse_scene();
     scene.virtuals.remove(0);

@@ -21,7 +21,10 @@ pub fn room_lines(scene: &Scene, probe: &ProbeScene) -> Vec<(&'static str, Strin
             "room",
             format!(
                 "{}  {} triangles with the table and the phantoms",
-                counted(probe.room.len(), "part"),
+                match probe.is_far {
+                    true => "none, light from afar".to_owned(),
+                    false => counted(probe.room.len(), "part"),
+                },
                 room.triangles.len()
             ),
         ),

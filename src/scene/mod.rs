@@ -301,6 +301,8 @@ pub struct ProbeScene {
     pub exposure: f64,
     /// What is around the table, in the world.
     pub room: Vec<RoomPiece>,
+    /// Whether the scene says nothing of a room: `room` is then a box far away.
+    pub is_far: bool,
 }
 
 /// A part of the room.
@@ -492,6 +494,10 @@ impl Scene {
         match self.shadows.technique {
             Technique::Auto => match &self.probe {
                 None => (Technique::Volumes, "the scene has no probe"),
+                Some(probe) if probe.is_far => {
+                    let reason = "the scene has a probe; without a room its light comes from afar";
+                    (Technique::Shafts, reason)
+                }
                 Some(_) => (Technique::Shafts, "the scene has a probe and a room"),
             },
             Technique::Shafts => (Technique::Shafts, "the scene asks for it"),

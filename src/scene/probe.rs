@@ -13,6 +13,10 @@ use super::reader::{Numbers, Table, Value};
 use super::{ProbeScene, RoomPiece};
 use crate::geometry::winding::winding_number;
 
+/// Without a room the light comes from a box that reaches so far to each side of the probe: on a table it comes from the same
+/// direction everywhere.
+const FAR_M: f32 = 20.0;
+
 const PROBE_KEYS: [&str; 5] = ["image", "kind", "position_m", "exposure", "room"];
 const ROOM_KEYS: [&str; 8] = [
     "name",
@@ -69,6 +73,11 @@ pub fn probe(root: &Table) -> Result<Option<ProbeScene>, SceneError> {
     for table in &rooms {
         room.push(piece(table, &mut name_lines)?);
     }
+    let is_far = room.is_empty();
+    if is_far {
+        let around = [-FAR_M, FAR_M].map(|way| position_m.as_vec3() + way);
+        room.push(box_between(around, None));
+    }
     for piece in &mut room {
         turn_to(piece, position_m.as_vec3());
     }
@@ -78,6 +87,7 @@ pub fn probe(root: &Table) -> Result<Option<ProbeScene>, SceneError> {
         position_m,
         exposure,
         room,
+        is_far,
     }))
 }
 
@@ -138,15 +148,14 @@ fn box_piece(value: &Value, albedo: Option<DVec3>) -> Result<RoomPiece, SceneErr
             "no volume; allowed: [x0, y0, z0, x1, y1, z1] with x0 < x1, y0 < y1 and z0 < z1",
         ));
     }
-    let (low, high) = (Vec3::new(x0, y0, z0), Vec3::new(x1, y1, z1));
+    let corners = [Vec3::new(x0, y0, z0), Vec3::new(x1, y1, z1)];
+    Ok(box_between(corners, albedo.map(|albedo| albedo.as_vec3())))
+}
+
+/// A box between its lowest and its highest corner.
+fn box_between(corners: [Vec3; 2], albedo: Option<Vec3>) -> RoomPiece {
     let corner = |index: usize| {
-        let pick = |axis: usize| {
-            if index >> axis & 1 == 1 {
-                high[axis]
-            } else {
-                low[axis]
-            }
-        };
+        let pick = |axis: usize| corners[index >> axis & 1][axis];
         Vec3::new(pick(0), pick(1), pick(2))
     };
     // Counter-clockwise seen from outside.
@@ -158,15 +167,14 @@ fn box_piece(value: &Value, albedo: Option<DVec3>) -> Result<RoomPiece, SceneErr
         [0, 2, 3, 1],
         [4, 5, 7, 6],
     ];
-    let albedo = albedo.map(|albedo| albedo.as_vec3());
     let triangles = FACES
         .iter()
         .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
         .map(|triangle| (triangle.map(corner), albedo));
-    Ok(RoomPiece {
+    RoomPiece {
         triangles: triangles.collect(),
         is_closed: true,
-    })
+    }
 }
 
 /// A flat polygon of three or four corners.
