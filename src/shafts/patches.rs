@@ -5,6 +5,7 @@ use std::collections::{HashMap, HashSet};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use super::light_of_room::points_on;
 use crate::geometry::bounds::Bounds;
 
 /// A triangle of the room, the table or a phantom.
@@ -52,6 +53,26 @@ const NEAREST_M: f64 = 0.04;
 /// Part of the weight that darkness leaves.
 const WEIGHT_OF_DARKNESS: f32 = 0.3;
 
+/// Mean brightness of some triangles, by how large they look from a distance.
+fn mean_seen(
+    triangles: &[RoomTriangle],
+    distance: impl Fn(Vec3) -> f32,
+    brightness: impl Fn(Vec3) -> f32,
+) -> f32 {
+    const POINTS: usize = 64;
+    let (mut sum, mut whole) = (0.0, 0.0);
+    for &RoomTriangle { corners, .. } in triangles {
+        let [a, b, c] = corners;
+        let area = (b - a).cross(c - a).length() / 2.0;
+        for place in points_on(corners, POINTS) {
+            let looks = area / distance(place).powi(2);
+            sum += looks * brightness(place);
+            whole += looks;
+        }
+    }
+    sum / whole.max(f32::MIN_POSITIVE)
+}
+
 impl Patches {
     /// Cuts triangles until there are about `budget` patches, never more unless there are more triangles. Edges are
     /// judged by how large they look from the nearest of `focuses`, and by `brightness` there (in any unit).
@@ -61,18 +82,17 @@ impl Patches {
         focuses: &[Bounds],
         brightness: impl Fn(Vec3) -> f32,
     ) -> Self {
-        let middles = triangles
-            .iter()
-            .map(|triangle| triangle.corners.iter().sum::<Vec3>() / 3.0);
-        let mean = middles.map(&brightness).sum::<f32>() / triangles.len().max(1) as f32;
+        let distance = |place: Vec3| {
+            let point = place.as_dvec3();
+            let distances = focuses
+                .iter()
+                .map(|focus| point.distance(point.clamp(focus.low, focus.high)));
+            distances.fold(f64::INFINITY, f64::min).max(NEAREST_M) as f32
+        };
+        let mean = mean_seen(triangles, &distance, &brightness);
         let weight = |middle: Vec3| {
-            let distance = |focus: &Bounds| {
-                let point = middle.as_dvec3();
-                point.distance(point.clamp(focus.low, focus.high))
-            };
-            let nearest = focuses.iter().map(distance).fold(f64::INFINITY, f64::min);
             let bright = WEIGHT_OF_DARKNESS + brightness(middle) / mean.max(1e-9);
-            bright.sqrt() / nearest.max(NEAREST_M) as f32
+            bright.sqrt() / distance(middle)
         };
         let too_large = |limit: f32| {
             let weight = &weight;
@@ -282,6 +302,24 @@ mod tests {
             albedo: None,
             piece,
         })
+    }
+
+    #[test]
+    fn a_bright_spot_is_cut_alike_wherever_the_room_s_own_triangles_lie() {
+        let focus = Bounds::around([DVec3::new(0.0, 0.0, 2.0)]).expect("a point");
+        // In the middle of a triangle, and aside.
+        let counts = [Vec3::new(0.667, -0.667, 0.0), Vec3::new(0.667, 0.667, 0.0)].map(|spot| {
+            let brightness = |place: Vec3| match place.distance(spot) < 0.3 {
+                true => 100.0,
+                false => 1.0,
+            };
+            let patches = Patches::new(&square(2.0, 0.0, 0), 600, &[focus], brightness);
+            let all = patches.patches.iter();
+            let inside = all.filter(|patch| patches.center(patch).distance(spot) < 0.3);
+            inside.count()
+        });
+        assert!(counts[0].abs_diff(counts[1]) < counts[1] / 2, "{counts:?}");
+        assert!(counts[0] > 20, "{counts:?}");
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::shafts::prepared::Prepared;
 use super::room::Room;
 
 /// Another layout, or another way to work rooms out.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// The newest ones stay.
 const MOST_ROOMS: usize = 16;
 
