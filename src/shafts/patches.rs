@@ -89,7 +89,7 @@ impl Patches {
                 .map(|focus| point.distance(point.clamp(focus.low, focus.high)));
             distances.fold(f64::INFINITY, f64::min).max(NEAREST_M) as f32
         };
-        let mean = mean_seen(triangles, &distance, &brightness);
+        let mean = mean_seen(triangles, distance, &brightness);
         let weight = |middle: Vec3| {
             let bright = WEIGHT_OF_DARKNESS + brightness(middle) / mean.max(1e-9);
             bright.sqrt() / distance(middle)
