@@ -12,6 +12,7 @@ use crate::light::cores::on_all_cores;
 use crate::light::probe::Probe;
 
 use super::patches::{Patch, Patches};
+use super::points::points_on;
 
 /// Points of a patch that are looked for from the probe.
 const SAMPLES: usize = 16;
@@ -56,23 +57,6 @@ pub struct PatchLight {
     pub radiance: Vec3,
     /// Diffuse reflectance: as given, or estimated.
     pub albedo: Vec3,
-}
-
-/// Points spread over a triangle.
-pub fn points_on(corners: [Vec3; 3], count: usize) -> impl Iterator<Item = Vec3> {
-    let [a, b, c] = corners;
-    (0..count).map(move |index| {
-        // The R2 sequence (Roberts 2018), folded over the diagonal.
-        let number = index as f32 + 0.5;
-        let (mut u, mut v) = (
-            (0.5 + number * 0.754_877_7).fract(),
-            (0.5 + number * 0.569_840_3).fract(),
-        );
-        if u + v > 1.0 {
-            (u, v) = (1.0 - u, 1.0 - v);
-        }
-        a + (b - a) * u + (c - a) * v
-    })
 }
 
 /// Light of every patch; `caster` holds the patches' triangles in their order.

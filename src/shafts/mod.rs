@@ -8,6 +8,7 @@ pub mod intensity_transfers;
 pub mod irradiance_volume;
 mod light_of_room;
 pub mod patches;
+mod points;
 pub mod prepared;
 mod receiver_tree;
 pub mod selection;

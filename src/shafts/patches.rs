@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::light_of_room::points_on;
+use super::points::points_on;
 use crate::geometry::bounds::Bounds;
 
 /// A triangle of the room, the table or a phantom.

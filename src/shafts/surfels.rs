@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::light_of_room::points_on;
+use super::points::points_on;
 use super::source_tree::BoxM;
 
 /// Neighbours in a group.

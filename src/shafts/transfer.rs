@@ -9,8 +9,9 @@ use crate::geometry::ray_caster::RayCaster;
 use crate::light::cores::on_all_cores;
 
 use super::form_factor::form_factor;
-use super::light_of_room::{START_OFFSET_M, points_on};
+use super::light_of_room::START_OFFSET_M;
 use super::patches::{PatchVertex, Patches};
+use super::points::points_on;
 
 /// Rays for a patch that covers much of the hemisphere, and for one that hardly shows.
 const MOST_RAYS: f32 = 16.0;
