@@ -42,6 +42,8 @@ impl Ruler {
                 } else {
                     high + room
                 };
+                // Nothing but where it begins.
+                high = if high > low { high } else { low + 1.0 };
             }
             Scale::Log => {
                 let room = (high / low).powf(0.06).max(1.15);
@@ -148,6 +150,16 @@ mod tests {
         let narrow = Ruler::new(&Axis::log(""), [1.9, 55.0]);
         assert_eq!(names(&narrow), ["2", "5", "10", "20", "50"]);
         assert_eq!(number(1_234_567.0, 1.0), "1,234,567");
+    }
+
+    #[test]
+    fn an_axis_without_values_has_ticks_all_the_same() {
+        for axis in [Axis::from_zero(""), Axis::log(""), Axis::default()] {
+            for values in [vec![], vec![0.0]] {
+                let ruler = Ruler::new(&axis, values);
+                assert!(ruler.ticks().len() > 1 && ruler.share(0.0).is_finite());
+            }
+        }
     }
 
     #[test]

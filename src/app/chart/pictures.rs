@@ -112,14 +112,14 @@ fn ways(scene: &Scene) -> Vec<(String, ShadowSettings)> {
 
 /// What the first of the frames takes to draw once all is made, milliseconds: the middle of some.
 fn frame_ms(lab: &Lab<'_>, shots: &Shots, scene: &Scene) -> Result<f64> {
-    const FRAMES: usize = 5;
+    let frames = lab.rounds();
     let Some(shot) = shots.shots.first() else {
         return Ok(0.0);
     };
     let mut renderer = Renderer::new(lab.gpu()?, scene, shots.intrinsics)?;
     renderer.upload(&shot.frame)?;
     let mut frames_ms = Vec::new();
-    for _ in 0..=FRAMES {
+    for _ in 0..=frames {
         let (waited, ms) = Stopwatch::time(|| {
             renderer.draw(&shot.camera_from_anchor, Shown::Composite);
             renderer.wait()

@@ -149,7 +149,7 @@ impl Chart for Scaling {
     fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
         let gpu = lab.gpu()?;
         let (warm_up, frames) = if lab.quick {
-            (2, 5)
+            (1, 3)
         } else {
             (WARM_UP_FRAMES, 40)
         };
