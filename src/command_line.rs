@@ -98,7 +98,7 @@ pub struct ChartArgs {
     pub out: Option<PathBuf>,
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', help = format!("Make these alone: {}", chart::names().join(", ")))]
     pub only: Vec<String>,
-    /// Fewer rounds: rougher times in a tenth of the time
+    /// Fewer rounds, frames and settings: a look in a tenth of the time
     #[arg(long)]
     pub quick: bool,
     /// Track the sessions of this folder too

@@ -89,18 +89,16 @@ impl Chart for Compositing {
         if unit == SETS {
             return sets(&scene, if lab.quick { 200 } else { 10_000 }).map(Some);
         }
-        let mut shots = Shots::of(&recording, &scene)?;
-        let step = if lab.quick { 3 } else { 1 };
-        if lab.quick {
-            shots.shots.truncate(1);
-        }
+        let shots = Shots::of(lab, &recording, &scene)?;
+        // For a look the cheapest do.
+        let most = if lab.quick { 2 } else { usize::MAX };
         let settings: Vec<(u32, f64)> = match unit {
             ALBEDO => ALBEDOS.map(|albedo| (AT_SOURCES, albedo)).to_vec(),
             _ => SOURCES.map(|sources| (sources, 1.0)).to_vec(),
         };
         let mut rows = Vec::new();
         for (way, difference) in WAYS {
-            for &(sources, albedo) in settings.iter().step_by(step) {
+            for &(sources, albedo) in settings.iter().take(most) {
                 if lab.is_stopped() {
                     return Ok(None);
                 }

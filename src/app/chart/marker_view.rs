@@ -1,5 +1,5 @@
-//! Tracking against marker size and viewing angle: rendered sheets through a known camera, each picture as if it were the
-//! first.
+//! Tracking, and a shadow drawn with the pose that it gives, against marker size and viewing angle: rendered sheets through
+//! a known camera, each picture as if it were the first.
 
 use std::path::PathBuf;
 
@@ -11,10 +11,14 @@ use super::family::Chart;
 use super::figure::{Axis, Figure, Panel, Point, Series};
 use super::lab::Lab;
 use super::measured::rounded;
+use super::peers_table::{LIGHT_M, Stage, TORUS_CENTER_M, torus};
+use super::shots::grey_frame;
 use super::tracking::bare_library;
+use crate::app::stats::quantile;
 use crate::app::truth::sheets::{camera_above, photograph, with_noise};
 use crate::app::truth::{PoseErrors, shifts_px};
 use crate::geometry::camera::Intrinsics;
+use crate::render::{Layers, REAL, Renderer, Shown, VIRTUAL_HIDES};
 use crate::scene::{Anchor, DetectorKind, Family, Marker, Search, TrackingSettings};
 use crate::tracking::{Status, Tracker};
 
@@ -52,6 +56,8 @@ pub struct Row {
     with_pose_pct: f64,
     shift_median_px: Option<f64>,
     shift_p95_px: Option<f64>,
+    /// Pixels wrongly in or out of a virtual shadow, of those that are in it; the median of the pictures with a pose.
+    wrong_shadow_pct: Option<f64>,
 }
 
 const LONE: &str = "lone marker";
@@ -121,13 +127,51 @@ fn pose(side_px: f64, tilt_deg: f64, picture: u32) -> DAffine3 {
     camera_above(tilt_deg, 360.0 * part(0.618_034), at_m)
 }
 
+/// A torus over the sheet in the light of a lamp, drawn with poses of the sheet.
+struct ShadowBench {
+    renderer: Renderer,
+}
+
+impl ShadowBench {
+    fn new(lab: &Lab<'_>) -> Result<Self> {
+        let caster = (torus(2_500, 0.5), TORUS_CENTER_M);
+        let mut stage = Stage::new(vec![caster], &[LIGHT_M], CAMERA.size_px, 1);
+        // The box, which is not on the sheet.
+        stage.scene.phantoms.pop();
+        let mut renderer = Renderer::new(lab.gpu()?, &stage.scene, CAMERA)?;
+        renderer.upload(&grey_frame(CAMERA.size_px))?;
+        Ok(Self { renderer })
+    }
+
+    fn draw(&mut self, camera_from_sheet: DAffine3) -> Result<Layers> {
+        let caster = camera_from_sheet * DAffine3::from_translation(TORUS_CENTER_M);
+        let poses = [Some(camera_from_sheet), Some(caster)];
+        self.renderer.draw(&poses, Shown::Composite);
+        Ok(self.renderer.layers()?)
+    }
+}
+
+/// Pixels, real in both, whose virtual shadow is another, over those that have one; percent.
+fn wrong_shadow_pct(truth: &Layers, found: &Layers) -> f64 {
+    let (mut shadow, mut wrong) = (0_u32, 0_u32);
+    for index in 0..truth.role.len() {
+        if truth.role[index] == REAL && found.role[index] == REAL {
+            let bits = [truth, found].map(|layers| layers.shadow[0][index] & VIRTUAL_HIDES);
+            shadow += u32::from(bits[0] != 0);
+            wrong += u32::from(bits[0] != bits[1]);
+        }
+    }
+    100.0 * f64::from(wrong) / f64::from(shadow.max(1))
+}
+
 impl Chart for MarkerView {
     const NAME: &'static str = "marker-view";
     const FAMILY: &'static str = "stability";
     const SHOWS: &'static str = "How small and how oblique a marker may be: rendered sheets (640 x 480, noise of 2 levels, \
         markers of 40 mm) through a known camera, each picture as if it were the first. Sizes are seen at 35 degrees from \
         frontal, tilts with sides of 50 pixels. Shift is that of chart tracking, whose four places lie up to 9 cm from \
-        the anchor. A lone marker has two poses: where the wrong one is taken, the 95 % panel jumps.";
+        the anchor. A lone marker has two poses: where the wrong one is taken, the 95 % panel jumps. Shadow: of a torus 6 cm \
+        above the sheet, drawn with the found pose instead of the true one; pixels wrongly in or out of it, of those in it.";
     type Row = Row;
 
     fn inputs(&self, _: &Lab<'_>) -> Result<Vec<PathBuf>> {
@@ -141,13 +185,16 @@ impl Chart for MarkerView {
     fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
         let pictures = if lab.quick { 2 } else { 40 };
         let mut rows = Vec::new();
-        for [side_px, tilt_deg] in steps(unit) {
+        let mut bench = ShadowBench::new(lab)?;
+        // For a look every other step does.
+        let steps = steps(unit).into_iter();
+        for [side_px, tilt_deg] in steps.step_by(if lab.quick { 2 } else { 1 }) {
             for (layout, markers) in layouts() {
                 let anchors = [Anchor {
                     name: layout.to_owned(),
                     markers: markers.clone(),
                 }];
-                let mut errors = ways().map(|_| PoseErrors::default());
+                let mut errors = ways().map(|_| (PoseErrors::default(), Vec::new()));
                 for picture in 0..pictures {
                     if lab.is_stopped() {
                         return Ok(None);
@@ -155,14 +202,19 @@ impl Chart for MarkerView {
                     let truth = pose(side_px, tilt_deg, picture);
                     let clean = photograph(&CAMERA, &[(&markers, truth)], 0.0);
                     let frame = with_noise(&clean, NOISE, u64::from(picture) + 1);
-                    for ((_, settings), errors) in ways().iter().zip(&mut errors) {
+                    let true_shadow = bench.draw(truth)?;
+                    for ((_, settings), (errors, wrong_pct)) in ways().iter().zip(&mut errors) {
                         let found = Tracker::new(settings, &anchors, CAMERA)?.track(&frame)?;
                         let found = found.first().filter(|pose| pose.status != Status::Lost);
                         let found = found.and_then(|pose| pose.camera_from_anchor);
                         errors.add(found.map(|found| shifts_px(&CAMERA, &found, &truth)));
+                        if let Some(found) = found {
+                            wrong_pct.push(wrong_shadow_pct(&true_shadow, &bench.draw(found)?));
+                        }
                     }
                 }
-                for ((library, _), errors) in ways().iter().zip(&errors) {
+                for ((library, _), (errors, wrong_pct)) in ways().iter().zip(&errors) {
+                    let has_any = !wrong_pct.is_empty();
                     rows.push(Row {
                         varied: unit.to_owned(),
                         side_px,
@@ -173,6 +225,7 @@ impl Chart for MarkerView {
                         with_pose_pct: rounded(errors.with_pose_pct()),
                         shift_median_px: errors.shift_px(0.5).map(rounded),
                         shift_p95_px: errors.shift_px(0.95).map(rounded),
+                        wrong_shadow_pct: has_any.then(|| rounded(quantile(wrong_pct, 0.5))),
                     });
                 }
             }
@@ -182,10 +235,11 @@ impl Chart for MarkerView {
 
     fn figure(&self, rows: &[Row]) -> Figure {
         type Metric = (&'static str, fn(&Row) -> Option<f64>);
-        let metrics: [Metric; 3] = [
+        let metrics: [Metric; 4] = [
             ("pictures with a pose, %", |row| Some(row.with_pose_pct)),
             ("shift, median, px", |row| row.shift_median_px),
             ("shift, 95 % of pictures, px", |row| row.shift_p95_px),
+            ("wrong shadow, median, %", |row| row.wrong_shadow_pct),
         ];
         let mut panels = Vec::new();
         for (varied, label) in [
@@ -233,7 +287,7 @@ impl Chart for MarkerView {
         }
         Figure {
             title: "How small and how oblique a marker may be".to_owned(),
-            reading: "Above: size; below: tilt. Left: how often there is a pose; middle and right: how far it is off."
+            reading: "Above: size; below: tilt. From the left: how often there is a pose, how far it is off, and what that makes of a shadow."
                 .to_owned(),
             columns: metrics.len(),
             panel_size: [420.0, 300.0],

@@ -196,9 +196,9 @@ impl<C: Chart> AnyChart for C {
 fn readme(out: &Path) -> String {
     let mut text = String::from(
         "# Charts: speed against accuracy\n\
-         Made by `gnomon chart`, all of them; `--only NAME` makes one, `--quick` takes fewer rounds. Each has its figures \
-         beside it as CSV. Times are those of the machine that made them and change with it; their ratios hold better, as \
-         all that is compared is timed in turn. Errors hold on any machine.\n",
+         Made by `gnomon chart`, all of them; `--only NAME` makes one, `--quick` takes fewer rounds, frames and \
+         settings. Each has its figures beside it as CSV. Times are those of the machine that made them and change \
+         with it; their ratios hold better, as all that is compared is timed in turn. Errors hold on any machine.\n",
     );
     for chart in all() {
         let name = chart.name();

@@ -94,7 +94,7 @@ impl AnyChart for Moved {
         progress.tell(NAME);
         let recording = lab.recording(ROOM)?;
         let scene = recording.load_scene()?;
-        let shots = Shots::of(&recording, &scene)?;
+        let shots = Shots::of(lab, &recording, &scene)?;
         let shot = shots.shots.first().context("a key frame")?;
         let width = shots.size_px()[0] as usize;
         let (mut rows, mut sheet) = (Vec::new(), Vec::new());

@@ -40,6 +40,7 @@ const SOURCES: &str = "sources";
 /// Where shafts are drawn.
 const ROOM: &str = "room";
 const SOURCE_COUNTS: [u32; 7] = [1, 3, 10, 20, 50, 100, 200];
+const QUICK_SOURCE_COUNTS: [u32; 3] = [1, 5, 25];
 
 /// What is drawn.
 struct Setup {
@@ -66,8 +67,11 @@ fn rooms(lab: &Lab<'_>, samples: u32) -> Result<Vec<(f64, Setup)>> {
     }
     let recording = lab.recording(ROOM)?;
     let scene = recording.load_scene()?;
-    let shots = Shots::of(&recording, &scene)?;
-    let counts = SOURCE_COUNTS.iter().step_by(if lab.quick { 3 } else { 1 });
+    let shots = Shots::of(lab, &recording, &scene)?;
+    let counts: &[u32] = match lab.quick {
+        true => &QUICK_SOURCE_COUNTS,
+        false => &SOURCE_COUNTS,
+    };
     let setup = |&count: &u32| {
         let mut scene = scene.clone();
         scene.shadows.samples = samples;
@@ -80,13 +84,14 @@ fn rooms(lab: &Lab<'_>, samples: u32) -> Result<Vec<(f64, Setup)>> {
         };
         (f64::from(count), setup)
     };
-    Ok(counts.map(setup).collect())
+    Ok(counts.iter().map(setup).collect())
 }
 
 /// The sizes of a sweep with their stages: the peers' torus over the table, one thing varied.
 fn sweep(varied: &str, samples: u32, quick: bool) -> Vec<(f64, Stage)> {
     let one = |triangles| vec![(torus(triangles, 1.0), TORUS_CENTER_M)];
     let sizes: &[u32] = match varied {
+        "triangles" if quick => &[100, 300, 1_000, 3_000, 10_000],
         "triangles" => &[100, 300, 1_000, 3_000, 10_000, 30_000, 100_000],
         "lights" => &[1, 2, 3, 4, 6, 8],
         "casters" => &[1, 2, 4, 8, 16, 32],

@@ -45,6 +45,8 @@ const VOLUMES_1: &str = "volumes, 1 sample";
 const TECHNIQUES: [&str; 3] = [VOLUMES_4, VOLUMES_1, SHAFTS];
 /// How many sources get a shadow each; `None`: all that are hidden.
 const SHAFT_SOURCES: [Option<u32>; 6] = [Some(5), Some(10), Some(20), Some(50), Some(100), None];
+/// For a look these do.
+const QUICK_SETTINGS: [&str; 6] = ["fast", "balanced", "accurate", "5", "20", "100"];
 const TRUTH: &str = "truth on the video";
 const BARE: &str = "bare video";
 
@@ -146,29 +148,22 @@ impl Chart for Shadows {
         let (longest_ms, least_draws) = if lab.quick { (2e3, 1) } else { (6e4, 3) };
         let recording = lab.recording(unit)?;
         let scene = recording.load_scene()?;
-        let shots = Shots::of(&recording, &scene)?;
+        let shots = Shots::of(lab, &recording, &scene)?;
         let gpu = lab.gpu()?;
         let mut ways = ways(&scene);
         if lab.quick {
-            // For a look every other number of sources does.
-            let mut place = 0;
-            ways.retain(|way| {
-                place += 1;
-                way.technique != SHAFTS || place % 2 == 0
-            });
+            ways.retain(|way| QUICK_SETTINGS.contains(&way.setting.as_str()));
         }
-        let mut rows = Vec::new();
+        let (mut rows, mut renderers) = (Vec::new(), Vec::new());
         for way in &ways {
             if lab.is_stopped() {
                 return Ok(None);
             }
-            let drawn = shots.draw(&gpu, &way.scene)?;
+            let mut renderer = Renderer::new(Arc::clone(&gpu), &way.scene, shots.intrinsics)?;
+            let drawn = shots.draw_with(&mut renderer)?;
             rows.push(row(unit, way.technique, &way.setting, &shots, &drawn)?);
+            renderers.push(renderer);
         }
-        let mut renderers = ways
-            .iter()
-            .map(|way| Renderer::new(Arc::clone(&gpu), &way.scene, shots.intrinsics))
-            .collect::<Result<Vec<_>, _>>()?;
         // Of each frame the least of all draws: nothing takes less than it needs.
         let mut least_ms = vec![vec![f64::INFINITY; shots.shots.len()]; ways.len()];
         let watch = Stopwatch::start();

@@ -41,16 +41,6 @@ pub struct Part {
     to: [usize; 2],
 }
 
-impl Part {
-    /// What all of two parts lie in.
-    pub fn union(self, other: &Self) -> Self {
-        Self {
-            from: [0, 1].map(|axis| self.from[axis].min(other.from[axis])),
-            to: [0, 1].map(|axis| self.to[axis].max(other.to[axis])),
-        }
-    }
-}
-
 /// What a change touches, with some room.
 pub fn changed_part(change: &Picture) -> Option<Part> {
     let (width, height) = (change.width, change.pixels.len() / change.width);
@@ -79,6 +69,14 @@ pub fn changed_part(change: &Picture) -> Option<Part> {
 }
 
 impl Part {
+    /// What all of two parts lie in.
+    pub fn union(self, other: &Self) -> Self {
+        Self {
+            from: [0, 1].map(|axis| self.from[axis].min(other.from[axis])),
+            to: [0, 1].map(|axis| self.to[axis].max(other.to[axis])),
+        }
+    }
+
     /// That part of a picture, its levels changed.
     pub fn cut(&self, label: String, picture: &Picture, level: impl Fn(f64) -> f64) -> Cell {
         let byte = |value: f64| level(value).round().clamp(0.0, 255.0) as u8;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use anyhow::Result;
 use glam::DAffine3;
 
-use super::lab::Recording;
+use super::lab::{Lab, Recording};
 use crate::app::recording;
 use crate::app::truth::{Drawn, Errors, Truth, compare, draw, key_frames};
 use crate::capture::Frame;
@@ -13,7 +13,10 @@ use crate::geometry::camera::Intrinsics;
 use crate::render::{Gpu, Renderer};
 use crate::scene::Scene;
 
-/// All key frames of one recording.
+/// A frame and its true poses, by anchor.
+type PosedFrame = (Frame, Vec<Option<DAffine3>>);
+
+/// Key frames of one recording.
 pub struct Shots {
     /// In their order.
     pub shots: Vec<Shot>,
@@ -32,14 +35,30 @@ pub struct Shot {
 }
 
 impl Shots {
-    /// Reads them.
+    /// Reads all of them, or the middle one where a look is enough.
     ///
     /// # Errors
     /// A recording or a truth that is not there.
-    pub fn of(recording: &Recording, scene: &Scene) -> Result<Self> {
+    pub fn of(lab: &Lab<'_>, recording: &Recording, scene: &Scene) -> Result<Self> {
+        let frames = key_frames(&recording.folder, &scene.anchors)?;
+        match lab.quick {
+            true => Self::read(recording, scene, middle(frames)),
+            false => Self::read(recording, scene, frames),
+        }
+    }
+
+    /// Reads the middle one alone.
+    ///
+    /// # Errors
+    /// As [`Shots::of`].
+    pub fn middle_of(recording: &Recording, scene: &Scene) -> Result<Self> {
+        let frames = key_frames(&recording.folder, &scene.anchors)?;
+        Self::read(recording, scene, middle(frames))
+    }
+
+    fn read(recording: &Recording, scene: &Scene, frames: Vec<PosedFrame>) -> Result<Self> {
         let (_, intrinsics) = recording::open(&scene.camera)?;
-        let frames = key_frames(&recording.folder, &scene.anchors)?.into_iter();
-        let shots = frames.map(|(frame, camera_from_anchor)| {
+        let shots = frames.into_iter().map(|(frame, camera_from_anchor)| {
             Ok(Shot {
                 truth: Truth::open(&recording.folder, frame.index)?,
                 frame,
@@ -62,10 +81,17 @@ impl Shots {
     /// # Errors
     /// A device that failed.
     pub fn draw(&self, gpu: &Arc<Gpu>, scene: &Scene) -> Result<Vec<Drawn>> {
-        let mut renderer = Renderer::new(Arc::clone(gpu), scene, self.intrinsics)?;
-        self.shots
-            .iter()
-            .map(|shot| draw(&mut renderer, &shot.frame, &shot.camera_from_anchor))
+        self.draw_with(&mut Renderer::new(Arc::clone(gpu), scene, self.intrinsics)?)
+    }
+
+    /// Draws all at their true poses with a renderer that is there already.
+    ///
+    /// # Errors
+    /// A device that failed.
+    pub fn draw_with(&self, renderer: &mut Renderer) -> Result<Vec<Drawn>> {
+        let shots = self.shots.iter();
+        shots
+            .map(|shot| draw(renderer, &shot.frame, &shot.camera_from_anchor))
             .collect()
     }
 
@@ -80,6 +106,11 @@ impl Shots {
             .map(|(shot, drawn)| compare(shot.frame.index, &shot.truth, drawn))
             .collect()
     }
+}
+
+fn middle(mut frames: Vec<PosedFrame>) -> Vec<PosedFrame> {
+    let middle = frames.len() / 2;
+    frames.drain(middle..).take(1).collect()
 }
 
 /// The mean of one of the errors over the frames.

@@ -19,7 +19,7 @@ use crate::scene::{ArucoRefinement, DetectorKind, Search, TrackingSettings};
 use crate::tracking::{Status, Tracker};
 
 /// Frames of a recording that `--quick` looks at.
-const QUICK_FRAMES: u32 = 40;
+const QUICK_FRAMES: u32 = 15;
 
 /// The chart.
 pub struct Tracking;

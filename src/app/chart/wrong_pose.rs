@@ -79,7 +79,7 @@ impl Chart for WrongPose {
     fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
         let recording = lab.recording(RECORDING)?;
         let scene = recording.load_scene()?;
-        let shots = Shots::of(&recording, &scene)?;
+        let shots = Shots::of(lab, &recording, &scene)?;
         let intrinsics = shots.intrinsics;
         let mut renderer = Renderer::new(Arc::clone(&lab.gpu()?), &scene, intrinsics)?;
         let ways: &[DVec2] = match unit {

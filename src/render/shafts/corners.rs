@@ -115,7 +115,7 @@ impl Notice<'_> {
         let least = least.into_iter().fold(Vec3::MAX, Vec3::min);
         let gains = |corner: &ThrownCorner| corner.irradiance.abs().cmpgt(least).any();
         // What the camera sees of an irradiance.
-        let seen = |irradiance: Vec3| irradiance * albedo * FRAC_1_PI;
+        let shown = |irradiance: Vec3| irradiance * albedo * FRAC_1_PI;
         let light = |index: usize| {
             let [a, b] = weights[index];
             let of = patch
@@ -125,10 +125,10 @@ impl Notice<'_> {
         };
         let in_terms = |index: usize| match (self.difference, corners[index].irradiance) {
             (Difference::Ratio, thrown) => thrown,
-            (Difference::Subtract, thrown) => seen(thrown),
+            (Difference::Subtract, thrown) => shown(thrown),
             // The paper has shadows alone; without what the casters throw back they are far too dark.
             (Difference::Encoded, thrown) => {
-                encoded(seen(light(index) + thrown)) - encoded(seen(light(index)))
+                encoded(shown(light(index) + thrown)) - encoded(shown(light(index)))
             }
         };
         if corners.iter().any(gains) {
