@@ -287,7 +287,8 @@ impl Chart for MarkerView {
         }
         Figure {
             title: "How small and how oblique a marker may be".to_owned(),
-            reading: "Above: size; below: tilt. From the left: how often there is a pose, how far it is off, and what that makes of a shadow."
+            reading: "Above: size; below: tilt. From the left: how often there is a pose, how far it is off, and what \
+                that makes of a shadow."
                 .to_owned(),
             columns: metrics.len(),
             panel_size: [420.0, 300.0],
