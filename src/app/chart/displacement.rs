@@ -203,8 +203,7 @@ fn rows(
     errors: impl Fn(Change) -> Result<Vec<Errors>>,
 ) -> Result<Option<Vec<Row>>> {
     let mut rows = Vec::new();
-    // For a look every other step does.
-    for (phantoms, amount, changes) in steps().into_iter().step_by(if lab.quick { 2 } else { 1 }) {
+    for (phantoms, amount, changes) in steps().into_iter().step_by(lab.step()) {
         if lab.is_stopped() {
             return Ok(None);
         }

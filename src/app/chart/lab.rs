@@ -84,6 +84,11 @@ impl<'a> Lab<'a> {
         if self.quick { 1 } else { usize::MAX }
     }
 
+    /// Of the values of what is varied, every so many-th is measured.
+    pub fn step(&self) -> usize {
+        if self.quick { 2 } else { 1 }
+    }
+
     /// The recordings that ship, then those of `sessions`, each of which a scene file of `config/` plays.
     ///
     /// # Errors

@@ -137,18 +137,20 @@ impl Chart for LeftOut {
         scene.shadows.counting = Counting::DepthFail;
         scene.shadows.shafts.sources = None;
         let is_soft = scene.chosen_technique().0 == Technique::Shafts;
-        let step = if lab.quick { 2 } else { 1 };
-        if lab.quick {
-            looks.frames.truncate(1);
-        }
+        let step = lab.step();
         let all = draw(lab, &looks)?;
-        let mut ways = vec![(CAPS, 0.0, Counting::Auto, None)];
-        let errors_px = ERRORS_PX.iter().skip(step - 1).step_by(step);
-        ways.extend(errors_px.map(|&error_px| (TRIANGLES, error_px, Counting::DepthFail, None)));
+        let mut ways = Vec::new();
+        if !is_soft {
+            ways.push((CAPS, 0.0, Counting::Auto, None));
+        }
+        // Many shadows take a while, too long for a look at what triangles do to soft ones.
+        if !(is_soft && lab.quick) {
+            let errors_px = ERRORS_PX.iter().skip(step - 1).step_by(step);
+            let way = |&error_px: &f64| (TRIANGLES, error_px, Counting::DepthFail, None);
+            ways.extend(errors_px.map(way));
+        }
         if is_soft {
             let counts = SOURCE_COUNTS.iter().skip(step - 1).step_by(step);
-            // Nothing is counted there; and many shadows take a while, too long for a look at what its triangles do.
-            ways.retain(|&(left_out, ..)| left_out == TRIANGLES && !lab.quick);
             ways.extend(counts.map(|&few| (SOURCES, 0.0, Counting::DepthFail, Some(few))));
         }
         let mut rows = Vec::new();

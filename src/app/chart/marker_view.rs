@@ -129,6 +129,7 @@ fn pose(side_px: f64, tilt_deg: f64, picture: u32) -> DAffine3 {
 
 /// A torus over the sheet in the light of a lamp, drawn with poses of the sheet.
 struct ShadowBench {
+    stage: Stage,
     renderer: Renderer,
 }
 
@@ -140,12 +141,11 @@ impl ShadowBench {
         stage.scene.phantoms.pop();
         let mut renderer = Renderer::new(lab.gpu()?, &stage.scene, CAMERA)?;
         renderer.upload(&grey_frame(CAMERA.size_px))?;
-        Ok(Self { renderer })
+        Ok(Self { stage, renderer })
     }
 
     fn draw(&mut self, camera_from_sheet: DAffine3) -> Result<Layers> {
-        let caster = camera_from_sheet * DAffine3::from_translation(TORUS_CENTER_M);
-        let poses = [Some(camera_from_sheet), Some(caster)];
+        let poses = self.stage.poses_from(camera_from_sheet, 0);
         self.renderer.draw(&poses, Shown::Composite);
         Ok(self.renderer.layers()?)
     }
@@ -156,9 +156,9 @@ fn wrong_shadow_pct(truth: &Layers, found: &Layers) -> f64 {
     let (mut shadow, mut wrong) = (0_u32, 0_u32);
     for index in 0..truth.role.len() {
         if truth.role[index] == REAL && found.role[index] == REAL {
-            let bits = [truth, found].map(|layers| layers.shadow[0][index] & VIRTUAL_HIDES);
-            shadow += u32::from(bits[0] != 0);
-            wrong += u32::from(bits[0] != bits[1]);
+            let [truly, found] = [truth, found].map(|layers| layers.shadow[0][index]);
+            shadow += u32::from(truly & VIRTUAL_HIDES != 0);
+            wrong += u32::from((truly ^ found) & VIRTUAL_HIDES != 0);
         }
     }
     100.0 * f64::from(wrong) / f64::from(shadow.max(1))
@@ -186,9 +186,7 @@ impl Chart for MarkerView {
         let pictures = if lab.quick { 2 } else { 40 };
         let mut rows = Vec::new();
         let mut bench = ShadowBench::new(lab)?;
-        // For a look every other step does.
-        let steps = steps(unit).into_iter();
-        for [side_px, tilt_deg] in steps.step_by(if lab.quick { 2 } else { 1 }) {
+        for [side_px, tilt_deg] in steps(unit).into_iter().step_by(lab.step()) {
             for (layout, markers) in layouts() {
                 let anchors = [Anchor {
                     name: layout.to_owned(),

@@ -121,9 +121,13 @@ impl Stage {
         }
     }
 
-    /// `camera_from_anchor` of all anchors.
+    /// `camera_from_anchor` of all anchors, from where the peers look.
     pub fn poses(&self, frame: usize) -> Vec<Option<DAffine3>> {
-        let camera_from_world = camera_from_world();
+        self.poses_from(camera_from_world(), frame)
+    }
+
+    /// The same from anywhere.
+    pub fn poses_from(&self, camera_from_world: DAffine3, frame: usize) -> Vec<Option<DAffine3>> {
         let turned = |&center_m: &DVec3| {
             Some(camera_from_world * DAffine3::from_mat3_translation(turn(frame), center_m))
         };

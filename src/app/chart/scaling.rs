@@ -88,17 +88,16 @@ fn rooms(lab: &Lab<'_>, samples: u32) -> Result<Vec<(f64, Setup)>> {
 }
 
 /// The sizes of a sweep with their stages: the peers' torus over the table, one thing varied.
-fn sweep(varied: &str, samples: u32, quick: bool) -> Vec<(f64, Stage)> {
+fn sweep(lab: &Lab<'_>, varied: &str, samples: u32) -> Vec<(f64, Stage)> {
     let one = |triangles| vec![(torus(triangles, 1.0), TORUS_CENTER_M)];
     let sizes: &[u32] = match varied {
-        "triangles" if quick => &[100, 300, 1_000, 3_000, 10_000],
+        "triangles" if lab.quick => &[100, 300, 1_000, 3_000, 10_000],
         "triangles" => &[100, 300, 1_000, 3_000, 10_000, 30_000, 100_000],
         "lights" => &[1, 2, 3, 4, 6, 8],
         "casters" => &[1, 2, 4, 8, 16, 32],
         _ => &[240, 480, 720, 960, 1_080],
     };
-    // For a look every other size does.
-    let sizes = sizes.iter().step_by(if quick { 2 } else { 1 });
+    let sizes = sizes.iter().step_by(lab.step());
     let stage = |&size: &u32| match varied {
         "triangles" => {
             let stage = Stage::new(one(size as usize), &[LIGHT_M], SIZE_PX, samples);
@@ -163,7 +162,7 @@ impl Chart for Scaling {
             let stages: Vec<(f64, Setup)> = match unit {
                 SOURCES => rooms(lab, samples)?,
                 _ => {
-                    let stages = sweep(unit, samples, lab.quick).into_iter();
+                    let stages = sweep(lab, unit, samples).into_iter();
                     stages.map(|(value, stage)| (value, stage.into())).collect()
                 }
             };

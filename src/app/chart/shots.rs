@@ -40,11 +40,11 @@ impl Shots {
     /// # Errors
     /// A recording or a truth that is not there.
     pub fn of(lab: &Lab<'_>, recording: &Recording, scene: &Scene) -> Result<Self> {
-        let frames = key_frames(&recording.folder, &scene.anchors)?;
-        match lab.quick {
-            true => Self::read(recording, scene, middle(frames)),
-            false => Self::read(recording, scene, frames),
+        if lab.quick {
+            return Self::middle_of(recording, scene);
         }
+        let frames = key_frames(&recording.folder, &scene.anchors)?;
+        Self::read(recording, scene, frames)
     }
 
     /// Reads the middle one alone.
@@ -53,7 +53,9 @@ impl Shots {
     /// As [`Shots::of`].
     pub fn middle_of(recording: &Recording, scene: &Scene) -> Result<Self> {
         let frames = key_frames(&recording.folder, &scene.anchors)?;
-        Self::read(recording, scene, middle(frames))
+        let middle = frames.len() / 2;
+        let frames = frames.into_iter().skip(middle).take(1).collect();
+        Self::read(recording, scene, frames)
     }
 
     fn read(recording: &Recording, scene: &Scene, frames: Vec<PosedFrame>) -> Result<Self> {
@@ -106,11 +108,6 @@ impl Shots {
             .map(|(shot, drawn)| compare(shot.frame.index, &shot.truth, drawn))
             .collect()
     }
-}
-
-fn middle(mut frames: Vec<PosedFrame>) -> Vec<PosedFrame> {
-    let middle = frames.len() / 2;
-    frames.drain(middle..).take(1).collect()
 }
 
 /// The mean of one of the errors over the frames.
