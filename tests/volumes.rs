@@ -6,7 +6,7 @@ mod common;
 use common::judge::{ENOUGH, gain_error, is_edge};
 use common::random::{Random, random_camera, random_stage};
 use common::shapes;
-use common::{Stage, Thing, lamp, look_at, sun};
+use common::{Stage, Thing, lamp, linear_of_level, look_at, sun};
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use gnomon::app::truth::FACES_AWAY;
 use gnomon::app::truth::ray_cast::{
@@ -335,14 +335,4 @@ fn hold_smooth_sphere(
         "{name}: the plate shades {shaded} pixels"
     );
     assert_eq!(wrong, 0, "{name}: pixels wrong by up to {worst}");
-}
-
-/// IEC 61966-2-1, also between levels.
-fn linear_of_level(level: f64) -> f64 {
-    let encoded = level / 255.0;
-    if encoded <= 0.040_45 {
-        encoded / 12.92
-    } else {
-        ((encoded + 0.055) / 1.055).powf(2.4)
-    }
 }

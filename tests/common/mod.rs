@@ -1,6 +1,7 @@
 //! What several tests need: scenes from the stability rows, a device, and masks held against exact ones.
 #![allow(dead_code)] // Each test binary uses its own part.
 
+pub mod composite;
 pub mod judge;
 pub mod photographs;
 pub mod prints;
@@ -135,6 +136,11 @@ pub struct Thing {
     /// As the scene file gives it, before the rotation.
     pub scale: DVec3,
     pub casts: bool,
+    pub visible: bool,
+    /// Diffuse reflectance.
+    pub albedo: f64,
+    /// Whether a virtual thing's triangles stay flat where the file has no normals.
+    pub faceted: bool,
 }
 
 /// Where a thing's triangles come from.
@@ -151,6 +157,9 @@ impl Thing {
             anchor_from_thing: DAffine3::IDENTITY,
             scale: DVec3::ONE,
             casts: true,
+            visible: true,
+            albedo: 0.5,
+            faceted: false,
         }
     }
 
@@ -185,9 +194,20 @@ impl Thing {
         }
     }
 
+    pub fn of_albedo(self, albedo: f64) -> Self {
+        Self { albedo, ..self }
+    }
+
+    pub fn faceted(self) -> Self {
+        Self {
+            faceted: true,
+            ..self
+        }
+    }
+
     /// Its raw triangles in the world; the renderer's vertices are single precision on their anchor, and the oracle
     /// judges its visibility, not its rounding.
-    fn triangles(&self, role: u8, world_from_anchor: &DAffine3) -> Vec<Triangle> {
+    fn triangles(&self, role: u8, thing: usize, world_from_anchor: &DAffine3) -> Vec<Triangle> {
         let scaled = DAffine3::from_scale(self.scale);
         let anchor_from_object = self.anchor_from_thing * scaled;
         let place = |position: Vec3| {
@@ -207,6 +227,7 @@ impl Thing {
             .iter()
             .map(|triangle| Triangle {
                 role,
+                thing,
                 casts: self.casts,
                 corners: corners(triangle),
             })
@@ -220,6 +241,10 @@ pub struct Stage {
     pub world: World,
     /// Where the second anchor lies, which carries the virtual things; `None` where the world does.
     pub world_from_card: Option<DAffine3>,
+    pub phantoms: Vec<Thing>,
+    pub virtuals: Vec<Thing>,
+    /// What the file said of each thing's place: its scale.
+    scales: Vec<DAffine3>,
 }
 
 impl Stage {
@@ -237,22 +262,15 @@ impl Stage {
              markers = [{ id = 0, size_m = 0.045, center_m = [0, 0] }]\n\
              [[marker]]\nname = \"card\"\nid = 1\nsize_m = 0.045\n",
         );
-        let mut triangles = Vec::new();
-        let virtual_anchor = if world_from_card.is_some() {
-            "card"
-        } else {
-            "table"
+        let virtual_anchor = match world_from_card {
+            Some(_) => "card",
+            None => "table",
         };
-        for (kind, role, anchor, things) in [
-            ("phantom", REAL, "table", phantoms),
-            ("virtual", VIRTUAL, virtual_anchor, virtuals),
+        for (kind, anchor, things) in [
+            ("phantom", "table", phantoms),
+            ("virtual", virtual_anchor, virtuals),
         ] {
-            let world_from_anchor = match role {
-                VIRTUAL => world_from_card.unwrap_or(DAffine3::IDENTITY),
-                _ => DAffine3::IDENTITY,
-            };
             for (index, thing) in things.iter().enumerate() {
-                triangles.extend(thing.triangles(role, &world_from_anchor));
                 let path = match &thing.shape {
                     Shape::File(path) => path.clone(),
                     Shape::Made(soup) => {
@@ -261,33 +279,65 @@ impl Stage {
                         path
                     }
                 };
-                let (path, casts) = (path.display(), thing.casts);
+                let (path, casts, albedo) = (path.display(), thing.casts, thing.albedo);
                 let [x, y, z] = thing.scale.to_array();
+                let crease = match thing.faceted && kind == "virtual" {
+                    true => "smooth_deg = 0\n",
+                    false => "",
+                };
                 toml += &format!(
                     "[[{kind}]]\nname = \"{kind} {index}\"\nmesh = \"{path}\"\non = \"{anchor}\"\n\
-                     scale = [{x:?}, {y:?}, {z:?}]\ncasts = {casts}\n"
+                     scale = [{x:?}, {y:?}, {z:?}]\ncasts = {casts}\n\
+                     material = {{ albedo = {albedo:?} }}\n{crease}"
                 );
             }
         }
         let path = folder.path().join("scene.toml");
         std::fs::write(&path, toml).expect("a scene file");
         let mut scene = Scene::load(&path).unwrap_or_else(|error| panic!("{error}"));
-        let read = scene.phantoms.iter_mut().zip(phantoms);
-        for (object, thing) in read.chain(scene.virtuals.iter_mut().zip(virtuals)) {
-            object.anchor_from_object = thing.anchor_from_thing * object.anchor_from_object;
-        }
         scene.lights = lights;
         scene.ambient_radiance = ambient_radiance;
-        Self {
+        let objects = scene.phantoms.iter().chain(&scene.virtuals);
+        let scales = objects.map(|object| object.anchor_from_object).collect();
+        let mut stage = Self {
             scene,
-            world: World::new(triangles),
+            world: World::new(Vec::new()),
             world_from_card,
-        }
+            phantoms: phantoms.to_vec(),
+            virtuals: virtuals.to_vec(),
+            scales,
+        };
+        stage.place();
+        stage
     }
 
+    /// Takes over where its things are now, and which are to be seen.
+    pub fn place(&mut self) {
+        let things = || self.phantoms.iter().chain(&self.virtuals);
+        let objects = self
+            .scene
+            .phantoms
+            .iter_mut()
+            .chain(&mut self.scene.virtuals);
+        for ((object, thing), scale) in objects.zip(things()).zip(&self.scales) {
+            object.anchor_from_object = thing.anchor_from_thing * *scale;
+            object.visible = thing.visible;
+        }
+        let card = self.world_from_card.unwrap_or(DAffine3::IDENTITY);
+        let of = |role: u8, things: &[Thing], world_from_anchor: &DAffine3| -> Vec<Triangle> {
+            let seen = things.iter().enumerate().filter(|(_, thing)| thing.visible);
+            seen.flat_map(|(index, thing)| thing.triangles(role, index, world_from_anchor))
+                .collect()
+        };
+        let real = of(REAL, &self.phantoms, &DAffine3::IDENTITY);
+        let seeming = of(VIRTUAL, &self.virtuals, &card);
+        self.world = World::new([real, seeming].concat());
+    }
+
+    /// Its video is white: what is left of it is the gain.
     pub fn renderer(&self, intrinsics: Intrinsics) -> Renderer {
         let mut renderer = Renderer::new(gpu(), &self.scene, intrinsics).expect("a renderer");
-        let frame = grey_frame(intrinsics.size_px);
+        let frame = frame_of(intrinsics.size_px, |_| 255);
         renderer.upload(&frame).expect("an uploaded frame");
         renderer
     }
@@ -296,6 +346,12 @@ impl Stage {
     pub fn poses(&self, camera_from_world: DAffine3) -> [Option<DAffine3>; 2] {
         let card = self.world_from_card.map(|card| camera_from_world * card);
         [Some(camera_from_world), card]
+    }
+
+    /// The composite.
+    pub fn picture(&self, renderer: &mut Renderer, camera_from_world: DAffine3) -> Picture {
+        renderer.draw(&self.poses(camera_from_world), Shown::Composite);
+        Picture::new(renderer.read_picture().expect("a picture"))
     }
 
     /// The composite and its layers.
@@ -356,11 +412,49 @@ pub fn look_with_up(eye: DVec3, target: DVec3, up: DVec3) -> DAffine3 {
 }
 
 pub fn grey_frame(size_px: [u32; 2]) -> Frame {
+    frame_of(size_px, |_| 128)
+}
+
+/// A frame whose bytes are a function of their index.
+pub fn frame_of(size_px: [u32; 2], level: impl FnMut(usize) -> u8) -> Frame {
+    let bytes = 0..(4 * size_px[0] * size_px[1]) as usize;
     Frame {
         index: 0,
         time_secs: 0.0,
         size_px,
-        rgba: vec![128; (4 * size_px[0] * size_px[1]) as usize],
+        rgba: bytes.map(level).collect(),
+    }
+}
+
+/// A composite. Over a white video a real pixel is its gain, and a virtual one its radiance.
+pub struct Picture {
+    /// sRGB-encoded, four bytes a pixel.
+    pub rgba: Vec<u8>,
+}
+
+impl Picture {
+    pub fn new(rgba: Vec<u8>) -> Self {
+        Self { rgba }
+    }
+
+    pub fn pixel(&self, index: usize) -> [u8; 3] {
+        std::array::from_fn(|channel| self.rgba[4 * index + channel])
+    }
+
+    /// Linear, 0 to 1.
+    pub fn linear(&self, index: usize) -> DVec3 {
+        let level = |level: u8| linear_of_level(f64::from(level));
+        DVec3::from_array(self.pixel(index).map(level))
+    }
+}
+
+/// IEC 61966-2-1, also between levels.
+pub fn linear_of_level(level: f64) -> f64 {
+    let encoded = level / 255.0;
+    if encoded <= 0.040_45 {
+        encoded / 12.92
+    } else {
+        ((encoded + 0.055) / 1.055).powf(2.4)
     }
 }
 

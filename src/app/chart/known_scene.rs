@@ -155,7 +155,7 @@ impl KnownScene {
 
 /// The triangles of a scene whose things all stand in the world, for rays. Corners are single precision, as what is drawn.
 pub fn world_of(scene: &Scene) -> World {
-    let triangles_of = |object: &Object, role| {
+    let triangles_of = |thing: usize, object: &Object, role| {
         let corner = |index: u32| {
             let position = object.mesh.positions[index as usize].as_dvec3();
             let in_world = object.anchor_from_object.transform_point3(position);
@@ -163,6 +163,7 @@ pub fn world_of(scene: &Scene) -> World {
         };
         let triangle = |vertices: &[u32; 3]| Triangle {
             role,
+            thing,
             casts: object.casts,
             corners: vertices.map(corner),
         };
@@ -170,8 +171,8 @@ pub fn world_of(scene: &Scene) -> World {
     };
     let real = scene.phantoms.iter().map(|object| (object, REAL));
     let seeming = scene.virtuals.iter().map(|object| (object, VIRTUAL));
-    let triangles = real
-        .chain(seeming)
-        .flat_map(|(object, role)| -> Vec<Triangle> { triangles_of(object, role) });
+    let triangles = (real.enumerate())
+        .chain(seeming.enumerate())
+        .flat_map(|(thing, (object, role))| -> Vec<Triangle> { triangles_of(thing, object, role) });
     World::new(triangles.collect())
 }

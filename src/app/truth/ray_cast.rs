@@ -16,6 +16,18 @@ pub const NONE: u8 = 0;
 const NEAREST_M: f64 = 1e-3;
 /// What lies within this of a surface is that surface, of which a mesh may have copies, metres.
 const COINCIDENT_M: f64 = 1e-9;
+/// Part of a point's coordinates that single precision may move it by: of two things that were placed in one plane by
+/// different sums neither lies above the other.
+const ROUNDING: f64 = 1e-7;
+/// Sine of the angle up to which two triangles lie in one plane.
+const PARALLEL: f64 = 1e-5;
+/// What hides a light within this part of the way to it is where the light is: a triangle on which the light lies hides
+/// nothing.
+const AT_THE_LIGHT: f64 = 1e-7;
+/// A virtual surface is seen as if it were nearer by this part, so that it wins where it lies in a real one,
+const NEARER: f64 = 1.0 / 65_536.0;
+/// and nearer by so much again than the virtual thing before it.
+const NEARER_THAN_THE_LAST: f64 = 1.0 / 262_144.0;
 /// Sine of the angle between light and surface below which the light grazes. Single precision puts a volume's side
 /// off by some 2e-7 of its distance; on a surface at this angle that is 2e-4 of the distance, a tenth of a pixel of
 /// the cameras here.
@@ -37,6 +49,8 @@ pub const SAMPLES_PX: [[f64; 2]; 4] = [
 pub struct Triangle {
     /// [`REAL`] or [`VIRTUAL`].
     pub role: u8,
+    /// Index of its thing among those of its role.
+    pub thing: usize,
     /// Whether it takes light away from others.
     pub casts: bool,
     /// In the world, metres.
@@ -50,10 +64,14 @@ pub struct Surface {
     pub role: u8,
     /// Its index.
     pub triangle: usize,
+    /// And that of its thing among those of its role.
+    pub thing: usize,
     /// Where the ray meets it, metres.
     pub point: DVec3,
     /// Of the triangle, towards where the ray came from.
     pub normal: DVec3,
+    /// What lies within this of its plane is in the same place, metres.
+    pub tie_m: f64,
 }
 
 /// A camera in the world.
@@ -79,6 +97,7 @@ pub struct Exact {
 pub struct World {
     /// All of them.
     pub triangles: Vec<Triangle>,
+    most_nearness: f64,
     visible: Hierarchy,
     real_casters: Hierarchy,
     virtual_casters: Hierarchy,
@@ -91,7 +110,9 @@ impl World {
             let indices = (0..triangles.len()).filter(|&index| takes(&triangles[index]));
             Hierarchy::new(&triangles, indices.collect())
         };
+        let things = triangles.iter().map(|triangle| triangle.thing + 1).max();
         Self {
+            most_nearness: 1.0 + NEARER + things.unwrap_or(0) as f64 * NEARER_THAN_THE_LAST,
             visible: where_(&|_| true),
             real_casters: where_(&|t| t.casts && t.role == REAL),
             virtual_casters: where_(&|t| t.casts && t.role == VIRTUAL),
@@ -111,19 +132,55 @@ impl World {
             near: NEAREST_M,
             reach: f64::INFINITY,
         };
-        let (triangle, distance) = self.first_hit(&ray)?;
-        let [a, b, c] = self.triangles[triangle].corners;
-        let normal = (b - a).cross(c - a).normalize();
+        let (triangle, distance) = self.first_seen(&ray)?;
+        let Triangle {
+            role,
+            thing,
+            corners,
+            ..
+        } = self.triangles[triangle];
+        let normal = plane_normal(&corners);
+        let point = eye + direction * distance;
         Some(Surface {
-            role: self.triangles[triangle].role,
+            role,
             triangle,
-            point: eye + direction * distance,
+            thing,
+            point,
             normal: if normal.dot(direction) > 0.0 {
                 -normal
             } else {
                 normal
             },
+            tie_m: match role {
+                VIRTUAL => (self.nearness(triangle) - 1.0) * distance * direction.length(),
+                _ => ROUNDING * point.abs().max_element(),
+            },
         })
+    }
+
+    /// How many times nearer than it is a triangle is seen.
+    fn nearness(&self, triangle: usize) -> f64 {
+        let Triangle { role, thing, .. } = self.triangles[triangle];
+        match role {
+            VIRTUAL => 1.0 + NEARER + thing as f64 * NEARER_THAN_THE_LAST,
+            _ => 1.0,
+        }
+    }
+
+    /// What is seen along a ray: the first triangle, but of several in one place the one that wins.
+    fn first_seen(&self, ray: &Ray) -> Option<(usize, f64)> {
+        let mut first: Option<(usize, f64)> = None;
+        let mut seen_at = f64::INFINITY;
+        self.visible
+            .visit(&self.triangles, ray, |triangle, distance| {
+                let seen = distance / self.nearness(triangle);
+                if seen < seen_at {
+                    seen_at = seen;
+                    first = Some((triangle, distance));
+                }
+                Some(seen_at * self.most_nearness)
+            });
+        first
     }
 
     /// Who takes a light from a surface. `lift_m` moves the start of the ray off it along its normal: 0 is the truth;
@@ -131,7 +188,7 @@ impl World {
     pub fn bits(&self, surface: &Surface, light: &Light, lift_m: f64) -> u8 {
         let start = surface.point + surface.normal * lift_m;
         let (to_light, reach) = match *light {
-            Light::Point { position_m, .. } => (position_m - surface.point, 1.0),
+            Light::Point { position_m, .. } => (position_m - surface.point, 1.0 - AT_THE_LIGHT),
             Light::Directional { direction, .. } => (-direction, f64::INFINITY),
         };
         let sine = surface.normal.dot(to_light.normalize());
@@ -141,7 +198,15 @@ impl World {
             near: COINCIDENT_M / to_light.length(),
             reach,
         };
-        let hides = |casters: &Hierarchy| casters.is_hit(&self.triangles, &ray, surface.triangle);
+        // Of a triangle in the same plane it lies neither above nor below.
+        let is_own = |triangle: usize| {
+            let [a, b, c] = self.triangles[triangle].corners;
+            let normal = plane_normal(&[a, b, c]);
+            triangle == surface.triangle
+                || normal.cross(surface.normal).length() < PARALLEL
+                    && surface.normal.dot(a - surface.point).abs() <= surface.tie_m
+        };
+        let hides = |casters: &Hierarchy| casters.is_hit(&self.triangles, &ray, &is_own);
         let bit = |holds: bool, bit: u8| if holds { bit } else { 0 };
         bit(sine < 0.0, FACES_AWAY)
             | bit(sine.abs() < GRAZING, GRAZES)
@@ -218,6 +283,10 @@ impl World {
 pub fn sample_places(pixel: DVec2) -> impl Iterator<Item = DVec2> {
     let samples = SAMPLES_PX.map(|[x, y]| pixel + DVec2::new(x, y));
     std::iter::once(pixel).chain(samples)
+}
+
+fn plane_normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
+    (b - a).cross(c - a).normalize()
 }
 
 /// Index and centre of each pixel.
@@ -385,10 +454,11 @@ impl Hierarchy {
         first
     }
 
-    fn is_hit(&self, triangles: &[Triangle], ray: &Ray, own: usize) -> bool {
+    /// Whether any triangle but those that are the ray's `own` lies on it.
+    fn is_hit(&self, triangles: &[Triangle], ray: &Ray, own: &dyn Fn(usize) -> bool) -> bool {
         let mut hit = false;
         self.visit(triangles, ray, |triangle, _| {
-            (triangle != own).then(|| {
+            (!own(triangle)).then(|| {
                 hit = true;
                 0.0
             })
@@ -409,6 +479,6 @@ impl World {
             REAL => &self.real_casters,
             _ => &self.virtual_casters,
         };
-        casters.is_hit(&self.triangles, ray, usize::MAX)
+        casters.is_hit(&self.triangles, ray, &|_| false)
     }
 }

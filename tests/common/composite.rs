@@ -1,0 +1,485 @@
+//! The composite held against rays in double precision, pixel by pixel.
+//!
+//! Drawn over a white video the picture is, in linear light, `gain` on real surfaces and radiance on virtual ones. What
+//! it has to be is made of *states*, one for each sample: what a ray there sees, and which lights reach that. A pixel is
+//! right if the states at its samples explain it within [`TOLERANCE`]; an edge that passes a sample close by may have the
+//! state beyond it instead, and how far away that is found is measured.
+
+use glam::{DVec2, DVec3};
+use gnomon::app::truth::FACES_AWAY;
+use gnomon::app::truth::ray_cast::{GRAZES, SAMPLES_PX, Surface, View, World, pixels};
+use gnomon::light::{Light, irradiance};
+use gnomon::render::{REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};
+use std::f64::consts::PI;
+
+use super::{Picture, Stage};
+
+/// Linear; half a level of white is 0.0045 of it.
+pub const TOLERANCE: f64 = 0.02;
+
+/// Distances from a sample within which an edge is looked for, pixels. Corners are snapped to 1/256 px.
+pub const RINGS_PX: [f64; 7] = [0.004, 0.01, 0.03, 0.1, 0.25, 0.5, 0.75];
+const PLACES_IN_RING: usize = 24;
+/// Rays along each side of a pixel for its area's average.
+const AREA_SIDE: usize = 8;
+/// So many wrong pixels are looked into; the rest of them are counted.
+const ENOUGH: usize = 12;
+
+/// What is seen at a place and which lights reach it.
+#[derive(Debug, Clone, Copy)]
+pub struct State {
+    surface: Option<Surface>,
+    /// Lights that reach a real surface in the video, or a virtual one past all casters.
+    arriving: u32,
+    /// Those of them that virtual things take from a real surface.
+    taken: u32,
+    /// A light that is nearly in the surface's plane.
+    grazes: bool,
+}
+
+impl State {
+    fn role(&self) -> u8 {
+        self.surface.map_or(0, |surface| surface.role)
+    }
+
+    /// Whether nothing but the place differs.
+    fn is_like(&self, other: &Self) -> bool {
+        let normals = self.surface.zip(other.surface);
+        self.role() == other.role()
+            && (self.arriving, self.taken) == (other.arriving, other.taken)
+            && self.thing() == other.thing()
+            && normals.is_none_or(|(one, other)| one.normal.dot(other.normal) > 0.999_99)
+    }
+
+    fn thing(&self) -> usize {
+        self.surface.map_or(usize::MAX, |surface| surface.thing)
+    }
+}
+
+/// What a scene must look like from a camera.
+pub struct Expected<'a> {
+    world: &'a World,
+    view: View,
+    lights: &'a [Light],
+    /// Irradiance from all around.
+    ambient: DVec3,
+    /// Of the virtual things.
+    albedos: Vec<f64>,
+    /// Radiance that virtual surfaces get beyond what is known, at most, for each unit of albedo: in the world they get the
+    /// light that their surroundings throw back, which a table of harmonics or rays knows and this does not.
+    unknown: f64,
+    samples: usize,
+    /// At each pixel's centre.
+    centers: Vec<State>,
+}
+
+/// How a picture differs from what it must be.
+#[derive(Debug, Default, Clone)]
+pub struct Verdict {
+    /// Pixels that were judged.
+    pub judged: usize,
+    /// Those that a virtual thing changes.
+    pub changed: usize,
+    /// Pixels that no state within [`RINGS_PX`] explains.
+    pub wrong: usize,
+    /// What the first of them are.
+    pub first: Vec<String>,
+    /// How many pixels needed an edge within each of [`RINGS_PX`].
+    pub snapped: [usize; RINGS_PX.len()],
+    /// Differences from the area's average on pixels with edges in them, found and as the samples' exact states have it.
+    pub edges: Differences,
+    pub pattern: Differences,
+}
+
+/// Of some pixels.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct Differences {
+    pub count: usize,
+    pub sum_of_squares: f64,
+    pub most: f64,
+}
+
+impl Differences {
+    fn add(&mut self, difference: f64) {
+        self.count += 1;
+        self.sum_of_squares += difference * difference;
+        self.most = self.most.max(difference.abs());
+    }
+
+    pub fn join(&mut self, other: &Self) {
+        self.count += other.count;
+        self.sum_of_squares += other.sum_of_squares;
+        self.most = self.most.max(other.most);
+    }
+
+    pub fn rms(&self) -> f64 {
+        (self.sum_of_squares / self.count.max(1) as f64).sqrt()
+    }
+}
+
+impl Verdict {
+    pub fn join(&mut self, other: &Self) {
+        self.judged += other.judged;
+        self.changed += other.changed;
+        self.wrong += other.wrong;
+        self.first.extend(other.first.iter().cloned());
+        for (sum, count) in self.snapped.iter_mut().zip(other.snapped) {
+            *sum += count;
+        }
+        self.edges.join(&other.edges);
+        self.pattern.join(&other.pattern);
+    }
+
+    pub fn summary(&self) -> String {
+        format!(
+            "{} judged, {} changed, {} wrong, snapped {:?}, edges {} rms {:.4} most {:.3} (pattern rms {:.4} most {:.3})",
+            self.judged,
+            self.changed,
+            self.wrong,
+            self.snapped,
+            self.edges.count,
+            self.edges.rms(),
+            self.edges.most,
+            self.pattern.rms(),
+            self.pattern.most,
+        )
+    }
+}
+
+/// Least and most that a pixel may be.
+#[derive(Debug, Clone, Copy)]
+struct Range {
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Range {
+    fn holds(&self, found: DVec3) -> bool {
+        found.cmpge(self.low - TOLERANCE).all() && found.cmple(self.high + TOLERANCE).all()
+    }
+
+    fn union(self, other: Self) -> Self {
+        Self {
+            low: self.low.min(other.low),
+            high: self.high.max(other.high),
+        }
+    }
+}
+
+impl<'a> Expected<'a> {
+    pub fn new(stage: &'a Stage, view: View) -> Self {
+        let of_world = stage.world_from_card.is_none();
+        let ambient = stage.scene.ambient_radiance;
+        let mut expected = Self {
+            world: &stage.world,
+            view,
+            lights: &stage.scene.lights,
+            ambient: ambient * PI,
+            albedos: stage.virtuals.iter().map(|thing| thing.albedo).collect(),
+            unknown: if of_world {
+                ambient.max_element() + 0.15
+            } else {
+                0.0
+            },
+            samples: stage.scene.shadows.samples as usize,
+            centers: Vec::new(),
+        };
+        expected.centers = pixels(view.intrinsics.size_px)
+            .map(|(_, center)| expected.state(center))
+            .collect();
+        expected
+    }
+
+    /// What is seen at a place, and which lights reach it.
+    pub fn state(&self, place: DVec2) -> State {
+        let surface = self.world.look(&self.view, place);
+        let mut state = State {
+            surface,
+            arriving: 0,
+            taken: 0,
+            grazes: false,
+        };
+        let Some(surface) = surface else {
+            return state;
+        };
+        for (index, light) in self.lights.iter().enumerate() {
+            let bits = self.world.bits(&surface, light, 0.0);
+            state.grazes |= bits & GRAZES != 0;
+            if bits & (FACES_AWAY | REAL_HIDES) != 0 {
+                continue;
+            }
+            let virtual_hides = bits & VIRTUAL_HIDES != 0;
+            if surface.role == REAL || !virtual_hides {
+                state.arriving |= 1 << index;
+            }
+            if surface.role == REAL && virtual_hides {
+                state.taken |= 1 << index;
+            }
+        }
+        state
+    }
+
+    /// The composite of a pixel whose samples have these states, shaded at one place.
+    fn composite(&self, states: &[State], shaded_at: impl Fn(usize) -> DVec2) -> Range {
+        let (mut reaching, mut taken) = (DVec3::ZERO, DVec3::ZERO);
+        let (mut modelled, mut open) = (0.0, 0.0);
+        let mut added = Range {
+            low: DVec3::ZERO,
+            high: DVec3::ZERO,
+        };
+        for (index, state) in states.iter().enumerate() {
+            let Some(surface) = state.surface else {
+                open += 1.0;
+                continue;
+            };
+            let point = self.on_plane(&surface, shaded_at(index));
+            let sum_of = |lights: u32| -> DVec3 {
+                let reaches = |index: &usize| lights >> index & 1 == 1;
+                let given = |index: usize| irradiance(&self.lights[index], point, surface.normal);
+                (0..self.lights.len()).filter(reaches).map(given).sum()
+            };
+            if surface.role == VIRTUAL {
+                let albedo = self.albedos[surface.thing];
+                let lights = sum_of(state.arriving) * (albedo / PI);
+                let ambient = self.ambient * (albedo / PI);
+                added.low += lights
+                    + if self.unknown > 0.0 {
+                        DVec3::ZERO
+                    } else {
+                        ambient
+                    };
+                added.high += lights + ambient + self.unknown * albedo;
+            } else {
+                reaching += self.ambient + sum_of(state.arriving);
+                taken += sum_of(state.taken);
+                modelled += 1.0;
+            }
+        }
+        let gain = DVec3::select(
+            taken.cmpgt(DVec3::ZERO),
+            (reaching - taken) / reaching,
+            DVec3::ONE,
+        );
+        let kept = gain * modelled + open;
+        let weight = 1.0 / states.len() as f64;
+        Range {
+            low: ((kept + added.low) * weight).min(DVec3::ONE),
+            high: ((kept + added.high) * weight).min(DVec3::ONE),
+        }
+    }
+
+    /// Where a ray at a place would meet the plane of a surface.
+    fn on_plane(&self, surface: &Surface, place: DVec2) -> DVec3 {
+        let world_from_camera = self.view.camera_from_world.inverse();
+        let eye = world_from_camera.translation;
+        let plane = self.view.intrinsics.plane_from_pixel(place);
+        let direction = world_from_camera.transform_vector3(plane.extend(1.0));
+        let along = surface.normal.dot(surface.point - eye) / surface.normal.dot(direction);
+        if along.is_finite() && along > 0.0 {
+            eye + direction * along
+        } else {
+            surface.point
+        }
+    }
+
+    /// The least and most of it, wherever in the pixel the renderer shades: at the centre or the middle of the samples
+    /// that a triangle has.
+    fn range(&self, center: DVec2, states: &[State]) -> Range {
+        let at_center = self.composite(states, |_| center);
+        if self.samples == 1 {
+            return at_center;
+        }
+        let places = SAMPLES_PX.map(|sample| center + DVec2::from_array(sample));
+        let own = self.composite(states, |index| places[index]);
+        places.iter().fold(at_center.union(own), |range, place| {
+            range.union(self.composite(states, |_| *place))
+        })
+    }
+
+    fn is_touched(&self, state: &State) -> bool {
+        let Some(surface) = state.surface else {
+            return false;
+        };
+        surface.role == VIRTUAL || state.taken != 0
+    }
+
+    fn sample_places(&self, center: DVec2) -> Vec<DVec2> {
+        match self.samples {
+            1 => vec![center],
+            _ => SAMPLES_PX
+                .iter()
+                .map(|sample| center + DVec2::from_array(*sample))
+                .collect(),
+        }
+    }
+
+    /// Whether the centres of the pixels around it have the state of its own.
+    fn is_uniform(&self, index: usize) -> bool {
+        let size_px = self.view.intrinsics.size_px;
+        let center = &self.centers[index];
+        gnomon::app::truth::ray_cast::is_uniform(size_px, index, |_, other| {
+            center.is_like(&self.centers[other])
+        })
+    }
+
+    /// Holds a picture over white, and the same over a video that must stay where nothing virtual is.
+    pub fn judge(&self, picture: &Picture, over_noise: Option<(&Picture, &[u8])>) -> Verdict {
+        let mut verdict = Verdict::default();
+        for (index, center) in pixels(self.view.intrinsics.size_px) {
+            self.judge_pixel(index, center, picture, over_noise, &mut verdict);
+        }
+        verdict
+    }
+
+    fn judge_pixel(
+        &self,
+        index: usize,
+        center: DVec2,
+        picture: &Picture,
+        over_noise: Option<(&Picture, &[u8])>,
+        verdict: &mut Verdict,
+    ) {
+        let state = &self.centers[index];
+        let uniform = self.is_uniform(index);
+        if state.grazes && uniform {
+            return;
+        }
+        let found = picture.linear(index);
+        let is_white = picture.pixel(index) == [255; 3];
+        let stays = over_noise.is_none_or(|(noisy, video)| {
+            noisy.rgba[4 * index..4 * index + 3] == video[4 * index..4 * index + 3]
+        });
+        let states: Vec<State> = if uniform {
+            vec![*state; self.samples]
+        } else {
+            let places = self.sample_places(center);
+            places.iter().map(|place| self.state(*place)).collect()
+        };
+        if states.iter().any(|state| state.grazes) {
+            return;
+        }
+        verdict.judged += 1;
+        verdict.changed += usize::from(states.iter().any(|state| self.is_touched(state)));
+        if !uniform {
+            self.measure_edge(center, &states, found, index, verdict);
+        }
+        let touched = states.iter().any(|state| self.is_touched(state));
+        let explained = |states: &[State]| self.range(center, states).holds(found);
+        if explained(&states) && (touched || is_white && stays) {
+            return;
+        }
+        if verdict.wrong >= ENOUGH {
+            verdict.wrong += 1;
+            return;
+        }
+        if let Some(ring) = self.nearest_explanation(center, &states, found, touched) {
+            verdict.snapped[ring] += 1;
+            return;
+        }
+        let on_edge = self.sample_places(center).iter().any(|place| {
+            let mut lights = self.lights.iter();
+            lights.any(|light| self.world.is_on_edge(&self.view, *place, light))
+        });
+        if on_edge {
+            verdict.snapped[0] += 1;
+            return;
+        }
+        verdict.wrong += 1;
+        let range = self.range(center, &states);
+        let seen = state.surface.map(|s| (s.point, s.normal, s.thing));
+        verdict.first.push(format!(
+            "pixel {center}: found {found:.3} (stays: {stays}) for {:.3} to {:.3}; role {}, arriving {:b}, taken {:b}, {seen:?}{}",
+            range.low,
+            range.high,
+            state.role(),
+            state.arriving,
+            state.taken,
+            if uniform { ", away from edges" } else { "" },
+        ));
+    }
+
+    fn measure_edge(
+        &self,
+        center: DVec2,
+        states: &[State],
+        found: DVec3,
+        index: usize,
+        verdict: &mut Verdict,
+    ) {
+        // A part of them tells enough.
+        if index % 5 != 0 {
+            return;
+        }
+        let area = self.area(center);
+        let differ = area[1..].iter().any(|state| !state.is_like(&area[0]));
+        if !differ || area.iter().any(|state| state.grazes) {
+            return;
+        }
+        let average = |states: &[State]| {
+            let range = self.composite(states, |_| center);
+            0.5 * (range.low + range.high)
+        };
+        let of_area = average(&area);
+        verdict.edges.add((found - of_area).abs().max_element());
+        let pattern = average(states) - of_area;
+        verdict.pattern.add(pattern.abs().max_element());
+    }
+
+    /// States all over a pixel.
+    fn area(&self, center: DVec2) -> Vec<State> {
+        (0..AREA_SIDE * AREA_SIDE)
+            .map(|step| {
+                let cell = DVec2::new((step % AREA_SIDE) as f64, (step / AREA_SIDE) as f64);
+                self.state(center + (cell + 0.5) / AREA_SIDE as f64 - 0.5)
+            })
+            .collect()
+    }
+
+    /// The smallest of [`RINGS_PX`] around the samples in which states are found that explain a pixel.
+    fn nearest_explanation(
+        &self,
+        center: DVec2,
+        states: &[State],
+        found: DVec3,
+        touched: bool,
+    ) -> Option<usize> {
+        let places = self.sample_places(center);
+        let mut choices: Vec<Vec<State>> = states.iter().map(|state| vec![*state]).collect();
+        let mut touched = touched;
+        for (ring, radius_px) in RINGS_PX.iter().enumerate() {
+            let mut more = false;
+            for (place, choices) in places.iter().zip(&mut choices) {
+                for step in 0..PLACES_IN_RING {
+                    let turn = (step as f64 + 0.37 * ring as f64) / PLACES_IN_RING as f64;
+                    let towards = DVec2::from_angle(turn * 2.0 * PI);
+                    let state = self.state(place + towards * *radius_px);
+                    if !choices.iter().any(|known| known.is_like(&state)) {
+                        touched |= self.is_touched(&state) || state.grazes;
+                        choices.push(state);
+                        more = true;
+                    }
+                }
+            }
+            if more && touched && self.any_explains(center, &choices, found) {
+                return Some(ring);
+            }
+        }
+        None
+    }
+
+    fn any_explains(&self, center: DVec2, choices: &[Vec<State>], found: DVec3) -> bool {
+        let count: usize = choices.iter().map(Vec::len).product();
+        let combination = |mut number: usize| -> Vec<State> {
+            let chosen = choices.iter().map(|states| {
+                let state = states[number % states.len()];
+                number /= states.len();
+                state
+            });
+            chosen.collect()
+        };
+        let combinations = (0..count.min(20_000)).map(combination);
+        combinations
+            .into_iter()
+            .any(|states| self.range(center, &states).holds(found))
+    }
+}
