@@ -2,11 +2,9 @@
 //! Reads the stencil (stencil.rs). Writes depth, `reaching` and `change` (see surfaces.wgsl).
 
 use super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT};
+use super::gpu::Gpu;
 use super::shader;
 use super::stencil::{ADDED, REAL_HIDES, SHADOW, VIRTUAL_SHADOW};
-
-/// Format of `reaching` and `change`.
-pub(super) const LIGHT_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 
 /// Pipelines of the pass where several samples or lights are added up.
 pub(super) struct Surfaces {
@@ -127,12 +125,12 @@ impl Use<'_> {
 
 impl Surfaces {
     pub fn new(
-        device: &wgpu::Device,
+        gpu: &Gpu,
         layout: &wgpu::PipelineLayout,
-        depth_format: wgpu::TextureFormat,
         samples: u32,
         glossy: bool,
     ) -> Self {
+        let device = &gpu.device;
         let module = shader::module(
             device,
             "surfaces",
@@ -147,7 +145,7 @@ impl Surfaces {
             let writes_depth = stencil == wgpu::CompareFunction::Always;
             let target = |written: bool| {
                 Some(wgpu::ColorTargetState {
-                    format: LIGHT_FORMAT,
+                    format: gpu.light_format,
                     blend: (!writes_depth).then_some(wgpu::BlendState {
                         color: add,
                         alpha: add,
@@ -168,7 +166,7 @@ impl Surfaces {
                 targets: &targets.map(target),
                 constants: &[("GLOSSY", f64::from(glossy))],
             };
-            usage.pipelines(device, layout, &module, depth_format, samples)
+            usage.pipelines(device, layout, &module, gpu.depth_format, samples)
         };
         let (always, equal, other) = (
             wgpu::CompareFunction::Always,
