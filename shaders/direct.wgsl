@@ -59,20 +59,22 @@ fn nothing() -> Light {
     return Light(vec4f(0.0), vec4f(NOT_VIRTUAL));
 }
 
+// No light reaches it that could be taken again.
+@fragment
+fn ambient_on_virtual(surface: AmbientSurface) -> Light {
+    let ambient = surface.material.rgb / PI * surface.indirect;
+    return Light(vec4f(srgb_from_linear(ambient), 1.0), vec4f(NOT_VIRTUAL));
+}
+
 struct AmbientSurface {
     @invariant @builtin(position) clip: vec4f,
-    @location(0) radiance: vec3f,
+    @location(0) @interpolate(flat) material: vec4f,
+    @location(1) @interpolate(perspective, centroid) indirect: vec3f,
 }
 
 @vertex
 fn place_in_ambient_light(@location(0) position: vec3f, @location(2) material: vec4f, @location(3) indirect: vec3f) -> AmbientSurface {
-    return AmbientSurface(clip_from_point(view, vec4f(position, 1.0)), material.rgb / PI * indirect);
-}
-
-// No light reaches it that could be taken again.
-@fragment
-fn ambient_on_virtual(surface: AmbientSurface) -> Light {
-    return Light(vec4f(srgb_from_linear(surface.radiance), 1.0), vec4f(NOT_VIRTUAL));
+    return AmbientSurface(clip_from_point(view, vec4f(position, 1.0)), material, indirect);
 }
 
 // Set when the shader is built.

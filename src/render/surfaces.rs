@@ -17,7 +17,7 @@ pub(super) struct Surfaces {
     /// A light where virtual things hide it from real surfaces.
     pub light_hidden_from_real: Sided,
     /// A light on virtual surfaces past all casters; the stencil's reference is 0, or 1 for surfaces that lie in no
-    /// shadow but their own.
+    /// shadow but perhaps their own.
     pub light_on_virtual: Sided,
 }
 
@@ -173,6 +173,8 @@ impl Surfaces {
             wgpu::CompareFunction::Equal,
             wgpu::CompareFunction::NotEqual,
         );
+        // The reference is what the stencil may count at most.
+        let at_most = wgpu::CompareFunction::GreaterEqual;
         // Coplanar surfaces land on the same depth, and each sample is to get a light once.
         let nothing = (wgpu::StencilOperation::Keep, 0);
         let added = (wgpu::StencilOperation::Invert, ADDED);
@@ -184,7 +186,7 @@ impl Surfaces {
             ambient_on_virtual: build(ambient[1], always, 0, nothing, [true, true]),
             light_reaching_real: build(light, equal, reaching, added, [true, false]),
             light_hidden_from_real: build(light, other, VIRTUAL_SHADOW, taken, [false, true]),
-            light_on_virtual: build("light_on_virtual", equal, SHADOW, nothing, [false, true]),
+            light_on_virtual: build("light_on_virtual", at_most, SHADOW, nothing, [false, true]),
         }
     }
 }
