@@ -47,7 +47,7 @@ fn change(pixel: vec2i) -> Change {
     let weight = 1.0 / f32(SAMPLES);
     // A surface that loses and gains nothing keeps its picture bit for bit.
     let touched = seeming > 0.0 || any(taken != vec3f(0.0));
-    let kept_gain = select(vec3f(kept), gain * modelled + kept - modelled, DIFFERENCE == 0);
+    let kept_gain = select(vec3f(kept), gain * modelled + (kept - modelled), DIFFERENCE == 0);
     return Change(kept_gain * weight, added * weight, taken * weight, kept * weight, touched);
 }
 

@@ -16,15 +16,27 @@ fn place_alone(@location(0) position: vec3f) -> Place {
 @fragment
 fn depth_alone() {}
 
+// What virtual things leave of a real surface's light where they hide the lamp. In the order of sums (composite.wgsl), so
+// that both round alike.
+fn gain(surface: Surface, outside: bool) -> vec3f {
+    let taken = irradiance(surface, outside);
+    let light = surface.indirect + taken;
+    return select(vec3f(1.0), max(light - taken, vec3f(0.0)) / max(light, vec3f(1e-6)), taken != vec3f(0.0));
+}
+
 // A real surface from which virtual things take the light: video · gain in linear light.
 @fragment
 fn hidden_on_real(surface: Surface, @builtin(front_facing) outside: bool) -> @location(0) vec4f {
-    let taken = irradiance(surface, outside);
     let recorded = undistorted(vec2i(surface.clip.xy));
-    let gain = surface.indirect / max(surface.indirect + taken, vec3f(1e-6));
+    let gain = gain(surface, outside);
     // A surface that loses nothing keeps its picture bit for bit. (To discard it would make the stencil wait for it.)
-    let loses = any(taken > vec3f(0.0));
+    let loses = any(gain != vec3f(1.0));
     return vec4f(select(recorded, srgb_from_linear(linear_from_srgb(recorded) * gain), loses), 1.0);
+}
+
+@fragment
+fn gain_on_real(surface: Surface, @builtin(front_facing) outside: bool) -> @location(0) vec4f {
+    return vec4f(gain(surface, outside), 1.0);
 }
 
 // Of a virtual surface the picture gets all its light, as if nothing hid any, and `ambient` what is left of it where
@@ -47,20 +59,22 @@ fn nothing() -> Light {
     return Light(vec4f(0.0), vec4f(NOT_VIRTUAL));
 }
 
+// No light reaches it that could be taken again.
+@fragment
+fn ambient_on_virtual(surface: AmbientSurface) -> Light {
+    let ambient = surface.material.rgb / PI * surface.indirect;
+    return Light(vec4f(srgb_from_linear(ambient), 1.0), vec4f(NOT_VIRTUAL));
+}
+
 struct AmbientSurface {
     @invariant @builtin(position) clip: vec4f,
-    @location(0) radiance: vec3f,
+    @location(0) @interpolate(flat) material: vec4f,
+    @location(1) @interpolate(perspective, centroid) indirect: vec3f,
 }
 
 @vertex
 fn place_in_ambient_light(@location(0) position: vec3f, @location(2) material: vec4f, @location(3) indirect: vec3f) -> AmbientSurface {
-    return AmbientSurface(clip_from_point(view, vec4f(position, 1.0)), material.rgb / PI * indirect);
-}
-
-// No light reaches it that could be taken again.
-@fragment
-fn ambient_on_virtual(surface: AmbientSurface) -> Light {
-    return Light(vec4f(srgb_from_linear(surface.radiance), 1.0), vec4f(NOT_VIRTUAL));
+    return AmbientSurface(clip_from_point(view, vec4f(position, 1.0)), material, indirect);
 }
 
 // Set when the shader is built.

@@ -11,7 +11,7 @@ use gnomon::app::layer_files::Layer;
 use gnomon::app::probe::exposure_of;
 use gnomon::calibration::{Target, TargetMarkers};
 use gnomon::light::probe_maps::Circle;
-use gnomon::scene::{Family, PixelFormat, TrackingSettings, WantedFormat};
+use gnomon::scene::{Family, PixelFormat, Shortcut, TrackingSettings, WantedFormat};
 
 /// Virtual things on a real table, lit and shadowed as if they stood there.
 #[derive(Parser)]
@@ -149,6 +149,9 @@ pub struct ReplayArgs {
     /// Write times per stage, frames, adapter and memory (JSON)
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,
+    /// Draw shadow volumes without these shortcuts, to find what a wrong pixel comes from
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', value_enum)]
+    pub without: Vec<Shortcut>,
     /// Write small pictures of the whole replay on one sheet (PNG)
     #[arg(long, value_name = "FILE")]
     pub sheet: Option<PathBuf>,

@@ -97,6 +97,7 @@ fn run_replay(args: ReplayArgs) -> Result<()> {
         poses_from: args.poses_from,
         stats: args.stats,
         sheet: args.sheet,
+        without: args.without.into_iter().collect(),
         adapter: args.adapter,
     };
     conclude(&replay(&request, &stop)?)

@@ -13,7 +13,7 @@ use anyhow::{Context as _, Result, bail};
 use crate::capture::{Frame, FrameSource};
 use crate::geometry::camera::Intrinsics;
 use crate::render::{Governed, Gpu, Layers, Renderer, Shown};
-use crate::scene::Scene;
+use crate::scene::{Scene, Shortcuts};
 use crate::tracking::{AnchorPose, Tracker};
 
 use super::budget_words::budget_words;
@@ -53,6 +53,8 @@ pub struct Request {
     pub stats: Option<PathBuf>,
     /// Where to put a sheet of small pictures.
     pub sheet: Option<PathBuf>,
+    /// Shortcuts that shadow volumes are not to take.
+    pub without: Shortcuts,
     /// Part of the wanted graphics adapter's name.
     pub adapter: Option<String>,
 }
@@ -63,7 +65,8 @@ pub struct Request {
 /// Anything that keeps a frame from being read, tracked, drawn or written; files are then not left half-written.
 pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
     let watch = Stopwatch::start();
-    let scene = Scene::load(&request.scene)?;
+    let mut scene = Scene::load(&request.scene)?;
+    scene.shadows.without = request.without;
     for warning in check::warnings(&scene) {
         eprintln!("warning: {warning}");
     }

@@ -28,6 +28,14 @@ impl Bounds {
             })
     }
 
+    /// The box with its sides moved outwards.
+    pub fn grown(&self, by_m: f64) -> Self {
+        Self {
+            low: self.low - by_m,
+            high: self.high + by_m,
+        }
+    }
+
     /// Whether a point lies in it or on its sides.
     pub fn contains(&self, point: DVec3) -> bool {
         point.cmpge(self.low).all() && point.cmple(self.high).all()

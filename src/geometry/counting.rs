@@ -22,9 +22,10 @@ pub enum Counting {
 ///
 /// All in the caster's space, metres; `near` are the rectangle's corners in turn ([`near_corners`]).
 pub fn counting(caster: &Bounds, light: LightPlace, near: &[DVec3; 4]) -> Counting {
-    // Rounding of the GPU's own arithmetic.
-    let slack = 1e-6 * (caster.high - caster.low).length();
     let box_corners = caster.corners();
+    // Rounding of the GPU's own arithmetic, which goes by how far from the anchor's and the camera's origins things are.
+    let lengths = box_corners.iter().chain(near).map(|corner| corner.length());
+    let slack = 4e-6 * lengths.fold(0.0, f64::max);
     let box_is_beyond = |normal: DVec3, point: DVec3| {
         let length = normal.length();
         length > 0.0

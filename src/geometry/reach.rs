@@ -111,9 +111,9 @@ pub fn covered(
 /// The pixels in which the shadow of a thing with these corners can fall on anything within `receivers`, the thing
 /// itself included; all of world space.
 ///
-/// The shadow is a cone from the light. Cut off at a side of the receivers' box that lies beyond the thing, it is the
-/// hull of the corners and of their images on that side. Each such side gives a rectangle that holds the shadow, and so
-/// does what all of them share.
+/// The shadow is a cone from the light. Where all its rays leave the receivers' box through one side, what matters of it
+/// is the hull of the corners and of their images on that side. Each such side gives a rectangle that holds the shadow,
+/// and so does what all of them share.
 pub fn shadowed(
     corners: &[DVec3; 8],
     light: LightPlace,
@@ -123,19 +123,18 @@ pub fn shadowed(
 ) -> PixelRect {
     let mut rect = PixelRect::whole(intrinsics.size_px);
     for axis in 0..3 {
-        for side in [receivers.low[axis], receivers.high[axis]] {
-            // How many times the way from the light to the corner leads to the side.
-            let cast = corners.map(|corner| match light {
-                LightPlace::Point(light) => {
-                    let stretch = (side - light[axis]) / (corner[axis] - light[axis]);
-                    (stretch >= 1.0).then(|| light + (corner - light) * stretch)
-                }
-                LightPlace::Along(direction) => {
-                    let way = (side - corner[axis]) / direction[axis];
-                    (way >= 0.0).then(|| corner + direction * way)
-                }
+        for (side, outward) in [(receivers.low[axis], -1.0), (receivers.high[axis], 1.0)] {
+            // A side through which light comes in cuts nothing off, even where the thing lies in it.
+            let images = corners.map(|corner| {
+                let way = match light {
+                    LightPlace::Point(light) => corner - light,
+                    LightPlace::Along(direction) => direction,
+                };
+                let leaves = outward * way[axis] > 0.0;
+                let ahead_m = (outward * (side - corner[axis])).max(0.0);
+                leaves.then(|| corner + way * (ahead_m / (outward * way[axis])))
             });
-            let images: Vec<DVec3> = cast.iter().flatten().copied().collect();
+            let images: Vec<DVec3> = images.iter().flatten().copied().collect();
             if images.len() == corners.len() && images.iter().all(|image| image.is_finite()) {
                 let hull = [&images[..], &corners[..]].concat();
                 rect = rect.intersection(covered(&hull, camera_from_world, intrinsics));

@@ -153,12 +153,16 @@ impl Caster {
 
     /// The fewest triangles that are known to cast the right shadow for an eye at `eye`, which sees the scene.
     pub fn casting(&self, light: LightPlace, eye: DVec3) -> Casting {
-        let outside = |point: DVec3| !self.bounds.is_some_and(|bounds| bounds.contains(point));
+        let outside = |point: DVec3, margin_m: f64| {
+            let near = |bounds: Bounds| bounds.grown(margin_m).contains(point);
+            !self.bounds.is_some_and(near)
+        };
         let lit_from_outside = match light {
-            LightPlace::Point(light) => outside(light),
+            // On the surface some triangles are seen edge-on, and those that face the light are not all that hide it.
+            LightPlace::Point(point) => outside(point, 2.0 * self.edge_on(light)),
             LightPlace::Along(_) => true,
         };
-        if self.closed && lit_from_outside && outside(eye) {
+        if self.closed && lit_from_outside && outside(eye, 0.0) {
             Casting::Facing
         } else {
             Casting::All
@@ -204,20 +208,23 @@ impl Caster {
         edges.into_iter().map(ends).collect()
     }
 
+    /// A light no higher above a triangle's plane than this sees it edge-on, or lies on it: metres, or the sine of the angle
+    /// for a distant light.
+    fn edge_on(&self, light: LightPlace) -> f64 {
+        match (light, &self.bounds) {
+            (LightPlace::Point(light), Some(bounds)) => {
+                let away = (bounds.low - light).abs().max((bounds.high - light).abs());
+                EDGE_ON * away.length()
+            }
+            _ => EDGE_ON,
+        }
+    }
+
     /// How far above each triangle's plane the light is, as the sine of the angle for a distant one; exactly 0 where it
     /// sees the triangle edge-on.
     fn light_heights(&self, light: LightPlace) -> impl Iterator<Item = f64> {
         let (light_point, light_weight) = light.homogeneous();
-        let edge_on = match (light, &self.bounds) {
-            (LightPlace::Point(light), Some(bounds)) => {
-                EDGE_ON
-                    * (bounds.low - light)
-                        .abs()
-                        .max((bounds.high - light).abs())
-                        .length()
-            }
-            _ => EDGE_ON,
-        };
+        let edge_on = self.edge_on(light);
         self.planes.iter().map(move |(normal, offset)| {
             let height = normal.dot(light_point) - offset * light_weight;
             if height.abs() > edge_on { height } else { 0.0 }

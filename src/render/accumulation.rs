@@ -3,7 +3,7 @@
 use super::background::{Background, extent};
 use super::composite::Composite;
 use super::gpu::Gpu;
-use super::surfaces::{LIGHT_FORMAT, Surfaces};
+use super::surfaces::Surfaces;
 use super::volumes::Volumes;
 use crate::scene::Difference;
 
@@ -34,8 +34,8 @@ impl Targets {
                 .create_view(&Default::default())
         };
         let read = wgpu::TextureUsages::TEXTURE_BINDING;
-        let reaching = target("reaching", LIGHT_FORMAT, read);
-        let change = target("change", LIGHT_FORMAT, read);
+        let reaching = target("reaching", gpu.light_format, read);
+        let change = target("change", gpu.light_format, read);
         Self {
             composite: Composite::new(
                 device,
@@ -72,13 +72,13 @@ impl Accumulation {
     ) -> Self {
         let device = &gpu.device;
         Self {
-            surfaces: Surfaces::new(device, layout, gpu.depth_format, samples, glossy),
+            surfaces: Surfaces::new(gpu, layout, samples, glossy),
             volumes: Volumes::new(
                 device,
                 layout,
                 gpu.depth_format,
                 samples,
-                &[LIGHT_FORMAT, LIGHT_FORMAT],
+                &[gpu.light_format; 2],
             ),
             targets: Targets::new(gpu, background, samples, Difference::Ratio),
         }

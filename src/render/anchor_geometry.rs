@@ -16,7 +16,7 @@ use crate::geometry::outline_scale::largest_stretch;
 use crate::geometry::shadow_volume::Caster;
 use crate::geometry::solid::holes;
 use crate::light::bounce::Reflector;
-use crate::scene::{Object, Scene};
+use crate::scene::{Object, Scene, Shortcut};
 
 /// What kind of thing a surface belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,6 +65,9 @@ pub(super) struct SurfaceBatch {
 pub(super) struct Thing {
     pub role: Role,
     pub anchor: usize,
+    /// Where two surfaces are in one place, one is to be seen: a virtual thing before a real one, and of virtual ones that
+    /// of the larger number, the later in the scene. `None`: it is real.
+    pub tie: Option<usize>,
     /// Around the mesh itself; its coarser levels lie within.
     pub bounds: Bounds,
     /// The mesh itself, then ever coarser ones.
@@ -144,14 +147,18 @@ impl AnchorGeometry {
                 let mut shared = SharedCorners::default();
                 let there = objects
                     .iter()
-                    .filter(|object| object.visible && object.anchor == anchor);
-                for object in there {
+                    .enumerate()
+                    .filter(|(_, object)| object.visible && object.anchor == anchor);
+                for (index, object) in there {
+                    let tie = (role == Role::Virtual).then_some(index);
                     let coarsest_px = scene.shadows.max_silhouette_error_px;
-                    let coarser = match coarsest_px > 0.0 {
+                    let with_levels =
+                        coarsest_px > 0.0 && !scene.shadows.without.has(Shortcut::Levels);
+                    let coarser = match with_levels {
                         true => known.of(&object.mesh),
                         false => &[],
                     };
-                    let thing = thing(device, role, object, coarser, &mut shared);
+                    let thing = thing(device, (role, tie), object, coarser, &mut shared);
                     geometry.things.extend(thing);
                 }
                 if shared.triangles.is_empty() {
@@ -175,7 +182,7 @@ impl AnchorGeometry {
 /// Puts an object's levels among its batch's corners; `None` without triangles.
 fn thing(
     device: &wgpu::Device,
-    role: Role,
+    (role, tie): (Role, Option<usize>),
     object: &Object,
     coarser: &[Level],
     shared: &mut SharedCorners,
@@ -226,6 +233,7 @@ fn thing(
     let positions = positions_in_anchor(object, &object.mesh);
     Some(Thing {
         role,
+        tie,
         anchor: object.anchor,
         bounds: Bounds::around(positions.iter().map(|position| position.as_dvec3()))?,
         levels,

@@ -8,7 +8,7 @@ use crate::geometry::counting::{self, Counting};
 use crate::geometry::reach::PixelRect;
 use crate::geometry::shadow_volume::{Casting, LightPlace};
 use crate::light::Light;
-use crate::scene;
+use crate::scene::{self, ShadowSettings, Shortcut};
 
 use super::anchor_geometry::{LevelCaster, Role, Thing};
 use super::gpu::Gpu;
@@ -24,7 +24,10 @@ pub(super) struct Casters {
     /// For each light, that light as each thing meets it.
     lights: UniformRow,
     light_group: wgpu::BindGroup,
-    counting: scene::Counting,
+    /// Whether depth-pass may be taken.
+    depth_pass: bool,
+    /// Whether what has not changed since the last frame is made anew all the same.
+    forgets: bool,
 }
 
 /// What one caster does to one light.
@@ -76,7 +79,7 @@ impl Casters {
         thing_count: usize,
         light_count: usize,
         light_layout: &wgpu::BindGroupLayout,
-        counting: scene::Counting,
+        shadows: &ShadowSettings,
     ) -> Self {
         let lights =
             UniformRow::new::<CastingLight>(device, "casting lights", light_count * thing_count);
@@ -92,12 +95,14 @@ impl Casters {
                 }],
             }),
             lights,
-            counting,
+            depth_pass: shadows.counting == scene::Counting::Auto
+                && !shadows.without.has(Shortcut::DepthPass),
+            forgets: shadows.without.has(Shortcut::Kept),
         }
     }
 
-    /// Makes the volumes that `touched` asks for, where light or caster has moved or another of its `levels` is to be
-    /// drawn, and chooses how they are counted.
+    /// Makes the volumes that reach the pixels `within`, where light or caster has moved or another of its `levels` is to
+    /// be drawn, and chooses how they are counted.
     pub fn update(
         &mut self,
         gpu: &Gpu,
@@ -105,7 +110,7 @@ impl Casters {
         lights: &[Light],
         camera_from_anchor: &[Option<DAffine3>],
         intrinsics: &Intrinsics,
-        touched: &Touched,
+        (touched, within): (&Touched, PixelRect),
     ) {
         let Some(camera_from_world) = camera_from_anchor.first().copied().flatten() else {
             return;
@@ -135,14 +140,15 @@ impl Casters {
                 let reach = &touched.shadows[index][number];
                 shadow.scissor = None;
                 let level = levels[number];
+                let pixels = reach.pixels.intersection(within);
                 let (Some(caster), Some(placed), false) = (
                     &thing.levels[level].caster,
                     &placed[thing.anchor],
-                    reach.pixels.is_empty(),
+                    pixels.is_empty(),
                 ) else {
                     continue;
                 };
-                shadow.scissor = Some(reach.pixels);
+                shadow.scissor = Some(pixels);
                 shadow.level = level;
                 let light = light_place(light, &placed.anchor_from_world);
                 let end = reach
@@ -158,12 +164,14 @@ impl Casters {
                         .iter()
                         .any(|corner| end.depth_of(*corner) <= 0.0)
                 };
-                let counting = match self.counting {
-                    scene::Counting::Auto if !end.is_some_and(sees_past_end) => {
-                        counting::counting(&thing.bounds, light, &placed.near)
-                    }
-                    _ => Counting::DepthFail,
+                let counting = match self.depth_pass && !end.is_some_and(sees_past_end) {
+                    true => counting::counting(&thing.bounds, light, &placed.near),
+                    false => Counting::DepthFail,
                 };
+                if self.forgets {
+                    shadow.volume = Volume::default();
+                    shadow.lit_for = None;
+                }
                 shadow.counting = Some(counting);
                 let made_for = MadeFor {
                     level,
@@ -189,7 +197,7 @@ impl Casters {
         role: Role,
         light: usize,
         insides: &'a [Insides],
-        views: &'a UniformRow,
+        view_offset: impl Fn(&Thing) -> u32 + 'a,
     ) -> impl Iterator<Item = Counted<'a>> {
         let shadows = things.iter().zip(&self.shadows[light]).enumerate();
         shadows
@@ -201,7 +209,7 @@ impl Casters {
                     counting: shadow.counting?,
                     insides: insides[number],
                     scissor: shadow.scissor?,
-                    offsets: [views.offset(thing.anchor), self.lights.offset(slot)],
+                    offsets: [view_offset(thing), self.lights.offset(slot)],
                     vertices: &thing.levels[shadow.level].caster.as_ref()?.vertices,
                 })
             })

@@ -4,6 +4,7 @@
 //! surfaces, what a shadow leaves of them, which is copied into the picture where one falls.
 
 use super::background::{Background, PICTURE_FORMAT, extent};
+use super::composite::GAIN_FORMAT;
 use super::gpu::Gpu;
 use super::shader;
 use super::stencil::{SHADOW, VIRTUAL_SHADOW};
@@ -30,6 +31,8 @@ pub(super) struct Direct {
     pub volumes: Volumes,
     /// Real surfaces where virtual things hide the light.
     pub hidden_on_real: Sided,
+    /// The factor that they then have on the video, for the `gain` layer.
+    pub gain_on_real: Sided,
     /// The ambient light alone where virtual surfaces lie in more volumes than the stencil's reference says: those in the
     /// open (0), and those at the terminator (1), which lie in their own.
     pub shadow_on_virtual: [wgpu::RenderPipeline; 2],
@@ -126,6 +129,19 @@ impl Direct {
             let constants = [constants[0], ("SEEN", seen)];
             surface("place", "light_on_virtual", &constants, all)
         };
+        let hidden = |fragment, format| {
+            let usage = Use {
+                vertex: "place",
+                fragment,
+                writes_depth: false,
+                stencil: wgpu::CompareFunction::Less,
+                stencil_bits: VIRTUAL_SHADOW,
+                marks: (wgpu::StencilOperation::Keep, 0),
+                targets: &[target(format, all)],
+                constants: &constants,
+            };
+            usage.pipelines(device, &geometry, &module, gpu.depth_format, 1)
+        };
         let over_all = |layout, fragment, constants: &[_], targets: &[_], depth_stencil| {
             shader::whole_picture(
                 device,
@@ -170,17 +186,8 @@ impl Direct {
                 all,
             ),
             volumes: Volumes::new(device, &geometry, depth_format, 1, &[PICTURE_FORMAT]),
-            hidden_on_real: Use {
-                vertex: "place",
-                fragment: "hidden_on_real",
-                writes_depth: false,
-                stencil: wgpu::CompareFunction::Less,
-                stencil_bits: VIRTUAL_SHADOW,
-                marks: (wgpu::StencilOperation::Keep, 0),
-                targets: &[target(PICTURE_FORMAT, all)],
-                constants: &constants,
-            }
-            .pipelines(device, &geometry, &module, depth_format, 1),
+            hidden_on_real: hidden("hidden_on_real", PICTURE_FORMAT),
+            gain_on_real: hidden("gain_on_real", GAIN_FORMAT),
             shadow_on_virtual: [shadow(IN_OPEN_LIGHT), shadow(AT_TERMINATOR)],
             ambient_group: device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("ambient light"),

@@ -54,6 +54,8 @@ pub struct Gpu {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     pub(super) depth_format: wgpu::TextureFormat,
+    /// What light is added up in.
+    pub(super) light_format: wgpu::TextureFormat,
     /// Nanoseconds per tick of a timestamp; `None` where the adapter has no timestamps.
     pub(super) timestamp_period_ns: Option<f32>,
     description: String,
@@ -115,8 +117,12 @@ impl Gpu {
     ) -> Result<Self, RenderError> {
         let info = adapter.get_info();
         let offered = adapter.features();
-        let wished = wgpu::Features::DEPTH32FLOAT_STENCIL8 | wgpu::Features::TIMESTAMP_QUERY;
+        let wished = wgpu::Features::DEPTH32FLOAT_STENCIL8
+            | wgpu::Features::TIMESTAMP_QUERY
+            | wgpu::Features::FLOAT32_BLENDABLE
+            | wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES;
         let features = offered & wished;
+        let light_format = light_format(adapter, features);
         let unusable = |reason: String| RenderError::Unusable {
             adapter: info.name.clone(),
             reason,
@@ -154,6 +160,7 @@ impl Gpu {
             } else {
                 wgpu::TextureFormat::Depth24PlusStencil8
             },
+            light_format,
             timestamp_period_ns: features
                 .contains(wgpu::Features::TIMESTAMP_QUERY)
                 .then(|| queue.get_timestamp_period()),
@@ -195,5 +202,20 @@ impl Gpu {
             .map(|first| first.clone())
             .unwrap_or_default();
         failure.map_or(Ok(()), |message| Err(RenderError::Failed(message)))
+    }
+}
+
+/// Single precision where the adapter can blend it, else half: a lamp a millimetre away is brighter than half precision
+/// reaches, and sixteen lights add up to more than its rounding.
+fn light_format(adapter: &wgpu::Adapter, features: wgpu::Features) -> wgpu::TextureFormat {
+    let single = wgpu::TextureFormat::Rgba32Float;
+    let needed = wgpu::Features::FLOAT32_BLENDABLE
+        | wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES;
+    let offered = adapter.get_texture_format_features(single).flags;
+    let blends = wgpu::TextureFormatFeatureFlags::BLENDABLE
+        | wgpu::TextureFormatFeatureFlags::MULTISAMPLE_X4;
+    match features.contains(needed) && offered.contains(blends) {
+        true => single,
+        false => wgpu::TextureFormat::Rgba16Float,
     }
 }

@@ -1,6 +1,6 @@
 //! The frame from top to bottom: recorded picture, surfaces, shadow volumes light by light, composite.
 
-mod inspect;
+mod read_back;
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
 use crate::light::Material;
-use crate::scene::{Object, Scene, ShadowSettings, Technique};
+use crate::scene::{Object, Scene, ShadowSettings, Shortcut, Shortcuts, Technique};
 
 use super::accumulation::{Accumulation, Targets};
 use super::anchor_geometry::Role;
@@ -42,15 +42,13 @@ pub struct Renderer {
     gpu: Arc<Gpu>,
     size_px: [u32; 2],
     intrinsics: Intrinsics,
-    samples: u32,
-    /// Whether any material is.
-    glossy: bool,
+    without: Shortcuts,
     stage: Stage,
     background: Background,
     geometry_layout: wgpu::PipelineLayout,
     /// Where nothing has to be added up or averaged.
     direct: Option<Direct>,
-    /// Otherwise; beside it for the `gain` layer alone.
+    /// Where it has.
     accumulation: Option<Accumulation>,
     /// Keeps to the scene's frame budget.
     governed: Option<Governed>,
@@ -64,7 +62,7 @@ pub struct Renderer {
     layer_passes: Option<LayerPasses>,
     /// What the frame that was drawn last showed.
     shown: Shown,
-    /// What virtual things and their shadows could reach in that frame.
+    /// What things and their shadows could reach in that frame; `None` where nothing was placed.
     touched: Option<Touched>,
     /// Where the picture is not that of the video.
     stale: PixelRect,
@@ -139,7 +137,11 @@ impl Renderer {
             let targets = Targets::new(&gpu, &background, samples, difference);
             (Shafts::new(&gpu, scene, probe, &stage), targets)
         });
-        let is_direct = samples == 1 && scene.lights.len() == 1 && shafts.is_none();
+        let without = scene.shadows.without;
+        let is_direct = samples == 1
+            && scene.lights.len() == 1
+            && shafts.is_none()
+            && !without.has(Shortcut::Direct);
         Ok(Self {
             direct: is_direct.then(|| Direct::new(&gpu, &stage.layouts, &background, glossy)),
             accumulation: (!is_direct && shafts.is_none())
@@ -171,8 +173,7 @@ impl Renderer {
             made_for: Shape::of(scene),
             size_px,
             intrinsics,
-            samples,
-            glossy,
+            without,
             stage,
             background,
             geometry_layout,
@@ -278,15 +279,26 @@ impl Renderer {
     pub fn draw(&mut self, camera_from_anchor: &[Option<DAffine3>], shown: Shown) {
         self.shown = shown;
         self.stage.place(&self.gpu, camera_from_anchor);
-        self.touched = match (shown, &mut self.shafts) {
-            (Shown::Bare, _) => None,
-            (Shown::Composite, None) => self.stage.cast_on_touched(&self.gpu),
-            (Shown::Composite, Some((shafts, _))) => {
+        self.touched = match &mut self.shafts {
+            None => self.stage.touched(),
+            Some(_) if shown == Shown::Bare => None,
+            Some((shafts, _)) => {
                 let pixels =
                     shafts.update(&self.gpu, &self.stage, camera_from_anchor, &self.intrinsics);
                 pixels.map(Touched::pixels_alone)
             }
         };
+        let touched = match shown {
+            Shown::Bare => None,
+            Shown::Composite => self.touched.as_ref(),
+        };
+        let touched = touched.filter(|touched| !touched.pixels.is_empty());
+        if let (Some(touched), None) = (touched, &self.shafts) {
+            self.stage.cast(&self.gpu, touched, touched.pixels);
+        }
+        if self.without.has(Shortcut::Kept) {
+            self.stale = PixelRect::whole(self.size_px);
+        }
 
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let mut drawn = Vec::new();
@@ -300,7 +312,7 @@ impl Renderer {
             drawn.push(Stretch::Background);
         }
         self.stale = PixelRect::NONE;
-        if let Some(touched) = &self.touched {
+        if let Some(touched) = touched {
             self.stale = touched.pixels;
             drawn.push(Stretch::Light);
             if let Some(direct) = &self.direct {

@@ -6,7 +6,7 @@ use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
 use crate::light::Light;
 use crate::light::cores::on_all_cores;
-use crate::scene::{Scene, Technique};
+use crate::scene::{Scene, ShadowSettings, Shortcut, Technique};
 
 use super::anchor_geometry::{
     AnchorGeometry, KnownLevels, Role, SurfaceBatch, Thing, VirtualCorners,
@@ -17,7 +17,7 @@ use super::gpu::Gpu;
 use super::indirect::Indirect;
 use super::insides::{Insides, insides};
 use super::surfaces::Sided;
-use super::touched::{Touched, everywhere, touched_by_virtual};
+use super::touched::{Touched, touched_by_virtual};
 use super::uniforms::{LightSource, UniformRow, View, uniform_entry};
 use super::volumes::{Among, Volumes, set_scissor};
 
@@ -30,13 +30,14 @@ pub(super) struct Stage {
     /// For each thing the level that is drawn.
     levels: Vec<usize>,
     max_silhouette_error_px: f64,
-    samples: u32,
+    shadows: ShadowSettings,
     /// For each thing where its inside can be seen.
     insides: Vec<Insides>,
     casters: Casters,
     /// Of shadow volumes alone.
     indirect: Option<Indirect>,
     virtual_corners: Vec<(usize, VirtualCorners)>,
+    /// The camera as what stands on each anchor meets it, and after that as each virtual thing does.
     views: UniformRow,
     light_sources: UniformRow,
     view_group: wgpu::BindGroup,
@@ -68,7 +69,8 @@ impl Stage {
                 }],
             })
         };
-        let views = UniformRow::new::<View>(device, "views", scene.anchors.len());
+        let view_count = scene.anchors.len() + scene.virtuals.len();
+        let views = UniformRow::new::<View>(device, "views", view_count);
         let light_sources = UniformRow::new::<LightSource>(device, "lights", scene.lights.len());
         let mut known_levels = KnownLevels::default();
         let AnchorGeometry {
@@ -84,7 +86,7 @@ impl Stage {
                 things.len(),
                 scene.lights.len(),
                 &layouts[1],
-                scene.shadows.counting,
+                &scene.shadows,
             ),
             indirect: virtual_corners
                 .iter()
@@ -93,7 +95,7 @@ impl Stage {
                 .and_then(|(_, corners)| Indirect::new(scene, corners)),
             virtual_corners,
             max_silhouette_error_px: scene.shadows.max_silhouette_error_px,
-            samples: scene.shadows.samples,
+            shadows: scene.shadows,
             levels: vec![0; things.len()],
             insides: vec![Insides::Anywhere; things.len()],
             batches,
@@ -130,7 +132,7 @@ impl Stage {
             things.len(),
             scene.lights.len(),
             &self.layouts[1],
-            scene.shadows.counting,
+            &scene.shadows,
         );
         let world_virtuals = virtual_corners.iter().find(|(anchor, _)| *anchor == 0);
         self.indirect = self
@@ -174,6 +176,12 @@ impl Stage {
                 self.views.write(queue, anchor, &view);
             }
         }
+        for thing in &self.things {
+            if let (Some(tie), Some(pose)) = (thing.tie, camera_from_anchor[thing.anchor]) {
+                let view = View::new(&self.intrinsics, &pose).winning_ties(tie);
+                self.views.write(queue, self.view_of(thing), &view);
+            }
+        }
         let Some(camera_from_world) = camera_from_anchor.first().copied().flatten() else {
             return;
         };
@@ -200,9 +208,12 @@ impl Stage {
                 let Some(camera_from_anchor) = camera_from_anchor[thing.anchor] else {
                     return Insides::Unseen;
                 };
+                if self.shadows.without.has(Shortcut::Insides) {
+                    return Insides::Anywhere;
+                }
                 match insides(thing, level, &camera_from_anchor, &self.intrinsics) {
                     // Mesa's software driver cuts rectangles between the samples of a pixel.
-                    Insides::Within(_) if self.samples > 1 => Insides::Anywhere,
+                    Insides::Within(_) if self.shadows.samples > 1 => Insides::Anywhere,
                     insides => insides,
                 }
             })
@@ -248,45 +259,33 @@ impl Stage {
     ) {
         self.set_light(pass, 0);
         for batch in self.placed(Role::Real).filter(|batch| batch.anchor != 0) {
-            self.set_batch(pass, batch);
             for (number, thing) in self.of_batch(batch) {
+                self.set_thing(pass, batch, thing);
                 self.draw_whole(pass, pipelines, number, thing, within);
             }
         }
     }
 
-    /// Makes the shadow volumes that matter to the picture. Returns what virtual things touch in it, if anything.
-    pub fn cast_on_touched(&mut self, gpu: &Gpu) -> Option<Touched> {
-        let touched = touched_by_virtual(
+    /// Where the placed things and their shadows can be; `None` where nothing is placed.
+    pub fn touched(&self) -> Option<Touched> {
+        touched_by_virtual(
             &self.things,
             &self.lights,
             &self.camera_from_anchor,
             &self.intrinsics,
-        )?;
-        self.cast(gpu, &touched);
-        Some(touched)
+            self.shadows.without,
+        )
     }
 
-    /// Makes all shadow volumes, wherever they are.
-    pub fn cast_everywhere(&mut self, gpu: &Gpu) {
-        let everywhere = everywhere(
-            &self.things,
-            &self.lights,
-            &self.camera_from_anchor,
-            &self.intrinsics,
-        );
-        self.cast(gpu, &everywhere);
-    }
-
-    /// Makes the shadow volumes that `touched` asks for.
-    fn cast(&mut self, gpu: &Gpu, touched: &Touched) {
+    /// Makes the shadow volumes that reach the pixels `within`.
+    pub fn cast(&mut self, gpu: &Gpu, touched: &Touched, within: PixelRect) {
         self.casters.update(
             gpu,
             (&self.things, &self.levels),
             &self.lights,
             &self.camera_from_anchor,
             &self.intrinsics,
-            touched,
+            (touched, within),
         );
     }
 
@@ -301,8 +300,8 @@ impl Stage {
     ) {
         self.set_light(pass, light);
         for batch in self.placed(role) {
-            self.set_batch(pass, batch);
             for (number, thing) in self.of_batch(batch) {
+                self.set_thing(pass, batch, thing);
                 self.draw_whole(pass, pipelines, number, thing, within);
             }
         }
@@ -319,7 +318,7 @@ impl Stage {
         self.set_light(pass, light);
         for batch in self.placed(Role::Virtual) {
             for (number, thing) in self.of_batch(batch) {
-                self.set_batch(pass, batch);
+                self.set_thing(pass, batch, thing);
                 let Some(surface) = self.casters.lit(number, light) else {
                     self.draw_whole(pass, open, number, thing, within);
                     continue;
@@ -348,7 +347,7 @@ impl Stage {
         self.set_light(pass, light);
         for batch in self.placed(Role::Virtual) {
             for (number, thing) in self.of_batch(batch) {
-                self.set_batch(pass, batch);
+                self.set_thing(pass, batch, thing);
                 match self.casters.lit(number, light) {
                     Some(surface) => {
                         self.draw_sides(pass, pipelines, number, &surface.facing, within);
@@ -420,7 +419,9 @@ impl Stage {
         let (things, insides) = (&self.things, &self.insides);
         let counted = self
             .casters
-            .counted(things, role, light, insides, &self.views);
+            .counted(things, role, light, insides, |thing| {
+                self.views.offset(self.view_of(thing))
+            });
         volumes.count(pass, among, role, groups, within, counted)
     }
 
@@ -449,8 +450,17 @@ impl Stage {
         pass.set_bind_group(1, &self.light_group, &[self.light_sources.offset(light)]);
     }
 
-    fn set_batch(&self, pass: &mut wgpu::RenderPass<'_>, batch: &SurfaceBatch) {
-        pass.set_bind_group(0, &self.view_group, &[self.views.offset(batch.anchor)]);
+    /// Where in `views` a thing's is.
+    fn view_of(&self, thing: &Thing) -> usize {
+        match thing.tie {
+            None => thing.anchor,
+            Some(tie) => self.camera_from_anchor.len() + tie,
+        }
+    }
+
+    fn set_thing(&self, pass: &mut wgpu::RenderPass<'_>, batch: &SurfaceBatch, thing: &Thing) {
+        let view = self.views.offset(self.view_of(thing));
+        pass.set_bind_group(0, &self.view_group, &[view]);
         pass.set_vertex_buffer(0, batch.corners.slice(..));
         pass.set_vertex_buffer(1, batch.indirect.slice(..));
         pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);

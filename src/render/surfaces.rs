@@ -2,11 +2,9 @@
 //! Reads the stencil (stencil.rs). Writes depth, `reaching` and `change` (see surfaces.wgsl).
 
 use super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT};
+use super::gpu::Gpu;
 use super::shader;
 use super::stencil::{ADDED, REAL_HIDES, SHADOW, VIRTUAL_SHADOW};
-
-/// Format of `reaching` and `change`.
-pub(super) const LIGHT_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 
 /// Pipelines of the pass where several samples or lights are added up.
 pub(super) struct Surfaces {
@@ -19,7 +17,7 @@ pub(super) struct Surfaces {
     /// A light where virtual things hide it from real surfaces.
     pub light_hidden_from_real: Sided,
     /// A light on virtual surfaces past all casters; the stencil's reference is 0, or 1 for surfaces that lie in no
-    /// shadow but their own.
+    /// shadow but perhaps their own.
     pub light_on_virtual: Sided,
 }
 
@@ -127,12 +125,12 @@ impl Use<'_> {
 
 impl Surfaces {
     pub fn new(
-        device: &wgpu::Device,
+        gpu: &Gpu,
         layout: &wgpu::PipelineLayout,
-        depth_format: wgpu::TextureFormat,
         samples: u32,
         glossy: bool,
     ) -> Self {
+        let device = &gpu.device;
         let module = shader::module(
             device,
             "surfaces",
@@ -147,7 +145,7 @@ impl Surfaces {
             let writes_depth = stencil == wgpu::CompareFunction::Always;
             let target = |written: bool| {
                 Some(wgpu::ColorTargetState {
-                    format: LIGHT_FORMAT,
+                    format: gpu.light_format,
                     blend: (!writes_depth).then_some(wgpu::BlendState {
                         color: add,
                         alpha: add,
@@ -168,13 +166,15 @@ impl Surfaces {
                 targets: &targets.map(target),
                 constants: &[("GLOSSY", f64::from(glossy))],
             };
-            usage.pipelines(device, layout, &module, depth_format, samples)
+            usage.pipelines(device, layout, &module, gpu.depth_format, samples)
         };
         let (always, equal, other) = (
             wgpu::CompareFunction::Always,
             wgpu::CompareFunction::Equal,
             wgpu::CompareFunction::NotEqual,
         );
+        // The reference is what the stencil may count at most.
+        let at_most = wgpu::CompareFunction::GreaterEqual;
         // Coplanar surfaces land on the same depth, and each sample is to get a light once.
         let nothing = (wgpu::StencilOperation::Keep, 0);
         let added = (wgpu::StencilOperation::Invert, ADDED);
@@ -186,7 +186,7 @@ impl Surfaces {
             ambient_on_virtual: build(ambient[1], always, 0, nothing, [true, true]),
             light_reaching_real: build(light, equal, reaching, added, [true, false]),
             light_hidden_from_real: build(light, other, VIRTUAL_SHADOW, taken, [false, true]),
-            light_on_virtual: build("light_on_virtual", equal, SHADOW, nothing, [false, true]),
+            light_on_virtual: build("light_on_virtual", at_most, SHADOW, nothing, [false, true]),
         }
     }
 }

@@ -7,6 +7,7 @@ use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::{self, PixelRect};
 use crate::geometry::shadow_volume::LightPlace;
 use crate::light::Light;
+use crate::scene::{Shortcut, Shortcuts};
 
 use super::anchor_geometry::{Role, Thing};
 
@@ -26,10 +27,10 @@ pub(super) struct Touched {
     pub shadows: Vec<Vec<ShadowReach>>,
 }
 
-/// How far a caster's shadow matters.
+/// How far a caster's shadow reaches.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ShadowReach {
-    /// Where in the picture it can be; empty where it need not be counted.
+    /// Where in the picture it can fall on anything; empty where there is none.
     pub pixels: PixelRect,
     /// Where in the world it may end.
     pub end: Option<HalfSpace>,
@@ -46,13 +47,19 @@ impl Touched {
     }
 }
 
-/// What virtual things and their shadows can change; `None` if nothing.
+/// What virtual things and their shadows can change, and how far all shadows reach; `None` where nothing is placed.
 pub(super) fn touched_by_virtual(
     things: &[Thing],
     lights: &[Light],
     camera_from_anchor: &[Option<DAffine3>],
     intrinsics: &Intrinsics,
+    without: Shortcuts,
 ) -> Option<Touched> {
+    let whole = PixelRect::whole(intrinsics.size_px);
+    let scissored = |pixels: PixelRect| match without.has(Shortcut::Scissors) {
+        true => whole,
+        false => pixels,
+    };
     let camera_from_world = (*camera_from_anchor.first()?)?;
     let world_from_camera = camera_from_world.inverse();
     let corners_in_world = |thing: &Thing| {
@@ -76,13 +83,18 @@ pub(super) fn touched_by_virtual(
     let mut pixels = PixelRect::NONE;
     for (index, thing, corners) in &placed {
         if thing.role == Role::Virtual {
-            virtuals = virtuals.union(reach::covered(corners, &camera_from_world, intrinsics));
+            let covered = reach::covered(corners, &camera_from_world, intrinsics);
+            virtuals = virtuals.union(scissored(covered));
         }
         for (light, shadows) in lights.iter().zip(&mut shadows).filter(|_| thing.casts) {
             let light = light_place(light, &DAffine3::IDENTITY);
+            let reached =
+                reach::shadowed(corners, light, &receivers, &camera_from_world, intrinsics);
             let shadow = ShadowReach {
-                pixels: reach::shadowed(corners, light, &receivers, &camera_from_world, intrinsics),
-                end: reach::shadow_end(corners, light, &receivers),
+                pixels: scissored(reached),
+                end: (!without.has(Shortcut::Ends))
+                    .then(|| reach::shadow_end(corners, light, &receivers))
+                    .flatten(),
             };
             if thing.role == Role::Virtual {
                 pixels = pixels.union(shadow.pixels);
@@ -90,37 +102,11 @@ pub(super) fn touched_by_virtual(
             shadows[*index] = shadow;
         }
     }
-    let pixels = pixels.union(virtuals);
-    for shadow in shadows.iter_mut().flatten() {
-        shadow.pixels = shadow.pixels.intersection(pixels);
-    }
-    (!pixels.is_empty()).then_some(Touched {
-        pixels,
+    Some(Touched {
+        pixels: pixels.union(virtuals),
         virtuals,
         shadows,
     })
-}
-
-/// The whole picture, as far as things have poses.
-pub(super) fn everywhere(
-    things: &[Thing],
-    lights: &[Light],
-    camera_from_anchor: &[Option<DAffine3>],
-    intrinsics: &Intrinsics,
-) -> Touched {
-    let pixels = PixelRect::whole(intrinsics.size_px);
-    let world = camera_from_anchor.first().copied().flatten();
-    let placed = |thing: &Thing| world.is_some() && camera_from_anchor[thing.anchor].is_some();
-    let of_thing = |thing: &Thing| match placed(thing) && thing.casts {
-        true => ShadowReach { pixels, end: None },
-        false => UNSEEN,
-    };
-    let shadows = vec![things.iter().map(of_thing).collect(); lights.len()];
-    Touched {
-        pixels,
-        virtuals: pixels,
-        shadows,
-    }
 }
 
 /// A light as its shadow volumes see it from an anchor.

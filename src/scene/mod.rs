@@ -21,6 +21,7 @@ mod probe;
 pub mod probe_file;
 mod reader;
 mod settings;
+mod shortcuts;
 
 pub use dictionary::Dictionary;
 pub use error::{Place, SceneError};
@@ -28,6 +29,7 @@ pub use family::{Codes, Family};
 pub use lights::unit_direction;
 pub use load::Reading;
 pub use reader::{NAMES, is_name};
+pub use shortcuts::{Shortcut, Shortcuts};
 
 /// What one scene file says, checked.
 #[derive(Debug, Clone, Default)]
@@ -421,6 +423,8 @@ pub struct ShadowSettings {
     pub frame_budget_ms: Option<f64>,
     /// What technique shafts alone is asked for.
     pub shafts: ShaftSettings,
+    /// Shortcuts that technique volumes is not to take; no key of a scene file.
+    pub without: Shortcuts,
 }
 
 /// How finely shafts make soft shadows.
@@ -484,6 +488,7 @@ impl Default for ShadowSettings {
             max_silhouette_error_px: 0.5,
             frame_budget_ms: None,
             shafts: ShaftSettings::default(),
+            without: Shortcuts::NONE,
         }
     }
 }

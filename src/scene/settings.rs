@@ -210,6 +210,7 @@ pub fn shadows(root: &Table, probe: Option<&ProbeScene>) -> Result<ShadowSetting
             .map(budget)
             .transpose()?,
         shafts: shaft_settings(&shadows, default.shafts)?,
+        without: default.without,
     })
 }
 

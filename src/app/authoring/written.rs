@@ -353,6 +353,7 @@ fn shadow_keys(old: &ShadowSettings, new: &ShadowSettings) -> Vec<(&'static str,
         frame_budget_ms,
         shafts,
         quality,
+        without: _,
     } = *new;
     let ratio = |number: f64| super::numbers::new_number(number, RATIO);
     // Another quality gives other defaults: what it says itself goes, what it does not stands.

@@ -3,7 +3,7 @@
 use super::super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT};
 use super::super::gpu::Gpu;
 use super::super::shader;
-use super::super::surfaces::{LIGHT_FORMAT, Sided};
+use super::super::surfaces::Sided;
 use super::data::{PATCH_CORNER_LAYOUT, PLACE_LAYOUT, THROWN_CORNER_LAYOUT};
 
 const SUM: wgpu::BlendComponent = wgpu::BlendComponent {
@@ -83,7 +83,7 @@ impl Pipelines {
                      writes_depth: bool,
                      adds: bool,
                      bias: wgpu::DepthBiasState| {
-            let targets = [LIGHT_FORMAT; 2].map(|format| {
+            let targets = [gpu.light_format; 2].map(|format| {
                 Some(wgpu::ColorTargetState {
                     format,
                     blend: adds.then_some(wgpu::BlendState {

@@ -1,10 +1,11 @@
-//! What a frame that was drawn is made of, read back for tests, charts and views: layers, counts, gain.
+//! What a frame that was drawn is made of, read back for tests, charts and views: layers, counts, gain. The gain is the
+//! picture's own; the rest comes from the same surfaces and shadow volumes, as far as they reach in the picture, asked once
+//! more at the pixels' centres.
 
 use std::sync::Arc;
 
-use super::super::accumulation::Accumulation;
 use super::super::anchor_geometry::Role;
-use super::super::attachments::loaded;
+use super::super::attachments::{kept, loaded};
 use super::super::composite::GAIN_FORMAT;
 use super::super::gpu::RenderError;
 use super::super::layers::{LayerPasses, Layers};
@@ -20,27 +21,23 @@ impl Renderer {
     /// # Errors
     /// The device failed since it was opened.
     pub fn layers(&mut self) -> Result<Layers, RenderError> {
-        let gain = match &self.touched {
-            Some(touched) => self.read_gain(touched.pixels)?,
-            None => vec![[1.0; 3]; (self.size_px[0] * self.size_px[1]) as usize],
-        };
-        // The other layers cover the whole picture, not only what virtual things touch.
-        self.stage.cast_everywhere(&self.gpu);
+        let gain = self.read_gain()?;
+        self.cast_on_all_pixels();
         let (gpu, stage, size_px) = (&self.gpu, &self.stage, self.size_px);
         let passes = self
             .layer_passes
-            .get_or_insert_with(|| LayerPasses::new(gpu, &self.geometry_layout, self.size_px));
+            .get_or_insert_with(|| LayerPasses::new(gpu, &self.geometry_layout, size_px));
+        let whole = PixelRect::whole(size_px);
         let shown = |role: Role| role == Role::Real || self.shown == Shown::Composite;
         let (role, depth_m) = passes.role_and_depth(gpu, &|pass, pipeline, role| {
             if shown(role) {
-                stage.draw_surfaces(pass, pipeline, role, 0, PixelRect::whole(size_px));
+                stage.draw_surfaces(pass, pipeline, role, 0, whole);
             }
         })?;
         let mut shadow = Vec::new();
         for light in 0..stage.light_count() {
             let mut bits = passes.shadow(gpu, &|pass, volumes, role| {
                 if shown(role) {
-                    let whole = PixelRect::whole(size_px);
                     stage.count_volumes(pass, volumes, Among::All, role, light, whole);
                 }
             })?;
@@ -64,7 +61,7 @@ impl Renderer {
     /// # Errors
     /// The device failed since it was opened.
     pub fn stencil_counts(&mut self) -> Result<Vec<u8>, RenderError> {
-        self.stage.cast_everywhere(&self.gpu);
+        self.cast_on_all_pixels();
         let (gpu, stage, size_px) = (&self.gpu, &self.stage, self.size_px);
         let passes = self
             .layer_passes
@@ -86,32 +83,23 @@ impl Renderer {
         Ok(sums)
     }
 
+    /// The picture needs real shadows only where virtual things touch it; the layers tell of all.
+    fn cast_on_all_pixels(&mut self) {
+        if let (Some(touched), None) = (&self.touched, &self.shafts) {
+            let whole = PixelRect::whole(self.size_px);
+            self.stage.cast(&self.gpu, touched, whole);
+        }
+    }
+
     /// The factor that the picture's own samples put on the video.
-    fn read_gain(&mut self, touched: PixelRect) -> Result<Vec<[f32; 3]>, RenderError> {
+    fn read_gain(&self) -> Result<Vec<[f32; 3]>, RenderError> {
+        let nothing = || vec![[1.0; 3]; (self.size_px[0] * self.size_px[1]) as usize];
+        let within = match (&self.touched, self.shown) {
+            (Some(touched), Shown::Composite) if !touched.pixels.is_empty() => touched.pixels,
+            _ => return Ok(nothing()),
+        };
         let gpu = Arc::clone(&self.gpu);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        if self.shafts.is_none() && self.accumulation.is_none() {
-            self.accumulation = Some(Accumulation::new(
-                &gpu,
-                &self.geometry_layout,
-                &self.background,
-                self.samples,
-                self.glossy,
-            ));
-        }
-        // Shafts leave the targets as they were drawn; the direct pass has none.
-        let targets = match (&self.shafts, &self.accumulation) {
-            (Some((_, targets)), _) => targets,
-            (None, Some(accumulation)) => {
-                if self.direct.is_some() {
-                    self.accumulate(&mut encoder, accumulation, touched);
-                }
-                &accumulation.targets
-            }
-            (None, None) => {
-                return Ok(vec![[1.0; 3]; (self.size_px[0] * self.size_px[1]) as usize]);
-            }
-        };
         let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("gain layer"),
             size: self.picture.size(),
@@ -123,16 +111,29 @@ impl Renderer {
             view_formats: &[],
         });
         let view = texture.create_view(&Default::default());
+        // What the picture was made of lies where it was drawn: sums in the targets, or the stencil.
+        let targets = match (&self.shafts, &self.accumulation) {
+            (Some((_, targets)), _) => Some(targets),
+            (None, Some(accumulation)) => Some(&accumulation.targets),
+            (None, None) => None,
+        };
+        let stencil = targets.is_none().then_some(self.direct.as_ref()).flatten();
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("gain"),
             color_attachments: &[Some(loaded(&view, wgpu::LoadOp::Clear(wgpu::Color::WHITE)))],
+            depth_stencil_attachment: stencil.map(|direct| kept(&direct.depth_stencil)),
             ..Default::default()
         });
-        set_scissor(&mut pass, touched);
-        pass.set_pipeline(&targets.composite.gain);
-        pass.set_bind_group(0, &targets.composite.group, &[]);
+        set_scissor(&mut pass, within);
         pass.set_bind_group(2, &self.background.group, &[]);
-        pass.draw(0..3, 0..1);
+        if let Some(targets) = targets {
+            pass.set_pipeline(&targets.composite.gain);
+            pass.set_bind_group(0, &targets.composite.group, &[]);
+            pass.draw(0..3, 0..1);
+        } else if let Some(direct) = stencil {
+            let stage = &self.stage;
+            stage.draw_surfaces(&mut pass, &direct.gain_on_real, Role::Real, 0, within);
+        }
         drop(pass);
         let readback = Readback::new(&gpu.device, self.size_px, 16);
         readback.copy_from(&mut encoder, &texture);
