@@ -4,6 +4,7 @@
 mod common;
 
 use common::composite::{Expected, Verdict};
+use common::degenerate::{degenerate_camera, degenerate_case};
 use common::random::{Random, random_camera, random_stage};
 use common::{Picture, Stage, frame_of};
 use gnomon::app::truth::ray_cast::View;
@@ -31,12 +32,44 @@ fn seeds(count: u64) -> std::ops::Range<u64> {
     only.map_or(0..count, |seed| seed..seed + 1)
 }
 
-#[test]
-fn random_scenes() {
-    let count =
-        std::env::var("GNOMON_SCENES").map_or(100, |count| count.parse().expect("a number"));
-    let mut sum = Verdict::default();
-    let mut failures = Vec::new();
+/// Of a run of many pictures.
+#[derive(Default)]
+struct Run {
+    sum: Verdict,
+    pictures: usize,
+    failures: Vec<String>,
+}
+
+impl Run {
+    fn add(&mut self, name: impl Fn() -> String, verdict: &Verdict) {
+        self.pictures += 1;
+        if verdict.wrong > 0 {
+            let first: Vec<&str> = verdict.first.iter().take(3).map(String::as_str).collect();
+            self.failures.push(format!(
+                "{}: {} wrong of {} changed\n    {}",
+                name(),
+                verdict.wrong,
+                verdict.changed,
+                first.join("\n    ")
+            ));
+        }
+        self.sum.join(verdict);
+    }
+
+    fn end(self) {
+        eprintln!("{} pictures: {}", self.pictures, self.sum.summary());
+        assert!(
+            self.failures.is_empty(),
+            "{} of {} pictures (run a scene by GNOMON_SEED=n):\n{}",
+            self.failures.len(),
+            self.pictures,
+            self.failures.join("\n")
+        );
+    }
+}
+
+fn hold_random(count: u64) {
+    let mut run = Run::default();
     for seed in seeds(count) {
         let mut random = Random::new(seed);
         let (stage, places, intrinsics) = random_stage(&mut random, seed % 2 == 1);
@@ -47,29 +80,51 @@ fn random_scenes() {
                 camera_from_world: random_camera(&mut random, &places, &stage.scene.lights),
             };
             let verdict = judge(&stage, &mut renderer, view);
-            if verdict.wrong > 0 {
-                failures.push(format!(
-                    "seed {seed}, camera {camera}, {} samples, {} lights: {} wrong\n    {}",
-                    stage.scene.shadows.samples,
-                    stage.scene.lights.len(),
-                    verdict.wrong,
-                    verdict
-                        .first
-                        .iter()
-                        .take(3)
-                        .cloned()
-                        .collect::<Vec<_>>()
-                        .join("\n    ")
-                ));
-            }
-            sum.join(&verdict);
+            let samples = stage.scene.shadows.samples;
+            run.add(
+                || format!("seed {seed}, camera {camera}, {samples} samples"),
+                &verdict,
+            );
         }
     }
-    eprintln!("{}", sum.summary());
-    assert!(
-        failures.is_empty(),
-        "{} pictures:\n{}",
-        failures.len(),
-        failures.join("\n")
-    );
+    run.end();
+}
+
+fn hold_degenerate(count: u64) {
+    let mut run = Run::default();
+    for seed in seeds(count) {
+        let mut random = Random::new(77_000_000 + seed);
+        let case = degenerate_case(&mut random);
+        let mut renderer = case.stage.renderer(case.intrinsics);
+        for camera in 0..CAMERAS {
+            let (camera_from_world, from) = degenerate_camera(&mut random, &case);
+            let view = View {
+                intrinsics: case.intrinsics,
+                camera_from_world,
+            };
+            let verdict = judge(&case.stage, &mut renderer, view);
+            let samples = case.stage.scene.shadows.samples;
+            let name = &case.name;
+            run.add(
+                || format!("seed {seed}, camera {camera} ({from}), {samples} samples: {name}"),
+                &verdict,
+            );
+        }
+    }
+    run.end();
+}
+
+fn scenes(count: u64) -> u64 {
+    let wanted = std::env::var("GNOMON_SCENES").ok();
+    wanted.and_then(|count| count.parse().ok()).unwrap_or(count)
+}
+
+#[test]
+fn random_scenes() {
+    hold_random(scenes(200));
+}
+
+#[test]
+fn degenerate_scenes() {
+    hold_degenerate(scenes(100));
 }

@@ -219,53 +219,141 @@ impl<'a> Expected<'a> {
         state
     }
 
-    /// The composite of a pixel whose samples have these states, shaded at one place.
-    fn composite(&self, states: &[State], shaded_at: impl Fn(usize) -> DVec2) -> Range {
-        let (mut reaching, mut taken) = (DVec3::ZERO, DVec3::ZERO);
-        let (mut modelled, mut open) = (0.0, 0.0);
-        let mut added = Range {
+    /// The composite of a pixel whose samples have these states, shaded where the pixel's centre is.
+    fn composite(&self, states: &[State], center: DVec2) -> Range {
+        self.shaded(states, &|_| vec![center])
+    }
+
+    /// The least and most of it, wherever in the pixel the renderer shades. With several samples each triangle's, and of
+    /// those the ones that the stencil lets pass, are shaded together, somewhere in their middle.
+    fn range(&self, center: DVec2, states: &[State]) -> Range {
+        if self.samples == 1 {
+            return self.composite(states, center);
+        }
+        let of_samples = SAMPLES_PX.map(|sample| center + DVec2::from_array(sample));
+        let anywhere = [&[center], &of_samples[..]].concat();
+        let triangle = |state: &State| state.surface.map(|surface| surface.triangle);
+        let whole = states
+            .iter()
+            .all(|state| state.is_like(&states[0]) && triangle(state) == triangle(&states[0]));
+        match whole {
+            true => anywhere
+                .iter()
+                .fold(self.composite(states, center), |range, place| {
+                    range.union(self.composite(states, *place))
+                }),
+            false => self.shaded(states, &|_| anywhere.clone()),
+        }
+    }
+
+    /// Each sample's state shaded at any of some places, what is taken from a surface apart from what reaches it.
+    fn shaded(&self, states: &[State], places: &dyn Fn(usize) -> Vec<DVec2>) -> Range {
+        let nothing = Range {
             low: DVec3::ZERO,
             high: DVec3::ZERO,
         };
+        let (mut reaching, mut taken, mut added) = (nothing, nothing, nothing);
+        let (mut modelled, mut open) = (0.0, 0.0);
         for (index, state) in states.iter().enumerate() {
             let Some(surface) = state.surface else {
                 open += 1.0;
                 continue;
             };
-            let point = self.on_plane(&surface, shaded_at(index));
-            let sum_of = |lights: u32| -> DVec3 {
+            let points = places(index);
+            let mut points: Vec<DVec3> = points
+                .iter()
+                .map(|place| self.on_plane(&surface, *place))
+                .collect();
+            let edge_on = points.len() > 1 && self.is_edge_on(&points);
+            if points.len() > 1 {
+                points.extend(self.off_plane(&points));
+            }
+            let sum_of = |lights: u32| -> Range {
                 let reaches = |index: &usize| lights >> index & 1 == 1;
-                let given = |index: usize| irradiance(&self.lights[index], point, surface.normal);
-                (0..self.lights.len()).filter(reaches).map(given).sum()
+                let at = |point: &DVec3| -> DVec3 {
+                    let given =
+                        |index: usize| irradiance(&self.lights[index], *point, surface.normal);
+                    (0..self.lights.len()).filter(reaches).map(given).sum()
+                };
+                let sums = points.iter().map(at);
+                let ranges = sums.map(|sum| Range {
+                    low: sum,
+                    high: sum,
+                });
+                ranges.reduce(Range::union).unwrap_or(nothing)
             };
             if surface.role == VIRTUAL {
                 let albedo = self.albedos[surface.thing];
-                let lights = sum_of(state.arriving) * (albedo / PI);
-                let ambient = self.ambient * (albedo / PI);
-                added.low += lights
-                    + if self.unknown > 0.0 {
-                        DVec3::ZERO
-                    } else {
-                        ambient
-                    };
-                added.high += lights + ambient + self.unknown * albedo;
+                let lights = sum_of(state.arriving);
+                let least = if self.unknown > 0.0 { 0.0 } else { 1.0 };
+                if edge_on {
+                    added.high += 1.0;
+                    continue;
+                }
+                added.low += (lights.low + self.ambient * least) * (albedo / PI);
+                added.high += (lights.high + self.ambient) * (albedo / PI) + self.unknown * albedo;
             } else {
-                reaching += self.ambient + sum_of(state.arriving);
-                taken += sum_of(state.taken);
+                let (reaches, takes) = (sum_of(state.arriving), sum_of(state.taken));
+                reaching.low += self.ambient + reaches.low;
+                reaching.high += self.ambient + reaches.high;
+                taken.low += takes.low;
+                taken.high += takes.high;
                 modelled += 1.0;
             }
         }
-        let gain = DVec3::select(
-            taken.cmpgt(DVec3::ZERO),
-            (reaching - taken) / reaching,
-            DVec3::ONE,
-        );
-        let kept = gain * modelled + open;
+        let gain = |taken: DVec3, reaching: DVec3| {
+            let left = (reaching - taken).max(DVec3::ZERO) / reaching;
+            DVec3::select(taken.cmpgt(DVec3::ZERO), left, DVec3::ONE)
+        };
+        let mut gains = Range {
+            low: gain(taken.high, reaching.low),
+            high: gain(taken.low, reaching.high),
+        };
+        if states.iter().all(|state| state.is_like(&states[0])) {
+            // All of it is shaded at one place.
+            gains = Range {
+                low: gain(taken.low, reaching.low),
+                high: gain(taken.high, reaching.high),
+            };
+            gains = Range {
+                low: gains.low.min(gains.high),
+                high: gains.low.max(gains.high),
+            };
+        }
         let weight = 1.0 / states.len() as f64;
         Range {
-            low: ((kept + added.low) * weight).min(DVec3::ONE),
-            high: ((kept + added.high) * weight).min(DVec3::ONE),
+            low: ((gains.low * modelled + open + added.low) * weight).min(DVec3::ONE),
+            high: ((gains.high * modelled + open + added.high) * weight).min(DVec3::ONE),
         }
+    }
+
+    /// Where Mesa's software driver has the points of a triangle that it shades elsewhere than at the pixel's centre: it
+    /// takes what is interpolated there to the depth of the centre, so the point leaves its plane.
+    fn off_plane(&self, points: &[DVec3]) -> Vec<DVec3> {
+        let to_camera = &self.view.camera_from_world;
+        let world_from_camera = to_camera.inverse();
+        let depths = points
+            .iter()
+            .map(|point| to_camera.transform_point3(*point).z);
+        let center_depth_m = depths.clone().next().unwrap_or(1.0);
+        (points.iter().zip(depths))
+            .map(|(point, depth_m)| {
+                let in_camera = to_camera.transform_point3(*point);
+                world_from_camera.transform_point3(in_camera * (center_depth_m / depth_m))
+            })
+            .collect()
+    }
+
+    /// Whether the depth changes so much from a pixel to the next that those points are anywhere.
+    fn is_edge_on(&self, points: &[DVec3]) -> bool {
+        let to_camera = &self.view.camera_from_world;
+        let depths = points
+            .iter()
+            .map(|point| to_camera.transform_point3(*point).z);
+        let (low, high) = depths.fold((f64::MAX, 0.0_f64), |(low, high), depth_m| {
+            (low.min(depth_m), high.max(depth_m))
+        });
+        high > 1.3 * low
     }
 
     /// Where a ray at a place would meet the plane of a surface.
@@ -275,25 +363,22 @@ impl<'a> Expected<'a> {
         let plane = self.view.intrinsics.plane_from_pixel(place);
         let direction = world_from_camera.transform_vector3(plane.extend(1.0));
         let along = surface.normal.dot(surface.point - eye) / surface.normal.dot(direction);
-        if along.is_finite() && along > 0.0 {
-            eye + direction * along
+        // Seen edge-on the plane may be behind the camera there.
+        let along = if along.is_finite() && along > 0.0 {
+            along
         } else {
-            surface.point
-        }
+            1e3
+        };
+        eye + direction * along
     }
 
-    /// The least and most of it, wherever in the pixel the renderer shades: at the centre or the middle of the samples
-    /// that a triangle has.
-    fn range(&self, center: DVec2, states: &[State]) -> Range {
-        let at_center = self.composite(states, |_| center);
-        if self.samples == 1 {
-            return at_center;
-        }
-        let places = SAMPLES_PX.map(|sample| center + DVec2::from_array(sample));
-        let own = self.composite(states, |index| places[index]);
-        places.iter().fold(at_center.union(own), |range, place| {
-            range.union(self.composite(states, |_| *place))
-        })
+    /// Whether a part of the triangle lies behind the camera: there the driver cuts it.
+    fn reaches_behind(&self, surface: &Surface) -> bool {
+        let corners = self.world.triangles[surface.triangle].corners;
+        let to_camera = &self.view.camera_from_world;
+        corners
+            .iter()
+            .any(|corner| to_camera.transform_point3(*corner).z <= 0.0)
     }
 
     fn is_touched(&self, state: &State) -> bool {
@@ -368,6 +453,15 @@ impl<'a> Expected<'a> {
         if explained(&states) && (touched || is_white && stays) {
             return;
         }
+        let states: Vec<State> = self
+            .sample_places(center)
+            .iter()
+            .map(|place| self.state(*place))
+            .collect();
+        let touched = states.iter().any(|state| self.is_touched(state));
+        if explained(&states) && (touched || is_white && stays) {
+            return;
+        }
         if verdict.wrong >= ENOUGH {
             verdict.wrong += 1;
             return;
@@ -386,14 +480,63 @@ impl<'a> Expected<'a> {
         }
         verdict.wrong += 1;
         let range = self.range(center, &states);
-        let seen = state.surface.map(|s| (s.point, s.normal, s.thing));
+        let of_state = |state: &State| {
+            let Some(surface) = state.surface else {
+                return "nothing".to_owned();
+            };
+            let kind = if surface.role == REAL {
+                "real"
+            } else {
+                "virtual"
+            };
+            format!(
+                "{kind} {} triangle {}{} at {:.5} normal {:.4} arriving {:b} taken {:b}",
+                surface.thing,
+                surface.triangle,
+                if self.reaches_behind(&surface) {
+                    " (reaching behind the camera)"
+                } else {
+                    ""
+                },
+                surface.point,
+                surface.normal,
+                state.arriving,
+                state.taken,
+            )
+        };
+        if std::env::var_os("GNOMON_DEBUG").is_some() {
+            for state in &states {
+                let Some(surface) = state.surface else {
+                    continue;
+                };
+                let corners = self.world.triangles[surface.triangle].corners;
+                let to = &self.view.camera_from_world;
+                for corner in corners {
+                    let c = to.transform_point3(corner);
+                    let px = self.view.intrinsics.pixel_from_plane(c.truncate() / c.z);
+                    eprint!("  {px:.3} z {:.4};", c.z);
+                }
+                let eye = to.inverse().translation;
+                let cosine = (eye - surface.point).normalize().dot(surface.normal);
+                eprintln!(" cos to eye {cosine:.5}");
+                for light in self.lights {
+                    let bits = self.world.bits(&surface, light, 0.0);
+                    let given = irradiance(light, surface.point, surface.normal).x / PI * 0.5;
+                    if let Light::Point { position_m, .. } = light {
+                        let way = *position_m - surface.point;
+                        let sine = way.normalize().dot(surface.normal);
+                        eprint!("    at {:.4} m sine {sine:.4}", way.length());
+                    }
+                    eprintln!("    bits {bits} radiance {given:.4}");
+                }
+            }
+        }
+        let seen: Vec<String> = states.iter().map(of_state).collect();
         verdict.first.push(format!(
-            "pixel {center}: found {found:.3} (stays: {stays}) for {:.3} to {:.3}; role {}, arriving {:b}, taken {:b}, {seen:?}{}",
+            "pixel {center}: found {found:.3} (stays: {stays}) for {:.3} to {:.3}; {}{}",
             range.low,
             range.high,
-            state.role(),
-            state.arriving,
-            state.taken,
+            seen.join(" | "),
             if uniform { ", away from edges" } else { "" },
         ));
     }
@@ -416,7 +559,7 @@ impl<'a> Expected<'a> {
             return;
         }
         let average = |states: &[State]| {
-            let range = self.composite(states, |_| center);
+            let range = self.composite(states, center);
             0.5 * (range.low + range.high)
         };
         let of_area = average(&area);

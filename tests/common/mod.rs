@@ -2,6 +2,7 @@
 #![allow(dead_code)] // Each test binary uses its own part.
 
 pub mod composite;
+pub mod degenerate;
 pub mod judge;
 pub mod photographs;
 pub mod prints;

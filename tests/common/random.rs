@@ -221,7 +221,10 @@ pub fn random_stage(random: &mut Random, broken: bool) -> (Stage, Vec<DVec3>, In
         let middle = std::iter::once(DVec3::ZERO);
         let corners = soup.positions.iter().map(|position| position.as_dvec3());
         places.extend(middle.chain(corners).map(|p| placed.transform_point3(p)));
-        let thing = Thing::made(soup).placed(anchor_from_thing).scaled(scale).faceted();
+        let thing = Thing::made(soup)
+            .placed(anchor_from_thing)
+            .scaled(scale)
+            .faceted();
         if random.chance(0.1) {
             thing.without_shadow()
         } else {
