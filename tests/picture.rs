@@ -4,13 +4,51 @@
 mod common;
 
 use common::composite::{Expected, Verdict};
-use common::degenerate::{degenerate_camera, degenerate_case};
+use common::degenerate::{corners_of, degenerate_camera, degenerate_case};
 use common::random::{Random, random_camera, random_stage};
 use common::{Picture, Stage, frame_of};
+use glam::{DAffine3, DVec3};
 use gnomon::app::truth::ray_cast::View;
 use gnomon::render::Renderer;
 
 const CAMERAS: usize = 2;
+
+/// What a failure is told with.
+fn described(stage: &Stage, view: &View) -> String {
+    let mut text = String::new();
+    let card = stage.world_from_card.unwrap_or_default();
+    let real = stage
+        .phantoms
+        .iter()
+        .map(|thing| ("real", thing, DAffine3::IDENTITY));
+    let seeming = stage.virtuals.iter().map(|thing| ("virtual", thing, card));
+    for (kind, thing, world_from_anchor) in real.chain(seeming) {
+        let corners: Vec<DVec3> = corners_of(thing)
+            .iter()
+            .flatten()
+            .map(|corner| world_from_anchor.transform_point3(*corner))
+            .collect();
+        let low = corners.iter().copied().fold(DVec3::MAX, DVec3::min);
+        let high = corners.iter().copied().fold(DVec3::MIN, DVec3::max);
+        text += &format!(
+            "    {kind}: {} triangles from {low:.4} to {high:.4}{}{}\n",
+            corners.len() / 3,
+            if thing.casts { "" } else { ", casts nothing" },
+            if thing.visible { "" } else { ", hidden" },
+        );
+    }
+    for light in &stage.scene.lights {
+        text += &format!("    {light:?}\n");
+    }
+    let eye = view.camera_from_world.inverse();
+    text += &format!(
+        "    from {:.4} towards {:.4}, on the card {:?}\n",
+        eye.translation,
+        eye.matrix3.z_axis,
+        stage.world_from_card.map(|card| card.translation)
+    );
+    text
+}
 
 /// Draws a stage over white and over noise, and holds both.
 fn judge(stage: &Stage, renderer: &mut Renderer, view: View) -> Verdict {
@@ -41,15 +79,16 @@ struct Run {
 }
 
 impl Run {
-    fn add(&mut self, name: impl Fn() -> String, verdict: &Verdict) {
+    fn add(&mut self, name: impl Fn() -> String, stage: &Stage, view: &View, verdict: &Verdict) {
         self.pictures += 1;
         if verdict.wrong > 0 {
             let first: Vec<&str> = verdict.first.iter().take(3).map(String::as_str).collect();
             self.failures.push(format!(
-                "{}: {} wrong of {} changed\n    {}",
+                "{}: {} wrong of {} changed\n{}    {}",
                 name(),
                 verdict.wrong,
                 verdict.changed,
+                described(stage, view),
                 first.join("\n    ")
             ));
         }
@@ -83,6 +122,8 @@ fn hold_random(count: u64) {
             let samples = stage.scene.shadows.samples;
             run.add(
                 || format!("seed {seed}, camera {camera}, {samples} samples"),
+                &stage,
+                &view,
                 &verdict,
             );
         }
@@ -107,6 +148,8 @@ fn hold_degenerate(count: u64) {
             let name = &case.name;
             run.add(
                 || format!("seed {seed}, camera {camera} ({from}), {samples} samples: {name}"),
+                &case.stage,
+                &view,
                 &verdict,
             );
         }

@@ -166,6 +166,27 @@ impl Range {
     }
 }
 
+fn is_close_to_virtual(stage: &Stage) -> bool {
+    const CLOSE_M: f64 = 0.1;
+    let mut seeming = stage
+        .world
+        .triangles
+        .iter()
+        .filter(|triangle| triangle.role == VIRTUAL);
+    seeming.any(|triangle| {
+        stage.scene.lights.iter().any(|light| match light {
+            Light::Point { position_m, .. } => {
+                let [a, b, c] = triangle.corners;
+                let places = [a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0];
+                places
+                    .iter()
+                    .any(|place| place.distance(*position_m) < CLOSE_M)
+            }
+            Light::Directional { .. } => false,
+        })
+    })
+}
+
 impl<'a> Expected<'a> {
     pub fn new(stage: &'a Stage, view: View) -> Self {
         let of_world = stage.world_from_card.is_none();

@@ -204,7 +204,8 @@ fn things(random: &mut Random) -> (Vec<Thing>, Vec<Thing>, &'static str) {
     }
 }
 
-fn corners_of(thing: &Thing) -> Vec<[DVec3; 3]> {
+/// Of each of its triangles, on its anchor.
+pub fn corners_of(thing: &Thing) -> Vec<[DVec3; 3]> {
     let Shape::Made(soup) = &thing.shape else {
         return Vec::new();
     };

@@ -21,9 +21,9 @@ const COINCIDENT_M: f64 = 1e-9;
 const ROUNDING: f64 = 1e-7;
 /// Sine of the angle up to which two triangles lie in one plane.
 const PARALLEL: f64 = 1e-5;
-/// What hides a light within this part of the way to it is where the light is: a triangle on which the light lies hides
-/// nothing.
-const AT_THE_LIGHT: f64 = 1e-7;
+/// A light no farther from a triangle's plane than this part of the way to its farthest corner (or at no larger sine to it,
+/// if it is distant) lies in it: it sees the triangle edge-on or lies on it, and the triangle hides nothing.
+const IN_THE_PLANE: f64 = 1e-7;
 /// A virtual surface is seen as if it were nearer by this part, so that it wins where it lies in a real one,
 const NEARER: f64 = 1.0 / 65_536.0;
 /// and nearer by so much again than the virtual thing before it.
@@ -188,7 +188,7 @@ impl World {
     pub fn bits(&self, surface: &Surface, light: &Light, lift_m: f64) -> u8 {
         let start = surface.point + surface.normal * lift_m;
         let (to_light, reach) = match *light {
-            Light::Point { position_m, .. } => (position_m - surface.point, 1.0 - AT_THE_LIGHT),
+            Light::Point { position_m, .. } => (position_m - surface.point, 1.0),
             Light::Directional { direction, .. } => (-direction, f64::INFINITY),
         };
         let sine = surface.normal.dot(to_light.normalize());
@@ -198,15 +198,16 @@ impl World {
             near: COINCIDENT_M / to_light.length(),
             reach,
         };
-        // Of a triangle in the same plane it lies neither above nor below.
-        let is_own = |triangle: usize| {
-            let [a, b, c] = self.triangles[triangle].corners;
-            let normal = plane_normal(&[a, b, c]);
+        let hides_nothing = |triangle: usize| {
+            let corners = &self.triangles[triangle].corners;
+            let normal = plane_normal(corners);
+            // Of a triangle in the same plane it lies neither above nor below.
             triangle == surface.triangle
                 || normal.cross(surface.normal).length() < PARALLEL
-                    && surface.normal.dot(a - surface.point).abs() <= surface.tie_m
+                    && surface.normal.dot(corners[0] - surface.point).abs() <= surface.tie_m
+                || is_in_plane(light, corners, normal)
         };
-        let hides = |casters: &Hierarchy| casters.is_hit(&self.triangles, &ray, &is_own);
+        let hides = |casters: &Hierarchy| casters.is_hit(&self.triangles, &ray, &hides_nothing);
         let bit = |holds: bool, bit: u8| if holds { bit } else { 0 };
         bit(sine < 0.0, FACES_AWAY)
             | bit(sine.abs() < GRAZING, GRAZES)
@@ -287,6 +288,17 @@ pub fn sample_places(pixel: DVec2) -> impl Iterator<Item = DVec2> {
 
 fn plane_normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a).normalize()
+}
+
+fn is_in_plane(light: &Light, corners: &[DVec3; 3], normal: DVec3) -> bool {
+    match *light {
+        Light::Point { position_m, .. } => {
+            let ways = corners.map(|corner| corner - position_m);
+            let farthest_m = ways.iter().map(|way| way.length()).fold(0.0, f64::max);
+            normal.dot(ways[0]).abs() <= IN_THE_PLANE * farthest_m
+        }
+        Light::Directional { direction, .. } => normal.dot(direction).abs() <= IN_THE_PLANE,
+    }
 }
 
 /// Index and centre of each pixel.
@@ -454,11 +466,11 @@ impl Hierarchy {
         first
     }
 
-    /// Whether any triangle but those that are the ray's `own` lies on it.
-    fn is_hit(&self, triangles: &[Triangle], ray: &Ray, own: &dyn Fn(usize) -> bool) -> bool {
+    /// Whether any triangle lies on it but those that are `left_out`.
+    fn is_hit(&self, triangles: &[Triangle], ray: &Ray, left_out: &dyn Fn(usize) -> bool) -> bool {
         let mut hit = false;
         self.visit(triangles, ray, |triangle, _| {
-            (!own(triangle)).then(|| {
+            (!left_out(triangle)).then(|| {
                 hit = true;
                 0.0
             })
