@@ -6,10 +6,11 @@ mod common;
 use common::composite::{Expected, Verdict};
 use common::degenerate::{corners_of, degenerate_camera, degenerate_case};
 use common::random::{Random, random_camera, random_stage};
-use common::{Picture, Stage, frame_of};
+use common::{Picture, Stage, frame_of, gpu};
 use glam::{DAffine3, DVec3};
 use gnomon::app::truth::ray_cast::View;
 use gnomon::render::Renderer;
+use gnomon::scene::{Shortcut, Shortcuts};
 
 const CAMERAS: usize = 2;
 
@@ -50,17 +51,51 @@ fn described(stage: &Stage, view: &View) -> String {
     text
 }
 
-/// Draws a stage over white and over noise, and holds both.
+/// Draws a stage over white and over noise, and holds both; the same again without shortcuts, and the layers.
 fn judge(stage: &Stage, renderer: &mut Renderer, view: View) -> Verdict {
-    let size_px = view.intrinsics.size_px;
     let mut random = Random::new(99);
-    let noise = frame_of(size_px, |_| random.below(256) as u8);
+    let noise = frame_of(view.intrinsics.size_px, |_| random.below(256) as u8);
     renderer.upload(&noise).expect("an uploaded frame");
     let noisy = stage.picture(renderer, view.camera_from_world);
-    let white = frame_of(size_px, |_| 255);
+    let white = frame_of(view.intrinsics.size_px, |_| 255);
     renderer.upload(&white).expect("an uploaded frame");
     let picture: Picture = stage.picture(renderer, view.camera_from_world);
-    Expected::new(stage, view).judge(&picture, Some((&noisy, &noise.rgba)))
+    let expected = Expected::new(stage, view);
+    let mut verdict = expected.judge(&picture, Some((&noisy, &noise.rgba)));
+
+    let layers = renderer.layers().expect("layers");
+    let (disagreements, first) = expected.disagreements(&picture, &layers);
+    if disagreements > 0 {
+        verdict.wrong += disagreements;
+        verdict.first.push(format!(
+            "layers: {disagreements} pixels: {}",
+            first.unwrap_or_default()
+        ));
+    }
+    let plain = without_shortcuts(stage, view);
+    let differing = differing(&picture, &plain);
+    if differing > 0 {
+        verdict.wrong += differing;
+        verdict.first.push(format!(
+            "{differing} pixels differ from the picture without shortcuts"
+        ));
+    }
+    verdict
+}
+
+/// With the same levels of detail, for these are meant to show in the last digits.
+fn without_shortcuts(stage: &Stage, view: View) -> Picture {
+    let mut scene = stage.scene.clone();
+    scene.shadows.without = Shortcuts::ALL.with(Shortcut::Levels, false);
+    let mut renderer = Renderer::new(gpu(), &scene, view.intrinsics).expect("a renderer");
+    let white = frame_of(view.intrinsics.size_px, |_| 255);
+    renderer.upload(&white).expect("an uploaded frame");
+    stage.picture(&mut renderer, view.camera_from_world)
+}
+
+fn differing(one: &Picture, other: &Picture) -> usize {
+    let pairs = one.rgba.chunks(4).zip(other.rgba.chunks(4));
+    pairs.filter(|(one, other)| one != other).count()
 }
 
 fn seeds(count: u64) -> std::ops::Range<u64> {
@@ -135,7 +170,22 @@ fn hold_degenerate(count: u64) {
     let mut run = Run::default();
     for seed in seeds(count) {
         let mut random = Random::new(77_000_000 + seed);
-        let case = degenerate_case(&mut random);
+        let mut case = degenerate_case(&mut random);
+        if let Ok(n) = std::env::var("GNOMON_SAMPLES") {
+            case.stage.scene.shadows.samples = n.parse().unwrap();
+        }
+        if let Ok(n) = std::env::var("GNOMON_WITHOUT") {
+            use gnomon::scene::{Shortcut, Shortcuts};
+            case.stage.scene.shadows.without = if n == "all" {
+                Shortcuts::ALL
+            } else {
+                Shortcut::BY_NAME
+                    .iter()
+                    .filter(|(name, _)| *name == n)
+                    .map(|(_, s)| *s)
+                    .collect()
+            };
+        }
         let mut renderer = case.stage.renderer(case.intrinsics);
         for camera in 0..CAMERAS {
             let (camera_from_world, from) = degenerate_camera(&mut random, &case);

@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3};
 use gnomon::app::truth::FACES_AWAY;
 use gnomon::app::truth::ray_cast::{GRAZES, SAMPLES_PX, Surface, View, World, pixels};
 use gnomon::light::{Light, irradiance};
-use gnomon::render::{REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};
+use gnomon::render::{Layers, REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};
 use std::f64::consts::PI;
 
 use super::{Picture, Stage};
@@ -64,7 +64,10 @@ pub struct Expected<'a> {
     /// Irradiance from all around.
     ambient: DVec3,
     /// Of the virtual things.
-    albedos: Vec<f64>,
+    albedos: Vec<DVec3>,
+    /// For each of them whether its normals are those of its triangles. Of others no more is known than what bounds them:
+    /// what no light gives, and what all lights would that shine straight on them.
+    faceted: Vec<bool>,
     /// Radiance that virtual surfaces get beyond what is known, at most, for each unit of albedo: in the world they get the
     /// light that their surroundings throw back, which a table of harmonics or rays knows and this does not.
     unknown: f64,
@@ -166,6 +169,15 @@ impl Range {
     }
 }
 
+/// What a light gives a surface that faces it.
+fn straight_on(light: &Light, point: DVec3) -> DVec3 {
+    let towards = match *light {
+        Light::Point { position_m, .. } => position_m - point,
+        Light::Directional { direction, .. } => -direction,
+    };
+    irradiance(light, point, towards.normalize_or_zero())
+}
+
 fn is_close_to_virtual(stage: &Stage) -> bool {
     const CLOSE_M: f64 = 0.1;
     let mut seeming = stage
@@ -196,11 +208,15 @@ impl<'a> Expected<'a> {
             view,
             lights: &stage.scene.lights,
             ambient: ambient * PI,
-            albedos: stage.virtuals.iter().map(|thing| thing.albedo).collect(),
-            unknown: if of_world {
-                ambient.max_element() + 0.15
-            } else {
-                0.0
+            albedos: (stage.scene.virtuals.iter())
+                .map(|object| object.materials[0].albedo)
+                .collect(),
+            faceted: stage.virtuals.iter().map(|thing| thing.faceted).collect(),
+            unknown: match of_world {
+                false => 0.0,
+                // A spot that a light close by makes bright may throw any light back.
+                true if is_close_to_virtual(stage) => 1e6,
+                true => ambient.max_element() + 0.3,
             },
             samples: stage.scene.shadows.samples as usize,
             centers: Vec::new(),
@@ -289,6 +305,9 @@ impl<'a> Expected<'a> {
             if points.len() > 1 {
                 points.extend(self.off_plane(&points));
             }
+            if self.samples > 1 {
+                points.extend(self.hardly_off_plane(&surface, places(index)[0]));
+            }
             let sum_of = |lights: u32| -> Range {
                 let reaches = |index: &usize| lights >> index & 1 == 1;
                 let at = |point: &DVec3| -> DVec3 {
@@ -305,14 +324,24 @@ impl<'a> Expected<'a> {
             };
             if surface.role == VIRTUAL {
                 let albedo = self.albedos[surface.thing];
-                let lights = sum_of(state.arriving);
                 let least = if self.unknown > 0.0 { 0.0 } else { 1.0 };
+                let unlit = self.ambient * albedo / PI;
+                added.low += unlit * least;
+                added.high += unlit + self.unknown * albedo;
                 if edge_on {
                     added.high += 1.0;
-                    continue;
+                } else if self.faceted[surface.thing] {
+                    let lights = sum_of(state.arriving);
+                    added.low += lights.low * albedo / PI;
+                    added.high += lights.high * albedo / PI;
+                } else {
+                    let straight = self.lights.iter().map(|light| {
+                        points.iter().fold(DVec3::ZERO, |most, point| {
+                            most.max(straight_on(light, *point))
+                        })
+                    });
+                    added.high += straight.sum::<DVec3>() * albedo / PI;
                 }
-                added.low += (lights.low + self.ambient * least) * (albedo / PI);
-                added.high += (lights.high + self.ambient) * (albedo / PI) + self.unknown * albedo;
             } else {
                 let (reaches, takes) = (sum_of(state.arriving), sum_of(state.taken));
                 reaching.low += self.ambient + reaches.low;
@@ -363,6 +392,19 @@ impl<'a> Expected<'a> {
                 world_from_camera.transform_point3(in_camera * (center_depth_m / depth_m))
             })
             .collect()
+    }
+
+    /// The same where all of a pixel is the triangle's: what that driver takes for the middle of its samples is it to so
+    /// small a part of a pixel.
+    fn hardly_off_plane(&self, surface: &Surface, center: DVec2) -> [DVec3; 2] {
+        const OFF_PX: f64 = 1.0 / 64.0;
+        let to_camera = &self.view.camera_from_world;
+        let in_camera = |place: DVec2| to_camera.transform_point3(self.on_plane(surface, place));
+        let point = in_camera(center);
+        let slope = [DVec2::X, DVec2::Y].map(|axis| in_camera(center + axis * OFF_PX).z - point.z);
+        let part = (slope[0].abs() + slope[1].abs()) / point.z;
+        let world_from_camera = to_camera.inverse();
+        [1.0 - part, 1.0 + part].map(|scale| world_from_camera.transform_point3(point * scale))
     }
 
     /// Whether the depth changes so much from a pixel to the next that those points are anywhere.
@@ -560,6 +602,53 @@ impl<'a> Expected<'a> {
             seen.join(" | "),
             if uniform { ", away from edges" } else { "" },
         ));
+    }
+
+    /// Pixels away from edges where the layers say something else than the picture: what is there, which lights reach it, and
+    /// what is left of the video. For the first of them what that is.
+    pub fn disagreements(&self, picture: &Picture, layers: &Layers) -> (usize, Option<String>) {
+        let (mut count, mut first) = (0, None);
+        for (index, center) in pixels(self.view.intrinsics.size_px) {
+            let state = self.centers[index];
+            if state.grazes || !self.is_uniform(index) {
+                continue;
+            }
+            let found = picture.linear(index);
+            // What the layers say, with the exact place to shade.
+            let mut told = State {
+                arriving: 0,
+                taken: 0,
+                ..state
+            };
+            for (light, bits) in layers.shadow.iter().enumerate() {
+                let (real, seeming) = (
+                    bits[index] & REAL_HIDES != 0,
+                    bits[index] & VIRTUAL_HIDES != 0,
+                );
+                let arrives = !real && (state.role() == REAL || !seeming);
+                told.arriving |= u32::from(arrives) << light;
+                told.taken |= u32::from(arrives && seeming && state.role() == REAL) << light;
+            }
+            let gain = DVec3::from_array(layers.gain[index].map(f64::from));
+            let gain_differs = state.role() == REAL && (gain - found).abs().max_element() > 0.01;
+            let states = vec![told; self.samples];
+            let bits_differ = state.role() == REAL && !self.range(center, &states).holds(found);
+            if layers.role[index] != state.role() || gain_differs || bits_differ {
+                // What is thinner than a pixel shows at no centre.
+                let places = self.sample_places(center);
+                if !places.iter().all(|place| self.state(*place).is_like(&state)) {
+                    continue;
+                }
+                count += 1;
+                first.get_or_insert_with(|| {
+                    let role = layers.role[index];
+                    format!(
+                        "pixel {center}: picture {found:.3}, gain {gain:.3}, role {role}, {told:?}"
+                    )
+                });
+            }
+        }
+        (count, first)
     }
 
     fn measure_edge(

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
-use gnomon::app::chart::known_scene::{AMBIENT, KnownScene, Placed};
+use gnomon::app::chart::known_scene::{AMBIENT, KnownScene, Placed, world_of};
 use gnomon::app::truth::ray_cast::{Triangle, View, World};
 use gnomon::capture::Frame;
 use gnomon::geometry::camera::Intrinsics;
@@ -310,6 +310,19 @@ impl Stage {
         };
         stage.place();
         stage
+    }
+
+    /// One whose meshes are its own truth, all in the world, none of them bent smoothly.
+    pub fn of_scene(scene: Scene) -> Self {
+        let stand_in = Thing::made(Soup::default()).faceted();
+        Self {
+            world: world_of(&scene),
+            world_from_card: None,
+            phantoms: vec![stand_in.clone(); scene.phantoms.len()],
+            virtuals: vec![stand_in; scene.virtuals.len()],
+            scales: Vec::new(),
+            scene,
+        }
     }
 
     /// Takes over where its things are now, and which are to be seen.
