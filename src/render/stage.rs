@@ -427,11 +427,9 @@ impl Stage {
     ) -> bool {
         let groups = [&self.view_group, self.casters.light_group()];
         let (things, insides) = (&self.things, &self.insides);
-        let counted = self
-            .casters
-            .counted(things, role, light, insides, |thing| {
-                self.views.offset(self.view_of(thing))
-            });
+        let counted = self.casters.counted(things, role, light, insides, |thing| {
+            self.views.offset(self.view_of(thing))
+        });
         volumes.count(pass, among, role, groups, within, counted)
     }
 

@@ -124,12 +124,7 @@ impl Use<'_> {
 }
 
 impl Surfaces {
-    pub fn new(
-        gpu: &Gpu,
-        layout: &wgpu::PipelineLayout,
-        samples: u32,
-        glossy: bool,
-    ) -> Self {
+    pub fn new(gpu: &Gpu, layout: &wgpu::PipelineLayout, samples: u32, glossy: bool) -> Self {
         let device = &gpu.device;
         let module = shader::module(
             device,
