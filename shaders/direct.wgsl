@@ -26,7 +26,8 @@ fn gain(surface: Surface, outside: bool) -> vec3f {
 
 // A real surface from which virtual things take the light: video · gain in linear light.
 @fragment
-fn hidden_on_real(surface: Surface, @builtin(front_facing) outside: bool) -> @location(0) vec4f {
+fn hidden_on_real(interpolated: Surface, @builtin(front_facing) outside: bool) -> @location(0) vec4f {
+    let surface = recovered(interpolated);
     let recorded = undistorted(vec2i(surface.clip.xy));
     let gain = gain(surface, outside);
     // A surface that loses nothing keeps its picture bit for bit. (To discard it would make the stencil wait for it.)
@@ -35,7 +36,8 @@ fn hidden_on_real(surface: Surface, @builtin(front_facing) outside: bool) -> @lo
 }
 
 @fragment
-fn gain_on_real(surface: Surface, @builtin(front_facing) outside: bool) -> @location(0) vec4f {
+fn gain_on_real(interpolated: Surface, @builtin(front_facing) outside: bool) -> @location(0) vec4f {
+    let surface = recovered(interpolated);
     return vec4f(gain(surface, outside), 1.0);
 }
 
@@ -81,7 +83,8 @@ fn place_in_ambient_light(@location(0) position: vec3f, @location(2) material: v
 override SEEN: f32 = IN_OPEN_LIGHT;
 
 @fragment
-fn light_on_virtual(surface: Surface, @builtin(front_facing) outside: bool) -> Light {
+fn light_on_virtual(interpolated: Surface, @builtin(front_facing) outside: bool) -> Light {
+    let surface = recovered(interpolated);
     let ambient = surface.material.rgb / PI * surface.indirect;
     return Light(
         vec4f(srgb_from_linear(ambient + radiance(surface, outside)), 1.0),

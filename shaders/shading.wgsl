@@ -23,10 +23,24 @@ struct Surface {
     @location(2) @interpolate(flat) material: vec4f,
     // Irradiance from the surroundings, lights aside (light::bounce).
     @location(3) @interpolate(perspective, centroid) indirect: vec3f,
+    @location(4) @interpolate(perspective, centroid) one: f32,
+}
+
+// A surface as it comes from interpolation, put right.
+fn recovered(surface: Surface) -> Surface {
+    let recovery = recovery(surface.one);
+    return Surface(
+        surface.clip,
+        surface.point_in_camera * recovery,
+        surface.normal_in_camera * recovery,
+        surface.material,
+        surface.indirect * recovery,
+        1.0,
+    );
 }
 
 @vertex
-fn place(corner: Corner) -> Surface {
+fn place(corner: Corner, @builtin(vertex_index) index: u32) -> Surface {
     let point = vec4f(corner.position, 1.0);
     return Surface(
         clip_from_point(view, point),
@@ -34,22 +48,28 @@ fn place(corner: Corner) -> Surface {
         (view.camera_from_anchor * vec4f(corner.normal, 0.0)).xyz,
         corner.material,
         corner.indirect,
+        one(index),
     );
 }
 
 fn irradiance(surface: Surface, outside: bool) -> vec3f {
     let arriving = incidence(light, surface.point_in_camera);
-    let normal = normalize(surface.normal_in_camera) * select(-1.0, 1.0, outside);
+    let normal = unit(surface.normal_in_camera) * select(-1.0, 1.0, outside);
     return arriving.irradiance * max(dot(normal, arriving.direction), 0.0);
 }
 
 // Radiance of a virtual surface towards the camera.
 fn radiance(surface: Surface, outside: bool) -> vec3f {
     let arriving = incidence(light, surface.point_in_camera);
-    let normal = normalize(surface.normal_in_camera) * select(-1.0, 1.0, outside);
+    let normal = unit(surface.normal_in_camera) * select(-1.0, 1.0, outside);
     let to_camera = normalize(-surface.point_in_camera);
     let reflected = reflectance(surface.material.rgb, surface.material.a, normal, arriving.direction, to_camera);
     return arriving.irradiance * max(dot(normal, arriving.direction), 0.0) * reflected;
+}
+
+// Where opposite normals meet there is none.
+fn unit(normal: vec3f) -> vec3f {
+    return normal * inverseSqrt(max(dot(normal, normal), 1e-20));
 }
 
 // The BRDF; its CPU twin is `light::reflectance`. Lambert under a dielectric GGX layer (Walter et al. 2007, with Schlick's

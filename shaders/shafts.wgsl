@@ -49,6 +49,7 @@ struct ThrownCorner {
 struct ThrownSurface {
     @builtin(position) clip: vec4f,
     @location(0) @interpolate(perspective, centroid) irradiance: vec3f,
+    @location(1) @interpolate(perspective, centroid) one: f32,
 }
 
 struct PatchSurface {
@@ -57,6 +58,7 @@ struct PatchSurface {
     @location(1) @interpolate(perspective, centroid) weights: vec2f,
     @location(2) @interpolate(flat) rows: vec3u,
     @location(3) @interpolate(flat) list: vec2u,
+    @location(4) @interpolate(perspective, centroid) one: f32,
 }
 
 struct Light {
@@ -68,19 +70,20 @@ struct Light {
 }
 
 @vertex
-fn place_patch(corner: PatchCorner) -> PatchSurface {
+fn place_patch(corner: PatchCorner, @builtin(vertex_index) index: u32) -> PatchSurface {
     return PatchSurface(
         clip_from_point(view, vec4f(corner.position, 1.0)),
         corner.position,
         corner.weights,
         corner.rows,
         corner.list,
+        one(index),
     );
 }
 
 @vertex
-fn place_thrown(corner: ThrownCorner) -> ThrownSurface {
-    return ThrownSurface(clip_from_point(view, vec4f(corner.position, 1.0)), corner.irradiance);
+fn place_thrown(corner: ThrownCorner, @builtin(vertex_index) index: u32) -> ThrownSurface {
+    return ThrownSurface(clip_from_point(view, vec4f(corner.position, 1.0)), corner.irradiance, one(index));
 }
 
 @vertex
@@ -143,11 +146,14 @@ fn transfer(row: u32, source: u32) -> vec3f {
 
 @fragment
 fn light_on_patch(surface: PatchSurface) -> Light {
-    let weights = vec3f(surface.weights, 1.0 - surface.weights.x - surface.weights.y);
+    let recovery = recovery(surface.one);
+    let point_in_world = surface.point_in_world * recovery;
+    let first = surface.weights * recovery;
+    let weights = vec3f(first, 1.0 - first.x - first.y);
     var taken = vec3f(0.0);
     for (var place = 0u; place < surface.list.y; place++) {
         let index = lists[surface.list.x + place];
-        let hidden = hidden(index, surface.point_in_world, false);
+        let hidden = hidden(index, point_in_world, false);
         if hidden > 0.0 {
             let arriving = weights.x * transfer(surface.rows.x, index)
                 + weights.y * transfer(surface.rows.y, index)
@@ -164,13 +170,14 @@ fn light_on_patch(surface: PatchSurface) -> Light {
 // Added to what sources take.
 @fragment
 fn thrown_back(surface: ThrownSurface) -> @location(1) vec4f {
-    return vec4f(-surface.irradiance, 0.0);
+    return vec4f(-surface.irradiance * recovery(surface.one), 0.0);
 }
 
 @fragment
-fn light_on_virtual(surface: Surface, @builtin(front_facing) outside: bool) -> Light {
+fn light_on_virtual(interpolated: Surface, @builtin(front_facing) outside: bool) -> Light {
+    let surface = recovered(interpolated);
     let point_in_world = (frame.world_from_camera * vec4f(surface.point_in_camera, 1.0)).xyz;
-    let normal_in_camera = normalize(surface.normal_in_camera) * select(-1.0, 1.0, outside);
+    let normal_in_camera = unit(surface.normal_in_camera) * select(-1.0, 1.0, outside);
     let normal = (frame.world_from_camera * vec4f(normal_in_camera, 0.0)).xyz;
     var taken = vec3f(0.0);
     for (var index = 0u; index < frame.source_count; index++) {

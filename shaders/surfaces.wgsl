@@ -10,23 +10,27 @@ struct Light {
 }
 
 @fragment
-fn ambient_on_real(surface: Surface) -> Light {
+fn ambient_on_real(interpolated: Surface) -> Light {
+    let surface = recovered(interpolated);
     return Light(vec4f(surface.indirect, 1.0), vec4f(0.0));
 }
 
 @fragment
-fn ambient_on_virtual(surface: Surface) -> Light {
+fn ambient_on_virtual(interpolated: Surface) -> Light {
+    let surface = recovered(interpolated);
     return Light(vec4f(0.0), vec4f(surface.material.rgb / PI * surface.indirect, 1.0));
 }
 
 // Once where the light reaches the surface in the video, and once where virtual things then hide it.
 @fragment
-fn light_on_real(surface: Surface, @builtin(front_facing) outside: bool) -> Light {
+fn light_on_real(interpolated: Surface, @builtin(front_facing) outside: bool) -> Light {
+    let surface = recovered(interpolated);
     let irradiance = vec4f(irradiance(surface, outside), 0.0);
     return Light(irradiance, irradiance);
 }
 
 @fragment
-fn light_on_virtual(surface: Surface, @builtin(front_facing) outside: bool) -> Light {
+fn light_on_virtual(interpolated: Surface, @builtin(front_facing) outside: bool) -> Light {
+    let surface = recovered(interpolated);
     return Light(vec4f(0.0), vec4f(radiance(surface, outside), 0.0));
 }

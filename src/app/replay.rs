@@ -243,7 +243,7 @@ impl Run<'_> {
     fn one_frame(
         &mut self,
         tracked: TrackedFrame,
-        renderer: Option<&mut Renderer>,
+        mut renderer: Option<&mut Renderer>,
         to_files: &SyncSender<DrawnFrame>,
     ) -> Result<()> {
         self.tally.add(&tracked);
@@ -259,6 +259,11 @@ impl Run<'_> {
             .as_ref()
             .is_none_or(|frames| frames.contains(&frame.index));
         let mut render_ms = None;
+        if let (Some(renderer), false) = (&mut renderer, wanted) {
+            // `--frames 25` shows what the whole replay shows in frame 25.
+            let placed: Vec<_> = poses.iter().map(|pose| pose.camera_from_anchor).collect();
+            renderer.pass_over(&placed);
+        }
         if let (Some(renderer), true) = (renderer, wanted) {
             let (drawn, ms) = self
                 .draw(renderer, &frame, &poses)

@@ -16,13 +16,24 @@ use super::uniforms::NEAR_M;
 /// So far may the line move at which a real thing turns away from a light.
 const LARGEST_REAL_FACET_PX: f64 = 1.0;
 
-/// For each thing the index of its level, for the camera and all lights.
+/// A coarser level than the last frame's is taken where it is off by no more than this part of what is allowed: a camera
+/// that trembles about the limit does not make things flip between two levels.
+const COARSER_AT: f64 = 0.75;
+
+/// How much farther than an outline the edge of a thing's shadow on itself may move: by the surface's own error and by
+/// that of what it falls on, on a surface that the light grazes at this sine. Where it grazes more, the edge is fainter
+/// than its shading.
+const OWN_SHADOW: f64 = 2.0 / OWN_SHADOW_SINE;
+const OWN_SHADOW_SINE: f64 = 0.1;
+
+/// For each thing the index of its level, for the camera and all lights; `before` are those of the last frame.
 pub(super) fn chosen_levels(
     things: &[Thing],
     lights: &[Light],
     camera_from_anchor: &[Option<DAffine3>],
     intrinsics: &Intrinsics,
     max_silhouette_error_px: f64,
+    before: &[usize],
 ) -> Vec<usize> {
     let Some(camera_from_world) = camera_from_anchor.first().copied().flatten() else {
         return vec![0; things.len()];
@@ -61,8 +72,10 @@ pub(super) fn chosen_levels(
             }
             let outline_px_per_m = outline_px_per_m(bounds, &view);
             let mut px_per_m = outline_px_per_m;
+            if thing.casts && !lights.is_empty() {
+                px_per_m *= OWN_SHADOW;
+            }
             for &light in lights.iter().filter(|_| thing.casts) {
-                // Its shadow on itself moves no farther than its outline, as the light sees it.
                 let others = things.iter().zip(&placed).enumerate();
                 for (_, (other, placed)) in others.filter(|(other, _)| *other != index) {
                     let Some(placed) = placed
@@ -76,15 +89,25 @@ pub(super) fn chosen_levels(
                     px_per_m = px_per_m.max(shadow_px_per_m(bounds, light, receivers, &view));
                 }
             }
-            let close_enough = |level: &ThingLevel| {
+            // Where `part` of all that is allowed is.
+            let close_enough = |level: &ThingLevel, part: f64| {
                 let (max_px, mean_px) =
                     (level.max_error_m * px_per_m, level.mean_error_m * px_per_m);
                 // The video shows a real thing's own shading, and where that ends its own shadow has to.
                 let facets_show = thing.role == Role::Real
-                    && level.largest_facet_m * outline_px_per_m > LARGEST_REAL_FACET_PX;
-                is_close_enough(max_px, mean_px, max_silhouette_error_px) && !facets_show
+                    && level.largest_facet_m * outline_px_per_m > part * LARGEST_REAL_FACET_PX;
+                is_close_enough(max_px, mean_px, part * max_silhouette_error_px) && !facets_show
             };
-            thing.levels.iter().rposition(close_enough).unwrap_or(0)
+            let mut levels = thing.levels.iter();
+            let surely = levels
+                .rposition(|level| close_enough(level, COARSER_AT))
+                .unwrap_or(0);
+            let kept = before.get(index).copied().unwrap_or(0);
+            let may_stay = |level: &ThingLevel| kept > surely && close_enough(level, 1.0);
+            match thing.levels.get(kept).is_some_and(may_stay) {
+                true => kept,
+                false => surely,
+            }
         })
         .collect()
 }

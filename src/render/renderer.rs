@@ -341,6 +341,11 @@ impl Renderer {
         self.gpu.queue.submit([encoder.finish()]);
     }
 
+    /// Takes note of a frame that is not drawn, so that the next one is what it would be after it.
+    pub fn pass_over(&mut self, camera_from_anchor: &[Option<DAffine3>]) {
+        self.stage.choose_levels(camera_from_anchor);
+    }
+
     /// The picture that is drawn: sRGB-encoded bytes, whatever the format says. It stays the same texture.
     pub fn picture(&self) -> &wgpu::Texture {
         &self.picture

@@ -195,13 +195,7 @@ impl Stage {
             let light = LightSource::new(light, &camera_from_world);
             self.light_sources.write(queue, index, &light);
         }
-        self.levels = chosen_levels(
-            &self.things,
-            &self.lights,
-            camera_from_anchor,
-            &self.intrinsics,
-            self.max_silhouette_error_px,
-        );
+        self.choose_levels(camera_from_anchor);
         let placed = self.things.iter().zip(&self.levels);
         self.insides = placed
             .map(|(thing, &level)| {
@@ -218,6 +212,22 @@ impl Stage {
                 }
             })
             .collect();
+    }
+
+    /// Chooses the levels of detail of a frame, which go by those of the frame before it.
+    pub fn choose_levels(&mut self, camera_from_anchor: &[Option<DAffine3>]) {
+        let before = match self.shadows.without.has(Shortcut::Kept) {
+            true => vec![0; self.levels.len()],
+            false => std::mem::take(&mut self.levels),
+        };
+        self.levels = chosen_levels(
+            &self.things,
+            &self.lights,
+            camera_from_anchor,
+            &self.intrinsics,
+            self.max_silhouette_error_px,
+            &before,
+        );
     }
 
     /// Gives the virtual things' corners the irradiance that a function of place and unit normal (world space) says.

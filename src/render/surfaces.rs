@@ -159,7 +159,10 @@ impl Surfaces {
                 stencil_bits,
                 marks,
                 targets: &targets.map(target),
-                constants: &[("GLOSSY", f64::from(glossy))],
+                constants: &[
+                    ("GLOSSY", f64::from(glossy)),
+                    ("MULTISAMPLED", f64::from(samples > 1)),
+                ],
             };
             usage.pipelines(device, layout, &module, gpu.depth_format, samples)
         };

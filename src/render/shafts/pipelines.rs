@@ -108,7 +108,10 @@ impl Pipelines {
                 false => reaching,
             };
             let targets = [reaching, change];
-            let constants = [("GLOSSY", f64::from(glossy))];
+            let constants = [
+                ("GLOSSY", f64::from(glossy)),
+                ("MULTISAMPLED", f64::from(samples > 1)),
+            ];
             device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(fragment.unwrap_or(vertex)),
                 layout: Some(&pipeline_layout),
