@@ -98,10 +98,10 @@ pub fn covered(
     let Some(bounds) = Bounds::around(pixels) else {
         return PixelRect::NONE;
     };
-    // Casts saturate: what lies outside the picture becomes its edge.
+    // Casts saturate: what lies outside the picture, however far, becomes its edge.
     let [left, top] = [bounds.low.x, bounds.low.y].map(|low| (low - MARGIN_PX).floor() as u32);
     let [right, bottom] =
-        [bounds.high.x, bounds.high.y].map(|high| (high + MARGIN_PX).ceil() as u32 + 1);
+        [bounds.high.x, bounds.high.y].map(|high| (high + MARGIN_PX + 1.0).ceil() as u32);
     whole.intersection(PixelRect {
         low: [left, top],
         high: [right, bottom],
@@ -264,6 +264,37 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn a_side_in_the_caster_s_own_plane_cuts_off_what_light_leaves_through_it_alone() {
+        // A card at the very top of all receivers: light comes in there, and its shadow lies on the table.
+        let receivers = Bounds {
+            low: DVec3::new(-0.6, -0.5, 0.0),
+            high: DVec3::new(0.6, 0.5, 0.12),
+        };
+        let card = Bounds {
+            low: DVec3::new(-0.02, -0.03, 0.12),
+            high: DVec3::new(0.06, 0.03, 0.12),
+        };
+        let reached = |light: LightPlace| {
+            shadowed(
+                &card.corners(),
+                light,
+                &receivers,
+                &looking_down(),
+                &CAMERA,
+            )
+        };
+        // From (-0.3, 0, 0.6) the card's corners fall on x = 0.05 to 0.15 of the table: pixels 349.5 to 409.5.
+        let lamp = reached(LightPlace::Point(DVec3::new(-0.3, 0.0, 0.6)));
+        assert!(lamp.low[0] <= 349 && lamp.high[0] >= 410, "{lamp:?}");
+        assert!(lamp.high[0] <= 414, "{lamp:?}");
+        let sun = reached(LightPlace::Along(DVec3::new(0.6, 0.0, -0.8)));
+        assert!(sun.high[0] >= 409, "{sun:?}");
+        // A ray that hardly leaves through a side leaves it very far away.
+        let nearly_above = DVec3::new(-0.02 - 1e-9, 0.0, 0.6);
+        assert!(!reached(LightPlace::Point(nearly_above)).is_empty());
     }
 
     #[test]
