@@ -2,7 +2,7 @@
 # Mesa's layer that asks the desktop for its favourite card complains on machines without a desktop; gnomon chooses itself.
 export NODEVICE_SELECT = 1
 
-.PHONY: demo test test-camera soak charts reference bench bench-volumes bench-tracking setup
+.PHONY: demo test test-camera soak charts reference bench bench-volumes bench-tracking setup setup-tests
 
 demo: setup
 	cargo build --release
@@ -14,7 +14,7 @@ demo: setup
 	@echo "  out/lamp_poses.csv   where the camera was"
 	@echo "  out/lamp_stats.json  how long each stage took"
 
-test: setup
+test: setup-tests
 	cargo fmt --check
 	cargo clippy --release --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps
@@ -56,3 +56,6 @@ bench-tracking: setup
 
 setup:
 	@scripts/setup
+
+setup-tests:
+	@scripts/setup tests

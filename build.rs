@@ -1,4 +1,5 @@
-//! Compiles the libapriltag shim against the installed header and tells which OpenCV module holds ArUco.
+//! Compiles the libapriltag shim against the installed header, tells which OpenCV module holds ArUco, and which tests have
+//! what they need.
 
 use std::path::{Path, PathBuf};
 
@@ -9,6 +10,7 @@ fn main() {
     if aruco_is_in_contrib() {
         println!("cargo::rustc-cfg=aruco_in_contrib");
     }
+    tell_what_tests_have();
 }
 
 /// The structs of libapriltag differ between its releases, so the C compiler reads them from the installed header.
@@ -58,4 +60,39 @@ fn aruco_is_in_contrib() -> bool {
         .map(|part| part.parse::<u32>().unwrap_or(0));
     let version = (parts.next().unwrap_or(0), parts.next().unwrap_or(0));
     version < (4, 7)
+}
+
+/// Tests of what is not there count as ignored, with the reason. `has_shared`: the recordings and photographs beside the
+/// project, which are not shipped with it; `has_xvfb`: the programs that show a window without a screen and press its keys.
+///
+/// Only what is there is watched, as cargo builds anew each time for a path that is missing. What came later is seen once
+/// this file is touched, which `scripts/setup tests` does when it has installed something.
+fn tell_what_tests_have() {
+    println!("cargo::rustc-check-cfg=cfg(has_shared)");
+    println!("cargo::rustc-check-cfg=cfg(has_xvfb)");
+    let shared = Path::new("../shared");
+    let parts = ["sessions", "real", "stability"];
+    if parts.iter().all(|part| shared.join(part).is_dir()) {
+        println!("cargo::rustc-cfg=has_shared");
+        // The folders are large, and cargo would look at each file.
+        watch_if_there(&shared.join("DESIGN.md"));
+    }
+    if let (Some(xvfb), Some(xdotool)) = (on_path("Xvfb"), on_path("xdotool")) {
+        println!("cargo::rustc-cfg=has_xvfb");
+        watch_if_there(&xvfb);
+        watch_if_there(&xdotool);
+    }
+}
+
+fn watch_if_there(path: &Path) {
+    if path.exists() {
+        println!("cargo::rerun-if-changed={}", path.display());
+    }
+}
+
+fn on_path(program: &str) -> Option<PathBuf> {
+    let folders = std::env::var_os("PATH")?;
+    std::env::split_paths(&folders)
+        .map(|folder| folder.join(program))
+        .find(|path| path.is_file())
 }

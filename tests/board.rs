@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 
 use assert_cmd::Command;
+use common::photographs::photographs;
 use common::project_file;
 use common::random::Random;
 use common::sheets;
@@ -566,12 +567,9 @@ fn the_board_of_a_session_is_learnt_from_its_video() {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
 fn the_grid_of_the_photographs_is_learnt_from_them() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/real/yac_mocap");
-    if !folder.is_dir() {
-        eprintln!("skipped: {} is not there", folder.display());
-        return;
-    }
+    let folder = photographs("yac_mocap");
     let temporary = tempfile::tempdir().unwrap();
     let calibration = temporary.path().join("camera.toml");
     let text = "size_px = [640, 480]\nfocal_px = [606.57, 609.98]\ncenter_px = [324.44, 245.65]\n\

@@ -438,10 +438,9 @@ fn mistakes_are_told_and_leave_nothing() {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
 fn the_photographs_of_a_wall_give_their_cameras_calibration() {
-    let Some(folder) = photographs::photographs("swatbotics/mapping_feb_2014/calibration") else {
-        return;
-    };
+    let folder = photographs::photographs("swatbotics/mapping_feb_2014/calibration");
     let here = tempfile::tempdir().expect("a folder");
     let arguments = "--chessboard 7x5 --square-mm 30 --out camera.toml";
     let output = gnomon(
@@ -473,10 +472,9 @@ fn the_photographs_of_a_wall_give_their_cameras_calibration() {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
 fn a_photographed_charuco_board_is_found_whole() {
-    let Some(folder) = photographs::photographs("opencv_tutorial") else {
-        return;
-    };
+    let folder = photographs::photographs("opencv_tutorial");
     let target = charuco_of([5, 7], 0.04, 0.02, "DICT_6X6_250");
     let mut finder = TargetFinder::new(target).expect("a finder");
     for (name, fewest) in [("choriginal.jpg", 24), ("chocclusion_original.jpg", 12)] {

@@ -1,10 +1,17 @@
 //! `gnomon chart` as a user types it: what it writes, that it goes on where it was, and that an interrupt leaves whole
 //! files.
 
+#[cfg(unix)]
+#[path = "common/signals.rs"]
+mod signals;
+
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
+
+#[cfg(unix)]
+use signals::Signal;
 
 fn chart(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_gnomon"));
@@ -41,6 +48,7 @@ fn mistakes_are_told() {
     assert!(!folder.path().join("out").exists());
 }
 
+#[cfg(unix)]
 #[test]
 fn an_interrupt_leaves_what_was_measured_and_a_rerun_goes_on() {
     let folder = tempfile::tempdir().unwrap();
@@ -61,10 +69,7 @@ fn an_interrupt_leaves_what_was_measured_and_a_rerun_goes_on() {
         assert!(running.try_wait().unwrap().is_none(), "it ended by itself");
         std::thread::sleep(Duration::from_millis(5));
     }
-    let stopped = Command::new("kill")
-        .args(["-INT", &running.id().to_string()])
-        .status();
-    assert!(stopped.unwrap().success());
+    signals::send(Signal::INT, running.id()).unwrap();
     let ended = running.wait_with_output().unwrap();
     assert!(!ended.status.success());
     assert!(said(&ended).contains("interrupted"), "{}", said(&ended));

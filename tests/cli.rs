@@ -9,6 +9,8 @@ use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
 use common::project_file;
+#[cfg(unix)]
+use common::signals::{self, Signal};
 use gnomon::capture::FrameSource;
 
 const HEADER: &str =
@@ -527,17 +529,20 @@ fn damaged_picture_in_a_folder() {
     );
 }
 
+#[cfg(unix)]
 #[test]
 fn interrupt_leaves_a_whole_video() {
-    stop_midway("-INT");
+    stop_midway(Signal::INT);
 }
 
+#[cfg(unix)]
 #[test]
 fn termination_leaves_a_whole_video() {
-    stop_midway("-TERM");
+    stop_midway(Signal::TERM);
 }
 
-fn stop_midway(signal: &str) {
+#[cfg(unix)]
+fn stop_midway(signal: Signal) {
     let folder = tempfile::tempdir().expect("a run that can be stopped");
     // Long enough for any card to be in the midst of it.
     let inputs = tempfile::tempdir().expect("a folder");
@@ -567,12 +572,7 @@ fn stop_midway(signal: &str) {
         std::thread::sleep(Duration::from_millis(20));
     }
     std::thread::sleep(Duration::from_millis(1500));
-    // The shell's own `kill`: a small system has no other.
-    let told = Process::new("sh")
-        .args(["-c", &format!("kill {signal} {}", child.id())])
-        .status()
-        .expect("a run that can be stopped");
-    assert!(told.success(), "it was over already");
+    signals::send(signal, child.id()).expect("a run that can be stopped");
     let output = child.wait_with_output().expect("a run that can be stopped");
     let said = stderr(&output);
     assert!(!output.status.success(), "{said}");

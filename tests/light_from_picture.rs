@@ -3,8 +3,6 @@
 
 mod common;
 
-use std::path::PathBuf;
-
 use common::random::Random;
 use glam::{DAffine3, DVec2, DVec3};
 use gnomon::app::authoring::{FoundLight, PicturedThings, ShadowClick};
@@ -186,11 +184,9 @@ fn the_lamp_is_found_from_clicks_that_are_off() {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared/sessions")]
 fn the_lamp_of_the_shared_session_is_found() {
-    let folder: PathBuf = common::project_file("../shared/sessions/lamp");
-    if !folder.exists() {
-        return;
-    }
+    let folder = common::project_file("../shared/sessions/lamp");
     let scene = scene("lamp");
     let intrinsics = load_calibration(&folder.join("session.json")).expect("a calibration");
     for key in key_frames(&folder, &scene.anchors).expect("key frames") {

@@ -6,12 +6,18 @@
     reason = "a test may stop where its own files fail"
 )]
 
+#[cfg(unix)]
+#[path = "common/signals.rs"]
+mod signals;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command as Process, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
 use gnomon::capture::{Frame, FrameSource};
+#[cfg(unix)]
+use signals::Signal;
 
 fn project_file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
@@ -191,10 +197,7 @@ fn a_kill_of_the_encoder_too_costs_no_more_than_the_last_moment() {
     let encoder = encoder_of(child.id()).expect("ffmpeg");
     std::thread::sleep(Duration::from_millis(2500));
     child.kill().unwrap();
-    let killed = Process::new("kill")
-        .args(["-9", &encoder.to_string()])
-        .status();
-    assert!(killed.unwrap().success());
+    signals::send(Signal::KILL, encoder).unwrap();
     child.wait().unwrap();
     wait_until_settled(&session);
     let frames = assert_begins_as_lamp(&session);
@@ -208,14 +211,7 @@ fn an_interrupt_ends_a_recording_well() {
     let session = folder.path().join("session");
     let child = start_recording(&session);
     std::thread::sleep(Duration::from_millis(500));
-    let pid = child.id().to_string();
-    assert!(
-        Process::new("kill")
-            .args(["-INT", &pid])
-            .status()
-            .unwrap()
-            .success()
-    );
+    signals::send(Signal::INT, child.id()).unwrap();
     let output = child.wait_with_output().unwrap();
     assert!(output.status.success(), "{}", said(&output));
     let frames = assert_begins_as_lamp(&session);
@@ -320,6 +316,7 @@ fn cameras_says_when_there_is_none() {
 }
 
 /// ffmpeg serves a video over HTTP as a phone's camera app does, once.
+#[cfg(unix)]
 #[test]
 fn a_stream_is_tracked_until_an_interrupt() {
     let port = std::net::TcpListener::bind("127.0.0.1:0")
@@ -356,14 +353,7 @@ fn a_stream_is_tracked_until_an_interrupt() {
         .spawn()
         .unwrap();
     std::thread::sleep(Duration::from_millis(6000));
-    let pid = child.id().to_string();
-    assert!(
-        Process::new("kill")
-            .args(["-INT", &pid])
-            .status()
-            .unwrap()
-            .success()
-    );
+    signals::send(Signal::INT, child.id()).unwrap();
     let output = child.wait_with_output().unwrap();
     server.kill().unwrap();
     server.wait().unwrap();

@@ -1,4 +1,5 @@
-//! Tracking on photographs with real markers and what is known of them; `common/photographs.rs` says where they lie.
+//! Tracking on photographs with real markers and what is known of them; `common/photographs.rs` says where they lie,
+//! and build.rs whether they are there.
 
 mod common;
 
@@ -18,10 +19,9 @@ use common::sheets::{
 };
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
 fn photographs_of_a_room_show_the_markers_that_people_counted() {
-    let Some(folder) = photographs("swatbotics/mapping_feb_2014") else {
-        return;
-    };
+    let folder = photographs("swatbotics/mapping_feb_2014");
     let truth = std::fs::read_to_string(folder.join("groundtruth.txt")).unwrap();
     let full = TrackingSettings {
         decimation: 1.0,
@@ -58,10 +58,9 @@ fn photographs_of_a_room_show_the_markers_that_people_counted() {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
 fn photographs_of_a_turned_tag_show_its_turn() {
-    let Some(folder) = photographs("duckietown") else {
-        return;
-    };
+    let folder = photographs("duckietown");
     let camera = Intrinsics {
         size_px: [1056, 792],
         focal_px: DVec2::new(329.8729619143081, 332.94611303946357),
@@ -139,10 +138,9 @@ fn april_grid() -> Vec<Marker> {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
 fn photographs_of_an_april_grid_show_all_its_tags() {
-    let Some(folder) = photographs("yac_mocap") else {
-        return;
-    };
+    let folder = photographs("yac_mocap");
     let camera = Intrinsics {
         size_px: [640, 480],
         focal_px: DVec2::new(606.57, 609.98),
@@ -385,10 +383,9 @@ fn solved(rows: &mut [Vec<f64>]) -> [f64; 12] {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
 fn photographs_of_an_april_grid_agree_with_motion_capture() {
-    let Some(folder) = photographs("yac_mocap") else {
-        return;
-    };
+    let folder = photographs("yac_mocap");
     let bodies = captured_poses(&folder.join("body0/data.csv"));
     let targets = captured_poses(&folder.join("target0/data.csv"));
     // The target lies still; its jitter is the instrument's.
@@ -514,10 +511,9 @@ fn camera_of(frame: &Frame) -> Intrinsics {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
 fn photographs_of_a_clipboard_show_its_tags() {
-    let Some(folder) = photographs("swatbotics/clipboard") else {
-        return;
-    };
+    let folder = photographs("swatbotics/clipboard");
     // Ten more than it has.
     let anchors = lone_markers(Family::TAG36H11, 0..40, 0.02);
     // Of those pictures that show the clipboard whole.
@@ -549,10 +545,9 @@ fn photographs_of_a_clipboard_show_its_tags() {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
 fn photographs_of_a_hallway_show_one_tag_each() {
-    let Some(folder) = photographs("swatbotics/hallway") else {
-        return;
-    };
+    let folder = photographs("swatbotics/hallway");
     let anchors = lone_markers(Family::TAG36H11, 0..30, 0.16);
     for (file, id) in pictures_in(&folder).iter().zip([3, 3, 2, 2, 10]) {
         let frame = read_photograph(file);
@@ -567,10 +562,9 @@ fn photographs_of_a_hallway_show_one_tag_each() {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
 fn photographs_of_road_signs_show_their_tags() {
-    let Some(folder) = photographs("duckietown") else {
-        return;
-    };
+    let folder = photographs("duckietown");
     let camera = |focal_px, center_px| Intrinsics {
         size_px: [640, 480],
         focal_px,
@@ -607,10 +601,9 @@ fn photographs_of_road_signs_show_their_tags() {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
 fn photographs_of_the_aruco_tutorials_show_their_markers() {
-    let Some(folder) = photographs("opencv_tutorial") else {
-        return;
-    };
+    let folder = photographs("opencv_tutorial");
     let predefined = Family::from_name("DICT_6X6_250").expect("a dictionary");
     let own = Family::from_file(&folder.join("tutorial_dict.yml")).expect("a dictionary");
     assert_eq!(own.id_count(), 35);

@@ -9,6 +9,8 @@ pub mod prints;
 pub mod random;
 pub mod shapes;
 pub mod sheets;
+#[cfg(unix)]
+pub mod signals;
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
