@@ -8,6 +8,7 @@
 use glam::{DVec2, DVec3};
 use gnomon::app::truth::FACES_AWAY;
 use gnomon::app::truth::ray_cast::{Exact, GRAZES, SAMPLES_PX, Surface, View, World, pixels};
+use gnomon::geometry::mesh::Mesh;
 use gnomon::light::{Light, irradiance};
 use gnomon::render::{Layers, REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};
 use std::f64::consts::PI;
@@ -198,6 +199,15 @@ fn straight_on(light: &Light, point: DVec3) -> DVec3 {
     irradiance(light, point, towards.normalize_or_zero())
 }
 
+fn is_faceted(mesh: &Mesh) -> bool {
+    let triangles = mesh.triangles.iter().zip(&mesh.corner_normals);
+    triangles.into_iter().all(|(corners, normals)| {
+        let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize].as_dvec3());
+        let normal = (b - a).cross(c - a).normalize_or_zero().as_vec3();
+        normals.iter().all(|corner| corner.distance(normal) < 1e-4)
+    })
+}
+
 fn is_close_to_virtual(stage: &Stage) -> bool {
     const CLOSE_M: f64 = 0.1;
     let mut seeming = stage
@@ -237,7 +247,12 @@ impl<'a> Expected<'a> {
             albedos: (stage.scene.virtuals.iter())
                 .map(|object| object.materials[0].albedo)
                 .collect(),
-            faceted: stage.virtuals.iter().map(|thing| thing.faceted).collect(),
+            faceted: stage
+                .scene
+                .virtuals
+                .iter()
+                .map(|object| is_faceted(&object.mesh))
+                .collect(),
             unknown: match of_world {
                 false => 0.0,
                 // A spot that a light close by makes bright may throw any light back.
@@ -695,6 +710,24 @@ impl<'a> Expected<'a> {
         verdict.edges.add((found - of_area).abs().max_element());
         let pattern = average(states) - of_area;
         verdict.pattern.add(pattern.abs().max_element());
+    }
+
+    /// Whether an edge passes a sample of a pixel so closely that snapping alone decides between two pictures of it.
+    pub fn is_snapped(&self, index: usize, center: DVec2) -> bool {
+        let differs = |place: &DVec2| {
+            let state = self.state(*place);
+            (0..PLACES_IN_RING).any(|step| {
+                let turn = step as f64 / PLACES_IN_RING as f64 * 2.0 * PI;
+                let around = self.state(*place + DVec2::from_angle(turn) * RINGS_PX[0]);
+                !around.is_like(&state)
+            })
+        };
+        let on_edge = |place: &DVec2| {
+            let mut lights = self.lights.iter();
+            lights.any(|light| self.world.is_on_edge(&self.view, *place, light))
+        };
+        let places = self.sample_places(center);
+        self.centers[index].grazes || places.iter().any(|place| differs(place) || on_edge(place))
     }
 
     /// States all over a pixel.

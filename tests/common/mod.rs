@@ -379,9 +379,8 @@ impl Stage {
     }
 
     /// The composite and its layers.
-    pub fn shoot(&self, renderer: &mut Renderer, camera_from_world: DAffine3) -> (Vec<u8>, Layers) {
-        renderer.draw(&self.poses(camera_from_world), Shown::Composite);
-        let picture = renderer.read_picture().expect("a picture");
+    pub fn shoot(&self, renderer: &mut Renderer, camera_from_world: DAffine3) -> (Picture, Layers) {
+        let picture = self.picture(renderer, camera_from_world);
         (picture, renderer.layers().expect("layers"))
     }
 }
