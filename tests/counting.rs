@@ -4,7 +4,7 @@
 mod common;
 
 use common::random::{Random, random_camera, random_stage};
-use common::{Stage, Thing, lamp, look_at, project_file, shapes, stability_row, sun};
+use common::{Picture, Stage, Thing, lamp, look_at, project_file, shapes, stability_row, sun};
 use glam::{DAffine3, DVec2, DVec3, Vec3};
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::light::Light;
@@ -31,7 +31,7 @@ fn hold(name: &str, stage: &mut Stage, intrinsics: Intrinsics, cameras: &[DAffin
             let pairs = a.chunks(of).zip(b.chunks(of));
             pairs.filter(|(one, other)| one != other).count()
         };
-        let picture = differing(4, &ours.0, &theirs.0);
+        let picture = differing(4, &ours.0.rgba, &theirs.0.rgba);
         assert_eq!(picture, 0, "{name}, camera {camera}: pixels of the picture");
         let lights = ours.1.shadow.iter().zip(&theirs.1.shadow);
         for (light, (one, other)) in lights.enumerate() {
@@ -128,11 +128,9 @@ fn one_light_and_one_sample_need_no_sums() {
         let apart = gains.map(|(one, other)| (one[0] - other[0]).abs());
         let apart = apart.fold(0.0, f32::max);
         assert!(apart <= 4.0 * f32::EPSILON, "seed {seed}: {apart} apart");
-        let colors = |picture: &[u8]| {
-            picture
-                .chunks(4)
-                .map(|p| [p[0], p[1], p[2]])
-                .collect::<Vec<_>>()
+        let colors = |picture: &Picture| -> Vec<[u8; 3]> {
+            let pixels = 0..picture.rgba.len() / 4;
+            pixels.map(|index| picture.pixel(index)).collect()
         };
         assert!(
             colors(&direct) == colors(&summed),

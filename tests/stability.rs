@@ -1,9 +1,10 @@
-//! Where shadow methods fail, row by row (`../shared/stability.md`, first table): shadows held against ray casts in
-//! double precision. At most 0.02 % wrong pixels, and none of them farther than 1.5 px from an edge.
+//! Where shadow methods fail, row by row (`../shared/stability.md`, first table): composites held against ray casts in
+//! double precision, and the layers: at most 0.02 % wrong pixels, and none of them farther than 1.5 px from an edge.
 
 mod common;
 
-use common::judge::{gain_error, shadow_error};
+use common::composite::Expected;
+use common::judge::shadow_error;
 use common::random::Random;
 use common::shapes::{self, Soup};
 use common::{Stage, Thing, lamp, look_at, look_with_up, project_file, stability_row, sun};
@@ -13,6 +14,7 @@ use gnomon::app::truth::ray_cast::{Ray, Triangle, View, World, is_uniform};
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::light::Light;
 use gnomon::render::{Layers, REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};
+use gnomon::scene::ShadowSettings;
 use std::path::Path;
 
 const MOST_WRONG_PCT: f64 = 0.02;
@@ -29,12 +31,12 @@ fn bar(name: &str, stage: &Stage, view: &View) -> Layers {
     hold(name, stage, view, 200)
 }
 
-/// Holds each light's bits and the picture's gain; `least_shadowed` real pixels must lie in a virtual shadow, or the
-/// row would show nothing.
+/// Holds the composite with one and four samples, each light's bits, and the gain of the layers; `least_shadowed` real
+/// pixels must lie in a virtual shadow, or the row would show nothing.
 fn hold(name: &str, stage: &Stage, view: &View, least_shadowed: usize) -> Layers {
     let lights = &stage.scene.lights;
     let mut renderer = stage.renderer(view.intrinsics);
-    let (_, layers) = stage.shoot(&mut renderer, view.camera_from_world);
+    let (picture, layers) = stage.shoot(&mut renderer, view.camera_from_world);
     let exact = stage.world.cast(lights, view, 0.0);
     let mut failures = Vec::new();
     let mut shadowed = 0;
@@ -50,11 +52,30 @@ fn hold(name: &str, stage: &Stage, view: &View, least_shadowed: usize) -> Layers
             failures.push(format!("light {index}: {error:?}"));
         }
     }
-    let ambient = stage.scene.ambient_radiance;
-    let gain = gain_error(&stage.world, view, &exact, lights, ambient, &layers);
-    eprintln!("{name}: {gain:?}");
-    if gain.wrong > 0 {
-        failures.push(format!("{gain:?}"));
+    let expected = Expected::of_exact(stage, *view, &exact);
+    let (disagreeing, first) = expected.disagreements(&picture, &layers);
+    if let Some(first) = first {
+        failures.push(format!(
+            "{disagreeing} pixels differ from their layers: {first}"
+        ));
+    }
+    let of_four = expected.judge(&picture, None);
+    let once = ShadowSettings {
+        samples: 1,
+        ..stage.scene.shadows
+    };
+    let mut renderer = stage.renderer_of(once, view.intrinsics);
+    let picture = stage.picture(&mut renderer, view.camera_from_world);
+    let of_one = expected.with_samples(1).judge(&picture, None);
+    for (samples, verdict) in [(4, of_four), (1, of_one)] {
+        eprintln!("{name}, {samples} samples: {}", verdict.summary());
+        if verdict.wrong > 0 {
+            let first = verdict.first.join("\n");
+            failures.push(format!(
+                "{samples} samples: {} wrong: {first}",
+                verdict.wrong
+            ));
+        }
     }
     assert!(shadowed >= least_shadowed, "{name}: {shadowed} shadowed");
     assert!(failures.is_empty(), "{name}: {}", failures.join("; "));

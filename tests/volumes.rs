@@ -3,7 +3,8 @@
 
 mod common;
 
-use common::judge::{ENOUGH, gain_error, is_edge};
+use common::composite::{Expected, Verdict};
+use common::judge::{ENOUGH, is_edge};
 use common::random::{Random, random_camera, random_stage};
 use common::shapes;
 use common::{Stage, Thing, lamp, linear_of_level, look_at, sun};
@@ -21,7 +22,7 @@ use std::f64::consts::PI;
 const SCENES: u64 = 330;
 const CAMERAS: usize = 3;
 
-/// Holds every light's bits and the picture's gain in all scenes of a kind.
+/// Holds every light's bits and the composite in all scenes of a kind.
 fn hold_random(broken: bool) {
     let only: Option<u64> = std::env::var("GNOMON_SEED")
         .ok()
@@ -29,6 +30,7 @@ fn hold_random(broken: bool) {
     let seeds = only.map_or(0..SCENES, |seed| seed..seed + 1);
     let (mut cases, mut compared, mut shadowed) = (0, 0, 0);
     let mut failures = Vec::new();
+    let mut sum = Verdict::default();
     for seed in seeds {
         let mut random = Random::new(2 * seed + u64::from(broken));
         let (stage, places, intrinsics) = random_stage(&mut random, broken);
@@ -39,7 +41,7 @@ fn hold_random(broken: bool) {
                 intrinsics,
                 camera_from_world: random_camera(&mut random, &places, lights),
             };
-            let (_, layers) = stage.shoot(&mut renderer, view.camera_from_world);
+            let (picture, layers) = stage.shoot(&mut renderer, view.camera_from_world);
             let exact = stage.world.cast(lights, &view, 0.0);
             for light in 0..lights.len() {
                 cases += 1;
@@ -51,14 +53,24 @@ fn hold_random(broken: bool) {
                     format!("seed {seed}, camera {camera}, light {light}: {failure}")
                 }));
             }
-            let ambient = stage.scene.ambient_radiance;
-            let gain = gain_error(&stage.world, &view, &exact, lights, ambient, &layers);
-            if gain.wrong > 0 {
-                failures.push(format!("seed {seed}, camera {camera}: {gain:?}"));
+            let expected = Expected::of_exact(&stage, view, &exact);
+            let verdict = expected.judge(&picture, None);
+            if verdict.wrong > 0 {
+                let (wrong, first) = (verdict.wrong, verdict.first.join("\n"));
+                failures.push(format!(
+                    "seed {seed}, camera {camera}: {wrong} wrong: {first}"
+                ));
             }
+            if let (count, Some(first)) = expected.disagreements(&picture, &layers) {
+                failures.push(format!(
+                    "seed {seed}, camera {camera}: {count} pixels differ from their layers: {first}"
+                ));
+            }
+            sum.join(&verdict);
         }
     }
     eprintln!("{cases} cases, {compared} pixels, {shadowed} of them in a virtual shadow");
+    eprintln!("{}", sum.summary());
     assert!(
         failures.is_empty(),
         "{} of {cases} cases (run one by GNOMON_SEED=n):\n{}",
@@ -155,7 +167,7 @@ fn edges_are_as_smooth_as_four_samples_can_make_them() {
             intrinsics,
             camera_from_world: look_at(turn.extend(0.5), DVec3::new(0.02, 0.02, 0.0)),
         };
-        let (_, layers) = stage.shoot(&mut renderer, view.camera_from_world);
+        let picture = stage.picture(&mut renderer, view.camera_from_world);
         let exact = stage.world.cast(&[light], &view, 0.0);
         let hidden = |place: DVec2| {
             let seen = stage.world.look(&view, place).filter(|s| s.role == REAL);
@@ -186,7 +198,7 @@ fn edges_are_as_smooth_as_four_samples_can_make_them() {
             if share(&area) == 0.0 || share(&area) == 1.0 {
                 continue;
             }
-            let found = (1.0 - f64::from(layers.gain[index][0])) / (1.0 - dark);
+            let found = (1.0 - picture.linear(index).x) / (1.0 - dark);
             errors.push(found - share(&area));
             pattern_errors.push(share(&samples) - share(&area));
         }
@@ -267,7 +279,7 @@ fn hold_smooth_sphere(
     );
     let albedo = stage.scene.virtuals[0].materials[0].albedo;
     let mut renderer = stage.renderer(view.intrinsics);
-    let (picture, _) = stage.shoot(&mut renderer, view.camera_from_world);
+    let picture = stage.picture(&mut renderer, view.camera_from_world);
     let of_sphere = soup.triangles.len();
     let others = World::new(stage.world.triangles[of_sphere..].to_vec());
     // Radiance of a place on the sphere.
@@ -304,8 +316,8 @@ fn hold_smooth_sphere(
             low = low.min(radiance(surface));
             high = high.max(radiance(surface));
         }
-        let found = linear_of_level(f64::from(picture[4 * index]));
-        let level = f64::from(picture[4 * index]);
+        let level = f64::from(picture.pixel(index)[0]);
+        let found = linear_of_level(level);
         let (least, most) = (linear_of_level(level - 1.5), linear_of_level(level + 1.5));
         held += 1;
         let [a, b, c] = stage.world.triangles[within[12].triangle].corners;

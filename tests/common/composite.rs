@@ -7,7 +7,8 @@
 
 use glam::{DVec2, DVec3};
 use gnomon::app::truth::FACES_AWAY;
-use gnomon::app::truth::ray_cast::{GRAZES, SAMPLES_PX, Surface, View, World, pixels};
+use gnomon::app::truth::ray_cast::{Exact, GRAZES, SAMPLES_PX, Surface, View, World, pixels};
+use gnomon::geometry::mesh::Mesh;
 use gnomon::light::{Light, irradiance};
 use gnomon::render::{Layers, REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};
 use std::f64::consts::PI;
@@ -28,16 +29,36 @@ const ENOUGH: usize = 12;
 /// What is seen at a place and which lights reach it.
 #[derive(Debug, Clone, Copy)]
 pub struct State {
-    surface: Option<Surface>,
+    pub surface: Option<Surface>,
     /// Lights that reach a real surface in the video, or a virtual one past all casters.
-    arriving: u32,
+    pub arriving: u32,
     /// Those of them that virtual things take from a real surface.
-    taken: u32,
+    pub taken: u32,
     /// A light that is nearly in the surface's plane.
     grazes: bool,
 }
 
 impl State {
+    /// With each light's bits.
+    fn new(surface: Option<Surface>, bits: impl Iterator<Item = u8>) -> Self {
+        let mut state = Self {
+            surface,
+            arriving: 0,
+            taken: 0,
+            grazes: false,
+        };
+        for (index, bits) in bits.enumerate().filter(|_| surface.is_some()) {
+            state.grazes |= bits & GRAZES != 0;
+            if bits & (FACES_AWAY | REAL_HIDES) != 0 {
+                continue;
+            }
+            let (real, hidden) = (state.role() == REAL, bits & VIRTUAL_HIDES != 0);
+            state.arriving |= u32::from(real || !hidden) << index;
+            state.taken |= u32::from(real && hidden) << index;
+        }
+        state
+    }
+
     fn role(&self) -> u8 {
         self.surface.map_or(0, |surface| surface.role)
     }
@@ -103,7 +124,7 @@ pub struct Differences {
 }
 
 impl Differences {
-    fn add(&mut self, difference: f64) {
+    pub fn add(&mut self, difference: f64) {
         self.count += 1;
         self.sum_of_squares += difference * difference;
         self.most = self.most.max(difference.abs());
@@ -178,6 +199,15 @@ fn straight_on(light: &Light, point: DVec3) -> DVec3 {
     irradiance(light, point, towards.normalize_or_zero())
 }
 
+fn is_faceted(mesh: &Mesh) -> bool {
+    let triangles = mesh.triangles.iter().zip(&mesh.corner_normals);
+    triangles.into_iter().all(|(corners, normals)| {
+        let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize].as_dvec3());
+        let normal = (b - a).cross(c - a).normalize_or_zero().as_vec3();
+        normals.iter().all(|corner| corner.distance(normal) < 1e-4)
+    })
+}
+
 fn is_close_to_virtual(stage: &Stage) -> bool {
     const CLOSE_M: f64 = 0.1;
     let mut seeming = stage
@@ -201,9 +231,15 @@ fn is_close_to_virtual(stage: &Stage) -> bool {
 
 impl<'a> Expected<'a> {
     pub fn new(stage: &'a Stage, view: View) -> Self {
+        let exact = stage.world.cast(&stage.scene.lights, &view, 0.0);
+        Self::of_exact(stage, view, &exact)
+    }
+
+    /// The same, where its rays have been cast.
+    pub fn of_exact(stage: &'a Stage, view: View, exact: &Exact) -> Self {
         let of_world = stage.world_from_card.is_none();
         let ambient = stage.scene.ambient_radiance;
-        let mut expected = Self {
+        Self {
             world: &stage.world,
             view,
             lights: &stage.scene.lights,
@@ -211,7 +247,12 @@ impl<'a> Expected<'a> {
             albedos: (stage.scene.virtuals.iter())
                 .map(|object| object.materials[0].albedo)
                 .collect(),
-            faceted: stage.virtuals.iter().map(|thing| thing.faceted).collect(),
+            faceted: stage
+                .scene
+                .virtuals
+                .iter()
+                .map(|object| is_faceted(&object.mesh))
+                .collect(),
             unknown: match of_world {
                 false => 0.0,
                 // A spot that a light close by makes bright may throw any light back.
@@ -219,41 +260,28 @@ impl<'a> Expected<'a> {
                 true => ambient.max_element() + 0.3,
             },
             samples: stage.scene.shadows.samples as usize,
-            centers: Vec::new(),
-        };
-        expected.centers = pixels(view.intrinsics.size_px)
-            .map(|(_, center)| expected.state(center))
-            .collect();
-        expected
+            centers: (exact.surfaces.iter().enumerate())
+                .map(|(index, surface)| {
+                    State::new(*surface, exact.bits.iter().map(|bits| bits[index]))
+                })
+                .collect(),
+        }
+    }
+
+    /// The same drawn with another number of samples.
+    pub fn with_samples(mut self, samples: u32) -> Self {
+        self.samples = samples as usize;
+        self
     }
 
     /// What is seen at a place, and which lights reach it.
     pub fn state(&self, place: DVec2) -> State {
         let surface = self.world.look(&self.view, place);
-        let mut state = State {
-            surface,
-            arriving: 0,
-            taken: 0,
-            grazes: false,
-        };
-        let Some(surface) = surface else {
-            return state;
-        };
-        for (index, light) in self.lights.iter().enumerate() {
-            let bits = self.world.bits(&surface, light, 0.0);
-            state.grazes |= bits & GRAZES != 0;
-            if bits & (FACES_AWAY | REAL_HIDES) != 0 {
-                continue;
-            }
-            let virtual_hides = bits & VIRTUAL_HIDES != 0;
-            if surface.role == REAL || !virtual_hides {
-                state.arriving |= 1 << index;
-            }
-            if surface.role == REAL && virtual_hides {
-                state.taken |= 1 << index;
-            }
-        }
-        state
+        let bits = surface.iter().flat_map(|surface| {
+            let bits_of = |light: &Light| self.world.bits(surface, light, 0.0);
+            self.lights.iter().map(bits_of)
+        });
+        State::new(surface, bits)
     }
 
     /// The composite of a pixel whose samples have these states, shaded where the pixel's centre is.
@@ -462,7 +490,7 @@ impl<'a> Expected<'a> {
     }
 
     /// Whether the centres of the pixels around it have the state of its own.
-    fn is_uniform(&self, index: usize) -> bool {
+    pub fn is_uniform(&self, index: usize) -> bool {
         let size_px = self.view.intrinsics.size_px;
         let center = &self.centers[index];
         gnomon::app::truth::ray_cast::is_uniform(size_px, index, |_, other| {
@@ -636,7 +664,10 @@ impl<'a> Expected<'a> {
             if layers.role[index] != state.role() || gain_differs || bits_differ {
                 // What is thinner than a pixel shows at no centre.
                 let places = self.sample_places(center);
-                if !places.iter().all(|place| self.state(*place).is_like(&state)) {
+                if !places
+                    .iter()
+                    .all(|place| self.state(*place).is_like(&state))
+                {
                     continue;
                 }
                 count += 1;
@@ -663,29 +694,69 @@ impl<'a> Expected<'a> {
         if index % 5 != 0 {
             return;
         }
-        let area = self.area(center);
+        let area = self.area(center, AREA_SIDE);
         let differ = area[1..].iter().any(|state| !state.is_like(&area[0]));
-        if !differ || area.iter().any(|state| state.grazes) {
+        let is_known = |state: &State| {
+            !state.grazes
+                && state.surface.is_none_or(|surface| {
+                    surface.role == REAL || self.unknown == 0.0 && self.faceted[surface.thing]
+                })
+        };
+        if !differ || !area.iter().all(is_known) {
             return;
         }
-        let average = |states: &[State]| {
-            let range = self.composite(states, center);
-            0.5 * (range.low + range.high)
-        };
+        let average = |states: &[State]| self.composite(states, center).low;
         let of_area = average(&area);
         verdict.edges.add((found - of_area).abs().max_element());
         let pattern = average(states) - of_area;
         verdict.pattern.add(pattern.abs().max_element());
     }
 
+    /// Whether an edge passes a sample of a pixel so closely that snapping alone decides between two pictures of it.
+    pub fn is_snapped(&self, index: usize, center: DVec2) -> bool {
+        let differs = |place: &DVec2| {
+            let state = self.state(*place);
+            (0..PLACES_IN_RING).any(|step| {
+                let turn = step as f64 / PLACES_IN_RING as f64 * 2.0 * PI;
+                let around = self.state(*place + DVec2::from_angle(turn) * RINGS_PX[0]);
+                !around.is_like(&state)
+            })
+        };
+        let on_edge = |place: &DVec2| {
+            let mut lights = self.lights.iter();
+            lights.any(|light| self.world.is_on_edge(&self.view, *place, light))
+        };
+        let places = self.sample_places(center);
+        self.centers[index].grazes || places.iter().any(|place| differs(place) || on_edge(place))
+    }
+
     /// States all over a pixel.
-    fn area(&self, center: DVec2) -> Vec<State> {
-        (0..AREA_SIDE * AREA_SIDE)
+    pub fn area(&self, center: DVec2, side: usize) -> Vec<State> {
+        (0..side * side)
             .map(|step| {
-                let cell = DVec2::new((step % AREA_SIDE) as f64, (step / AREA_SIDE) as f64);
-                self.state(center + (cell + 0.5) / AREA_SIDE as f64 - 0.5)
+                let cell = DVec2::new((step % side) as f64, (step / side) as f64);
+                self.state(center + (cell + 0.5) / side as f64 - 0.5)
             })
             .collect()
+    }
+
+    /// Mean radiance of some states where real things have this albedo: what an ideal camera records.
+    pub fn radiance(&self, states: &[State], real_albedo: f64) -> DVec3 {
+        let of_state = |state: &State| {
+            let Some(surface) = state.surface else {
+                return DVec3::ZERO;
+            };
+            let albedo = match surface.role {
+                VIRTUAL => self.albedos[surface.thing],
+                _ => DVec3::splat(real_albedo),
+            };
+            let left = state.arriving & !state.taken;
+            let lights = (0..self.lights.len()).filter(|index| left >> index & 1 == 1);
+            let given =
+                lights.map(|index| irradiance(&self.lights[index], surface.point, surface.normal));
+            (self.ambient + given.sum::<DVec3>()) * albedo / PI
+        };
+        states.iter().map(of_state).sum::<DVec3>() / states.len() as f64
     }
 
     /// The smallest of [`RINGS_PX`] around the samples in which states are found that explain a pixel.

@@ -352,16 +352,26 @@ impl Stage {
 
     /// Its video is white: what is left of it is the gain.
     pub fn renderer(&self, intrinsics: Intrinsics) -> Renderer {
-        let mut renderer = Renderer::new(gpu(), &self.scene, intrinsics).expect("a renderer");
+        self.renderer_of(self.scene.shadows, intrinsics)
+    }
+
+    /// One that makes its shadows otherwise.
+    pub fn renderer_of(&self, shadows: ShadowSettings, intrinsics: Intrinsics) -> Renderer {
+        let scene = Scene {
+            shadows,
+            ..self.scene.clone()
+        };
+        let mut renderer = Renderer::new(gpu(), &scene, intrinsics).expect("a renderer");
         let frame = frame_of(intrinsics.size_px, |_| 255);
         renderer.upload(&frame).expect("an uploaded frame");
         renderer
     }
 
     /// For each anchor.
-    pub fn poses(&self, camera_from_world: DAffine3) -> [Option<DAffine3>; 2] {
+    pub fn poses(&self, camera_from_world: DAffine3) -> Vec<Option<DAffine3>> {
         let card = self.world_from_card.map(|card| camera_from_world * card);
-        [Some(camera_from_world), card]
+        let poses = [Some(camera_from_world), card];
+        poses[..self.scene.anchors.len()].to_vec()
     }
 
     /// The composite.
@@ -371,9 +381,8 @@ impl Stage {
     }
 
     /// The composite and its layers.
-    pub fn shoot(&self, renderer: &mut Renderer, camera_from_world: DAffine3) -> (Vec<u8>, Layers) {
-        renderer.draw(&self.poses(camera_from_world), Shown::Composite);
-        let picture = renderer.read_picture().expect("a picture");
+    pub fn shoot(&self, renderer: &mut Renderer, camera_from_world: DAffine3) -> (Picture, Layers) {
+        let picture = self.picture(renderer, camera_from_world);
         (picture, renderer.layers().expect("layers"))
     }
 }
