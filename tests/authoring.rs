@@ -15,7 +15,8 @@ use gnomon::app::truth::{draw, key_frames};
 use gnomon::light::Light;
 use gnomon::render::Renderer;
 use gnomon::scene::{
-    Counting, Difference, Placement, Quality, Scene, ShadowSettings, ShaftSettings, Technique,
+    Counting, Difference, Placement, Quality, Scene, ShadowSettings, ShaftSettings, Shortcuts,
+    Technique,
 };
 
 /// What is promised for the time from a saved file to its scene.
@@ -373,6 +374,7 @@ mod edits {
                 visible: random.chance(0.5),
             },
             5 => Edit::Shadows(ShadowSettings {
+                without: Shortcuts::NONE,
                 technique: if random.chance(0.5) {
                     Technique::Auto
                 } else {

@@ -10,7 +10,7 @@ use gnomon::app::live::panel::{Facts, Panel};
 use gnomon::app::live::views::View;
 use gnomon::app::live::wish::{Clicks, Overlay, Selected, Wish};
 use gnomon::light::Light;
-use gnomon::scene::{Placement, Scene};
+use gnomon::scene::{Placement, Scene, Shortcut};
 
 /// A panel on a scene, and all that was wished for.
 struct Desk {
@@ -185,4 +185,17 @@ fn without_a_scene_it_asks_for_a_marker() {
         "how to print one"
     );
     assert!(harness.query_by_label("Lights").is_none());
+}
+
+#[test]
+fn shortcuts_are_switched_where_volumes_are_looked_at() {
+    let mut harness = desk(Some(lamp()), None);
+    _ = clicked(&mut harness, "View");
+    assert!(harness.query_by_label("scissors").is_none());
+    harness.state_mut().look.view = View::Volumes;
+    harness.run();
+    assert_eq!(
+        clicked(&mut harness, "scissors"),
+        [Wish::ToggleShortcut(Shortcut::Scissors)]
+    );
 }

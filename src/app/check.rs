@@ -5,6 +5,7 @@ use std::fmt::Write;
 use glam::DVec3;
 
 use crate::app::check_budget::budget_line;
+use crate::app::check_degenerate;
 use crate::app::check_room::{self, room_lines};
 use crate::geometry::levels::{Level, levels};
 use crate::geometry::mesh::MeshReport;
@@ -132,6 +133,7 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
         })
         .collect();
     let mut warnings = check_room::warnings(scene);
+    warnings.extend(check_degenerate::warnings(scene));
     for (number, light) in scene.lights.iter().enumerate() {
         let Light::Point { position_m, .. } = light else {
             continue;

@@ -10,6 +10,7 @@ mod capture_talk;
 pub mod chart;
 pub mod check;
 mod check_budget;
+mod check_degenerate;
 mod check_room;
 pub mod contact_sheet;
 pub mod detections_file;

@@ -8,6 +8,7 @@
 
 pub mod bounds;
 pub mod camera;
+pub mod coincidence;
 pub mod counting;
 pub mod dense;
 pub mod levels;

@@ -278,13 +278,7 @@ mod tests {
             high: DVec3::new(0.06, 0.03, 0.12),
         };
         let reached = |light: LightPlace| {
-            shadowed(
-                &card.corners(),
-                light,
-                &receivers,
-                &looking_down(),
-                &CAMERA,
-            )
+            shadowed(&card.corners(), light, &receivers, &looking_down(), &CAMERA)
         };
         // From (-0.3, 0, 0.6) the card's corners fall on x = 0.05 to 0.15 of the table: pixels 349.5 to 409.5.
         let lamp = reached(LightPlace::Point(DVec3::new(-0.3, 0.0, 0.6)));

@@ -14,7 +14,7 @@ use super::views::View;
 use crate::app::mailbox::{Mailbox, Taken};
 use crate::geometry::camera::Intrinsics;
 use crate::render::{Gpu, RenderError, Renderer, Shown};
-use crate::scene::Scene;
+use crate::scene::{Scene, Shortcuts};
 
 /// A renderer that is wanted.
 #[derive(Clone)]
@@ -36,6 +36,8 @@ pub struct Canvas {
     current: Option<(Order, Renderer)>,
     orders: Arc<Mailbox<Order>>,
     made: Arc<Mailbox<Made>>,
+    /// Shortcuts that are switched off.
+    without: Shortcuts,
     /// Whether a renderer for the scene as it is has yet to come.
     awaits: bool,
     maker: Option<JoinHandle<()>>,
@@ -64,6 +66,7 @@ impl Canvas {
             current: None,
             orders,
             made,
+            without: Shortcuts::NONE,
             awaits: false,
             maker: Some(maker),
         }
@@ -71,6 +74,7 @@ impl Canvas {
 
     /// Another scene, or another state of it. `lasting`: it stays so for now, and deserves its own renderer.
     pub fn set_scene(&mut self, scene: Arc<Scene>, lasting: bool) {
+        let scene = self.switched(scene);
         if let Some((order, renderer)) = &mut self.current {
             let follows = renderer.follow(&scene);
             if follows {
@@ -85,6 +89,26 @@ impl Canvas {
             }
         }
         self.scene = scene;
+    }
+
+    /// Shortcuts that are not to be taken from now on; tells whether they are others than before.
+    pub fn set_without(&mut self, without: Shortcuts) -> bool {
+        let changes = self.without != without;
+        if changes {
+            self.without = without;
+            self.set_scene(Arc::clone(&self.scene), true);
+        }
+        changes
+    }
+
+    /// The scene without the shortcuts that are switched off.
+    fn switched(&self, scene: Arc<Scene>) -> Arc<Scene> {
+        if scene.shadows.without == self.without {
+            return scene;
+        }
+        let mut switched = (*scene).clone();
+        switched.shadows.without = self.without;
+        Arc::new(switched)
     }
 
     /// Whether the scene is shown as well as can be, or a better renderer has yet to come.

@@ -2,6 +2,7 @@
 
 use super::views::View;
 use super::wish::{Overlay, Selected, Wish};
+use crate::scene::Shortcuts;
 
 /// The window's own state, apart from the scene's.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,6 +21,8 @@ pub struct Look {
     pub full_screen: bool,
     /// What is selected.
     pub selected: Option<Selected>,
+    /// Shortcuts that shadow volumes are not to take.
+    pub without: Shortcuts,
 }
 
 impl Look {
@@ -33,6 +36,7 @@ impl Look {
             keys: false,
             full_screen: false,
             selected: None,
+            without: Shortcuts::NONE,
         }
     }
 
@@ -49,6 +53,10 @@ impl Look {
                     Some(index) => _ = self.overlays.swap_remove(index),
                     None => self.overlays.push(*overlay),
                 }
+            }
+            Wish::ToggleShortcut(shortcut) => {
+                let was_off = self.without.has(*shortcut);
+                self.without = self.without.with(*shortcut, !was_off);
             }
             Wish::ToggleHold => self.holds = !self.holds,
             Wish::TogglePanel => self.panel = !self.panel,
@@ -77,12 +85,14 @@ impl Default for Look {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Shortcut;
 
     #[test]
     fn the_same_wish_twice_leads_back() {
         for wish in [
             Wish::Show(View::Depth),
             Wish::Toggle(Overlay::Axes),
+            Wish::ToggleShortcut(Shortcut::Ends),
             Wish::ToggleHold,
             Wish::TogglePanel,
             Wish::ToggleKeys,

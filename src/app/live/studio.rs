@@ -148,6 +148,9 @@ impl Studio {
             self.say(said);
         }
         self.pipeline.want_rejected(look.shows(Overlay::Rejected));
+        if self.canvas.set_without(look.without) {
+            self.drawn = None;
+        }
         if self.canvas.improve()? {
             self.drawn = None;
             self.renderers += 1;
@@ -355,6 +358,7 @@ impl Studio {
             Wish::Select(_)
             | Wish::Show(_)
             | Wish::Toggle(_)
+            | Wish::ToggleShortcut(_)
             | Wish::TogglePanel
             | Wish::ToggleKeys
             | Wish::ToggleHold

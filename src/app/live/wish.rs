@@ -7,6 +7,7 @@ use glam::DVec2;
 use super::views::View;
 use crate::app::authoring::Edit;
 use crate::geometry::light_placing::Freedom;
+use crate::scene::Shortcut;
 
 /// One thing that is asked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +28,8 @@ pub enum Wish {
     Show(View),
     /// Show or hide what lies over the picture.
     Toggle(Overlay),
+    /// Take a shortcut of shadow volumes no more, or again.
+    ToggleShortcut(Shortcut),
     /// Show or hide the panel.
     TogglePanel,
     /// Show or hide the list of keys.

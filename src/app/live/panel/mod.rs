@@ -18,7 +18,7 @@ use super::look::Look;
 use super::meters::Meters;
 use super::views::View;
 use super::wish::{Overlay, Wish};
-use crate::scene::{Placement, Scene};
+use crate::scene::{Placement, Scene, Shortcut};
 use editing::Editing;
 use first_use::FirstUse;
 
@@ -135,6 +135,18 @@ fn view(ui: &mut Ui, look: &Look, wishes: &mut Vec<Wish>) {
         let mut shown = look.shows(overlay);
         if ui.checkbox(&mut shown, name).changed() {
             wishes.push(Wish::Toggle(overlay));
+        }
+    }
+    // Where somebody looks for a wrong shadow.
+    if matches!(look.view, View::StencilCount | View::Volumes) {
+        ui.label("Shortcuts of shadow volumes").on_hover_text(
+            "They change no pixel: one that does when it is switched off is what a wrong pixel comes from.",
+        );
+        for (name, shortcut) in Shortcut::BY_NAME {
+            let mut taken = !look.without.has(shortcut);
+            if ui.checkbox(&mut taken, name).changed() {
+                wishes.push(Wish::ToggleShortcut(shortcut));
+            }
         }
     }
 }
