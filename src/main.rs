@@ -347,11 +347,17 @@ fn size_m(size_mm: f64) -> Result<f64> {
     Ok(size_mm * 1e-3)
 }
 
-/// What an interrupt sets.
+/// What an interrupt sets. A second one does not wait for a job that cannot end, as one that writes to a pipe which nobody
+/// reads.
 fn interrupts() -> Result<Arc<AtomicBool>> {
     let stop = Arc::new(AtomicBool::new(false));
     let asked = Arc::clone(&stop);
-    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))
+    let set = move || {
+        if asked.swap(true, Ordering::Relaxed) {
+            exit_without_traces(INTERRUPTED);
+        }
+    };
+    ctrlc::set_handler(set)
         .context("cannot listen for interrupts")?;
     Ok(stop)
 }

@@ -215,7 +215,7 @@ mod tests {
         use ResultKind::*;
         let poses = format!("{}\n0,0,a,lost,0,,,,,,,,\n", poses_file::HEADER).into_bytes();
         let board = b"[[board]]\nname = \"t\"\nmarkers = []\n".to_vec();
-        let printed = [anchor_block::PRINTED.as_bytes(), &board].concat();
+        let printed = [anchor_block::PRINTED.as_bytes(), b".\n", &board].concat();
         let cases: [(ResultKind, Vec<u8>); 10] = [
             (Poses, poses),
             (LearntBoard, board),

@@ -192,8 +192,10 @@ impl VideoWriter {
         if self.frames == 0 {
             return Ok(());
         }
-        self.close()?;
+        let closed = self.close();
+        // An encoder that misses its file says less.
         self.check_that_it_is_there()?;
+        closed?;
         match self.file.take() {
             Some(VideoFile::Unfinished(file)) => file.finish(),
             Some(VideoFile::Named(file)) => file.sync_all().map_err(|error| OutputError::Io {
