@@ -357,8 +357,7 @@ fn interrupts() -> Result<Arc<AtomicBool>> {
             exit_without_traces(INTERRUPTED);
         }
     };
-    ctrlc::set_handler(set)
-        .context("cannot listen for interrupts")?;
+    ctrlc::set_handler(set).context("cannot listen for interrupts")?;
     Ok(stop)
 }
 

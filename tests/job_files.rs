@@ -51,7 +51,10 @@ fn refused(folder: &Path, arguments: &[&str], parts: &[&str]) {
     for part in parts {
         assert!(said.contains(part), "{arguments:?} lacks {part:?}: {said}");
     }
-    assert!(contents(folder) == before, "{arguments:?} changed something: {said}");
+    assert!(
+        contents(folder) == before,
+        "{arguments:?} changed something: {said}"
+    );
 }
 
 /// What a folder holds: each file's bytes, each link's goal, each folder.
@@ -100,7 +103,11 @@ fn lamp_in(folder: &Path) -> PathBuf {
         .unwrap();
     }
     for mesh in ["house.obj", "tin.obj", "torus.obj"] {
-        fs::copy(project_file("models").join(mesh), folder.join("models").join(mesh)).unwrap();
+        fs::copy(
+            project_file("models").join(mesh),
+            folder.join("models").join(mesh),
+        )
+        .unwrap();
     }
     let text = fs::read_to_string(project_file("config/lamp.toml")).unwrap();
     let scene = folder.join("scene.toml");
@@ -111,7 +118,10 @@ fn lamp_in(folder: &Path) -> PathBuf {
 fn wait_for(what: &str, mut is_there: impl FnMut() -> bool) {
     let start = Instant::now();
     while !is_there() {
-        assert!(start.elapsed() < Duration::from_secs(120), "{what} does not come");
+        assert!(
+            start.elapsed() < Duration::from_secs(120),
+            "{what} does not come"
+        );
         std::thread::sleep(Duration::from_millis(10));
     }
 }
@@ -173,13 +183,23 @@ fn a_mesh_of_somebody_else_s_cannot_say_where_a_recording_writes() {
     let out = home.path().join("x/session");
     done(
         home.path(),
-        &["record", plain(&scene), "--out", plain(&out), "--seconds", "0.2"],
+        &[
+            "record",
+            plain(&scene),
+            "--out",
+            plain(&out),
+            "--seconds",
+            "0.2",
+        ],
     );
     let after = contents(home.path());
     for (name, bytes) in &before {
         assert!(after.get(name) == Some(bytes), "{name} was changed");
     }
-    let new: Vec<&String> = after.keys().filter(|name| !before.contains_key(*name)).collect();
+    let new: Vec<&String> = after
+        .keys()
+        .filter(|name| !before.contains_key(*name))
+        .collect();
     assert!(new.iter().all(|name| name.starts_with("x/")), "{new:?}");
 
     // The session has all that it needs.
@@ -191,9 +211,15 @@ fn a_mesh_of_somebody_else_s_cannot_say_where_a_recording_writes() {
     fs::remove_dir_all(home.path().join("a")).unwrap();
     done(home.path(), &["check", "session/scene.toml"]);
     let copies = contents(&session);
-    let meshes: Vec<&String> = copies.keys().filter(|name| name.ends_with(".obj")).collect();
+    let meshes: Vec<&String> = copies
+        .keys()
+        .filter(|name| name.ends_with(".obj"))
+        .collect();
     assert_eq!(meshes.len(), 3, "{meshes:?}");
-    let torus = copies.values().find(|bytes| bytes.starts_with(b"mtllib")).unwrap();
+    let torus = copies
+        .values()
+        .find(|bytes| bytes.starts_with(b"mtllib"))
+        .unwrap();
     let text = String::from_utf8_lossy(torus);
     assert!(
         text.starts_with("mtllib material-1.mtl\nmtllib material-2.mtl\nusemtl wood\n"),
@@ -207,7 +233,11 @@ fn a_session_has_probe_room_and_dictionaries_with_it() {
     let home = tempfile::tempdir().unwrap();
     let folder = home.path().join("project");
     let scene = lamp_in(&folder);
-    fs::copy(project_file("recordings/room/probe.hdr"), folder.join("p.hdr")).unwrap();
+    fs::copy(
+        project_file("recordings/room/probe.hdr"),
+        folder.join("p.hdr"),
+    )
+    .unwrap();
     let own = "%YAML:1.0\n---\nnmarkers: 2\nmarkersize: 3\nmarker_0: \"110100000\"\nmarker_1: \"111001011\"\n";
     fs::write(folder.join("own.yml"), own).unwrap();
     let text = fs::read_to_string(&scene).unwrap();
@@ -226,7 +256,12 @@ fn a_session_has_probe_room_and_dictionaries_with_it() {
         // Away from all that was copied.
         if scene.starts_with(&folder) {
             fs::remove_dir_all(&folder).unwrap();
-            let files = ["markers/1.yml", "room/1/mesh.obj", "room/2/mesh.obj", "models/3/mesh.obj"];
+            let files = [
+                "markers/1.yml",
+                "room/1/mesh.obj",
+                "room/2/mesh.obj",
+                "models/3/mesh.obj",
+            ];
             for file in files {
                 assert!(before.contains_key(file), "{file}: {:?}", before.keys());
             }
@@ -235,7 +270,10 @@ fn a_session_has_probe_room_and_dictionaries_with_it() {
         }
         let scene = session.join("scene.toml");
         done(home.path(), &["check", plain(&scene)]);
-        done(home.path(), &["replay", plain(&scene), "--frames", "0", "--poses", "p.csv"]);
+        done(
+            home.path(),
+            &["replay", plain(&scene), "--frames", "0", "--poses", "p.csv"],
+        );
         fs::remove_dir_all(&session).unwrap();
     }
 }
@@ -248,22 +286,39 @@ fn what_a_job_reads_is_never_written() {
     fs::write(at("models/torus.mtl"), "newmtl a\nKd 1 1 1\n").unwrap();
     let torus = fs::read_to_string(at("models/torus.obj")).unwrap();
     fs::write(at("models/torus.obj"), format!("mtllib torus.mtl\n{torus}")).unwrap();
-    fs::copy(project_file("recordings/lamp/camera.toml"), at("calibration.toml")).unwrap();
+    fs::copy(
+        project_file("recordings/lamp/camera.toml"),
+        at("calibration.toml"),
+    )
+    .unwrap();
     fs::copy(project_file("recordings/room/probe.hdr"), at("probe.hdr")).unwrap();
     fs::create_dir(at("frames")).unwrap();
     fs::copy(at("models/house.obj"), at("frames/000001.png")).unwrap();
     let scene = fs::read_to_string(at("scene.toml")).unwrap();
-    let scene = scene.replace("\"recording\"", "\"recording\"\ncalibration = \"calibration.toml\"");
+    let scene = scene.replace(
+        "\"recording\"",
+        "\"recording\"\ncalibration = \"calibration.toml\"",
+    );
     let scene = format!("{scene}\n[probe]\nimage = \"probe.hdr\"\nroom = \"frames/000001.png\"\n");
     fs::write(at("scene.toml"), scene).unwrap();
     fs::write(at("poses.csv"), format!("{POSES}\n")).unwrap();
     fs::hard_link(at("scene.toml"), at("hard.toml")).unwrap();
     #[cfg(unix)]
     std::os::unix::fs::symlink("models/../scene.toml", at("soft.toml")).unwrap();
+    fs::create_dir(at("links")).unwrap();
+    fs::hard_link(at("scene.toml"), at("links/000003_role.png")).unwrap();
     let lone = ["--calibration", "calibration.toml", "--size-mm", "44"];
     let of_video = ["recording/video.mp4", lone[0], lone[1], lone[2], lone[3]];
     let board = ["board", "--size-mm", "44", "--from"];
-    let chess = ["calibrate", "recording", "--chessboard", "9x6", "--square-mm", "25", "--out"];
+    let chess = [
+        "calibrate",
+        "recording",
+        "--chessboard",
+        "9x6",
+        "--square-mm",
+        "25",
+        "--out",
+    ];
     let jobs: Vec<Vec<&str>> = vec![
         vec!["replay", "scene.toml", "--stats", "scene.toml"],
         vec!["replay", "scene.toml", "--stats", "models/../scene.toml"],
@@ -277,18 +332,55 @@ fn what_a_job_reads_is_never_written() {
         vec!["replay", "scene.toml", "--sheet", "probe.hdr"],
         vec!["replay", "scene.toml", "--out", "recording/new.mp4"],
         vec!["replay", "scene.toml", "--out", "frames"],
-        vec!["replay", "scene.toml", "--poses-from", "poses.csv", "--poses", "poses.csv"],
+        vec!["replay", "scene.toml", "--out", "links"],
+        vec![
+            "replay",
+            "scene.toml",
+            "--poses-from",
+            "poses.csv",
+            "--poses",
+            "poses.csv",
+        ],
         vec!["track", "scene.toml", "--poses", "scene.toml"],
         vec!["track", "scene.toml", "--markers", "recording/camera.toml"],
-        [&["track"], &of_video[..], &["--poses", "recording/video.mp4"]].concat(),
+        [
+            &["track"],
+            &of_video[..],
+            &["--poses", "recording/video.mp4"],
+        ]
+        .concat(),
         [&["track"], &of_video[..], &["--poses", "calibration.toml"]].concat(),
-        vec!["track", "recording", "--anchors", "scene.toml", "--stats", "scene.toml"],
+        vec![
+            "track",
+            "recording",
+            "--anchors",
+            "scene.toml",
+            "--stats",
+            "scene.toml",
+        ],
         [&board[..], &["scene.toml", "--out", "scene.toml"]].concat(),
-        [&board[..], &["recording", "--calibration", "calibration.toml", "--out", "calibration.toml"]].concat(),
+        [
+            &board[..],
+            &[
+                "recording",
+                "--calibration",
+                "calibration.toml",
+                "--out",
+                "calibration.toml",
+            ],
+        ]
+        .concat(),
         [&chess[..], &["recording/camera.toml"]].concat(),
         [&chess[..], &["c.toml", "--coverage", "recording/video.mp4"]].concat(),
         vec!["record", "scene.toml", "--out", "recording/new"],
-        vec!["probe", "probe.hdr", "--kind", "panorama", "--out", "probe.hdr"],
+        vec![
+            "probe",
+            "probe.hdr",
+            "--kind",
+            "panorama",
+            "--out",
+            "probe.hdr",
+        ],
         vec!["live", "scene.toml", "--out", "recording"],
     ];
     for job in jobs {
@@ -319,8 +411,16 @@ fn two_outputs_are_never_one() {
     ];
     for job in jobs {
         let forced = [job.as_slice(), &["--force"]].concat();
-        refused(folder.path(), &job, &["one would be written over the other"]);
-        refused(folder.path(), &forced, &["one would be written over the other"]);
+        refused(
+            folder.path(),
+            &job,
+            &["one would be written over the other"],
+        );
+        refused(
+            folder.path(),
+            &forced,
+            &["one would be written over the other"],
+        );
     }
 }
 
@@ -329,14 +429,23 @@ fn an_older_result_is_replaced_and_nothing_else_without_force() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     lamp_in(folder.path());
-    let foreign = ["Cargo.toml", "models/block.obj", "config/hand.toml", "README.md"];
+    let foreign = [
+        "Cargo.toml",
+        "models/block.obj",
+        "config/hand.toml",
+        "README.md",
+    ];
     let of_kind: [(&str, &str); 3] = [("--poses", "p"), ("--stats", "s"), ("--sheet", "sheet.png")];
     for (option, name) in of_kind {
         done(folder.path(), &quick(&[option, name]));
         done(folder.path(), &quick(&[option, name]));
         for foreign in foreign {
             fs::copy(project_file(foreign), at(name)).unwrap();
-            refused(folder.path(), &quick(&[option, name]), &[name, "--force", "write elsewhere"]);
+            refused(
+                folder.path(),
+                &quick(&[option, name]),
+                &[name, "--force", "write elsewhere"],
+            );
         }
         done(folder.path(), &quick(&[option, name, "--force"]));
         done(folder.path(), &quick(&[option, name]));
@@ -362,7 +471,17 @@ fn an_older_result_is_replaced_and_nothing_else_without_force() {
 fn sheets_leave_layouts_that_were_learnt() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    let print = ["markers", "--board", "2x2", "--size-mm", "40", "--gap-mm", "20", "--out", "table.pdf"];
+    let print = [
+        "markers",
+        "--board",
+        "2x2",
+        "--size-mm",
+        "40",
+        "--gap-mm",
+        "20",
+        "--out",
+        "table.pdf",
+    ];
     let forced = [&print[..], &["--force"]].concat();
     done(folder.path(), &print);
     done(folder.path(), &print);
@@ -383,7 +502,15 @@ fn sheets_leave_layouts_that_were_learnt() {
     fs::copy(&scene, at("chess.toml")).unwrap();
     done(
         folder.path(),
-        &["markers", "--chessboard", "5x4", "--square-mm", "25", "--out", "chess.pdf"],
+        &[
+            "markers",
+            "--chessboard",
+            "5x4",
+            "--square-mm",
+            "25",
+            "--out",
+            "chess.pdf",
+        ],
     );
 }
 
@@ -405,9 +532,22 @@ fn folders_are_no_files_and_that_is_said_before_the_work() {
     ] {
         let job = [&["replay", "scene.toml", "--stats", "s.json"], &out[..]].concat();
         refused(folder.path(), &job, &[part]);
-        refused(folder.path(), &[job.as_slice(), &["--force"]].concat(), &[part]);
+        refused(
+            folder.path(),
+            &[job.as_slice(), &["--force"]].concat(),
+            &[part],
+        );
     }
-    for job in [["record", "scene.toml", "--out", "file"], ["live", "scene.toml", "--out", "file"]] {
+    fs::create_dir_all(at("d/000000.png")).unwrap();
+    refused(
+        folder.path(),
+        &quick(&["--out", "d", "--force"]),
+        &["a folder is there"],
+    );
+    for job in [
+        ["record", "scene.toml", "--out", "file"],
+        ["live", "scene.toml", "--out", "file"],
+    ] {
         refused(folder.path(), &job, &["a folder is wanted"]);
     }
 }
@@ -415,7 +555,16 @@ fn folders_are_no_files_and_that_is_said_before_the_work() {
 #[test]
 fn every_job_that_replaces_files_can_be_forced() {
     let folder = tempfile::tempdir().unwrap();
-    for job in ["replay", "record", "track", "board", "calibrate", "markers", "probe", "chart"] {
+    for job in [
+        "replay",
+        "record",
+        "track",
+        "board",
+        "calibrate",
+        "markers",
+        "probe",
+        "chart",
+    ] {
         let help = done(folder.path(), &[job, "--help"]).stdout;
         assert!(String::from_utf8_lossy(&help).contains("--force"), "{job}");
     }
@@ -430,7 +579,10 @@ fn devices_pipes_and_stdout_are_written_through() {
     lamp_in(folder.path());
     let text = |output: &Output| String::from_utf8(output.stdout.clone()).unwrap();
     // A device cannot be made by everyone, so the worst that may happen here is the true one: as root it was replaced.
-    done(folder.path(), &quick(&["--poses", "/dev/null", "--stats", "/dev/null"]));
+    done(
+        folder.path(),
+        &quick(&["--poses", "/dev/null", "--stats", "/dev/null"]),
+    );
     let null = fs::symlink_metadata("/dev/null").unwrap().file_type();
     assert!(null.is_char_device());
 
@@ -447,7 +599,11 @@ fn devices_pipes_and_stdout_are_written_through() {
         .status()
         .unwrap();
     assert!(output.success());
-    assert!(fs::read_to_string(at("redirected")).unwrap().starts_with(POSES));
+    assert!(
+        fs::read_to_string(at("redirected"))
+            .unwrap()
+            .starts_with(POSES)
+    );
 
     for (name, option) in [("pipe", "--poses"), ("pipe.mkv", "--out")] {
         let made = Process::new("mkfifo").arg(at(name)).status().unwrap();
@@ -455,11 +611,24 @@ fn devices_pipes_and_stdout_are_written_through() {
         let child = spawn(folder.path(), &quick(&[option, name]));
         let read = fs::read(at(name)).unwrap();
         assert!(child.wait_with_output().unwrap().status.success());
-        assert!(fs::symlink_metadata(at(name)).unwrap().file_type().is_fifo());
-        let begin: &[u8] = if name == "pipe" { POSES.as_bytes() } else { b"\x1a\x45\xdf\xa3" };
+        assert!(
+            fs::symlink_metadata(at(name))
+                .unwrap()
+                .file_type()
+                .is_fifo()
+        );
+        let begin: &[u8] = if name == "pipe" {
+            POSES.as_bytes()
+        } else {
+            b"\x1a\x45\xdf\xa3"
+        };
         assert!(read.starts_with(begin), "{name}");
     }
-    assert!(names(folder.path()).iter().all(|name| !name.starts_with('.')));
+    assert!(
+        names(folder.path())
+            .iter()
+            .all(|name| !name.starts_with('.'))
+    );
 }
 
 #[cfg(unix)]
@@ -475,13 +644,30 @@ fn a_link_stays_and_what_it_leads_to_is_replaced() {
     symlink("real/none.mkv", at("a.mkv")).unwrap();
     symlink("models/block.obj", at("s.json")).unwrap();
     fs::copy(project_file("models/block.obj"), at("models/block.obj")).unwrap();
-    done(folder.path(), &quick(&["--poses", "p.csv", "--out", "a.mkv"]));
-    refused(folder.path(), &quick(&["--stats", "s.json"]), &["s.json", "--force"]);
+    done(
+        folder.path(),
+        &quick(&["--poses", "p.csv", "--out", "a.mkv"]),
+    );
+    refused(
+        folder.path(),
+        &quick(&["--stats", "s.json"]),
+        &["s.json", "--force"],
+    );
     for link in ["p.csv", "a.mkv", "s.json"] {
         assert!(at(link).is_symlink(), "{link}");
     }
-    assert_eq!(fs::read_to_string(at("real/p.csv")).unwrap().lines().count(), 2);
-    assert!(fs::read(at("real/none.mkv")).unwrap().starts_with(b"\x1a\x45\xdf\xa3"));
+    assert_eq!(
+        fs::read_to_string(at("real/p.csv"))
+            .unwrap()
+            .lines()
+            .count(),
+        2
+    );
+    assert!(
+        fs::read(at("real/none.mkv"))
+            .unwrap()
+            .starts_with(b"\x1a\x45\xdf\xa3")
+    );
 }
 
 #[test]
@@ -489,7 +675,12 @@ fn no_other_file_is_touched() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     lamp_in(folder.path());
-    let mine = ["o.partial.mp4", "p.partial.csv", "o.partial", "o.mp4.partial"];
+    let mine = [
+        "o.partial.mp4",
+        "p.partial.csv",
+        "o.partial",
+        "o.mp4.partial",
+    ];
     for name in mine {
         fs::write(at(name), "mine").unwrap();
     }
@@ -500,32 +691,64 @@ fn no_other_file_is_touched() {
         fs::write(at("precious"), "mine").unwrap();
     }
     let before = contents(folder.path());
-    let job = ["replay", "scene.toml", "--frames", "0", "--out", "o.mp4", "--poses", "p.csv"];
+    let job = [
+        "replay",
+        "scene.toml",
+        "--frames",
+        "0",
+        "--out",
+        "o.mp4",
+        "--poses",
+        "p.csv",
+    ];
     done(folder.path(), &job);
     let mut after = contents(folder.path());
     assert!(after.remove("o.mp4").is_some() && after.remove("p.csv").is_some());
     assert!(after == before);
     // A run that fails leaves as little.
-    refused(folder.path(), &[&job[..], &["--adapter", "none such"]].concat(), &["none such"]);
+    refused(
+        folder.path(),
+        &[&job[..], &["--adapter", "none such"]].concat(),
+        &["none such"],
+    );
 }
 
 #[test]
 fn two_runs_at_once_give_one_whole_video() {
     let folder = tempfile::tempdir().unwrap();
     lamp_in(folder.path());
-    let job = ["replay", "scene.toml", "--frames", "0,1,2,3,4,5", "--out", "a.mkv"];
+    let job = [
+        "replay",
+        "scene.toml",
+        "--frames",
+        "0,1,2,3,4,5",
+        "--out",
+        "a.mkv",
+    ];
     let runs = [spawn(folder.path(), &job), spawn(folder.path(), &job)];
     for run in runs {
         let output = run.wait_with_output().unwrap();
         assert!(output.status.success(), "{}", said(&output));
     }
     let counted = Process::new("ffprobe")
-        .args(["-v", "error", "-count_frames", "-show_entries", "stream=nb_read_frames", "-of", "csv=p=0"])
+        .args([
+            "-v",
+            "error",
+            "-count_frames",
+            "-show_entries",
+            "stream=nb_read_frames",
+            "-of",
+            "csv=p=0",
+        ])
         .arg(folder.path().join("a.mkv"))
         .output()
         .unwrap();
     assert_eq!(String::from_utf8_lossy(&counted.stdout).trim(), "6");
-    assert!(names(folder.path()).iter().all(|name| !name.starts_with('.')));
+    assert!(
+        names(folder.path())
+            .iter()
+            .all(|name| !name.starts_with('.'))
+    );
 }
 
 #[test]
@@ -534,12 +757,18 @@ fn a_folder_of_frames_is_one_run_s() {
     long_lamp_in(folder.path());
     let mut first = spawn(folder.path(), &["replay", "scene.toml", "--out", "d"]);
     wait_for("a frame", || folder.path().join("d/000001.png").exists());
-    let second = run(folder.path(), &["replay", "scene.toml", "--frames", "0", "--out", "d"]);
+    let second = run(
+        folder.path(),
+        &["replay", "scene.toml", "--frames", "0", "--out", "d"],
+    );
     assert!(!second.status.success());
     assert!(said(&second).contains("another run"), "{}", said(&second));
     first.kill().unwrap();
     first.wait().unwrap();
-    done(folder.path(), &["replay", "scene.toml", "--frames", "0", "--out", "d"]);
+    done(
+        folder.path(),
+        &["replay", "scene.toml", "--frames", "0", "--out", "d"],
+    );
 }
 
 #[test]
@@ -584,8 +813,16 @@ fn an_older_session_is_replaced_when_that_is_asked_for() {
     done(folder.path(), &forced);
     done(folder.path(), &["check", "s/scene.toml"]);
     fs::write(folder.path().join("s/notes.txt"), "mine").unwrap();
-    refused(folder.path(), &forced, &["holds something already", "notes.txt"]);
-    assert!(names(folder.path()).iter().all(|name| !name.starts_with('.')));
+    refused(
+        folder.path(),
+        &forced,
+        &["holds something already", "notes.txt"],
+    );
+    assert!(
+        names(folder.path())
+            .iter()
+            .all(|name| !name.starts_with('.'))
+    );
 }
 
 /// Whoever writes to a pipe that nobody reads waits, with all that it has to write in a file for the time being.
@@ -597,12 +834,39 @@ fn an_interrupt_leaves_nothing_of_a_job_that_waits() {
     let temporary = folder.path().join("tmp");
     fs::create_dir(&temporary).unwrap();
     for (job, interrupts) in [
-        (vec!["markers", "--ids", "1,2", "--size-mm", "40", "--out", "pipe.pdf"], 1),
+        (
+            vec![
+                "markers",
+                "--ids",
+                "1,2",
+                "--size-mm",
+                "40",
+                "--out",
+                "pipe.pdf",
+            ],
+            1,
+        ),
         // What has frames to keep ends by itself; one that cannot is told twice.
-        (vec!["replay", "scene.toml", "--frames", "0", "--poses", "pipe.csv"], 2),
+        (
+            vec![
+                "replay",
+                "scene.toml",
+                "--frames",
+                "0",
+                "--poses",
+                "pipe.csv",
+            ],
+            2,
+        ),
     ] {
         let pipe = folder.path().join(job[job.len() - 1]);
-        assert!(Process::new("mkfifo").arg(&pipe).status().unwrap().success());
+        assert!(
+            Process::new("mkfifo")
+                .arg(&pipe)
+                .status()
+                .unwrap()
+                .success()
+        );
         let child = gnomon(folder.path())
             .args(&job)
             .env("TMPDIR", &temporary)

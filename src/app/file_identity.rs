@@ -130,7 +130,8 @@ pub fn is_open_file(place: &Path) -> bool {
     place.parent().is_some_and(is_descriptor)
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
+#[cfg(unix)]
 mod tests {
     use super::*;
     use std::os::unix::fs::symlink;

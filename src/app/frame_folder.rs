@@ -69,7 +69,8 @@ impl FrameFolder {
         let missing = self.written.iter().filter(is_missing).count();
         if missing > 0 {
             let all = self.written.len();
-            let message = format!("{missing} of {all} files that were written there are gone or broken");
+            let message =
+                format!("{missing} of {all} files that were written there are gone or broken");
             return Err(io_error(&self.path, io::Error::other(message)));
         }
         // Some file systems have no such thing for folders.
@@ -111,7 +112,10 @@ mod tests {
         let path = outer.path().join("out");
         let mut folder = FrameFolder::create(&path).unwrap();
         put(&mut folder, 0).unwrap();
-        assert!(FrameFolder::create(&path).is_err_and(|error| error.to_string().contains("another run")));
+        assert!(
+            FrameFolder::create(&path)
+                .is_err_and(|error| error.to_string().contains("another run"))
+        );
         fs::remove_dir_all(&path).unwrap();
         assert!(put(&mut folder, 1).is_err() && !path.exists());
         fs::create_dir(&path).unwrap();

@@ -5,6 +5,7 @@ use std::fs;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
+pub use super::file_conflict::FileConflict;
 use super::file_identity::{FileIdentity, is_open_file, real_place};
 use super::new_file::is_stdout;
 use super::result_kind::{ResultKind, is_frame_name};
@@ -23,74 +24,6 @@ pub enum Replacing {
     OlderResults,
     /// Any file that the job does not read.
     Anything,
-}
-
-/// Why a job is not begun: nothing has been written.
-#[derive(Debug, thiserror::Error)]
-pub enum FileConflict {
-    /// An output would be written over an input.
-    #[error("{output} {}: that is {}, which is read; write elsewhere", path.display(), input.display())]
-    Read {
-        /// The option that names the output.
-        output: &'static str,
-        /// What it names.
-        path: PathBuf,
-        /// The input.
-        input: PathBuf,
-    },
-    /// An output would be written into a folder that is an input.
-    #[error("{output} {}: that is, or lies in, {}, which is read; write elsewhere", path.display(), folder.display())]
-    InFolder {
-        /// The option that names the output.
-        output: &'static str,
-        /// What it names.
-        path: PathBuf,
-        /// The folder.
-        folder: PathBuf,
-    },
-    /// Two outputs would be one.
-    #[error("{output} {} and {other} {}: one would be written over the other", path.display(), other_path.display())]
-    Twice {
-        /// The option that names the one.
-        output: &'static str,
-        /// What it names.
-        path: PathBuf,
-        /// The option that names the other.
-        other: &'static str,
-        /// What that names.
-        other_path: PathBuf,
-    },
-    /// Something else stands there.
-    #[error(
-        "{output} {}: what is there is not {expected}; write elsewhere, or replace it with --force",
-        path.display()
-    )]
-    Foreign {
-        /// The option that names the output.
-        output: &'static str,
-        /// What it names.
-        path: PathBuf,
-        /// What might be replaced.
-        expected: &'static str,
-    },
-    /// A folder where a file is to be, or the other way round.
-    #[error("{output} {}: {message}", path.display())]
-    Unfit {
-        /// The option that names the output.
-        output: &'static str,
-        /// What it names.
-        path: PathBuf,
-        /// What is wrong.
-        message: &'static str,
-    },
-    /// The system does not tell what is there.
-    #[error("{}: {error}", path.display())]
-    Io {
-        /// What was looked at.
-        path: PathBuf,
-        /// What the system says.
-        error: std::io::Error,
-    },
 }
 
 /// The files of one job.
@@ -194,13 +127,23 @@ impl JobFiles {
                 path: output.path.clone(),
                 error,
             })?;
+            let frames = match output.kind {
+                ResultKind::Frames => found.frames(),
+                _ => Vec::new(),
+            };
             for (input, read) in &inputs {
                 output.differs_from_input(&found, input, read)?;
+                for frame in &frames {
+                    output.differs_from_input(frame, input, read)?;
+                }
             }
             for (other, written) in &before {
                 output.differs_from(&found, other, written)?;
             }
             output.has_room(&found, self.replacing)?;
+            for frame in &frames {
+                output.has_room_for_frame(frame, self.replacing)?;
+            }
             before.push((output, found));
         }
         Ok(())
@@ -227,6 +170,24 @@ impl Found {
         self.identity == *folder || self.place.ancestors().skip(1).any(is_folder)
     }
 
+    /// What a folder holds under names of frames, which new frames would replace.
+    fn frames(&self) -> Vec<Self> {
+        let entries = fs::read_dir(&self.place).into_iter().flatten().flatten();
+        let frames = entries
+            .map(|entry| entry.path())
+            .filter(|path| is_frame_name(path));
+        // A link leads to what is replaced, but the link's own name tells its kind.
+        frames
+            .filter_map(|path| {
+                let identity = FileIdentity::of(&path).ok()?;
+                Some(Self {
+                    identity,
+                    place: path,
+                })
+            })
+            .collect()
+    }
+
     /// Whether it lies in that folder under the name of a frame.
     fn is_frame_in(&self, folder: &FileIdentity) -> bool {
         let parent = self.place.parent().map(FileIdentity::of);
@@ -235,7 +196,12 @@ impl Found {
 }
 
 impl Output {
-    fn differs_from_input(&self, own: &Found, input: &Path, read: &Found) -> Result<(), FileConflict> {
+    fn differs_from_input(
+        &self,
+        own: &Found,
+        input: &Path,
+        read: &Found,
+    ) -> Result<(), FileConflict> {
         let (output, path) = (self.option, self.path.clone());
         if read.place.is_dir() {
             // Files of a folder may be known elsewhere by other names.
@@ -245,13 +211,21 @@ impl Output {
                 || files.any(|file| file.is_ok_and(|file| file == own.identity))
             {
                 let folder = input.to_owned();
-                return Err(FileConflict::InFolder { output, path, folder });
+                return Err(FileConflict::InFolder {
+                    output,
+                    path,
+                    folder,
+                });
             }
         }
         let is_frame = self.kind == ResultKind::Frames && read.is_frame_in(&own.identity);
         if own.identity == read.identity || is_frame {
             let input = input.to_owned();
-            return Err(FileConflict::Read { output, path, input });
+            return Err(FileConflict::Read {
+                output,
+                path,
+                input,
+            });
         }
         Ok(())
     }
@@ -261,7 +235,9 @@ impl Output {
             one.kind == ResultKind::Frames && frame.is_frame_in(&found.identity)
         };
         let is_below = |one: &Self, found: &Found, below: &Found| {
-            !one.kind.is_folder() && below.place != found.place && below.place.starts_with(&found.place)
+            !one.kind.is_folder()
+                && below.place != found.place
+                && below.place.starts_with(&found.place)
         };
         let is_one = own.identity == its.identity && !is_sink(&own.place);
         if is_one
@@ -311,25 +287,38 @@ impl Output {
         if replacing == Replacing::Anything {
             return Ok(());
         }
-        let foreign = |path: &Path| FileConflict::Foreign {
-            output: self.option,
-            path: path.to_owned(),
-            expected: self.kind.name(),
-        };
-        if self.kind == ResultKind::Frames {
-            let entries = fs::read_dir(&own.place).into_iter().flatten().flatten();
-            for entry in entries.map(|entry| entry.path()) {
-                if is_frame_name(&entry) && !is_of_kind(&entry, frame_kind(&entry)) {
-                    return Err(foreign(&entry));
-                }
-            }
-            return Ok(());
-        }
         let may_go = there.is_dir()
             || !there.is_file()
             || is_open_file(&own.place)
             || is_of_kind(&own.place, self.kind);
-        may_go.then_some(()).ok_or_else(|| foreign(&self.path))
+        match may_go {
+            true => Ok(()),
+            false => Err(self.foreign(&self.path, self.kind)),
+        }
+    }
+
+    /// Whether what has a frame's name may go.
+    fn has_room_for_frame(&self, own: &Found, replacing: Replacing) -> Result<(), FileConflict> {
+        if own.place.is_dir() {
+            return Err(FileConflict::Unfit {
+                output: self.option,
+                path: own.place.clone(),
+                message: "a folder is there; a file is to be written",
+            });
+        }
+        let kind = frame_kind(&own.place);
+        match replacing == Replacing::Anything || is_of_kind(&own.place, kind) {
+            true => Ok(()),
+            false => Err(self.foreign(&own.place, kind)),
+        }
+    }
+
+    fn foreign(&self, path: &Path, kind: ResultKind) -> FileConflict {
+        FileConflict::Foreign {
+            output: self.option,
+            path: path.to_owned(),
+            expected: kind.name(),
+        }
     }
 }
 

@@ -9,7 +9,12 @@ use std::path::Path;
 /// # Errors
 /// Another run writes there; a folder that cannot be opened.
 pub fn lock(path: &Path) -> io::Result<File> {
-    let folder = File::open(path)?;
+    let mut how = File::options();
+    how.read(true);
+    // Windows opens folders only if it is told so (FILE_FLAG_BACKUP_SEMANTICS).
+    #[cfg(windows)]
+    std::os::windows::fs::OpenOptionsExt::custom_flags(&mut how, 0x0200_0000);
+    let folder = how.open(path)?;
     match folder.try_lock() {
         Err(TryLockError::WouldBlock) => Err(io::Error::new(
             io::ErrorKind::ResourceBusy,

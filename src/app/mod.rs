@@ -13,6 +13,7 @@ mod check_budget;
 mod check_room;
 pub mod contact_sheet;
 pub mod detections_file;
+mod file_conflict;
 mod file_identity;
 pub mod first_look;
 mod frame_folder;

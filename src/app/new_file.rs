@@ -151,7 +151,10 @@ impl NewFile {
                 }
                 if let Ok(before) = fs::metadata(&place) {
                     // The one who may write here need not own it: rights that cannot be set are no reason to fail.
-                    _ = self.temporary.as_file().set_permissions(before.permissions());
+                    _ = self
+                        .temporary
+                        .as_file()
+                        .set_permissions(before.permissions());
                 }
                 sync(self.temporary.as_file())?;
                 match self.is_first {
@@ -248,7 +251,8 @@ fn io_error(path: &Path, error: io::Error) -> OutputError {
     }
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
+#[cfg(unix)]
 mod tests {
     use super::*;
     use std::os::unix::fs::{PermissionsExt as _, symlink};
@@ -283,7 +287,11 @@ mod tests {
         write(&path, "again").unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap(), "again");
         assert_eq!(names_in(path.parent().unwrap()), ["a.csv"]);
-        assert!(unfinished().iter().all(|listed| !listed.starts_with(folder.path())));
+        assert!(
+            unfinished()
+                .iter()
+                .all(|listed| !listed.starts_with(folder.path()))
+        );
     }
 
     #[test]

@@ -8,8 +8,8 @@ use std::time::Duration;
 use anyhow::{Result, bail};
 
 use super::capture_talk::say;
-use super::live_capture::{Arrived, CaptureEvent, LiveCapture};
 use super::job_files::{JobFiles, Replacing};
+use super::live_capture::{Arrived, CaptureEvent, LiveCapture};
 use super::live_input::LiveInput;
 use super::progress::Progress;
 use super::result_kind::ResultKind;

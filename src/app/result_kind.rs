@@ -130,7 +130,8 @@ impl ResultKind {
             Self::LearntBoard => has_keys(bytes, &["board"], &[]) && count_of(bytes, "board") == 1,
             // A layout that was learnt may have cost an hour; a printed one is made again by the same command.
             Self::PrintedMarkers => {
-                begins(anchor_block::PRINTED.as_bytes()) && has_keys(bytes, &[], &["board", "marker"])
+                begins(anchor_block::PRINTED.as_bytes())
+                    && has_keys(bytes, &[], &["board", "marker"])
             }
             Self::Calibration => has_keys(
                 bytes,
@@ -192,7 +193,9 @@ fn has_keys(bytes: &[u8], all: &[&str], perhaps: &[&str]) -> bool {
         return false;
     };
     let is_known = |key: &String| all.contains(&key.as_str()) || perhaps.contains(&key.as_str());
-    !table.is_empty() && all.iter().all(|key| table.contains_key(*key)) && table.keys().all(is_known)
+    !table.is_empty()
+        && all.iter().all(|key| table.contains_key(*key))
+        && table.keys().all(is_known)
 }
 
 fn count_of(bytes: &[u8], key: &str) -> usize {
@@ -229,18 +232,41 @@ mod tests {
             (Pdf, b"%PDF-1.7\n".to_vec()),
         ];
         let kinds = [
-            Poses, Detections, Stats, Response, Table, Measurements, ChartsPage, Video, Png, Radiance, Pdf,
-            Svg, LearntBoard, PrintedMarkers, Calibration, Frames, Session, Folder,
+            Poses,
+            Detections,
+            Stats,
+            Response,
+            Table,
+            Measurements,
+            ChartsPage,
+            Video,
+            Png,
+            Radiance,
+            Pdf,
+            Svg,
+            LearntBoard,
+            PrintedMarkers,
+            Calibration,
+            Frames,
+            Session,
+            Folder,
         ];
         for (kind, bytes) in &cases {
             assert!(kind.is(bytes), "{kind:?}");
             for other in kinds.iter().filter(|other| *other != kind) {
                 // Printed markers can be learnt anew; each CSV is a table.
-                let both = [(PrintedMarkers, LearntBoard), (Poses, Table)].contains(&(*kind, *other));
+                let both =
+                    [(PrintedMarkers, LearntBoard), (Poses, Table)].contains(&(*kind, *other));
                 assert_eq!(other.is(bytes), both, "{kind:?} as {other:?}");
             }
         }
-        for foreign in ["config/lamp.toml", "models/house.obj", "Cargo.toml", "README.md", "LICENSE"] {
+        for foreign in [
+            "config/lamp.toml",
+            "models/house.obj",
+            "Cargo.toml",
+            "README.md",
+            "LICENSE",
+        ] {
             let bytes = project_file(foreign);
             assert!(kinds.iter().all(|kind| !kind.is(&bytes)), "{foreign}");
         }

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result};
 use toml_edit::{DocumentMut, Item, Table, Value};
 
+use super::new_file::sync_folder;
 use crate::scene::material_libraries::with_libraries_named;
 use crate::scene::{FileKind, NamedFile, Scene};
 
@@ -83,7 +84,9 @@ fn play_own_folder(document: &mut DocumentMut) {
 fn comments_of(table: &Table, key: &str) -> Option<String> {
     let above = table.key(key)?.leaf_decor().prefix()?.as_str()?;
     let behind = table.get(key)?.as_value()?.decor().suffix();
-    let behind = behind.and_then(|suffix| suffix.as_str()).unwrap_or_default();
+    let behind = behind
+        .and_then(|suffix| suffix.as_str())
+        .unwrap_or_default();
     let comments = above.lines().chain(behind.lines());
     let comments: String = comments
         .map(str::trim)
@@ -118,10 +121,16 @@ impl Copies<'_> {
             FileKind::Probe => {
                 let bytes = read(&named.path)?;
                 // Whoever reads it goes by its content.
-                let extension = if bytes.starts_with(b"#?") { "hdr" } else { "exr" };
+                let extension = if bytes.starts_with(b"#?") {
+                    "hdr"
+                } else {
+                    "exr"
+                };
                 self.put(format!("probe/{number}.{extension}"), &bytes)?
             }
-            FileKind::Dictionary => self.put(format!("markers/{number}.yml"), &read(&named.path)?)?,
+            FileKind::Dictionary => {
+                self.put(format!("markers/{number}.yml"), &read(&named.path)?)?
+            }
         };
         self.known.insert(key, name.clone());
         Ok(Some(name))
@@ -161,7 +170,9 @@ fn write_new(path: &Path, bytes: &[u8]) -> Result<()> {
     }
     let mut file = File::create_new(path).with_context(failed)?;
     file.write_all(bytes).with_context(failed)?;
-    file.sync_all().with_context(failed)
+    file.sync_all().with_context(failed)?;
+    sync_folder(path.parent());
+    Ok(())
 }
 
 #[cfg(test)]
@@ -169,7 +180,9 @@ mod tests {
     use super::*;
 
     fn config(name: &str) -> PathBuf {
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("config").join(name)
+        Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("config")
+            .join(name)
     }
 
     #[test]
@@ -217,7 +230,13 @@ mod tests {
         assert!(!copy.camera.mirror);
         assert_eq!(copy.camera.wanted, crate::scene::WantedFormat::default());
         let written = fs::read_to_string(path).unwrap();
-        for comment in ["# the desk's", "# on the arm", "# left for right", "# yes", "# the card"] {
+        for comment in [
+            "# the desk's",
+            "# on the arm",
+            "# left for right",
+            "# yes",
+            "# the card",
+        ] {
             assert!(written.contains(comment), "{comment}: {written}");
         }
     }

@@ -14,7 +14,13 @@ use super::output_error::OutputError;
 use super::scene_copy::{COPY_FOLDERS, SCENE_NAME};
 
 /// Files of a session.
-const FILES: [&str; 5] = ["video.mkv", "times.csv", "poses.csv", "camera.toml", SCENE_NAME];
+const FILES: [&str; 5] = [
+    "video.mkv",
+    "times.csv",
+    "poses.csv",
+    "camera.toml",
+    SCENE_NAME,
+];
 
 /// A session's folder. Dropped before [`SessionFolder::keep`] all that the session has is removed, and an older one is back.
 #[derive(Debug)]
@@ -45,7 +51,9 @@ impl SessionFolder {
             let foreign = names.iter().find(|name| !is_of_session(name));
             let message = match (replacing, foreign) {
                 (Replacing::OlderResults, _) => {
-                    format!("the folder holds something already ({first}); a recording takes a new one")
+                    format!(
+                        "the folder holds something already ({first}); a recording takes a new one"
+                    )
                 }
                 (Replacing::Anything, Some(foreign)) => format!(
                     "the folder holds something already that is no part of a session ({foreign}); a recording takes a new one"
@@ -76,9 +84,9 @@ impl SessionFolder {
         &self.path
     }
 
-    /// The session has a frame: it stays, and an older one goes.
+    /// The session has a frame: it stays, and an older one goes; unless somebody took the session away.
     pub fn keep(&mut self) {
-        self.kept = true;
+        self.kept = is_at(&self.path, &self.folder);
     }
 }
 
@@ -98,8 +106,8 @@ impl Drop for SessionFolder {
             _ = fs::remove_dir(&self.path);
         }
         if let Some(older) = self.older.take() {
-            let is_back = !self.path.exists()
-                && fs::rename(older.path().join(OLDER), &self.path).is_ok();
+            let is_back =
+                !self.path.exists() && fs::rename(older.path().join(OLDER), &self.path).is_ok();
             if !is_back {
                 // Rather hidden than lost.
                 _ = older.keep();
@@ -121,7 +129,10 @@ fn set_aside(path: &Path) -> io::Result<TempDir> {
     match fs::create_dir(&place) {
         Ok(()) => Ok(aside),
         Err(error) => {
-            fs::rename(aside.path().join(OLDER), &place)?;
+            if fs::rename(aside.path().join(OLDER), &place).is_err() {
+                // Rather hidden than lost.
+                _ = aside.keep();
+            }
             Err(error)
         }
     }

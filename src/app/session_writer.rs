@@ -360,14 +360,24 @@ mod tests {
         let outer = tempfile::tempdir().unwrap();
         let path = outer.path().join("session");
         let record = |frames: u32, replacing: Replacing| {
-            let head = SessionHead { replacing, ..head() };
+            let head = SessionHead {
+                replacing,
+                ..head()
+            };
             let mut writer = SessionWriter::create(&path, head)?;
             for index in 0..frames {
-                writer.push(&frame(index, f64::from(index), [32, 24])).unwrap();
+                writer
+                    .push(&frame(index, f64::from(index), [32, 24]))
+                    .unwrap();
             }
             writer.finish()
         };
-        let rows = || std::fs::read_to_string(path.join("times.csv")).unwrap().lines().count();
+        let rows = || {
+            std::fs::read_to_string(path.join("times.csv"))
+                .unwrap()
+                .lines()
+                .count()
+        };
         let count = || std::fs::read_dir(outer.path()).unwrap().count();
         record(3, Replacing::OlderResults).unwrap();
         assert!(record(2, Replacing::OlderResults).is_err());

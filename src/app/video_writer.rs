@@ -102,6 +102,13 @@ impl VideoWriter {
         naming: Naming,
     ) -> Result<Self, OutputError> {
         let file = VideoFile::create(path, naming)?;
+        let mut writer = Self {
+            path: path.to_owned(),
+            size_px,
+            frames: 0,
+            encoder: None,
+            file: None,
+        };
         let mut command = Command::new("ffmpeg");
         command
             .args(["-hide_banner", "-loglevel", "error", "-nostdin", "-y"])
@@ -119,6 +126,8 @@ impl VideoWriter {
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::piped());
+        // From here on the file goes if the encoder does not start.
+        writer.file = Some(file);
         // Ctrl-C is for gnomon, which then finishes the video; the encoder must live until that is done.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
@@ -141,18 +150,12 @@ impl VideoWriter {
             _ = stderr.read_to_end(&mut bytes);
             String::from_utf8_lossy(&bytes).into_owned()
         });
-        let encoder = Some(Encoder {
+        writer.encoder = Some(Encoder {
             child,
             frames_in,
             talk,
         });
-        Ok(Self {
-            path: path.to_owned(),
-            size_px,
-            frames: 0,
-            encoder,
-            file: Some(file),
-        })
+        Ok(writer)
     }
 
     /// Adds a frame of 8-bit RGBA.

@@ -125,7 +125,11 @@ fn read_with_tobj(
                 Ok(text) => {
                     let (more, names) = tobj::load_mtl_buf(&mut Cursor::new(text))?;
                     let known = materials.len();
-                    numbers.extend(names.into_iter().map(|(name, number)| (name, known + number)));
+                    numbers.extend(
+                        names
+                            .into_iter()
+                            .map(|(name, number)| (name, known + number)),
+                    );
                     materials.extend(more);
                 }
                 Err(error) => {

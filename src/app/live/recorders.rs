@@ -193,7 +193,10 @@ mod tests {
             let planted = folder.path().join("picture-004.png");
             std::os::unix::fs::symlink(&elsewhere, planted).unwrap();
             let said = recorders.screenshot([3, 2], &pixels).unwrap();
-            assert!(said.contains("picture-005.png") && !elsewhere.exists(), "{said}");
+            assert!(
+                said.contains("picture-005.png") && !elsewhere.exists(),
+                "{said}"
+            );
         }
     }
 }
