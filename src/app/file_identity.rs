@@ -9,7 +9,7 @@ use std::path::{Component, Path, PathBuf};
 const MOST_LINKS: u32 = 40;
 
 /// A file or a folder. Two are equal if writing to one changes the other.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum FileIdentity {
     /// Of what is there (Unix): the device and the number on it, which hard links share.
     #[cfg(unix)]

@@ -1,6 +1,7 @@
 //! What a job reads and what it is to write, compared by file before it begins: no output is an input, two outputs are not
 //! one, and what stands under an output's name is an older result of its kind, or is replaced because somebody said so.
 
+use std::collections::HashSet;
 use std::fs;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
@@ -39,6 +40,14 @@ struct Output {
     option: &'static str,
     path: PathBuf,
     kind: ResultKind,
+}
+
+/// What is read.
+struct Input<'a> {
+    path: &'a Path,
+    found: Found,
+    /// Of a folder, those that lie in it: they may be known elsewhere by other names.
+    files: HashSet<FileIdentity>,
 }
 
 /// A file that was found.
@@ -117,10 +126,8 @@ impl JobFiles {
     /// # Errors
     /// The first output that would do harm.
     pub fn check(&self) -> Result<(), FileConflict> {
-        let inputs: Vec<(&PathBuf, Found)> = (self.inputs.iter())
-            // An input that cannot be looked at is the business of whoever reads it.
-            .filter_map(|path| Some((path, Found::at(path).ok()?)))
-            .collect();
+        let inputs = self.inputs.iter().filter_map(|path| Input::at(path));
+        let inputs: Vec<Input> = inputs.collect();
         let mut before: Vec<(&Output, Found)> = Vec::new();
         for output in &self.outputs {
             let found = Found::at(&output.path).map_err(|error| FileConflict::Io {
@@ -131,11 +138,8 @@ impl JobFiles {
                 ResultKind::Frames => found.frames(),
                 _ => Vec::new(),
             };
-            for (input, read) in &inputs {
-                output.differs_from_input(&found, input, read)?;
-                for frame in &frames {
-                    output.differs_from_input(frame, input, read)?;
-                }
+            for input in &inputs {
+                output.differs_from_input(&found, &frames, input)?;
             }
             for (other, written) in &before {
                 output.differs_from(&found, other, written)?;
@@ -147,6 +151,25 @@ impl JobFiles {
             before.push((output, found));
         }
         Ok(())
+    }
+}
+
+impl<'a> Input<'a> {
+    /// One that cannot be looked at is the business of whoever reads it.
+    fn at(path: &'a Path) -> Option<Self> {
+        let found = Found::at(path).ok()?;
+        let entries = fs::read_dir(&found.place).into_iter().flatten().flatten();
+        Some(Self {
+            path,
+            files: entries
+                .filter_map(|entry| FileIdentity::of(&entry.path()).ok())
+                .collect(),
+            found,
+        })
+    }
+
+    fn is(&self, file: &Found) -> bool {
+        file.identity == self.found.identity || self.files.contains(&file.identity)
     }
 }
 
@@ -196,35 +219,28 @@ impl Found {
 }
 
 impl Output {
+    /// `frames` are what is there already under names of frames.
     fn differs_from_input(
         &self,
         own: &Found,
-        input: &Path,
-        read: &Found,
+        frames: &[Found],
+        input: &Input,
     ) -> Result<(), FileConflict> {
-        let (output, path) = (self.option, self.path.clone());
-        if read.place.is_dir() {
-            // Files of a folder may be known elsewhere by other names.
-            let entries = fs::read_dir(&read.place).into_iter().flatten().flatten();
-            let mut files = entries.map(|entry| FileIdentity::of(&entry.path()));
-            if own.is_in(&read.identity)
-                || files.any(|file| file.is_ok_and(|file| file == own.identity))
-            {
-                let folder = input.to_owned();
-                return Err(FileConflict::InFolder {
-                    output,
-                    path,
-                    folder,
-                });
-            }
+        let output = self.option;
+        let read = &input.found;
+        if read.place.is_dir() && (own.is_in(&read.identity) || input.is(own)) {
+            return Err(FileConflict::InFolder {
+                output,
+                path: self.path.clone(),
+                folder: input.path.to_owned(),
+            });
         }
-        let is_frame = self.kind == ResultKind::Frames && read.is_frame_in(&own.identity);
-        if own.identity == read.identity || is_frame {
-            let input = input.to_owned();
+        let becomes_frame = self.kind == ResultKind::Frames && read.is_frame_in(&own.identity);
+        if input.is(own) || becomes_frame || frames.iter().any(|frame| input.is(frame)) {
             return Err(FileConflict::Read {
                 output,
-                path,
-                input,
+                path: self.path.clone(),
+                input: input.path.to_owned(),
             });
         }
         Ok(())
