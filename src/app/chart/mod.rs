@@ -138,12 +138,13 @@ pub fn chart(request: &Request, stop: &AtomicBool) -> Result<String> {
         .collect();
     let names = charts.iter().map(|chart| chart.name());
     files_of(request, names).check()?;
+    let counts: Result<Vec<usize>> = charts.iter().map(|chart| chart.unit_count(&lab)).collect();
+    let count = counts?.into_iter().sum();
     let measured = request.out.join(MEASURED);
     let _this_run_s = std::fs::create_dir_all(&measured)
         .and_then(|()| lock(&measured))
         .with_context(|| measured.display().to_string())?;
-    let counts: Result<Vec<usize>> = charts.iter().map(|chart| chart.unit_count(&lab)).collect();
-    let progress = Progress::of_measurements(counts?.into_iter().sum());
+    let progress = Progress::of_measurements(count);
     for chart in &charts {
         let done = chart.make(&lab, &request.out, &progress);
         if !matches!(done, Ok(true)) {
