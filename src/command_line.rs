@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand};
 
 use gnomon::app::board::Distance;
 use gnomon::app::chart;
+use gnomon::app::job_files::Replacing;
 use gnomon::app::layer_files::Layer;
 use gnomon::app::probe::exposure_of;
 use gnomon::calibration::{Target, TargetMarkers};
@@ -91,6 +92,23 @@ pub enum Command {
     Chart(ChartArgs),
 }
 
+/// What results may take the place of.
+#[derive(Args)]
+pub struct ForceArgs {
+    /// Replace whatever file has an output's name; without this an older result of its kind alone
+    #[arg(long)]
+    pub force: bool,
+}
+
+impl ForceArgs {
+    pub fn replacing(&self) -> Replacing {
+        match self.force {
+            true => Replacing::Anything,
+            false => Replacing::OlderResults,
+        }
+    }
+}
+
 #[derive(Args)]
 pub struct ChartArgs {
     /// Folder for the charts; charts without this, charts/quick with --quick
@@ -107,6 +125,8 @@ pub struct ChartArgs {
     /// Graphics adapter, by a part of its name; the fastest kind without this
     #[arg(long, value_name = "NAME")]
     pub adapter: Option<String>,
+    #[command(flatten)]
+    pub force: ForceArgs,
 }
 
 #[derive(Args)]
@@ -116,7 +136,7 @@ pub struct LiveArgs {
     pub source: PathBuf,
     #[command(flatten)]
     pub recording: RecordingArgs,
-    /// Folder for what the window's keys record: pictures, sessions, videos
+    /// Folder for what the window's keys record: pictures, sessions, videos, each under a name that nothing has yet
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
     /// Graphics adapter, by a part of its name; the fastest kind without this
@@ -140,13 +160,13 @@ pub struct ReplayArgs {
     /// Show no virtual thing: the undistorted video alone
     #[arg(long)]
     pub bare: bool,
-    /// Write the poses of all anchors (CSV)
+    /// Write the poses of all anchors (CSV; - for stdout, as for every text)
     #[arg(long, value_name = "FILE")]
     pub poses: Option<PathBuf>,
     /// Take the poses from such a file instead of tracking
     #[arg(long, value_name = "FILE")]
     pub poses_from: Option<PathBuf>,
-    /// Write times per stage, frames, adapter and memory (JSON)
+    /// Write times per stage, frames, adapter and memory (JSON, or -)
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,
     /// Draw shadow volumes without these shortcuts, to find what a wrong pixel comes from
@@ -158,6 +178,8 @@ pub struct ReplayArgs {
     /// Graphics adapter, by a part of its name; the fastest kind without this
     #[arg(long, value_name = "NAME")]
     pub adapter: Option<String>,
+    #[command(flatten)]
+    pub force: ForceArgs,
 }
 
 #[derive(Args)]
@@ -174,15 +196,17 @@ pub struct TrackArgs {
     pub size_mm: Option<f64>,
     #[command(flatten)]
     pub family: FamilyArgs,
-    /// Write the poses (CSV)
+    /// Write the poses (CSV; - for stdout, as for every text)
     #[arg(long, value_name = "FILE")]
     pub poses: Option<PathBuf>,
-    /// Write every marker that the detector sees, with its corners (CSV)
+    /// Write every marker that the detector sees, with its corners (CSV, or -)
     #[arg(long, value_name = "FILE")]
     pub markers: Option<PathBuf>,
-    /// Write times per stage, frames and memory (JSON)
+    /// Write times per stage, frames and memory (JSON, or -)
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,
+    #[command(flatten)]
+    pub force: ForceArgs,
 }
 
 #[derive(Args)]
@@ -215,6 +239,8 @@ pub struct BoardArgs {
     /// Write the [[board]] to a file rather than to stdout
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+    #[command(flatten)]
+    pub force: ForceArgs,
 }
 
 #[derive(Args)]
@@ -226,7 +252,7 @@ pub struct CalibrateArgs {
     pub source: Vec<String>,
     #[command(flatten)]
     pub target: TargetArgs,
-    /// Write the calibration (TOML)
+    /// Write the calibration (TOML, or - for stdout)
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Write a picture of where the corners lie, how far they are off, and where there are none (PNG)
@@ -243,6 +269,8 @@ pub struct CalibrateArgs {
     /// Graphics adapter of the window, by a part of its name; the fastest kind without this
     #[arg(long, value_name = "NAME")]
     pub adapter: Option<String>,
+    #[command(flatten)]
+    pub force: ForceArgs,
 }
 
 /// What a camera is calibrated with.
@@ -302,6 +330,8 @@ pub struct MarkersArgs {
     /// Pixels per inch of a PNG
     #[arg(long, value_name = "DPI", default_value = "300")]
     pub dpi: f64,
+    #[command(flatten)]
+    pub force: ForceArgs,
 }
 
 /// Sizes of paper.
@@ -330,12 +360,14 @@ pub struct RecordArgs {
     pub source: PathBuf,
     #[command(flatten)]
     pub recording: RecordingArgs,
-    /// The session's folder: a new one
+    /// The session's folder: a new one, or with --force an older session's
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// End after this many seconds of frames
     #[arg(long, value_name = "N", value_parser = seconds_of)]
     pub seconds: Option<f64>,
+    #[command(flatten)]
+    pub force: ForceArgs,
 }
 
 /// A recording or a camera that no scene describes.
@@ -422,7 +454,7 @@ pub struct ProbeArgs {
     /// The camera's response, as --save-response wrote it, instead of estimating it
     #[arg(long, value_name = "FILE")]
     pub response: Option<PathBuf>,
-    /// Write the camera's response (CSV)
+    /// Write the camera's response (CSV, or - for stdout)
     #[arg(long, value_name = "FILE")]
     pub save_response: Option<PathBuf>,
     /// Exposure at which radiance 1 is white; the middle picture's without this
@@ -437,6 +469,8 @@ pub struct ProbeArgs {
     /// Write a picture of the probe with rings around its brightest lights (PNG)
     #[arg(long, value_name = "FILE")]
     pub preview: Option<PathBuf>,
+    #[command(flatten)]
+    pub force: ForceArgs,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]

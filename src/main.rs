@@ -19,6 +19,7 @@ use gnomon::app::check;
 use gnomon::app::first_look::first_look;
 use gnomon::app::live;
 use gnomon::app::markers::{self, Paper, Sheet};
+use gnomon::app::new_file::{exit_without_traces, is_stdout};
 use gnomon::app::probe;
 use gnomon::app::record;
 use gnomon::app::replay::{self, replay};
@@ -32,6 +33,9 @@ use command_line::{
     BoardArgs, CalibrateArgs, ChartArgs, Cli, Command, LiveArgs, MarkersArgs, PageSize, ProbeArgs,
     ProbeKindArg, RecordArgs, RecordingArgs, ReplayArgs, Sizes, TrackArgs,
 };
+
+/// As shells have it for Ctrl-C.
+const INTERRUPTED: i32 = 130;
 
 fn main() -> ExitCode {
     match run(Cli::parse()) {
@@ -88,6 +92,7 @@ fn run_live(args: LiveArgs) -> Result<()> {
 fn run_replay(args: ReplayArgs) -> Result<()> {
     let stop = interrupts()?;
     let request = replay::Request {
+        replacing: args.force.replacing(),
         scene: args.scene,
         out: args.out,
         layers: args.layers.into_iter().collect(),
@@ -110,6 +115,7 @@ fn run_chart(args: ChartArgs) -> Result<()> {
         false => "charts",
     };
     let request = chart::Request {
+        replacing: args.force.replacing(),
         out: args.out.unwrap_or_else(|| out.into()),
         only: args.only,
         quick: args.quick,
@@ -123,6 +129,7 @@ fn run_chart(args: ChartArgs) -> Result<()> {
 fn run_track(args: TrackArgs) -> Result<()> {
     let stop = interrupts()?;
     let request = track::Request {
+        replacing: args.force.replacing(),
         input: track_input(&args)?,
         poses: args.poses,
         markers: args.markers,
@@ -132,6 +139,7 @@ fn run_track(args: TrackArgs) -> Result<()> {
 }
 
 fn run_markers(args: MarkersArgs) -> Result<()> {
+    end_at_interrupt()?;
     let family = args.family.family()?;
     // Each kind of sheet requires its sizes (`requires` above).
     let mm = |size: Option<f64>| size.unwrap_or(f64::NAN);
@@ -153,6 +161,7 @@ fn run_markers(args: MarkersArgs) -> Result<()> {
         _ => Sheet::Target(args.target.target()?),
     };
     let written = markers::markers(&markers::Request {
+        replacing: args.force.replacing(),
         out: args.out,
         sheet,
         paper: match args.page {
@@ -177,6 +186,7 @@ fn run_calibrate(args: CalibrateArgs) -> Result<()> {
         adapter: args.adapter,
     });
     let request = calibrate::Request {
+        replacing: args.force.replacing(),
         watch,
         sources: args.source,
         target: args.target.target()?,
@@ -185,7 +195,11 @@ fn run_calibrate(args: CalibrateArgs) -> Result<()> {
         coverage: args.coverage,
     };
     let done = calibrate::calibrate(&request, &stop)?;
-    print!("{}", done.summary);
+    // Where the calibration itself goes to stdout, the rest is talk.
+    match is_stdout(&request.out) {
+        true => eprint!("{}", done.summary),
+        false => print!("{}", done.summary),
+    }
     for warning in &done.warnings {
         eprintln!("warning: {warning}");
     }
@@ -216,6 +230,7 @@ fn run_board(args: BoardArgs) -> Result<()> {
         );
     }
     let request = board::Request {
+        replacing: args.force.replacing(),
         input,
         family: args.family.family()?,
         map: MapSettings {
@@ -240,6 +255,7 @@ fn run_record(args: RecordArgs) -> Result<()> {
         record::Input::Camera(camera_of(&args.source, &args.recording)?)
     };
     let request = record::Request {
+        replacing: args.force.replacing(),
         input,
         out: args.out,
         seconds: args.seconds,
@@ -249,7 +265,9 @@ fn run_record(args: RecordArgs) -> Result<()> {
 }
 
 fn run_probe(args: ProbeArgs) -> Result<()> {
+    end_at_interrupt()?;
     let request = probe::Request {
+        replacing: args.force.replacing(),
         pictures: args.pictures,
         exposures: args.exposures,
         kind: match args.kind {
@@ -273,7 +291,11 @@ fn run_probe(args: ProbeArgs) -> Result<()> {
     for remark in &told.remarks {
         eprintln!("{remark}");
     }
-    print!("{}", told.lights);
+    // Where the response goes to stdout, the rest is talk.
+    match request.save_response.as_deref().is_some_and(is_stdout) {
+        true => eprint!("{}", told.lights),
+        false => print!("{}", told.lights),
+    }
     Ok(())
 }
 
@@ -326,13 +348,23 @@ fn size_m(size_mm: f64) -> Result<f64> {
     Ok(size_mm * 1e-3)
 }
 
-/// What an interrupt sets.
+/// What an interrupt sets. A second one does not wait for a job that cannot end, as one that writes to a pipe which nobody
+/// reads.
 fn interrupts() -> Result<Arc<AtomicBool>> {
     let stop = Arc::new(AtomicBool::new(false));
     let asked = Arc::clone(&stop);
-    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))
-        .context("cannot listen for interrupts")?;
+    let set = move || {
+        if asked.swap(true, Ordering::Relaxed) {
+            exit_without_traces(INTERRUPTED);
+        }
+    };
+    ctrlc::set_handler(set).context("cannot listen for interrupts")?;
     Ok(stop)
+}
+
+/// An interrupt ends a job that is done in a moment, or has nothing to keep.
+fn end_at_interrupt() -> Result<()> {
+    ctrlc::set_handler(|| exit_without_traces(INTERRUPTED)).context("cannot listen for interrupts")
 }
 
 /// Says what was done.

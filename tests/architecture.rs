@@ -68,6 +68,37 @@ fn libraries_and_the_clock_stay_at_home() {
     assert!(complaints.is_empty(), "\n{}", complaints.join("\n"));
 }
 
+/// Whatever else is written goes through `app/new_file.rs`: whole, beside its place, under a name that nobody foresees.
+#[test]
+fn files_are_written_in_few_places() {
+    const WRITES: [&str; 7] = [
+        "fs::write(",
+        " File::create(",
+        "(File::create(",
+        "fs::File::create(",
+        "fs::rename(",
+        "fs::copy(",
+        "OpenOptions::",
+    ];
+    const HOMES: [&str; 3] = [
+        // Kept measurements: appended to, and begun anew.
+        "app/chart/measured.rs",
+        "app/session_folder.rs",
+        // A camera's device, to be read.
+        "capture/live/webcam.rs",
+    ];
+    let complaints: Vec<String> = sources()
+        .iter()
+        .filter(|(file, _)| !HOMES.contains(&file.as_str()) && !file.ends_with("tests.rs"))
+        .flat_map(|(file, text)| {
+            let code = text.split("\n#[cfg(test)]").next().unwrap_or_default();
+            let found = WRITES.iter().filter(|write| code.contains(**write));
+            found.map(move |write| format!("src/{file}: `{write}` belongs in {HOMES:?} alone"))
+        })
+        .collect();
+    assert!(complaints.is_empty(), "\n{}", complaints.join("\n"));
+}
+
 #[test]
 fn every_shader_is_valid() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");

@@ -12,7 +12,7 @@ use common::prints::{
 };
 use common::sheets::CAMERA;
 use glam::{DAffine3, DMat3, DVec2};
-use gnomon::app::picture_files::write_grey_png;
+use gnomon::app::picture_files::{grey_png, write_bytes};
 use gnomon::calibration::{
     CalibrateError, Calibration, Lack, Look, Target, TargetFinder, TargetMarkers, Views, solve,
 };
@@ -104,6 +104,11 @@ fn assert_camera(found: &Calibration, truth: &Intrinsics, within_px: f64) {
         "{}",
         found.focal_deviation_px
     );
+}
+
+fn write_grey_png(path: &Path, size_px: [u32; 2], grey: &[u8]) {
+    let picture = grey_png(path, size_px, grey).expect("a picture");
+    write_bytes(path, &picture).expect("a picture");
 }
 
 #[test]
@@ -329,7 +334,7 @@ fn the_command_writes_what_scenes_read() {
     for (k, pose) in good_poses(print).iter().enumerate() {
         let grey = Photographer::bent().photograph(print, pose, 1.0);
         let path = folder.path().join(format!("views/{k}.png"));
-        write_grey_png(&path, CAMERA.size_px, &grey).expect("a picture");
+        write_grey_png(&path, CAMERA.size_px, &grey);
     }
     let output = gnomon(
         folder.path(),
@@ -355,9 +360,9 @@ fn mistakes_are_told_and_leave_nothing() {
     let folder = tempfile::tempdir().expect("a folder");
     let grey = |side: usize| vec![90; side * 480];
     let path = |name: &str| folder.path().join(name);
-    write_grey_png(&path("wall/0.png"), [640, 480], &grey(640)).expect("a picture");
-    write_grey_png(&path("sizes/0.png"), [640, 480], &grey(640)).expect("a picture");
-    write_grey_png(&path("sizes/1.png"), [600, 480], &grey(600)).expect("a picture");
+    write_grey_png(&path("wall/0.png"), [640, 480], &grey(640));
+    write_grey_png(&path("sizes/0.png"), [640, 480], &grey(640));
+    write_grey_png(&path("sizes/1.png"), [600, 480], &grey(600));
     std::fs::create_dir(path("empty")).expect("a folder");
     let written = "--out out/camera.toml --coverage out/c.png";
     let chessboard = format!("{CHESSBOARD} {written}");

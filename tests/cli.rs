@@ -564,7 +564,8 @@ fn stop_midway(signal: Signal) {
         .stderr(Stdio::piped())
         .spawn()
         .expect("a run that can be stopped");
-    while !folder.path().join("a.partial.mp4").exists() {
+    let has_begun = |name: &String| name.starts_with(".gnomon-") && name.ends_with(".mp4");
+    while !files(folder.path()).iter().any(has_begun) {
         assert!(
             started.elapsed() < Duration::from_secs(30),
             "it never began"

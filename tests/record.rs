@@ -122,7 +122,10 @@ fn start_recording(session: &Path) -> std::process::Child {
         .stderr(Stdio::piped())
         .spawn()
         .expect("a start");
-    wait_for("the video", || session.join("video.mkv").exists());
+    // The file is there before the encoder is.
+    wait_for("the video", || {
+        std::fs::metadata(session.join("video.mkv")).is_ok_and(|video| video.len() > 0)
+    });
     child
 }
 

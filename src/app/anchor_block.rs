@@ -4,6 +4,9 @@ use std::fmt::Write as _;
 
 use crate::scene::{Family, Marker};
 
+/// What the text beside a printed sheet begins with.
+pub const PRINTED: &str = "# Printed by gnomon markers";
+
 /// A `[[board]]` of markers of one family.
 pub fn board(name: &str, markers: &[Marker]) -> String {
     let name = toml::Value::from(name);

@@ -7,13 +7,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Context as _, Result, bail};
 
 use super::anchor_block;
+use super::job_files::{JobFiles, Replacing};
 use super::picture_files::write_text;
 use super::progress::Progress;
-use super::recording::{self, refuse_to_overwrite};
+use super::recording;
+use super::result_kind::ResultKind;
 use super::track::settings_for;
 use crate::capture::{FrameSource, Notice};
 use crate::scene::{
-    CameraSettings, DetectorKind, Family, Marker, NAMES, Scene, TrackingSettings, is_name,
+    CameraSettings, DetectorKind, Family, Marker, NAMES, TrackingSettings, is_name,
 };
 use crate::tracking::mapping::{LearntBoard, MapSettings, learn_board};
 use crate::tracking::{Detection, Detector, grey_from_rgba};
@@ -36,6 +38,8 @@ pub struct Request {
     pub name: String,
     /// Where to write the `[[board]]` block; `None`: stdout.
     pub out: Option<PathBuf>,
+    /// What that may take the place of.
+    pub replacing: Replacing,
 }
 
 /// The recording.
@@ -66,20 +70,26 @@ pub struct Distance {
 /// # Errors
 /// Anything that keeps a frame from being read or the layout from being learnt; nothing is written then.
 pub fn board(request: &Request, stop: &AtomicBool) -> Result<()> {
+    let mut files = JobFiles::new(request.replacing);
     let (camera, settings) = match &request.input {
         Input::Scene(path) => {
-            let scene = Scene::load(path)?;
+            let scene = files.reads_scene(path)?;
             (scene.camera, scene.tracking)
         }
         Input::Recording { camera, decimation } => {
+            files.reads_camera(camera);
             (camera.clone(), settings_for(request.family, *decimation))
         }
     };
     if !is_name(&request.name) {
         bail!("--name \"{}\": not a name; allowed: {NAMES}", request.name);
     }
+    files.reads_family(request.family);
+    if let Some(out) = &request.out {
+        files.writes("--out", out, ResultKind::LearntBoard);
+    }
+    files.check()?;
     let (source, intrinsics) = recording::open(&camera)?;
-    refuse_to_overwrite(&source, request.out.as_deref())?;
     let (pictures, notices) = detections(source, &settings, request.family, stop)?;
     let learnt = learn_board(&intrinsics, request.family, &pictures, &request.map)
         .with_context(|| format!("{} pictures of {}", pictures.len(), camera.source))?;

@@ -7,12 +7,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context as _, Result, bail};
 
+use super::job_files::{JobFiles, Replacing};
 use super::live::calibrating;
+use super::new_file::is_stdout;
 use super::picture_files::{write_rgb_png, write_text};
 use super::progress::Progress;
-use super::recording::refuse_to_overwrite;
+use super::result_kind::ResultKind;
 use crate::calibration::{Calibration, Lack, Target, Views, coverage_picture, solve};
-use crate::capture::live::{LiveOptions, is_live};
+use crate::capture::live::LiveOptions;
 use crate::capture::{FrameSource, Notice, calibration_text};
 use crate::scene::WantedFormat;
 use crate::tracking::grey_from_rgba;
@@ -32,6 +34,8 @@ pub struct Request {
     pub coverage: Option<PathBuf>,
     /// A camera, or a video as if it were one, in a window; `None`: recordings, all frames that differ.
     pub watch: Option<Watch>,
+    /// What the files may take the place of.
+    pub replacing: Replacing,
 }
 
 /// How the window is opened.
@@ -65,9 +69,11 @@ const MOST_RMS_PX: f64 = 1.0;
 /// Pictures that cannot be read or give no calibration, files that cannot be written.
 pub fn calibrate(request: &Request, stop: &Arc<AtomicBool>) -> Result<Done> {
     let out = &request.out;
-    if out.extension().is_none_or(|extension| extension != "toml") {
+    let is_toml = out.extension().is_some_and(|extension| extension == "toml");
+    if !is_toml && !is_stdout(out) {
         bail!("{}: a calibration is written as .toml", out.display());
     }
+    request.files().check()?;
     let pictures = match &request.watch {
         Some(watch) => watched(request, watch, stop)?,
         None => Pictures::of_recordings(request, stop)?,
@@ -100,9 +106,6 @@ fn watched(request: &Request, watch: &Watch, stop: &Arc<AtomicBool>) -> Result<P
             "a camera is calibrated alone, in a window; several recordings together without --watch"
         );
     };
-    if !is_live(source) {
-        request.refuse_to_overwrite(&FrameSource::open(source)?)?;
-    }
     let options = LiveOptions {
         wanted: watch.wanted,
         mirror: request.mirror,
@@ -127,9 +130,19 @@ fn watched(request: &Request, watch: &Watch, stop: &Arc<AtomicBool>) -> Result<P
 }
 
 impl Request {
-    fn refuse_to_overwrite(&self, source: &FrameSource) -> Result<()> {
-        refuse_to_overwrite(source, Some(&self.out))?;
-        refuse_to_overwrite(source, self.coverage.as_deref())
+    fn files(&self) -> JobFiles {
+        let mut files = JobFiles::new(self.replacing);
+        for source in &self.sources {
+            files.reads(Path::new(source));
+        }
+        if let Some(markers) = &self.target.markers {
+            files.reads_family(markers.family);
+        }
+        files.writes("--out", &self.out, ResultKind::Calibration);
+        if let Some(path) = &self.coverage {
+            files.writes("--coverage", path, ResultKind::Png);
+        }
+        files
     }
 }
 
@@ -150,7 +163,6 @@ impl Pictures {
         };
         for name in &request.sources {
             let source = FrameSource::open(name)?.mirrored(request.mirror);
-            request.refuse_to_overwrite(&source)?;
             let is_only_source = request.sources.len() == 1;
             pictures.look_at(source, is_only_source, stop)?;
         }

@@ -1,12 +1,12 @@
 //! Layers as files beside the pictures, named as DESIGN's contract says.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 
 use crate::render::Layers;
 
-use super::output::OutputError;
-use super::picture_files::{write_float_exr, write_grey_png, write_rgb16_png};
+use super::frame_folder::FrameFolder;
+use super::output_error::OutputError;
+use super::picture_files::{float_exr, grey_png, rgb16_png};
 
 /// A layer that can be asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
@@ -26,27 +26,32 @@ pub enum Layer {
 /// # Errors
 /// What keeps a file from being written.
 pub fn write_layers(
-    folder: &Path,
+    folder: &mut FrameFolder,
     index: u32,
     size_px: [u32; 2],
     layers: &Layers,
     wanted: &BTreeSet<Layer>,
 ) -> Result<(), OutputError> {
-    let file = |suffix: &str| folder.join(format!("{index:06}_{suffix}"));
+    let name = |suffix: &str| format!("{index:06}_{suffix}");
     for layer in wanted {
         match layer {
-            Layer::Role => write_grey_png(&file("role.png"), size_px, &layers.role)?,
+            Layer::Role => folder.put(&name("role.png"), |path| {
+                grey_png(path, size_px, &layers.role)
+            })?,
             Layer::Shadow => {
                 for (light, bits) in layers.shadow.iter().enumerate() {
-                    write_grey_png(&file(&format!("shadow_{light}.png")), size_px, bits)?;
+                    let name = name(&format!("shadow_{light}.png"));
+                    folder.put(&name, |path| grey_png(path, size_px, bits))?;
                 }
             }
             Layer::Gain => {
                 let fixed_point = |gain: &f32| (gain * 32768.0).round().clamp(0.0, 65535.0) as u16;
                 let gain: Vec<u16> = layers.gain.iter().flatten().map(fixed_point).collect();
-                write_rgb16_png(&file("gain.png"), size_px, &gain)?;
+                folder.put(&name("gain.png"), |path| rgb16_png(path, size_px, &gain))?;
             }
-            Layer::Depth => write_float_exr(&file("depth.exr"), size_px, &layers.depth_m)?,
+            Layer::Depth => folder.put(&name("depth.exr"), |path| {
+                float_exr(path, size_px, &layers.depth_m)
+            })?,
         }
     }
     Ok(())

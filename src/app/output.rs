@@ -1,27 +1,34 @@
 //! Where composited frames go: a video or a folder of pictures, whole under its final name or not there at all.
 
-use std::path::{Path, PathBuf};
+use std::collections::BTreeSet;
+use std::path::Path;
 
+use super::frame_folder::{FrameFolder, frame_name};
+use super::layer_files::{Layer, write_layers};
 pub use super::output_error::OutputError;
 use super::picture_files;
+use super::result_kind::ResultKind;
 use super::video_writer::{Codec, Naming, VideoWriter};
+use crate::render::Layers;
 
 /// Takes frames one by one.
 pub enum FrameSink {
     /// A video file.
     Video(VideoWriter),
     /// A folder of `NNNNNN.png`.
-    Folder(PathBuf),
+    Folder(FrameFolder),
 }
 
 const FOREIGN_FILES: [&str; 8] = ["webm", "m4v", "mpg", "mpeg", "gif", "ts", "wmv", "png"];
 
 impl FrameSink {
-    /// Opens `path`: by its extension a video, else a folder of PNGs. Folders on the way are made.
-    pub fn create(path: &Path, size_px: [u32; 2], fps: f64) -> Result<Self, OutputError> {
-        if let Some(codec) = Codec::of_path(path) {
-            let video = VideoWriter::create(path, codec, size_px, fps, Naming::Finished)?;
-            return Ok(Self::Video(video));
+    /// What `path` is for by its extension: a video, else a folder of PNGs.
+    ///
+    /// # Errors
+    /// A name that looks like a video, of a kind that is not written.
+    pub fn kind_of(path: &Path) -> Result<ResultKind, OutputError> {
+        if Codec::of_path(path).is_some() {
+            return Ok(ResultKind::Video);
         }
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         if FOREIGN_FILES.iter().any(|foreign| extension == *foreign) && !path.is_dir() {
@@ -29,20 +36,46 @@ impl FrameSink {
                 path: path.to_owned(),
             });
         }
-        std::fs::create_dir_all(path).map_err(|error| OutputError::Io {
-            path: path.to_owned(),
-            error,
-        })?;
-        Ok(Self::Folder(path.to_owned()))
+        Ok(ResultKind::Frames)
+    }
+
+    /// Opens `path`: by its extension a video, else a folder of PNGs. Folders on the way are made.
+    ///
+    /// # Errors
+    /// As [`FrameSink::kind_of`]; a place that cannot be written to.
+    pub fn create(path: &Path, size_px: [u32; 2], fps: f64) -> Result<Self, OutputError> {
+        if let Some(codec) = Codec::of_path(path) {
+            let video = VideoWriter::create(path, codec, size_px, fps, Naming::Finished)?;
+            return Ok(Self::Video(video));
+        }
+        Self::kind_of(path)?;
+        FrameFolder::create(path).map(Self::Folder)
     }
 
     /// Adds a frame of 8-bit RGBA.
     pub fn push(&mut self, index: u32, size_px: [u32; 2], rgba: &[u8]) -> Result<(), OutputError> {
         match self {
             Self::Video(video) => video.push(size_px, rgba),
-            Self::Folder(folder) => {
-                picture_files::write_rgb_png(&folder.join(frame_name(index)), size_px, rgba)
-            }
+            Self::Folder(folder) => folder.put(&frame_name(index), |path| {
+                picture_files::rgb_png(path, size_px, rgba)
+            }),
+        }
+    }
+
+    /// Adds layers of a frame beside its picture. A video has no room for them.
+    ///
+    /// # Errors
+    /// What keeps a file from being written.
+    pub fn push_layers(
+        &mut self,
+        index: u32,
+        size_px: [u32; 2],
+        layers: &Layers,
+        wanted: &BTreeSet<Layer>,
+    ) -> Result<(), OutputError> {
+        match self {
+            Self::Video(_) => Ok(()),
+            Self::Folder(folder) => write_layers(folder, index, size_px, layers, wanted),
         }
     }
 
@@ -50,14 +83,9 @@ impl FrameSink {
     pub fn finish(self) -> Result<(), OutputError> {
         match self {
             Self::Video(video) => video.finish(),
-            Self::Folder(_) => Ok(()),
+            Self::Folder(folder) => folder.finish(),
         }
     }
-}
-
-/// The name of a frame's picture: its index in the recording, six digits.
-pub fn frame_name(index: u32) -> String {
-    format!("{index:06}.png")
 }
 
 #[cfg(test)]
@@ -184,16 +212,16 @@ mod tests {
     fn an_encoder_that_fails_is_quoted() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.mp4");
-        // The encoder cannot write over a folder.
-        std::fs::create_dir(folder.path().join("a.partial.mp4")).unwrap();
-        let mut sink = FrameSink::create(&path, [64, 48], 30.0).unwrap();
+        // No rate that the encoder knows.
+        let mut sink = FrameSink::create(&path, [64, 48], f64::NAN).unwrap();
         let pushed: Result<(), OutputError> =
             (0..500).try_for_each(|index| sink.push(index, [64, 48], &noise([64, 48], 1)));
         let text = pushed.and_then(|()| sink.finish()).unwrap_err().to_string();
         assert!(
-            text.contains("a.mp4: ffmpeg failed") && text.contains("Is a directory"),
+            text.contains("a.mp4: ffmpeg failed") && text.contains("NaN"),
             "{text}"
         );
+        assert_eq!(names_in(folder.path()), [""; 0]);
         let text = FrameSink::create(&folder.path().join("a.webm"), [64, 48], 30.0)
             .err()
             .unwrap()

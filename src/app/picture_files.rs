@@ -1,7 +1,6 @@
-//! Single pictures: PNGs of frames and layers, EXR for depth, Radiance HDR and EXR for probes. Each is written beside its place and then moved there.
+//! Single pictures: PNGs of frames and layers, EXR for depth, Radiance HDR and EXR for probes. Each is there whole or not at all.
 
-use std::fs::{self, File};
-use std::io::{BufWriter, Cursor, Write};
+use std::io::Cursor;
 use std::path::Path;
 
 use exr::prelude::WritableImage;
@@ -10,22 +9,27 @@ use image::codecs::hdr::HdrEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
+use super::new_file::NewFile;
 use super::output_error::OutputError;
-use super::partial_files::{make_parent, partial_path};
 
 /// Writes 8-bit RGBA as an 8-bit RGB PNG; alpha is dropped.
 pub fn write_rgb_png(path: &Path, size_px: [u32; 2], rgba: &[u8]) -> Result<(), OutputError> {
+    write_bytes(path, &rgb_png(path, size_px, rgba)?)
+}
+
+/// An 8-bit RGB PNG of 8-bit RGBA; alpha is dropped. `path` is for messages, here as below.
+pub fn rgb_png(path: &Path, size_px: [u32; 2], rgba: &[u8]) -> Result<Vec<u8>, OutputError> {
     let rgb: Vec<u8> = rgba
         .chunks_exact(4)
         .flat_map(|pixel| [pixel[0], pixel[1], pixel[2]])
         .collect();
     // Photographs: one cheap filter is as good as trying all.
-    write_png(path, size_px, &rgb, ExtendedColorType::Rgb8, FilterType::Up)
+    png(path, size_px, &rgb, ExtendedColorType::Rgb8, FilterType::Up)
 }
 
-/// Writes an 8-bit grey PNG (masks, roles).
-pub fn write_grey_png(path: &Path, size_px: [u32; 2], grey: &[u8]) -> Result<(), OutputError> {
-    write_png(
+/// An 8-bit grey PNG (masks, roles).
+pub fn grey_png(path: &Path, size_px: [u32; 2], grey: &[u8]) -> Result<Vec<u8>, OutputError> {
+    png(
         path,
         size_px,
         grey,
@@ -34,9 +38,9 @@ pub fn write_grey_png(path: &Path, size_px: [u32; 2], grey: &[u8]) -> Result<(),
     )
 }
 
-/// Writes a 16-bit RGB PNG (gain), three values a pixel.
-pub fn write_rgb16_png(path: &Path, size_px: [u32; 2], rgb: &[u16]) -> Result<(), OutputError> {
-    write_png(
+/// A 16-bit RGB PNG (gain), three values a pixel.
+pub fn rgb16_png(path: &Path, size_px: [u32; 2], rgb: &[u16]) -> Result<Vec<u8>, OutputError> {
+    png(
         path,
         size_px,
         bytemuck::cast_slice(rgb),
@@ -45,8 +49,8 @@ pub fn write_rgb16_png(path: &Path, size_px: [u32; 2], rgb: &[u16]) -> Result<()
     )
 }
 
-/// Writes one 32-bit float a pixel as an EXR whose only channel is `Y` (depth).
-pub fn write_float_exr(path: &Path, size_px: [u32; 2], values: &[f32]) -> Result<(), OutputError> {
+/// One 32-bit float a pixel as an EXR whose only channel is `Y` (depth).
+pub fn float_exr(path: &Path, size_px: [u32; 2], values: &[f32]) -> Result<Vec<u8>, OutputError> {
     let [width, height] = size_px.map(|side| side as usize);
     if values.len() != width * height {
         return Err(refuse(
@@ -60,7 +64,7 @@ pub fn write_float_exr(path: &Path, size_px: [u32; 2], values: &[f32]) -> Result
         .with_channel("Y")
         .with_pixel_fn(value_at);
     let image = exr::image::Image::from_channels((width, height), channels);
-    write_exr(path, |bytes| {
+    exr_bytes(path, |bytes| {
         image.write().non_parallel().to_buffered(bytes)
     })
 }
@@ -74,29 +78,29 @@ pub fn write_radiance(path: &Path, size_px: [usize; 2], rgb: &[Vec3]) -> Result<
             "the picture's size and its data disagree".to_owned(),
         ));
     }
-    match radiance_format(path)? {
-        RadianceFormat::Hdr => write_whole(path, |writer| {
+    let bytes = match radiance_format(path)? {
+        RadianceFormat::Hdr => {
             let rgb: Vec<image::Rgb<f32>> = rgb
                 .iter()
                 .map(|pixel| image::Rgb(pixel.to_array()))
                 .collect();
-            HdrEncoder::new(writer)
+            let mut bytes = Vec::new();
+            HdrEncoder::new(&mut bytes)
                 .encode(&rgb, width, height)
-                .map_err(|error| match error {
-                    image::ImageError::IoError(error) => io_error(path, error),
-                    error => refuse(path, error.to_string()),
-                })
-        }),
+                .map_err(|error| refuse(path, error.to_string()))?;
+            bytes
+        }
         RadianceFormat::Exr => {
             let pixel_at =
                 |position: exr::math::Vec2<usize>| rgb[position.y() * width + position.x()].into();
             let channels = exr::image::SpecificChannels::rgb::<f32, f32, f32>(pixel_at);
             let image = exr::image::Image::from_channels((width, height), channels);
-            write_exr(path, |bytes| {
+            exr_bytes(path, |bytes| {
                 image.write().non_parallel().to_buffered(bytes)
-            })
+            })?
         }
-    }
+    };
+    write_bytes(path, &bytes)
 }
 
 /// How radiance is written.
@@ -124,87 +128,64 @@ pub fn radiance_format(path: &Path) -> Result<RadianceFormat, OutputError> {
     }
 }
 
-/// Writes bytes that are a whole file (PDF).
+/// Writes bytes that are a whole file.
+///
+/// # Errors
+/// As [`NewFile`].
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
-    write_whole(path, |writer| {
-        writer
-            .write_all(bytes)
-            .map_err(|error| io_error(path, error))
-    })
+    let mut file = NewFile::create(path)?;
+    file.write(bytes)?;
+    file.finish()
+}
+
+/// Writes bytes that are a whole file under a name that nothing has.
+///
+/// # Errors
+/// As [`NewFile::create_first`].
+pub fn write_first(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    let mut file = NewFile::create_first(path)?;
+    file.write(bytes)?;
+    file.finish()
 }
 
 /// Writes text (poses, statistics).
+///
+/// # Errors
+/// As [`NewFile`].
 pub fn write_text(path: &Path, text: &str) -> Result<(), OutputError> {
-    write_whole(path, |writer| {
-        writer
-            .write_all(text.as_bytes())
-            .map_err(|error| io_error(path, error))
-    })
+    write_bytes(path, text.as_bytes())
 }
 
-/// The format is written with seeks, so it is made in memory first.
-fn write_exr(
+/// The format is written with seeks, so it is made in memory.
+fn exr_bytes(
     path: &Path,
     encode: impl FnOnce(&mut Cursor<Vec<u8>>) -> exr::error::UnitResult,
-) -> Result<(), OutputError> {
+) -> Result<Vec<u8>, OutputError> {
     let mut bytes = Cursor::new(Vec::new());
     encode(&mut bytes).map_err(|error| refuse(path, error.to_string()))?;
-    write_bytes(path, bytes.get_ref())
+    Ok(bytes.into_inner())
 }
 
-fn write_png(
+fn png(
     path: &Path,
     size_px: [u32; 2],
-    bytes: &[u8],
+    samples: &[u8],
     color: ExtendedColorType,
     filter: FilterType,
-) -> Result<(), OutputError> {
+) -> Result<Vec<u8>, OutputError> {
     let expected =
         size_px[0] as usize * size_px[1] as usize * usize::from(color.bits_per_pixel() / 8);
-    if bytes.len() != expected {
+    if samples.len() != expected {
         return Err(refuse(
             path,
             "the picture's size and its data disagree".to_owned(),
         ));
     }
-    write_whole(path, |writer| {
-        PngEncoder::new_with_quality(writer, CompressionType::Fast, filter)
-            .write_image(bytes, size_px[0], size_px[1], color)
-            .map_err(|error| match error {
-                image::ImageError::IoError(error) => io_error(path, error),
-                error => refuse(path, error.to_string()),
-            })
-    })
-}
-
-/// Writes a file whole or not at all.
-fn write_whole(
-    path: &Path,
-    write: impl FnOnce(&mut BufWriter<File>) -> Result<(), OutputError>,
-) -> Result<(), OutputError> {
-    make_parent(path)?;
-    let partial = partial_path(path);
-    let written = File::create(&partial)
-        .map_err(|error| io_error(path, error))
-        .and_then(|file| {
-            let mut writer = BufWriter::new(file);
-            write(&mut writer)?;
-            writer.flush().map_err(|error| io_error(path, error))
-        });
-    let moved =
-        written.and_then(|()| fs::rename(&partial, path).map_err(|error| io_error(path, error)));
-    if moved.is_err() {
-        // Best effort: the first error is the one to tell.
-        _ = fs::remove_file(&partial);
-    }
-    moved
-}
-
-fn io_error(path: &Path, error: std::io::Error) -> OutputError {
-    OutputError::Io {
-        path: path.to_owned(),
-        error,
-    }
+    let mut bytes = Vec::new();
+    PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, filter)
+        .write_image(samples, size_px[0], size_px[1], color)
+        .map_err(|error| refuse(path, error.to_string()))?;
+    Ok(bytes)
 }
 
 fn refuse(path: &Path, message: String) -> OutputError {
@@ -217,22 +198,23 @@ fn refuse(path: &Path, message: String) -> OutputError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     #[test]
     fn layers_come_back_as_written() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("new/000007_gain.png");
         let gain: Vec<u16> = (0..7 * 5 * 3).map(|value| value * 600 + 1).collect();
-        write_rgb16_png(&path, [7, 5], &gain).unwrap();
+        write_bytes(&path, &rgb16_png(&path, [7, 5], &gain).unwrap()).unwrap();
         assert_eq!(image::open(&path).unwrap().into_rgb16().into_raw(), gain);
 
         let role: Vec<u8> = (0..35).map(|value| value * 7).collect();
-        write_grey_png(&path, [7, 5], &role).unwrap();
+        write_bytes(&path, &grey_png(&path, [7, 5], &role).unwrap()).unwrap();
         assert_eq!(image::open(&path).unwrap().into_luma8().into_raw(), role);
 
         let path = folder.path().join("000007_depth.exr");
         let depth: Vec<f32> = (0..35).map(|value| 0.1 + value as f32).chain([]).collect();
-        write_float_exr(&path, [7, 5], &depth).unwrap();
+        write_bytes(&path, &float_exr(&path, [7, 5], &depth).unwrap()).unwrap();
         let back = exr::prelude::read_first_flat_layer_from_file(&path).unwrap();
         let channels = &back.layer_data.channel_data.list;
         assert_eq!(
@@ -249,9 +231,9 @@ mod tests {
     fn what_fails_leaves_nothing() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
-        assert!(write_grey_png(&path, [7, 5], &[0; 34]).is_err());
+        assert!(write_rgb_png(&path, [7, 5], &[0; 4 * 34]).is_err());
         fs::create_dir(&path).unwrap();
-        let text = write_grey_png(&path, [7, 5], &[0; 35])
+        let text = write_rgb_png(&path, [7, 5], &[0; 4 * 35])
             .unwrap_err()
             .to_string();
         assert!(text.contains("a.png"), "{text}");

@@ -7,8 +7,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, anyhow, bail, ensure};
 
+use super::job_files::{JobFiles, Replacing};
 use super::picture_files::{radiance_format, write_radiance, write_rgb_png, write_text};
 use super::probe_preview::preview;
+use super::result_kind::ResultKind;
 use crate::capture::ball;
 use crate::capture::exposures::{Bracket, exif_exposure};
 use crate::light::brightest::{BrightLight, brightest};
@@ -67,6 +69,8 @@ pub struct Request {
     pub out: PathBuf,
     /// Where to write a picture of it (PNG).
     pub preview: Option<PathBuf>,
+    /// What the files may take the place of.
+    pub replacing: Replacing,
 }
 
 /// What came of it, in words.
@@ -137,21 +141,22 @@ pub fn probe(request: &Request) -> Result<Told> {
 /// What can be known before any picture is read.
 fn check(request: &Request) -> Result<()> {
     radiance_format(&request.out)?;
-    let written = [
-        Some(&request.out),
-        request.preview.as_ref(),
-        request.save_response.as_ref(),
-    ];
-    for written in written.into_iter().flatten() {
-        let real = |path: &Path| path.canonicalize().ok();
-        let read = request.pictures.iter().chain(&request.response);
-        if real(written).is_some_and(|written| {
-            read.into_iter()
-                .any(|read| real(read).as_ref() == Some(&written))
-        }) {
-            bail!("{} is read; write elsewhere", written.display());
-        }
+    let mut files = JobFiles::new(request.replacing);
+    for read in request.pictures.iter().chain(&request.response) {
+        files.reads(read);
     }
+    if let Some(listed) = &request.exposures {
+        // A list of times is a path to nothing.
+        files.reads(Path::new(listed));
+    }
+    files.writes("--out", &request.out, ResultKind::Radiance);
+    if let Some(path) = &request.save_response {
+        files.writes("--save-response", path, ResultKind::Response);
+    }
+    if let Some(path) = &request.preview {
+        files.writes("--preview", path, ResultKind::Png);
+    }
+    files.check()?;
     if let Some(preview) = &request.preview {
         ensure!(
             preview

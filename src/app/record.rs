@@ -8,13 +8,15 @@ use std::time::Duration;
 use anyhow::{Result, bail};
 
 use super::capture_talk::say;
+use super::job_files::{JobFiles, Replacing};
 use super::live_capture::{Arrived, CaptureEvent, LiveCapture};
 use super::live_input::LiveInput;
 use super::progress::Progress;
+use super::result_kind::ResultKind;
 use super::session_recorder::{Recorded, SessionRecorder};
 use super::session_writer::SessionHead;
 use super::stopwatch::Stopwatch;
-use crate::scene::{CameraSettings, Scene};
+use crate::scene::CameraSettings;
 
 const PATIENCE: Duration = Duration::from_millis(50);
 
@@ -27,6 +29,8 @@ pub struct Request {
     pub out: PathBuf,
     /// When to end by itself, seconds of frames.
     pub seconds: Option<f64>,
+    /// What the session may take the place of.
+    pub replacing: Replacing,
 }
 
 /// What says where the frames come from.
@@ -44,15 +48,22 @@ pub enum Input {
 /// A source that cannot be opened, frames that do not come, or a session that cannot be written; what was recorded until
 /// then is whole.
 pub fn record(request: &Request, stop: &AtomicBool) -> Result<String> {
+    let mut files = JobFiles::new(request.replacing);
     let (camera, scene) = match &request.input {
-        Input::Scene(path) => (Scene::load(path)?.camera, Some(path.clone())),
-        Input::Camera(camera) => (camera.clone(), None),
+        Input::Scene(path) => (files.reads_scene(path)?.camera, Some(path.clone())),
+        Input::Camera(camera) => {
+            files.reads_camera(camera);
+            (camera.clone(), None)
+        }
     };
+    files.writes("--out", &request.out, ResultKind::Session);
+    files.check()?;
     let input = LiveInput::of(&camera)?;
     let options = input.options(false);
     let head = SessionHead {
         calibration: input.calibration,
         scene,
+        replacing: request.replacing,
         ..SessionHead::default()
     };
     let recorder = SessionRecorder::start(&request.out, head)?;

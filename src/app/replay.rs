@@ -2,7 +2,7 @@
 //! each have a thread and hand plain values on; no frame is dropped, and each frame's work depends on the frame alone.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -19,13 +19,15 @@ use crate::tracking::{AnchorPose, Tracker};
 use super::budget_words::budget_words;
 use super::check;
 use super::contact_sheet::ContactSheet;
-use super::layer_files::{Layer, write_layers};
+use super::job_files::{JobFiles, Replacing};
+use super::layer_files::Layer;
 use super::mirror_watch::MirrorWatch;
 use super::output::FrameSink;
 use super::picture_files::write_text;
 use super::poses_file::{GivenPoses, PosesText};
-use super::recording::{self, refuse_to_overwrite};
+use super::recording;
 use super::report::Report;
+use super::result_kind::ResultKind;
 use super::stats::{Stats, detector_in_words, peak_memory_mib};
 use super::stopwatch::Stopwatch;
 use super::tally::Tally;
@@ -57,6 +59,8 @@ pub struct Request {
     pub without: Shortcuts,
     /// Part of the wanted graphics adapter's name.
     pub adapter: Option<String>,
+    /// What the files may take the place of.
+    pub replacing: Replacing,
 }
 
 /// Runs a replay. `stop` ends it after the frames at hand, with whole files.
@@ -65,11 +69,14 @@ pub struct Request {
 /// Anything that keeps a frame from being read, tracked, drawn or written; files are then not left half-written.
 pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
     let watch = Stopwatch::start();
-    let mut scene = Scene::load(&request.scene)?;
+    let mut files = JobFiles::new(request.replacing);
+    let mut scene = files.reads_scene(&request.scene)?;
     scene.shadows.without = request.without;
     for warning in check::warnings(&scene) {
         eprintln!("warning: {warning}");
     }
+    request.name_files(&mut files)?;
+    files.check()?;
     let (source, intrinsics) = recording::open(&scene.camera)?;
     if !request.layers.is_empty() {
         match &request.out {
@@ -80,9 +87,6 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
             Some(_) => {}
             None => bail!("--layers writes PNGs beside the pictures: give --out a folder for them"),
         }
-    }
-    for written in [&request.out, &request.sheet, &request.poses, &request.stats] {
-        refuse_to_overwrite(&source, written.as_deref())?;
     }
     let poser = match &request.poses_from {
         Some(path) => Poser::Given(GivenPoses::read(path, &scene.anchors)?),
@@ -151,6 +155,28 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
         scene.camera.mirror,
         stop.load(Ordering::Relaxed),
     ))
+}
+
+impl Request {
+    /// What is read besides the scene, and what is written.
+    fn name_files(&self, files: &mut JobFiles) -> Result<()> {
+        if let Some(path) = &self.poses_from {
+            files.reads(path);
+        }
+        if let Some(out) = &self.out {
+            files.writes("--out", out, FrameSink::kind_of(out)?);
+        }
+        for (option, path, kind) in [
+            ("--sheet", &self.sheet, ResultKind::Png),
+            ("--poses", &self.poses, ResultKind::Poses),
+            ("--stats", &self.stats, ResultKind::Stats),
+        ] {
+            if let Some(path) = path {
+                files.writes(option, path, kind);
+            }
+        }
+        Ok(())
+    }
 }
 
 /// A frame on its way to the files.
@@ -398,7 +424,6 @@ fn write_stage(
         return Ok(Vec::new());
     };
     let mut encode_ms = Vec::new();
-    let folder = request.out.as_deref().unwrap_or(Path::new("."));
     for DrawnFrame {
         index,
         rgba,
@@ -409,8 +434,8 @@ fn write_stage(
             if let Some(sink) = &mut sink {
                 sink.push(index, size_px, &rgba)?;
             }
-            if let Some(layers) = &layers {
-                write_layers(folder, index, size_px, layers, &request.layers)?;
+            if let (Some(sink), Some(layers)) = (&mut sink, &layers) {
+                sink.push_layers(index, size_px, layers, &request.layers)?;
             }
             Ok(())
         });

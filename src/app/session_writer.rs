@@ -6,9 +6,13 @@ use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use super::file_identity::is_at;
+use super::job_files::Replacing;
+use super::new_file::{sync_folder, vanished};
 use super::output_error::OutputError;
 use super::poses_file::PosesText;
 use super::scene_copy::copy_scene;
+use super::session_folder::SessionFolder;
 use super::video_writer::{Codec, Naming, VideoWriter};
 use crate::capture::{Frame, calibration_text, check_frame_size};
 use crate::geometry::camera::Intrinsics;
@@ -31,11 +35,13 @@ pub struct SessionHead {
     pub scene: Option<PathBuf>,
     /// Of which poses will be given; none: no poses are.
     pub anchors: Vec<Anchor>,
+    /// Whether it may take the place of an older session.
+    pub replacing: Replacing,
 }
 
 /// A session that is being written. Dropped, it ends as if it were finished.
 pub struct SessionWriter {
-    folder: PathBuf,
+    folder: SessionFolder,
     head: SessionHead,
     times: GrowingFile,
     poses: Option<(GrowingFile, PosesText)>,
@@ -47,27 +53,13 @@ pub struct SessionWriter {
 }
 
 impl SessionWriter {
-    /// Makes the folder, which must not be there or be empty, with all but the frames.
+    /// Makes the folder, which must not be there or be empty, with all but the frames. An older session may be in the way if
+    /// the head says so.
     ///
     /// # Errors
     /// A folder that holds something, or what cannot be written into it.
     pub fn create(folder: &Path, head: SessionHead) -> Result<Self, OutputError> {
-        let io_error = |error| OutputError::Io {
-            path: folder.to_owned(),
-            error,
-        };
-        std::fs::create_dir_all(folder).map_err(io_error)?;
-        if std::fs::read_dir(folder)
-            .map_err(io_error)?
-            .next()
-            .is_some()
-        {
-            return Err(OutputError::Session {
-                path: folder.to_owned(),
-                message: "the folder holds something already; a recording takes a new one"
-                    .to_owned(),
-            });
-        }
+        let own_folder = SessionFolder::create(folder, head.replacing)?;
         let times = GrowingFile::create(&folder.join("times.csv"), "frame,time_s\n")?;
         let poses = if head.anchors.is_empty() {
             None
@@ -77,7 +69,7 @@ impl SessionWriter {
             Some((file, text))
         };
         let writer = Self {
-            folder: folder.to_owned(),
+            folder: own_folder,
             times,
             poses,
             video: None,
@@ -88,8 +80,7 @@ impl SessionWriter {
         };
         if let Some(calibration) = &writer.head.calibration {
             let path = folder.join("camera.toml");
-            std::fs::write(&path, calibration_text(calibration))
-                .map_err(|error| OutputError::Io { path, error })?;
+            GrowingFile::create(&path, &calibration_text(calibration))?.finish()?;
         }
         if let Some(scene) = &writer.head.scene {
             copy_scene(scene, folder).map_err(|error| writer.refuse(format!("{error:#}")))?;
@@ -107,6 +98,7 @@ impl SessionWriter {
     /// # Errors
     /// What kept it from being written; the session ends with the frame before.
     pub fn push(&mut self, frame: &Frame) -> Result<(), OutputError> {
+        self.times.check_that_it_is_there()?;
         let mut video = match self.video.take() {
             Some(video) => video,
             None => self.start_video(frame.size_px)?,
@@ -165,6 +157,11 @@ impl SessionWriter {
     pub fn finish(mut self) -> Result<u32, OutputError> {
         if let Some(video) = self.video.take() {
             video.finish()?;
+            self.times.finish()?;
+            if let Some((poses, _)) = &self.poses {
+                poses.finish()?;
+            }
+            sync_folder(Some(self.folder.path()));
         }
         Ok(self.frames)
     }
@@ -174,14 +171,14 @@ impl SessionWriter {
             check_frame_size(calibration, size_px, "the camera")
                 .map_err(|error| self.refuse(error.to_string()))?;
         }
-        let path = self.folder.join("video.mkv");
+        let path = self.folder.path().join("video.mkv");
         let fps = self.head.fps.unwrap_or(ASSUMED_FPS);
         VideoWriter::create(&path, Codec::Ffv1, size_px, fps, Naming::AtOnce)
     }
 
     fn refuse(&self, message: String) -> OutputError {
         OutputError::Session {
-            path: self.folder.clone(),
+            path: self.folder.path().to_owned(),
             message,
         }
     }
@@ -190,9 +187,8 @@ impl SessionWriter {
 impl Drop for SessionWriter {
     fn drop(&mut self) {
         drop(self.video.take());
-        if self.frames == 0 {
-            // Nobody can play it. The folder was empty before.
-            _ = std::fs::remove_dir_all(&self.folder);
+        if self.frames > 0 {
+            self.folder.keep();
         }
     }
 }
@@ -230,6 +226,25 @@ impl GrowingFile {
         }
         self.whole_bytes += text.len() as u64;
         Ok(())
+    }
+
+    /// Waits until it is on the disk.
+    fn finish(&self) -> Result<(), OutputError> {
+        self.check_that_it_is_there()?;
+        self.file.sync_all().map_err(|error| OutputError::Io {
+            path: self.path.clone(),
+            error,
+        })
+    }
+
+    fn check_that_it_is_there(&self) -> Result<(), OutputError> {
+        match is_at(&self.path, &self.file) {
+            true => Ok(()),
+            false => Err(OutputError::Io {
+                path: self.path.clone(),
+                error: vanished(),
+            }),
+        }
     }
 }
 
@@ -338,6 +353,56 @@ mod tests {
         let refused = SessionWriter::create(folder.path(), head());
         assert!(refused.is_err_and(|error| error.to_string().contains("holds something")));
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn an_older_session_goes_when_the_new_one_has_a_frame_and_nothing_else_goes() {
+        let outer = tempfile::tempdir().unwrap();
+        let path = outer.path().join("session");
+        let record = |frames: u32, replacing: Replacing| {
+            let head = SessionHead {
+                replacing,
+                ..head()
+            };
+            let mut writer = SessionWriter::create(&path, head)?;
+            for index in 0..frames {
+                writer
+                    .push(&frame(index, f64::from(index), [32, 24]))
+                    .unwrap();
+            }
+            writer.finish()
+        };
+        let rows = || {
+            std::fs::read_to_string(path.join("times.csv"))
+                .unwrap()
+                .lines()
+                .count()
+        };
+        let count = || std::fs::read_dir(outer.path()).unwrap().count();
+        record(3, Replacing::OlderResults).unwrap();
+        assert!(record(2, Replacing::OlderResults).is_err());
+        assert_eq!((rows(), count()), (4, 1));
+        assert_eq!(record(0, Replacing::Anything).unwrap(), 0);
+        assert_eq!((rows(), count()), (4, 1), "no frame came");
+        record(2, Replacing::Anything).unwrap();
+        assert_eq!((rows(), count()), (3, 1));
+        std::fs::write(path.join("mine.txt"), "mine").unwrap();
+        let refused = record(1, Replacing::Anything).unwrap_err().to_string();
+        assert!(refused.contains("mine.txt"), "{refused}");
+        assert_eq!((rows(), count()), (3, 1));
+    }
+
+    #[test]
+    fn a_session_that_is_taken_away_is_told() {
+        let outer = tempfile::tempdir().unwrap();
+        let path = outer.path().join("session");
+        let mut writer = SessionWriter::create(&path, head()).unwrap();
+        writer.push(&frame(0, 0.0, [32, 24])).unwrap();
+        std::fs::rename(&path, outer.path().join("elsewhere")).unwrap();
+        assert!(writer.push(&frame(1, 0.1, [32, 24])).is_err());
+        let refused = writer.finish().unwrap_err().to_string();
+        assert!(refused.contains("moved or removed"), "{refused}");
+        assert!(!path.exists());
     }
 
     #[test]

@@ -8,20 +8,22 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Result, bail};
 
 use super::detections_file::DetectionsText;
+use super::job_files::{JobFiles, Replacing};
 use super::live_capture::LiveCapture;
 use super::live_input::LiveInput;
 use super::mirror_watch::MirrorWatch;
 use super::picture_files::write_text;
 use super::poses_file::PosesText;
-use super::recording::{self, refuse_to_overwrite};
+use super::recording;
 use super::report::Report;
+use super::result_kind::ResultKind;
 use super::stats::{Stats, detector_in_words, peak_memory_mib};
 use super::stopwatch::Stopwatch;
 use super::tally::Tally;
 use super::tracked::{Ended, Frames, Poser, TrackedFrame, each_tracked_frame};
 use crate::capture::live::is_live;
 use crate::geometry::camera::Intrinsics;
-use crate::scene::{Anchor, CameraSettings, DetectorKind, Family, Scene, TrackingSettings};
+use crate::scene::{Anchor, CameraSettings, DetectorKind, Family, TrackingSettings};
 use crate::tracking::{AnchorPose, Detector, Tracker, grey_from_rgba};
 
 /// What tracking is asked for.
@@ -35,6 +37,8 @@ pub struct Request {
     pub markers: Option<PathBuf>,
     /// Where to write what it cost.
     pub stats: Option<PathBuf>,
+    /// What the files may take the place of.
+    pub replacing: Replacing,
 }
 
 /// What is played, and what is looked for in it.
@@ -69,13 +73,24 @@ pub fn track(request: &Request, stop: &AtomicBool) -> Result<Report> {
     {
         bail!("nothing to do: give --poses, --markers or --stats");
     }
+    let mut files = JobFiles::new(request.replacing);
     let Plan {
         camera,
         settings,
         anchors,
         lists_found_alone,
-    } = Plan::of(&request.input)?;
-    let (frames_in, intrinsics) = open(&camera, request)?;
+    } = Plan::of(&request.input, &mut files)?;
+    for (option, path, kind) in [
+        ("--poses", &request.poses, ResultKind::Poses),
+        ("--markers", &request.markers, ResultKind::Detections),
+        ("--stats", &request.stats, ResultKind::Stats),
+    ] {
+        if let Some(path) = path {
+            files.writes(option, path, kind);
+        }
+    }
+    files.check()?;
+    let (frames_in, intrinsics) = open(&camera)?;
     let poser = Poser::Tracker(
         Box::new(Tracker::new(&settings, &anchors, intrinsics)?),
         MirrorWatch::new(&settings, &anchors),
@@ -157,12 +172,9 @@ pub fn track(request: &Request, stop: &AtomicBool) -> Result<Report> {
 }
 
 /// Opens a recording or begins to open a camera, with its calibration.
-fn open(camera: &CameraSettings, request: &Request) -> Result<(Frames, Intrinsics)> {
+fn open(camera: &CameraSettings) -> Result<(Frames, Intrinsics)> {
     if !is_live(&camera.source) {
         let (source, intrinsics) = recording::open(camera)?;
-        for written in [&request.poses, &request.markers, &request.stats] {
-            refuse_to_overwrite(&source, written.as_deref())?;
-        }
         return Ok((Frames::Recorded(source), intrinsics));
     }
     let input = LiveInput::of(camera)?;
@@ -187,10 +199,10 @@ struct Plan {
 }
 
 impl Plan {
-    fn of(input: &Input) -> Result<Self> {
+    fn of(input: &Input, files: &mut JobFiles) -> Result<Self> {
         Ok(match input {
             Input::Scene(path) => {
-                let scene = Scene::load(path)?;
+                let scene = files.reads_scene(path)?;
                 Self {
                     camera: scene.camera,
                     settings: scene.tracking,
@@ -199,7 +211,8 @@ impl Plan {
                 }
             }
             Input::RecordingWithScene(camera, path) => {
-                let scene = Scene::load(path)?;
+                files.reads_camera(camera);
+                let scene = files.reads_scene_to_play_another(path)?;
                 Self {
                     camera: camera.clone(),
                     settings: scene.tracking,
@@ -212,12 +225,16 @@ impl Plan {
                 family,
                 size_m,
                 decimation,
-            } => Self {
-                camera: camera.clone(),
-                settings: settings_for(*family, *decimation),
-                anchors: lone_anchors(*family, *size_m),
-                lists_found_alone: true,
-            },
+            } => {
+                files.reads_camera(camera);
+                files.reads_family(*family);
+                Self {
+                    camera: camera.clone(),
+                    settings: settings_for(*family, *decimation),
+                    anchors: lone_anchors(*family, *size_m),
+                    lists_found_alone: true,
+                }
+            }
         })
     }
 }

@@ -1,12 +1,14 @@
 //! Video files, encoded by an ffmpeg process that is fed raw frames.
 
+use std::fs::File;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::thread::JoinHandle;
 
+use super::file_identity::is_at;
+use super::new_file::{NewFile, vanished};
 use super::output_error::OutputError;
-use super::partial_files::{make_parent, partial_path};
 
 /// How a video is encoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,10 +69,17 @@ pub enum Naming {
 /// A video that is being written.
 pub struct VideoWriter {
     path: PathBuf,
-    naming: Naming,
     size_px: [u32; 2],
     frames: u32,
     encoder: Option<Encoder>,
+    /// `None` once it is finished.
+    file: Option<VideoFile>,
+}
+
+/// The file that the encoder writes to, made before it begins.
+enum VideoFile {
+    Unfinished(NewFile),
+    Named(File),
 }
 
 struct Encoder {
@@ -80,7 +89,11 @@ struct Encoder {
 }
 
 impl VideoWriter {
-    /// Starts the encoder; the folder is made where it is missing.
+    /// Starts the encoder; the folder is made where it is missing. With [`Naming::AtOnce`] there must be no file of that
+    /// name.
+    ///
+    /// # Errors
+    /// A place that cannot be written to, or no encoder.
     pub fn create(
         path: &Path,
         codec: Codec,
@@ -88,7 +101,14 @@ impl VideoWriter {
         fps: f64,
         naming: Naming,
     ) -> Result<Self, OutputError> {
-        make_parent(path)?;
+        let file = VideoFile::create(path, naming)?;
+        let mut writer = Self {
+            path: path.to_owned(),
+            size_px,
+            frames: 0,
+            encoder: None,
+            file: None,
+        };
         let mut command = Command::new("ffmpeg");
         command
             .args(["-hide_banner", "-loglevel", "error", "-nostdin", "-y"])
@@ -102,10 +122,12 @@ impl VideoWriter {
             .args(["-i", "pipe:0"])
             .args(codec.arguments())
             .args(naming.arguments())
-            .arg(file_url(&naming.working_path(path)))
+            .arg(file_url(file.working_path(path)))
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::piped());
+        // From here on the file goes if the encoder does not start.
+        writer.file = Some(file);
         // Ctrl-C is for gnomon, which then finishes the video; the encoder must live until that is done.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
@@ -128,18 +150,12 @@ impl VideoWriter {
             _ = stderr.read_to_end(&mut bytes);
             String::from_utf8_lossy(&bytes).into_owned()
         });
-        let encoder = Some(Encoder {
+        writer.encoder = Some(Encoder {
             child,
             frames_in,
             talk,
         });
-        Ok(Self {
-            path: path.to_owned(),
-            naming,
-            size_px,
-            frames: 0,
-            encoder,
-        })
+        Ok(writer)
     }
 
     /// Adds a frame of 8-bit RGBA.
@@ -156,6 +172,7 @@ impl VideoWriter {
                 message,
             });
         }
+        self.check_that_it_is_there()?;
         let written = self
             .encoder
             .as_mut()
@@ -178,14 +195,29 @@ impl VideoWriter {
         if self.frames == 0 {
             return Ok(());
         }
-        self.close()?;
-        if self.naming == Naming::AtOnce {
-            return Ok(());
+        let closed = self.close();
+        // An encoder that misses its file says less.
+        self.check_that_it_is_there()?;
+        closed?;
+        match self.file.take() {
+            Some(VideoFile::Unfinished(file)) => file.finish(),
+            Some(VideoFile::Named(file)) => file.sync_all().map_err(|error| OutputError::Io {
+                path: self.path.clone(),
+                error,
+            }),
+            None => Ok(()),
         }
-        std::fs::rename(partial_path(&self.path), &self.path).map_err(|error| OutputError::Io {
-            path: self.path.clone(),
-            error,
-        })
+    }
+
+    /// The encoder does not notice when its file is taken away.
+    fn check_that_it_is_there(&self) -> Result<(), OutputError> {
+        match self.file.as_ref().map(|file| file.is_there(&self.path)) {
+            Some(true) => Ok(()),
+            _ => Err(OutputError::Io {
+                path: self.path.clone(),
+                error: vanished(),
+            }),
+        }
     }
 
     /// Ends the encoder's input and waits for it.
@@ -231,23 +263,52 @@ impl Naming {
             Self::AtOnce => &["-cluster_time_limit", "300", "-flush_packets", "1"],
         }
     }
+}
 
-    fn working_path(self, path: &Path) -> PathBuf {
+impl VideoFile {
+    /// Neither is there before: nobody's file is written over, and no link of somebody else's is followed.
+    fn create(path: &Path, naming: Naming) -> Result<Self, OutputError> {
+        match naming {
+            Naming::Finished => NewFile::create(path).map(Self::Unfinished),
+            Naming::AtOnce => {
+                let make = || {
+                    if let Some(folder) = path.parent() {
+                        std::fs::create_dir_all(folder)?;
+                    }
+                    File::create_new(path).map(Self::Named)
+                };
+                make().map_err(|error| OutputError::Io {
+                    path: path.to_owned(),
+                    error,
+                })
+            }
+        }
+    }
+
+    fn working_path<'a>(&'a self, path: &'a Path) -> &'a Path {
         match self {
-            Self::Finished => partial_path(path),
-            Self::AtOnce => path.to_owned(),
+            Self::Unfinished(file) => file.temporary_path(),
+            Self::Named(_) => path,
+        }
+    }
+
+    fn is_there(&self, path: &Path) -> bool {
+        match self {
+            Self::Unfinished(file) => file.is_there(),
+            Self::Named(file) => is_at(path, file),
         }
     }
 }
 
 impl Drop for VideoWriter {
     fn drop(&mut self) {
-        if self.naming == Naming::AtOnce {
+        if let Some(VideoFile::Named(file)) = self.file.take() {
             // Closing fails where the encoder has failed; what it wrote until then stays.
             _ = self.encoder.is_some().then(|| self.close());
-            return;
-        }
-        if let Some(Encoder {
+            if self.frames == 0 && is_at(&self.path, &file) {
+                _ = std::fs::remove_file(&self.path);
+            }
+        } else if let Some(Encoder {
             mut child,
             frames_in,
             ..
@@ -258,8 +319,6 @@ impl Drop for VideoWriter {
             _ = child.kill();
             _ = child.wait();
         }
-        // After a success there is nothing under this name any more.
-        _ = std::fs::remove_file(partial_path(&self.path));
     }
 }
 

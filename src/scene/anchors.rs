@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use glam::DVec2;
 
 use super::error::{SceneError, suggestion};
+use super::named_files::FileKind;
 use super::reader::{Numbers, Table, Value};
 use super::{Anchor, DetectorKind, Family, Marker};
 
@@ -97,7 +98,7 @@ impl AnchorReader {
     fn named_family(&self, value: &Value) -> Result<Family, SceneError> {
         let written = value.text()?;
         let family = if Family::is_file_name(written) {
-            Family::from_file(&value.existing_path()?)?
+            Family::from_file(&value.existing_path(FileKind::Dictionary)?)?
         } else {
             Family::from_name(written).ok_or_else(|| {
                 value.error(format!(

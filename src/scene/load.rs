@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
 use super::error::SceneError;
+use super::named_files::NamedFile;
 use super::reader::{Document, Table};
 use super::{Scene, anchors, lights, objects, probe, settings};
 
@@ -21,6 +22,8 @@ pub struct Reading {
     pub scene: Result<Scene, SceneError>,
     /// Every other file or folder that was read, or looked for and not there: a change of any may give something else.
     pub files: Vec<PathBuf>,
+    /// The files that the text names, in its order.
+    pub named: Vec<NamedFile>,
 }
 
 impl Scene {
@@ -56,9 +59,11 @@ impl Scene {
     pub fn read(path: &Path, text: &str) -> Reading {
         let document = Document::new(path, text);
         let scene = Self::from_document(&document);
+        let (files, named) = document.files();
         Reading {
             scene,
-            files: document.consulted(),
+            files,
+            named,
         }
     }
 

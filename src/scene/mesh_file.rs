@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 use glam::{DVec3, Vec3};
 
 use super::error::SceneError;
+use super::material_libraries::libraries;
+use super::named_files::FileKind;
 use super::obj_scan::{ScanError, ScannedObj, scan_mtl, scan_obj};
 use super::reader::Value;
 use crate::geometry::mesh::{Mesh, MeshReport, RawTriangle};
@@ -39,8 +41,8 @@ pub enum Normals {
 const LEAST_ROUGHNESS: f64 = 0.01;
 
 /// Reads the mesh that a scene's value names.
-pub fn load(value: &Value, normals: Normals) -> Result<LoadedMesh, SceneError> {
-    let path = value.existing_path()?;
+pub fn load(value: &Value, kind: FileKind, normals: Normals) -> Result<LoadedMesh, SceneError> {
+    let path = value.existing_path(kind)?;
     let bytes = std::fs::read(&path)
         .map_err(|error| value.error(format!("the mesh cannot be read: {error}")))?;
     // Only names and comments may be in another encoding, and nothing depends on them.
@@ -114,16 +116,28 @@ fn read_with_tobj(
         ..Default::default()
     };
     let mtl_error = RefCell::new(None);
-    let load_mtl = |name: &Path| {
-        let mtl_path = path.parent().unwrap_or(Path::new("")).join(name);
-        note_read(&mtl_path);
-        checked_mtl(&mtl_path).map_or_else(
-            |error| {
-                mtl_error.borrow_mut().get_or_insert(error);
-                Ok(Default::default())
-            },
-            |text| tobj::load_mtl_buf(&mut Cursor::new(text)),
-        )
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let load_mtl = |names: &Path| {
+        let (mut materials, mut numbers) = tobj::load_mtl_buf(&mut Cursor::new(""))?;
+        for library in libraries(folder, &names.to_string_lossy()) {
+            note_read(&library);
+            match checked_mtl(&library) {
+                Ok(text) => {
+                    let (more, names) = tobj::load_mtl_buf(&mut Cursor::new(text))?;
+                    let known = materials.len();
+                    numbers.extend(
+                        names
+                            .into_iter()
+                            .map(|(name, number)| (name, known + number)),
+                    );
+                    materials.extend(more);
+                }
+                Err(error) => {
+                    mtl_error.borrow_mut().get_or_insert(error);
+                }
+            }
+        }
+        Ok((materials, numbers))
     };
     let loaded = tobj::load_obj_buf(&mut Cursor::new(&scanned.text), &options, load_mtl);
     if let Some(error) = mtl_error.into_inner() {

@@ -14,7 +14,9 @@ mod error;
 mod family;
 mod lights;
 mod load;
+pub mod material_libraries;
 mod mesh_file;
+mod named_files;
 mod obj_scan;
 mod objects;
 mod probe;
@@ -28,6 +30,7 @@ pub use error::{Place, SceneError};
 pub use family::{Codes, Family};
 pub use lights::unit_direction;
 pub use load::Reading;
+pub use named_files::{FileKind, NamedFile};
 pub use reader::{NAMES, is_name};
 pub use shortcuts::{Shortcut, Shortcuts};
 

@@ -77,10 +77,16 @@ pub fn scan_obj(text: &str) -> Result<ScannedObj, ScanError> {
                     scanned.text += corner.written;
                 }
             }
-            Some("usemtl") if line.trim().split_once(' ').is_none() => {
-                return Err(record.error(line.trim(), "names no material"));
+            Some(kind @ ("usemtl" | "mtllib")) => {
+                let line = line.trim();
+                let name = line.split_once(char::is_whitespace);
+                let name = name.map_or("", |(_, name)| name.trim());
+                if kind == "usemtl" && name.is_empty() {
+                    return Err(record.error(line, "names no material"));
+                }
+                // tobj knows the space alone.
+                scanned.text += &format!("{kind} {name}");
             }
-            Some("usemtl" | "mtllib") => scanned.text += line.trim(),
             _ => continue,
         }
         scanned.text.push('\n');

@@ -8,6 +8,7 @@ use super::anchors::{ANGLE, unique_name};
 use super::error::{SceneError, suggestion};
 use super::lights::POSITION;
 use super::mesh_file::{self, DEFAULT_ALBEDO, LoadedMesh};
+use super::named_files::FileKind;
 use super::reader::{Numbers, Table, Value};
 use super::{Anchor, Object, Placement};
 use crate::geometry::mesh::{Mesh, RawTriangle};
@@ -113,7 +114,7 @@ fn object(
         (Some(_), Some(rect)) => {
             return Err(rect.error("the thing has a mesh; allowed: mesh or rect_m, not both"));
         }
-        (Some(mesh), None) => mesh_file::load(&mesh, normals)?,
+        (Some(mesh), None) => mesh_file::load(&mesh, FileKind::Mesh, normals)?,
         (None, Some(rect)) => rectangle(&rect, None)?,
         (None, None) if kind == Kind::Phantom => {
             return Err(table.error(format!("\"{name}\": no shape; mesh or rect_m is expected")));

@@ -7,6 +7,7 @@ use glam::{DVec3, Vec3};
 use super::error::SceneError;
 use super::lights::POSITION;
 use super::mesh_file::{self, Normals};
+use super::named_files::FileKind;
 use super::objects::{ALBEDO, placement};
 use super::probe_file::{ProbeKind, read};
 use super::reader::{Numbers, Table, Value};
@@ -54,7 +55,7 @@ pub fn probe(root: &Table) -> Result<Option<ProbeScene>, SceneError> {
         "image",
         "a picture in linear radiance (.hdr or .exr) is expected",
     )?;
-    let path = image.existing_path()?;
+    let path = image.existing_path(FileKind::Probe)?;
     let probe = read(&path, kind).map_err(|message| image.error(message))?;
     let position_m = table.vector_or("position_m", DVec3::ZERO, &POSITION)?;
     let exposure = table.number_or("exposure", 1.0, &Numbers::above(0.0, 1e9, ""))?;
@@ -125,7 +126,7 @@ fn piece(table: &Table, name_lines: &mut HashMap<String, usize>) -> Result<RoomP
 }
 
 fn mesh_piece(value: &Value, albedo: Option<DVec3>) -> Result<RoomPiece, SceneError> {
-    let loaded = mesh_file::load(value, Normals::Flat)?;
+    let loaded = mesh_file::load(value, FileKind::RoomMesh, Normals::Flat)?;
     let mesh = loaded.mesh;
     let triangles = mesh.triangles.iter().zip(&mesh.triangle_materials);
     let triangles = triangles.map(|(triangle, &material)| {

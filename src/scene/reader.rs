@@ -11,6 +11,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::{Place, SceneError, suggestion};
+use super::named_files::{FileKind, NamedFile};
 
 /// A TOML file's text and where it came from.
 pub struct Document<'a> {
@@ -18,6 +19,8 @@ pub struct Document<'a> {
     pub text: &'a str,
     /// Files that were read, or looked for, on the way.
     consulted: RefCell<BTreeSet<PathBuf>>,
+    /// Files that the text names.
+    named: RefCell<Vec<NamedFile>>,
 }
 
 impl<'a> Document<'a> {
@@ -26,12 +29,15 @@ impl<'a> Document<'a> {
             path,
             text,
             consulted: RefCell::default(),
+            named: RefCell::default(),
         }
     }
 
-    /// Files that were read, or looked for, so far.
-    pub fn consulted(self) -> Vec<PathBuf> {
-        self.consulted.into_inner().into_iter().collect()
+    /// Files that were read, or looked for, so far; and those that the text names, by their place in it.
+    pub fn files(self) -> (Vec<PathBuf>, Vec<NamedFile>) {
+        let mut named = self.named.into_inner();
+        named.sort_by_key(|file| file.span.start);
+        (self.consulted.into_inner().into_iter().collect(), named)
     }
 
     /// A mistake at a span of the text.
@@ -411,8 +417,8 @@ impl<'a> Value<'a> {
     }
 
     /// A file or folder that exists: relative to the scene file's folder, or else to that one's parent (the project's
-    /// root where scenes lie in `config/`).
-    pub fn existing_path(&self) -> Result<PathBuf, SceneError> {
+    /// root where scenes lie in `config/`). The document remembers that it is named here.
+    pub fn existing_path(&self, kind: FileKind) -> Result<PathBuf, SceneError> {
         let written = self.text()?;
         let scene_file = std::path::absolute(self.document.path)
             .unwrap_or_else(|_| self.document.path.to_owned());
@@ -422,6 +428,13 @@ impl<'a> Value<'a> {
             self.note_consulted(path);
             !written.is_empty() && path.exists()
         });
+        if let Some(path) = found {
+            self.document.named.borrow_mut().push(NamedFile {
+                kind,
+                path: path.clone(),
+                span: self.value.span(),
+            });
+        }
         found.cloned().ok_or_else(|| {
             let mut tried: Vec<String> = tried
                 .iter()

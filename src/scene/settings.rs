@@ -1,6 +1,7 @@
 //! Reads `[camera]`, `[tracking]` and `[shadows]`.
 
 use super::error::SceneError;
+use super::named_files::FileKind;
 use super::reader::{Numbers, Table, Value};
 use super::{
     ArucoRefinement, CameraSettings, Counting, DetectorKind, Difference, PixelFormat, ProbeScene,
@@ -23,7 +24,7 @@ pub fn camera(root: &Table) -> Result<CameraSettings, SceneError> {
         source: source(&camera.required("source", what)?)?,
         calibration: camera
             .optional("calibration")
-            .map(|path| path.existing_path())
+            .map(|path| path.existing_path(FileKind::Calibration))
             .transpose()?,
         mirror: camera.flag_or("mirror", false)?,
         wanted: wanted_format(&camera)?,
@@ -69,7 +70,7 @@ fn source(value: &Value) -> Result<String, SceneError> {
     {
         return Ok(written.to_owned());
     }
-    let path = value.existing_path()?;
+    let path = value.existing_path(FileKind::Recording)?;
     path.into_os_string()
         .into_string()
         .map_err(|_| value.error("the path to it is not UTF-8 text"))

@@ -88,6 +88,11 @@ impl SceneDocument {
         &self.path
     }
 
+    /// Every other file that the scene depends on.
+    pub fn files(&self) -> &[PathBuf] {
+        &self.files
+    }
+
     /// The text as it is in the file.
     pub fn text(&self) -> &str {
         &self.text
@@ -250,21 +255,17 @@ impl SceneDocument {
     }
 }
 
-/// Writes the file a link leads to, whole or not at all, and leaves it the rights that it has.
+/// Writes the file a link leads to, whole or not at all, unless it may not be written.
 fn replace_file(path: &Path, text: &str) -> Result<(), EditError> {
-    let io_error = |error| OutputError::Io {
+    let there = std::fs::metadata(path).map_err(|error| OutputError::Io {
         path: path.to_owned(),
         error,
-    };
-    let target = path.canonicalize().map_err(io_error)?;
-    let rights = std::fs::metadata(&target).map_err(io_error)?.permissions();
-    if rights.readonly() {
+    })?;
+    if there.permissions().readonly() {
         return Err(EditError::ReadOnly {
             path: path.to_owned(),
         });
     }
-    write_text(&target, text)?;
-    // The text is there already: rights that cannot be set are no reason to say it is not.
-    _ = std::fs::set_permissions(&target, rights);
+    write_text(path, text)?;
     Ok(())
 }

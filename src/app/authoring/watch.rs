@@ -198,6 +198,7 @@ impl Watched {
                 Err(error) => Reading {
                     scene: Err(error.clone()),
                     files: self.files.clone(),
+                    named: Vec::new(),
                 },
             };
             let after = stamps(&self.path, &self.files);

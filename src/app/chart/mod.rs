@@ -26,10 +26,13 @@ mod wrong_pose;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use anyhow::{Result, bail};
+use anyhow::{Context as _, Result, bail};
 
+use super::job_files::{JobFiles, Replacing};
+use super::locked_folder::lock;
 use super::picture_files::{write_rgb_png, write_text};
 use super::progress::Progress;
+use super::result_kind::ResultKind;
 use canvas::{bitmap, svg};
 use family::Chart;
 use lab::Lab;
@@ -48,7 +51,12 @@ pub struct Request {
     pub sessions: Option<PathBuf>,
     /// Part of the graphics adapter's name.
     pub adapter: Option<String>,
+    /// What the files may take the place of.
+    pub replacing: Replacing,
 }
+
+/// Folders of the project that charts are made from.
+const INPUTS: [&str; 4] = ["config", "models", "recordings", "tests"];
 
 /// Where measurements wait below the charts' folder.
 const MEASURED: &str = ".measured";
@@ -128,8 +136,15 @@ pub fn chart(request: &Request, stop: &AtomicBool) -> Result<String> {
         .iter()
         .filter(|chart| wanted(chart.as_ref()))
         .collect();
+    let names = charts.iter().map(|chart| chart.name());
+    files_of(request, names).check()?;
     let counts: Result<Vec<usize>> = charts.iter().map(|chart| chart.unit_count(&lab)).collect();
-    let progress = Progress::of_measurements(counts?.into_iter().sum());
+    let count = counts?.into_iter().sum();
+    let measured = request.out.join(MEASURED);
+    let _this_run_s = std::fs::create_dir_all(&measured)
+        .and_then(|()| lock(&measured))
+        .with_context(|| measured.display().to_string())?;
+    let progress = Progress::of_measurements(count);
     for chart in &charts {
         let done = chart.make(&lab, &request.out, &progress);
         if !matches!(done, Ok(true)) {
@@ -146,6 +161,24 @@ pub fn chart(request: &Request, stop: &AtomicBool) -> Result<String> {
         charts.len(),
         request.out.display()
     ))
+}
+
+/// What charts of these names are made from, and the files that they are.
+fn files_of(request: &Request, names: impl Iterator<Item = &'static str>) -> JobFiles {
+    let mut files = JobFiles::new(request.replacing);
+    let folders = INPUTS.iter().map(Path::new);
+    for folder in folders.chain(request.sessions.as_deref()) {
+        files.reads(folder);
+    }
+    let mut writes = |name: String, kind| files.writes("--out", &request.out.join(name), kind);
+    writes("README.md".to_owned(), ResultKind::ChartsPage);
+    for name in names {
+        writes(format!("{name}.csv"), ResultKind::Table);
+        writes(format!("{name}.svg"), ResultKind::Svg);
+        writes(format!("{name}.png"), ResultKind::Png);
+        writes(format!("{MEASURED}/{name}.csv"), ResultKind::Measurements);
+    }
+    files
 }
 
 impl<C: Chart> AnyChart for C {

@@ -6,7 +6,9 @@ use anyhow::Result;
 
 use super::eye::Plan;
 use crate::app::authoring::SceneDocument;
+use crate::app::job_files::JobFiles;
 use crate::app::live_input::LiveInput;
+use crate::app::result_kind::ResultKind;
 use crate::scene::CameraSettings;
 
 /// A scene or a camera that was read, before anything is opened.
@@ -42,6 +44,18 @@ impl Opening {
             document,
             camera,
         })
+    }
+
+    /// What is read, and the folder for what is recorded.
+    pub fn files(&self, out: &Path) -> JobFiles {
+        let mut files = JobFiles::default();
+        files.reads_camera(&self.camera);
+        if let Some(document) = &self.document {
+            files.reads(document.path());
+            document.files().iter().for_each(|file| files.reads(file));
+        }
+        files.writes("--out", out, ResultKind::Folder);
+        files
     }
 
     /// What it is, for a title.

@@ -6,7 +6,7 @@ use tempfile::TempDir;
 
 use crate::app::anchor_block;
 use crate::app::output::OutputError;
-use crate::app::picture_files::write_text;
+use crate::app::picture_files::{write_first, write_text};
 use crate::scene::{CameraSettings, Family, Marker};
 
 /// The thing that is put on the marker; it lies beside the scene's file.
@@ -55,17 +55,16 @@ impl Demonstration {
 /// A file that is there, or cannot be written.
 pub fn save(text: &str, path: &Path) -> Result<(), OutputError> {
     let mesh = path.with_file_name(MESH_NAME);
-    for wanted in [path, &mesh] {
-        let is_ours = wanted == mesh && std::fs::read_to_string(wanted).is_ok_and(|it| it == MESH);
-        if wanted.exists() && !is_ours {
-            return Err(OutputError::Io {
-                path: wanted.to_owned(),
-                error: std::io::ErrorKind::AlreadyExists.into(),
-            });
-        }
+    let is_there = std::fs::read_to_string(&mesh).is_ok_and(|it| it == MESH);
+    if !is_there {
+        write_first(&mesh, MESH.as_bytes())?;
     }
-    write_text(&mesh, MESH)?;
-    write_text(path, text)
+    let written = write_first(path, text.as_bytes());
+    if written.is_err() && !is_there {
+        // Nothing is left of what was not done.
+        _ = std::fs::remove_file(&mesh);
+    }
+    written
 }
 
 fn scene_text(camera: &CameraSettings, id: u32, size_m: f64) -> String {

@@ -80,6 +80,7 @@ pub fn live(request: &Request, stop: &Arc<AtomicBool>) -> Result<()> {
         Input::Scene(path) => Opening::scene(path)?,
         Input::Camera(camera) => Opening::camera(camera.clone())?,
     };
+    opening.files(&request.out).check()?;
     let gpu = Arc::new(Gpu::open(request.adapter.as_deref())?);
     let options = opening::options(&gpu);
     let failure: Failure = Arc::default();

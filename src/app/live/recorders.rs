@@ -1,12 +1,13 @@
 //! What the window's keys record: the camera as a session, the composite as a video, a single picture.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::composite_video::CompositeVideo;
 use super::eye::TrackedPicture;
 use super::pipeline::Pipeline;
 use crate::app::output::OutputError;
-use crate::app::picture_files::write_rgb_png;
+use crate::app::picture_files::{rgb_png, write_first};
 use crate::app::session_recorder::SessionRecorder;
 use crate::app::session_writer::SessionHead;
 
@@ -49,8 +50,11 @@ impl Recorders {
         if self.session.is_some() {
             return self.end_session(pipeline);
         }
-        let path = next_free(&self.folder, "session", "");
-        let recorder = SessionRecorder::start(&path, head)?;
+        let (path, recorder) = first_free(&self.folder, "session", "", |path| {
+            // Made here, so that it is nobody else's.
+            std::fs::create_dir(path).map_err(|error| io_error(path, error))?;
+            SessionRecorder::start(path, head.clone())
+        })?;
         pipeline.set_tap(Some(recorder.tap()));
         let said = format!("recording {}", path.display());
         self.session = Some((path, recorder));
@@ -66,8 +70,9 @@ impl Recorders {
             return self.end_video();
         }
         // Matroska alone is whole at every moment.
-        let path = next_free(&self.folder, "composite", ".mkv");
-        let video = CompositeVideo::start(&path, size_px, fps)?;
+        let (path, video) = first_free(&self.folder, "composite", ".mkv", |path| {
+            CompositeVideo::start(path, size_px, fps)
+        })?;
         self.video = Some(video);
         Ok(format!("recording {}", path.display()))
     }
@@ -77,8 +82,9 @@ impl Recorders {
     /// # Errors
     /// What kept it from being written.
     pub fn screenshot(&self, size_px: [u32; 2], rgba: &[u8]) -> Result<String, OutputError> {
-        let path = next_free(&self.folder, "picture", ".png");
-        write_rgb_png(&path, size_px, rgba)?;
+        let (path, ()) = first_free(&self.folder, "picture", ".png", |path| {
+            write_first(path, &rgb_png(path, size_px, rgba)?)
+        })?;
         Ok(format!("{} saved", path.display()))
     }
 
@@ -136,13 +142,33 @@ impl Recorders {
     }
 }
 
-/// The first name with a number that nothing has yet: `stem-001.png`.
-fn next_free(folder: &Path, stem: &str, extension: &str) -> PathBuf {
-    let numbered = |number: u32| folder.join(format!("{stem}-{number:03}{extension}"));
-    (1..u32::MAX)
-        .map(numbered)
-        .find(|path| !path.exists())
-        .unwrap_or_else(|| numbered(0))
+/// Makes something under the first name with a number that nothing has yet, `stem-001.png`, whoever else takes names there.
+fn first_free<T>(
+    folder: &Path,
+    stem: &str,
+    extension: &str,
+    make: impl Fn(&Path) -> Result<T, OutputError>,
+) -> Result<(PathBuf, T), OutputError> {
+    std::fs::create_dir_all(folder).map_err(|error| io_error(folder, error))?;
+    let mut number = 1_u32;
+    loop {
+        let path = folder.join(format!("{stem}-{number:03}{extension}"));
+        let is_taken = |error: &OutputError| {
+            matches!(error, OutputError::Io { error, .. } if error.kind() == ErrorKind::AlreadyExists)
+                && std::fs::symlink_metadata(&path).is_ok()
+        };
+        match make(&path) {
+            Err(error) if is_taken(&error) => number += 1,
+            made => return made.map(|made| (path, made)),
+        }
+    }
+}
+
+fn io_error(path: &Path, error: std::io::Error) -> OutputError {
+    OutputError::Io {
+        path: path.to_owned(),
+        error,
+    }
 }
 
 #[cfg(test)]
@@ -161,5 +187,16 @@ mod tests {
         std::fs::remove_file(folder.path().join("picture-002.png")).unwrap();
         let said = recorders.screenshot([3, 2], &pixels).unwrap();
         assert!(said.contains("picture-002.png"), "{said}");
+        #[cfg(unix)]
+        {
+            let elsewhere = folder.path().join("elsewhere");
+            let planted = folder.path().join("picture-004.png");
+            std::os::unix::fs::symlink(&elsewhere, planted).unwrap();
+            let said = recorders.screenshot([3, 2], &pixels).unwrap();
+            assert!(
+                said.contains("picture-005.png") && !elsewhere.exists(),
+                "{said}"
+            );
+        }
     }
 }

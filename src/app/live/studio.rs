@@ -20,6 +20,7 @@ use super::shadow_clicks::{self, ShadowClicks};
 use super::views::View;
 use super::wish::{Clicks, Overlay, Selected, Wish};
 use crate::app::authoring::{Edit, SceneDocument, SceneNews, SceneWatch};
+use crate::app::job_files::Replacing;
 use crate::app::live_capture::CaptureEvent;
 use crate::app::mailbox::Taken;
 use crate::app::output::OutputError;
@@ -513,6 +514,7 @@ impl Studio {
             anchors: self
                 .scene()
                 .map_or(Vec::new(), |scene| scene.anchors.clone()),
+            replacing: Replacing::OlderResults,
         };
         let said = self.recorders.toggle_session(&self.pipeline, head);
         self.say(said);

@@ -10,8 +10,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, bail, ensure};
 use glam::DVec2;
 
-use super::anchor_block;
+use super::anchor_block::{self, PRINTED};
+use super::job_files::{JobFiles, Replacing};
 use super::picture_files::{write_bytes, write_text};
+use super::result_kind::ResultKind;
 use crate::calibration::Target;
 use crate::scene::{Family, Marker};
 use crate::tracking::printed_cells;
@@ -41,6 +43,8 @@ pub struct Request {
     pub landscape: bool,
     /// Pixels per inch of a PNG.
     pub dpi: f64,
+    /// What the files may take the place of.
+    pub replacing: Replacing,
 }
 
 /// What is on a sheet.
@@ -81,16 +85,16 @@ pub enum Sheet {
 /// # Errors
 /// What does not fit on the paper, a marker that the family does not have, a file that cannot be written.
 pub fn markers(request: &Request) -> Result<Vec<PathBuf>> {
-    let extension = request
-        .out
-        .extension()
-        .and_then(|extension| extension.to_str());
-    let extension = extension.map(str::to_ascii_lowercase).unwrap_or_default();
-    ensure!(
-        ["pdf", "svg", "png"].contains(&extension.as_str()),
-        "{}: a sheet is written as .pdf, .svg or .png",
-        request.out.display()
-    );
+    let out = request.out.as_path();
+    let kind = ResultKind::of_sheet(out);
+    let kind = kind.with_context(|| {
+        format!(
+            "{}: a sheet is written as .pdf, .svg or .png",
+            out.display()
+        )
+    })?;
+    let beside = out.with_extension("toml");
+    request.files(kind, &beside).check()?;
     let [least, most] = DPIS;
     ensure!(
         (least..=most).contains(&request.dpi),
@@ -113,11 +117,10 @@ pub fn markers(request: &Request) -> Result<Vec<PathBuf>> {
         }
         Sheet::Target(target) => (vec![calibration_target(target, size_mm)?], None),
     };
-    let out = request.out.as_path();
-    match (extension.as_str(), pages.as_slice()) {
-        ("pdf", pages) => write_bytes(out, &pdf::bytes(pages))?,
-        ("svg", [page]) => write_text(out, &svg::text(page))?,
-        ("png", [page]) => {
+    match (kind, pages.as_slice()) {
+        (ResultKind::Pdf, pages) => write_bytes(out, &pdf::bytes(pages))?,
+        (ResultKind::Svg, [page]) => write_text(out, &svg::text(page))?,
+        (ResultKind::Png, [page]) => {
             write_bytes(out, &png::bytes(page, request.dpi)?)?;
         }
         _ => bail!(
@@ -127,11 +130,28 @@ pub fn markers(request: &Request) -> Result<Vec<PathBuf>> {
     }
     let mut written = vec![out.to_owned()];
     if let Some(block) = block {
-        let beside: PathBuf = Path::new(out).with_extension("toml");
-        write_text(&beside, &block)?;
+        write_text(&beside, &format!("{PRINTED}.\n{block}"))?;
         written.push(beside);
     }
     Ok(written)
+}
+
+impl Request {
+    fn files(&self, kind: ResultKind, beside: &Path) -> JobFiles {
+        let mut files = JobFiles::new(self.replacing);
+        files.writes("--out", &self.out, kind);
+        let family = match &self.sheet {
+            Sheet::Board { family, .. } | Sheet::Lone { family, .. } => Some(*family),
+            Sheet::Target(target) => target.markers.as_ref().map(|markers| markers.family),
+        };
+        if let Some(family) = family {
+            files.reads_family(family);
+        }
+        if !matches!(self.sheet, Sheet::Target(_)) {
+            files.writes("the text beside --out,", beside, ResultKind::PrintedMarkers);
+        }
+        files
+    }
 }
 
 /// The page of a board in the middle of the paper, and its `[[board]]`, whose origin is the board's centre.

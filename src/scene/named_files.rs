@@ -1,0 +1,32 @@
+//! The files that a scene names: what each is, and where in the scene's text it stands.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+/// What a file is that a scene names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FileKind {
+    /// What is played: a session, a video, a folder of pictures.
+    Recording,
+    /// The camera's calibration.
+    Calibration,
+    /// A phantom's or a virtual thing's mesh (OBJ).
+    Mesh,
+    /// A mesh of the room (OBJ).
+    RoomMesh,
+    /// A light probe's picture.
+    Probe,
+    /// A dictionary of markers (YAML).
+    Dictionary,
+}
+
+/// A file that a scene names, and that is there.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NamedFile {
+    /// What it is.
+    pub kind: FileKind,
+    /// Where it was found.
+    pub path: PathBuf,
+    /// The bytes of the scene's text that name it: a text of TOML with its quotes.
+    pub span: Range<usize>,
+}
