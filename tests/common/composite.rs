@@ -5,7 +5,7 @@
 //! right if the states at its samples explain it within [`TOLERANCE`]; an edge that passes a sample close by may have the
 //! state beyond it instead, and how far away that is found is measured.
 
-use glam::{DVec2, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 use gnomon::app::truth::FACES_AWAY;
 use gnomon::app::truth::ray_cast::{Exact, GRAZES, SAMPLES_PX, Surface, View, World, pixels};
 use gnomon::geometry::mesh::Mesh;
@@ -81,6 +81,7 @@ impl State {
 pub struct Expected<'a> {
     world: &'a World,
     view: View,
+    world_from_camera: DAffine3,
     lights: &'a [Light],
     /// Irradiance from all around.
     ambient: DVec3,
@@ -242,6 +243,7 @@ impl<'a> Expected<'a> {
         Self {
             world: &stage.world,
             view,
+            world_from_camera: view.camera_from_world.inverse(),
             lights: &stage.scene.lights,
             ambient: ambient * PI,
             albedos: (stage.scene.virtuals.iter())
@@ -325,17 +327,11 @@ impl<'a> Expected<'a> {
                 continue;
             };
             let points = places(index);
-            let mut points: Vec<DVec3> = points
+            let points: Vec<DVec3> = points
                 .iter()
                 .map(|place| self.on_plane(&surface, *place))
                 .collect();
             let edge_on = points.len() > 1 && self.is_edge_on(&points);
-            if points.len() > 1 {
-                points.extend(self.off_plane(&points));
-            }
-            if self.samples > 1 {
-                points.extend(self.hardly_off_plane(&surface, places(index)[0]));
-            }
             let sum_of = |lights: u32| -> Range {
                 let reaches = |index: &usize| lights >> index & 1 == 1;
                 let at = |point: &DVec3| -> DVec3 {
@@ -405,36 +401,6 @@ impl<'a> Expected<'a> {
         }
     }
 
-    /// Where Mesa's software driver has the points of a triangle that it shades elsewhere than at the pixel's centre: it
-    /// takes what is interpolated there to the depth of the centre, so the point leaves its plane.
-    fn off_plane(&self, points: &[DVec3]) -> Vec<DVec3> {
-        let to_camera = &self.view.camera_from_world;
-        let world_from_camera = to_camera.inverse();
-        let depths = points
-            .iter()
-            .map(|point| to_camera.transform_point3(*point).z);
-        let center_depth_m = depths.clone().next().unwrap_or(1.0);
-        (points.iter().zip(depths))
-            .map(|(point, depth_m)| {
-                let in_camera = to_camera.transform_point3(*point);
-                world_from_camera.transform_point3(in_camera * (center_depth_m / depth_m))
-            })
-            .collect()
-    }
-
-    /// The same where all of a pixel is the triangle's: what that driver takes for the middle of its samples is it to so
-    /// small a part of a pixel.
-    fn hardly_off_plane(&self, surface: &Surface, center: DVec2) -> [DVec3; 2] {
-        const OFF_PX: f64 = 1.0 / 64.0;
-        let to_camera = &self.view.camera_from_world;
-        let in_camera = |place: DVec2| to_camera.transform_point3(self.on_plane(surface, place));
-        let point = in_camera(center);
-        let slope = [DVec2::X, DVec2::Y].map(|axis| in_camera(center + axis * OFF_PX).z - point.z);
-        let part = (slope[0].abs() + slope[1].abs()) / point.z;
-        let world_from_camera = to_camera.inverse();
-        [1.0 - part, 1.0 + part].map(|scale| world_from_camera.transform_point3(point * scale))
-    }
-
     /// Whether the depth changes so much from a pixel to the next that those points are anywhere.
     fn is_edge_on(&self, points: &[DVec3]) -> bool {
         let to_camera = &self.view.camera_from_world;
@@ -449,10 +415,9 @@ impl<'a> Expected<'a> {
 
     /// Where a ray at a place would meet the plane of a surface.
     fn on_plane(&self, surface: &Surface, place: DVec2) -> DVec3 {
-        let world_from_camera = self.view.camera_from_world.inverse();
-        let eye = world_from_camera.translation;
+        let eye = self.world_from_camera.translation;
         let plane = self.view.intrinsics.plane_from_pixel(place);
-        let direction = world_from_camera.transform_vector3(plane.extend(1.0));
+        let direction = self.world_from_camera.transform_vector3(plane.extend(1.0));
         let along = surface.normal.dot(surface.point - eye) / surface.normal.dot(direction);
         // Seen edge-on the plane may be behind the camera there.
         let along = if along.is_finite() && along > 0.0 {
@@ -525,6 +490,19 @@ impl<'a> Expected<'a> {
         let stays = over_noise.is_none_or(|(noisy, video)| {
             noisy.rgba[4 * index..4 * index + 3] == video[4 * index..4 * index + 3]
         });
+        // Most pixels are alike all over.
+        if uniform {
+            let touched = self.is_touched(state);
+            let explained = match touched {
+                true => self.composite(&[*state], center).holds(found),
+                false => is_white && stays,
+            };
+            if explained {
+                verdict.judged += 1;
+                verdict.changed += usize::from(touched);
+                return;
+            }
+        }
         let states: Vec<State> = if uniform {
             vec![*state; self.samples]
         } else {
@@ -660,14 +638,16 @@ impl<'a> Expected<'a> {
             let gain = DVec3::from_array(layers.gain[index].map(f64::from));
             let gain_differs = state.role() == REAL && (gain - found).abs().max_element() > 0.01;
             let states = vec![told; self.samples];
-            let bits_differ = state.role() == REAL && !self.range(center, &states).holds(found);
+            let bits_differ = state.role() == REAL
+                && !state.is_like(&told)
+                && !self.range(center, &states).holds(found);
             if layers.role[index] != state.role() || gain_differs || bits_differ {
                 // What is thinner than a pixel shows at no centre.
                 let places = self.sample_places(center);
-                if !places
+                let whole = places
                     .iter()
-                    .all(|place| self.state(*place).is_like(&state))
-                {
+                    .all(|place| self.state(*place).is_like(&state));
+                if !whole || self.is_snapped(index, center) {
                     continue;
                 }
                 count += 1;
