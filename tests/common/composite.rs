@@ -694,20 +694,32 @@ impl<'a> Expected<'a> {
 
     /// Whether an edge passes a sample of a pixel so closely that snapping alone decides between two pictures of it.
     pub fn is_snapped(&self, index: usize, center: DVec2) -> bool {
-        let differs = |place: &DVec2| {
-            let state = self.state(*place);
-            (0..PLACES_IN_RING).any(|step| {
-                let turn = step as f64 / PLACES_IN_RING as f64 * 2.0 * PI;
-                let around = self.state(*place + DVec2::from_angle(turn) * RINGS_PX[0]);
-                !around.is_like(&state)
-            })
-        };
         let on_edge = |place: &DVec2| {
             let mut lights = self.lights.iter();
             lights.any(|light| self.world.is_on_edge(&self.view, *place, light))
         };
         let places = self.sample_places(center);
-        self.centers[index].grazes || places.iter().any(|place| differs(place) || on_edge(place))
+        self.centers[index].grazes || places.iter().any(|place| on_edge(place))
+    }
+
+    /// How far from a pixel's samples, pixels, there is what explains its value: 0 where their own states do; `None` if
+    /// nothing does.
+    pub fn explained_within(&self, index: usize, picture: &Picture) -> Option<f64> {
+        let width = self.view.intrinsics.size_px[0] as usize;
+        let center = DVec2::new((index % width) as f64, (index / width) as f64);
+        let found = picture.linear(index);
+        let places = self.sample_places(center);
+        let states: Vec<State> = places.iter().map(|place| self.state(*place)).collect();
+        let touched = states.iter().any(|state| self.is_touched(state));
+        let is_white = picture.pixel(index) == [255; 3];
+        if self.range(center, &states).holds(found) && (touched || is_white)
+            || states.iter().any(|state| state.grazes)
+        {
+            return Some(0.0);
+        }
+        let ring = self.nearest_explanation(center, &states, found, touched);
+        let radius_px = ring.map(|ring| RINGS_PX[ring]);
+        radius_px.or_else(|| self.is_snapped(index, center).then_some(RINGS_PX[0]))
     }
 
     /// States all over a pixel.
