@@ -19,7 +19,7 @@ use gnomon::geometry::mesh::Mesh;
 use gnomon::light::{Light, Material};
 use gnomon::scene::{
     ArucoRefinement, Codes, Counting, DetectorKind, Family, Object, Quality, Scene, SceneError,
-    ShadowSettings, ShaftSettings, Technique,
+    ShadowSettings, ShaftSettings, Shortcuts, Technique,
 };
 use tempfile::TempDir;
 
@@ -133,6 +133,7 @@ fn a_small_scene_has_the_defaults() {
     assert_eq!(
         scene.shadows,
         ShadowSettings {
+            without: Shortcuts::NONE,
             quality: None,
             technique: Technique::Auto,
             samples: 4,
@@ -298,6 +299,7 @@ frame_budget_ms = 16
     assert_eq!(
         scene.shadows,
         ShadowSettings {
+            without: Shortcuts::NONE,
             quality: Some(Quality::Accurate),
             technique: Technique::Volumes,
             samples: 1,
