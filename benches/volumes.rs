@@ -14,6 +14,7 @@ use clap::Parser;
 use glam::DVec3;
 use gnomon::capture::Frame;
 use gnomon::render::{Gpu, Renderer, Shown};
+use gnomon::scene::{Shortcut, Shortcuts};
 
 use common::{Csv, Times, at_least_one, read_obj, shared_folder};
 use gnomon::app::chart::peers_table::{
@@ -38,6 +39,9 @@ struct Options {
     /// Where to write the figures
     #[arg(long)]
     csv: Option<PathBuf>,
+    /// What each shortcut saves: frames without it against frames with all, turn by turn
+    #[arg(long)]
+    shortcuts: bool,
     /// What `cargo bench` adds
     #[arg(long, hide = true)]
     bench: bool,
@@ -62,6 +66,9 @@ fn main() -> Result<()> {
     let gpu = Arc::new(Gpu::open(options.adapter.as_deref())?);
     println!("{}", gpu.description());
     let cases = four_scenes(options.scene.as_deref(), options.samples)?;
+    if options.shortcuts {
+        return time_shortcuts(&gpu, cases, options.frames, options.csv);
+    }
     let mut csv = Csv::new(
         options.csv,
         "scene,triangles,lights,casters,width,height,samples,median_ms,p10_ms,p90_ms",
@@ -175,6 +182,75 @@ fn four_scenes(only: Option<&str>, samples: u32) -> Result<Vec<Case>> {
         .collect()
 }
 
+/// Frames without each shortcut against frames with all of them, in turns, so that both see the same machine; with a caster
+/// that turns, and with one that stands still.
+fn time_shortcuts(
+    gpu: &Arc<Gpu>,
+    cases: Vec<Case>,
+    frames: usize,
+    csv: Option<PathBuf>,
+) -> Result<()> {
+    let mut csv = Csv::new(csv, "scene,samples,caster,without,median_ms,times_as_long");
+    for Case { name, mut stage } in cases {
+        let samples = stage.scene.shadows.samples;
+        let switches = [("none", Shortcuts::NONE)]
+            .into_iter()
+            .chain(Shortcut::BY_NAME.map(|(name, one)| (name, Shortcuts::NONE.with(one, true))));
+        let switches: Vec<_> = switches.chain([("all", Shortcuts::ALL)]).collect();
+        let mut renderers = Vec::new();
+        for &(_, without) in &switches {
+            stage.scene.shadows.without = without;
+            renderers.push(renderer(gpu, &stage)?);
+        }
+        for (caster, moves) in [("turns", true), ("rests", false)] {
+            let mut times_ms = vec![Vec::with_capacity(frames); switches.len()];
+            for frame in 0..WARM_UP_FRAMES + frames {
+                let poses = stage.poses(if moves { frame } else { 0 });
+                for (renderer, times_ms) in renderers.iter_mut().zip(&mut times_ms) {
+                    let begun = Instant::now();
+                    renderer.draw(&poses, Shown::Composite);
+                    renderer.wait()?;
+                    if frame >= WARM_UP_FRAMES {
+                        times_ms.push(1e3 * begun.elapsed().as_secs_f64());
+                    }
+                }
+            }
+            let medians: Vec<f64> = times_ms
+                .into_iter()
+                .map(|t| Times::of(t).median_ms)
+                .collect();
+            for ((without, _), median_ms) in switches.iter().zip(&medians) {
+                let ratio = median_ms / medians[0];
+                println!(
+                    "{name:14} {samples} samples, {caster}: without {without:10} {median_ms:7.2} ms, {ratio:.2} times"
+                );
+                csv.row(&[
+                    &name,
+                    &samples,
+                    &caster,
+                    without,
+                    &format!("{median_ms:.3}"),
+                    &format!("{ratio:.3}"),
+                ]);
+            }
+        }
+    }
+    csv.finish()
+}
+
+/// A renderer with its picture.
+fn renderer(gpu: &Arc<Gpu>, stage: &Stage) -> Result<Renderer> {
+    let mut renderer = Renderer::new(Arc::clone(gpu), &stage.scene, stage.intrinsics)?;
+    let size_px = stage.intrinsics.size_px;
+    renderer.upload(&Frame {
+        index: 0,
+        time_secs: 0.0,
+        size_px,
+        rgba: vec![128; 4 * (size_px[0] * size_px[1]) as usize],
+    })?;
+    Ok(renderer)
+}
+
 /// A frame from the call to the last pixel, and its parts; what the GPU's own timestamps tell, where it has them.
 struct FrameTimes {
     total: Times,
@@ -185,14 +261,7 @@ struct FrameTimes {
 }
 
 fn time(gpu: &Arc<Gpu>, stage: &Stage, frames: usize) -> Result<FrameTimes> {
-    let mut renderer = Renderer::new(Arc::clone(gpu), &stage.scene, stage.intrinsics)?;
-    let size_px = stage.intrinsics.size_px;
-    renderer.upload(&Frame {
-        index: 0,
-        time_secs: 0.0,
-        size_px,
-        rgba: vec![128; 4 * (size_px[0] * size_px[1]) as usize],
-    })?;
+    let mut renderer = renderer(gpu, stage)?;
     let mut host_ms = [(); 3].map(|()| Vec::with_capacity(frames));
     let mut gpu_ms = [(); 2].map(|()| Vec::with_capacity(frames));
     for frame in 0..WARM_UP_FRAMES + frames {

@@ -285,6 +285,18 @@ fn degenerate_scenes() {
     hold_degenerate(scenes(100));
 }
 
+#[test]
+#[ignore = "a quarter of an hour; cargo test --release --test picture -- --ignored"]
+fn thousands_of_random_scenes() {
+    hold_random(scenes(3_300));
+}
+
+#[test]
+#[ignore = "a quarter of an hour; cargo test --release --test picture -- --ignored"]
+fn thousands_of_degenerate_scenes() {
+    hold_degenerate(scenes(1_700));
+}
+
 // What was wrong in the picture once, though the layers were right.
 
 fn table() -> Thing {
