@@ -19,7 +19,8 @@ fn depth_alone() {}
 // What virtual things leave of a real surface's light where they hide the lamp. In the order of sums (composite.wgsl), so
 // that both round alike.
 fn gain(surface: Surface, outside: bool) -> vec3f {
-    let taken = irradiance(surface, outside);
+    // (Never below 0, but so no compiler joins its product to the sum, which would round otherwise.)
+    let taken = max(irradiance(surface, outside), vec3f(0.0));
     let light = surface.indirect + taken;
     return select(vec3f(1.0), max(light - taken, vec3f(0.0)) / max(light, vec3f(1e-6)), taken != vec3f(0.0));
 }
@@ -87,7 +88,7 @@ fn light_on_virtual(interpolated: Surface, @builtin(front_facing) outside: bool)
     let surface = recovered(interpolated);
     let ambient = surface.material.rgb / PI * surface.indirect;
     return Light(
-        vec4f(srgb_from_linear(ambient + radiance(surface, outside)), 1.0),
+        vec4f(srgb_from_linear(ambient + max(radiance(surface, outside), vec3f(0.0))), 1.0),
         vec4f(srgb_from_linear(ambient), SEEN),
     );
 }

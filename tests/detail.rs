@@ -36,7 +36,7 @@ fn stage(thing: Thing) -> Stage {
 /// From so far away, metres.
 fn draw(stage: &Stage, renderer: &mut Renderer, distance_m: f64) -> Vec<u8> {
     let eye = MIDDLE + DVec3::new(0.05, -0.8, 0.6) * distance_m;
-    stage.shoot(renderer, look_at(eye, MIDDLE)).0
+    stage.picture(renderer, look_at(eye, MIDDLE)).rgba
 }
 
 fn changed(one: &[u8], other: &[u8]) -> usize {
@@ -71,7 +71,7 @@ fn a_camera_that_trembles_about_a_switch_sees_no_flicker() {
     let tremble = |stage: &Stage| -> usize {
         let mut renderer = stage.renderer(CAMERA);
         draw(stage, &mut renderer, 0.3);
-        let mut before = None;
+        let mut before: Option<Vec<u8>> = None;
         let mut most = 0;
         for step in 0..12 {
             // 0.02 px of what is 0.1 m off the middle.
@@ -110,8 +110,8 @@ fn shadows_on_the_thing_itself_move_no_farther_than_outlines() {
     let mut coarser = stage.renderer(CAMERA);
     stage.scene.shadows.without = Shortcuts::NONE.with(Shortcut::Levels, true);
     let mut exact = stage.renderer(CAMERA);
-    let mut were_coarser = 0;
-    for distance_m in [0.4, 1.0, 1.6, 2.4, 4.0, 6.0] {
+    let (mut were_coarser, mut wrong) = (0, 0);
+    for distance_m in [0.4, 1.0, 1.6, 2.4, 3.0, 4.0, 5.0, 6.0, 8.0] {
         let found = draw(&stage, &mut coarser, distance_m);
         let triangles = coarser.triangles();
         let expected = draw(&stage, &mut exact, distance_m);
@@ -137,8 +137,9 @@ fn shadows_on_the_thing_itself_move_no_farther_than_outlines() {
         });
         let unexplained = unexplained.count();
         eprintln!("{distance_m} m: {triangles} triangles, {unexplained} pixels off");
-        assert_eq!(unexplained, 0, "at {distance_m} m, {triangles} triangles");
+        wrong += unexplained;
     }
+    assert_eq!(wrong, 0, "pixels that no neighbour explains");
     assert!(
         were_coarser >= 2,
         "coarser in {were_coarser} pictures alone"

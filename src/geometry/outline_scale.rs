@@ -14,7 +14,7 @@ use super::shadow_volume::LightPlace;
 pub const LARGEST_MOVE_PX: f64 = 100.0;
 
 /// Where light grazes a receiver at less than this cosine, its shadow's edge is fainter by as much as it is longer.
-pub const LEAST_COSINE: f64 = 0.5;
+const LEAST_COSINE: f64 = 0.5;
 
 /// What the camera sees.
 #[derive(Debug, Clone, Copy, PartialEq)]
