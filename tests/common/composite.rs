@@ -671,7 +671,7 @@ impl<'a> Expected<'a> {
         verdict: &mut Verdict,
     ) {
         // A part of them tells enough.
-        if index % 5 != 0 {
+        if !index.is_multiple_of(5) {
             return;
         }
         let area = self.area(center, AREA_SIDE);
@@ -699,7 +699,7 @@ impl<'a> Expected<'a> {
             lights.any(|light| self.world.is_on_edge(&self.view, *place, light))
         };
         let places = self.sample_places(center);
-        self.centers[index].grazes || places.iter().any(|place| on_edge(place))
+        self.centers[index].grazes || places.iter().any(on_edge)
     }
 
     /// How far from a pixel's samples, pixels, there is what explains its value: 0 where their own states do; `None` if
