@@ -330,7 +330,7 @@ fn pose(translation: [f64; 3], rotation: [f64; 3]) -> DAffine3 {
 
 fn desk_pose() -> DAffine3 {
     pose(
-        [0.0, 0.026_098_466_788_990_572, 0.683_972_857_671_460_5],
+        [0.0, 0.026_098_466_788_990_57, 0.683_972_857_671_460_5],
         [
             2.084_987_641_109_178,
             0.089_703_804_092_166_91,
@@ -716,7 +716,6 @@ fn no_seam_where_a_virtual_shadow_meets_a_real_one() {
         channel => level_of_linear(of_pixels[index / 4].0[channel]).round() as u8,
     };
     let video = frame_of(intrinsics.size_px, bytes);
-    let mut stage = stage;
     stage.virtuals[0].visible = true;
     stage.place();
     let full = Expected::new(&stage, view);
