@@ -11,7 +11,7 @@ use crate::scene::{Object, Scene};
 const ON_SURFACE_M: f64 = 1e-6;
 /// A virtual surface is drawn in front of a real one that is no farther before it, metres: at a metre from the camera, as
 /// the renderer has it.
-const IN_SURFACE_M: f64 = 4e-6;
+const IN_SURFACE_M: f64 = 1.5e-5;
 
 /// What there is to warn of.
 pub fn warnings(scene: &Scene) -> Vec<String> {

@@ -20,6 +20,8 @@ pub struct Error {
     pub wrong_pct: f64,
     /// Wrong bits of a real thing's shadow, percent of `counted`.
     pub wrong_real_pct: f64,
+    /// Wrong pixels that no edge passes within the snapping of corners.
+    pub unsnapped: usize,
     /// Wrong pixels with no edge within 1.5 px: how many, and the first of them.
     pub far: usize,
     pub first_far: Option<[u32; 2]>,
@@ -69,13 +71,17 @@ pub fn shadow_error(
         let differs = exact_bit ^ found;
         wrong += usize::from(differs & VIRTUAL_HIDES != 0);
         wrong_real += usize::from(differs & REAL_HIDES != 0);
-        if differs & (VIRTUAL_HIDES | REAL_HIDES) != 0
-            && (error.far >= ENOUGH || !is_edge(world, view, exact, index, light, exact_bits))
-        {
-            let [x, y] = [
-                index as u32 % exact.size_px[0],
-                index as u32 / exact.size_px[0],
-            ];
+        if differs & (VIRTUAL_HIDES | REAL_HIDES) == 0 {
+            continue;
+        }
+        let [x, y] = [
+            index as u32 % exact.size_px[0],
+            index as u32 / exact.size_px[0],
+        ];
+        let center = DVec2::new(f64::from(x), f64::from(y));
+        let looks = error.unsnapped < ENOUGH;
+        error.unsnapped += usize::from(!looks || !world.is_on_edge(view, center, light));
+        if error.far >= ENOUGH || !is_edge(world, view, exact, index, light, exact_bits) {
             error.far += 1;
             error.first_far.get_or_insert([x, y]);
         }

@@ -21,8 +21,9 @@ const COINCIDENT_M: f64 = 1e-9;
 const ROUNDING: f64 = 1e-7;
 /// Sine of the angle up to which two triangles lie in one plane.
 const PARALLEL: f64 = 1e-5;
-/// A light no farther from a triangle's plane than this part of the way to its farthest corner (or at no larger sine to it,
-/// if it is distant) lies in it: it sees the triangle edge-on or lies on it, and the triangle hides nothing.
+/// A light no farther from a triangle's plane than this part of the way to its farthest corner and of its coordinates (or at
+/// no larger sine to it, if it is distant) lies in it: it sees the triangle edge-on or lies on it, and the triangle hides
+/// nothing.
 const IN_THE_PLANE: f64 = 1e-7;
 /// A virtual surface is seen as if it were nearer by this part, so that it wins where it lies in a real one,
 const NEARER: f64 = 1.0 / 65_536.0;
@@ -295,7 +296,8 @@ fn is_in_plane(light: &Light, corners: &[DVec3; 3], normal: DVec3) -> bool {
         Light::Point { position_m, .. } => {
             let ways = corners.map(|corner| corner - position_m);
             let farthest_m = ways.iter().map(|way| way.length()).fold(0.0, f64::max);
-            normal.dot(ways[0]).abs() <= IN_THE_PLANE * farthest_m
+            let size_m = farthest_m + position_m.abs().max_element();
+            normal.dot(ways[0]).abs() <= IN_THE_PLANE * size_m
         }
         Light::Directional { direction, .. } => normal.dot(direction).abs() <= IN_THE_PLANE,
     }
