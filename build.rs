@@ -71,7 +71,7 @@ fn tell_what_tests_have() {
     println!("cargo::rustc-check-cfg=cfg(has_shared)");
     println!("cargo::rustc-check-cfg=cfg(has_xvfb)");
     let shared = Path::new("../shared");
-    let parts = ["sessions", "real", "stability"];
+    let parts = ["sessions", "real", "stability", "models"];
     if parts.iter().all(|part| shared.join(part).is_dir()) {
         println!("cargo::rustc-cfg=has_shared");
         // The folders are large, and cargo would look at each file.

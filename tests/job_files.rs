@@ -6,11 +6,19 @@
     reason = "a test may stop where its own files fail"
 )]
 
+#[cfg(unix)]
+#[path = "common/signals.rs"]
+mod signals;
+#[path = "common/waiting.rs"]
+mod waiting;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command as Process, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use waiting::wait_for;
 
 const POSES: &str = "frame,time_s,anchor,status,markers,tx_m,ty_m,tz_m,rx,ry,rz,track_ms,render_ms";
 fn project_file(name: &str) -> PathBuf {
@@ -115,17 +123,6 @@ fn lamp_in(folder: &Path) -> PathBuf {
     scene
 }
 
-fn wait_for(what: &str, mut is_there: impl FnMut() -> bool) {
-    let start = Instant::now();
-    while !is_there() {
-        assert!(
-            start.elapsed() < Duration::from_secs(120),
-            "{what} does not come"
-        );
-        std::thread::sleep(Duration::from_millis(10));
-    }
-}
-
 /// Plays the lamp's recording so often that any machine is in the midst of it for a while.
 fn long_lamp_in(folder: &Path) -> PathBuf {
     let scene = lamp_in(folder);
@@ -154,11 +151,7 @@ fn spawn(folder: &Path, arguments: &[&str]) -> Child {
 
 #[cfg(unix)]
 fn interrupt(child: &Child) {
-    let told = Process::new("sh")
-        .args(["-c", &format!("kill -INT {}", child.id())])
-        .status()
-        .unwrap();
-    assert!(told.success());
+    signals::send(signals::Signal::INT, child.id()).unwrap();
 }
 
 #[test]

@@ -9,6 +9,8 @@
 #[cfg(unix)]
 #[path = "common/signals.rs"]
 mod signals;
+#[path = "common/waiting.rs"]
+mod waiting;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command as Process, Output, Stdio};
@@ -18,6 +20,7 @@ use assert_cmd::Command;
 use gnomon::capture::{Frame, FrameSource};
 #[cfg(unix)]
 use signals::Signal;
+use waiting::wait_for;
 
 fn project_file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
@@ -127,17 +130,6 @@ fn start_recording(session: &Path) -> std::process::Child {
         std::fs::metadata(session.join("video.mkv")).is_ok_and(|video| video.len() > 0)
     });
     child
-}
-
-fn wait_for(what: &str, mut is_there: impl FnMut() -> bool) {
-    let start = Instant::now();
-    while !is_there() {
-        assert!(
-            start.elapsed() < Duration::from_secs(120),
-            "{what} does not come"
-        );
-        std::thread::sleep(Duration::from_millis(20));
-    }
 }
 
 /// Until nobody writes the video any more.
