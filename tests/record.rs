@@ -14,7 +14,7 @@ mod waiting;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command as Process, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use assert_cmd::Command;
 use gnomon::capture::{Frame, FrameSource};
