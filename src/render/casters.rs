@@ -182,8 +182,12 @@ impl Casters {
                     .volume
                     .update(gpu, &caster.caster, made_for, counting);
                 if thing.role == Role::Virtual {
-                    // From outside, all that is seen of a closed mesh is seen from its outer side.
-                    let eye = (made_for.casting == Casting::All).then_some(placed.eye);
+                    // From outside, all that is seen of a solid is seen from its outer side. Of a closed mesh that passes
+                    // through itself the inner side of a lobe may be.
+                    let holes = thing.levels[level].holes.as_ref();
+                    let is_solid = holes.is_some_and(|holes| holes.is_empty());
+                    let outside = is_solid && made_for.casting == Casting::Facing;
+                    let eye = (!outside).then_some(placed.eye);
                     shadow.sort_lit(gpu, caster, (level, light, eye));
                 }
             }
