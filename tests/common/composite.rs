@@ -627,7 +627,8 @@ impl<'a> Expected<'a> {
                 let whole = places
                     .iter()
                     .all(|place| self.state(*place).is_like(&state));
-                if !whole || self.is_snapped(index, center) {
+                // Layers are told at the centre, which need be no sample's place.
+                if !whole || self.is_snapped(index, center) || self.is_on_edge(center) {
                     continue;
                 }
                 count += 1;
@@ -692,12 +693,13 @@ impl<'a> Expected<'a> {
 
     /// Whether an edge passes a sample of a pixel so closely that snapping alone decides between two pictures of it.
     pub fn is_snapped(&self, index: usize, center: DVec2) -> bool {
-        let on_edge = |place: &DVec2| {
-            let mut lights = self.lights.iter();
-            lights.any(|light| self.world.is_on_edge(&self.view, *place, light))
-        };
         let places = self.sample_places(center);
-        self.centers[index].grazes || places.iter().any(on_edge)
+        self.centers[index].grazes || places.iter().any(|place| self.is_on_edge(*place))
+    }
+
+    fn is_on_edge(&self, place: DVec2) -> bool {
+        let mut lights = self.lights.iter();
+        lights.any(|light| self.world.is_on_edge(&self.view, place, light))
     }
 
     /// How far from a pixel's samples, pixels, there is what explains its value: 0 where their own states do; `None` if
