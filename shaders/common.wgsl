@@ -32,18 +32,3 @@ fn incidence(light: LightSource, point_in_camera: vec3f) -> Incidence {
     let falloff = select(1.0, 1.0 / max(distance_squared, 1e-12), light.place_in_camera.w > 0.0);
     return Incidence(to_light * inverseSqrt(max(distance_squared, 1e-12)), light.power.rgb * falloff);
 }
-
-// 1, as no compiler may know. Where a pixel is partly covered, Mesa's software driver interpolates at the centroid but divides
-// by the centre's depth: what it makes of 1 tells by how much all else is off. (On a triangle seen edge-on that may be
-// anything, and turn it over.)
-fn one(vertex_index: u32) -> f32 {
-    return bitcast<f32>(0x3f800000u | (vertex_index >> 31u));
-}
-
-// Set when the shader is built: whether pixels can be partly covered.
-override MULTISAMPLED: bool = true;
-
-// What interpolated numbers are to be multiplied by.
-fn recovery(one: f32) -> f32 {
-    return select(1.0, 1.0 / one, MULTISAMPLED && abs(one) > 1e-9);
-}

@@ -27,8 +27,7 @@ fn gain(surface: Surface, outside: bool) -> vec3f {
 
 // A real surface from which virtual things take the light: video · gain in linear light.
 @fragment
-fn hidden_on_real(interpolated: Surface, @builtin(front_facing) outside: bool) -> @location(0) vec4f {
-    let surface = recovered(interpolated);
+fn hidden_on_real(surface: Surface, @builtin(front_facing) outside: bool) -> @location(0) vec4f {
     let recorded = undistorted(vec2i(surface.clip.xy));
     let gain = gain(surface, outside);
     // A surface that loses nothing keeps its picture bit for bit. (To discard it would make the stencil wait for it.)
@@ -37,8 +36,7 @@ fn hidden_on_real(interpolated: Surface, @builtin(front_facing) outside: bool) -
 }
 
 @fragment
-fn gain_on_real(interpolated: Surface, @builtin(front_facing) outside: bool) -> @location(0) vec4f {
-    let surface = recovered(interpolated);
+fn gain_on_real(surface: Surface, @builtin(front_facing) outside: bool) -> @location(0) vec4f {
     return vec4f(gain(surface, outside), 1.0);
 }
 
@@ -72,7 +70,7 @@ fn ambient_on_virtual(surface: AmbientSurface) -> Light {
 struct AmbientSurface {
     @invariant @builtin(position) clip: vec4f,
     @location(0) @interpolate(flat) material: vec4f,
-    @location(1) @interpolate(perspective, centroid) indirect: vec3f,
+    @location(1) indirect: vec3f,
 }
 
 @vertex
@@ -84,8 +82,7 @@ fn place_in_ambient_light(@location(0) position: vec3f, @location(2) material: v
 override SEEN: f32 = IN_OPEN_LIGHT;
 
 @fragment
-fn light_on_virtual(interpolated: Surface, @builtin(front_facing) outside: bool) -> Light {
-    let surface = recovered(interpolated);
+fn light_on_virtual(surface: Surface, @builtin(front_facing) outside: bool) -> Light {
     let ambient = surface.material.rgb / PI * surface.indirect;
     return Light(
         vec4f(srgb_from_linear(ambient + max(radiance(surface, outside), vec3f(0.0))), 1.0),

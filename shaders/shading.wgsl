@@ -17,30 +17,19 @@ struct Corner {
 
 struct Surface {
     @invariant @builtin(position) clip: vec4f,
-    // Centroid: at the edge of a triangle the pixel's centre may lie outside it.
-    @location(0) @interpolate(perspective, centroid) point_in_camera: vec3f,
-    @location(1) @interpolate(perspective, centroid) normal_in_camera: vec3f,
+    @location(0) point_in_camera: vec3f,
+    @location(1) normal_in_camera: vec3f,
     @location(2) @interpolate(flat) material: vec4f,
     // Irradiance from the surroundings, lights aside (light::bounce).
-    @location(3) @interpolate(perspective, centroid) indirect: vec3f,
-    @location(4) @interpolate(perspective, centroid) one: f32,
-}
-
-// A surface as it comes from interpolation, put right.
-fn recovered(surface: Surface) -> Surface {
-    let recovery = recovery(surface.one);
-    return Surface(
-        surface.clip,
-        surface.point_in_camera * recovery,
-        surface.normal_in_camera * recovery,
-        surface.material,
-        surface.indirect * recovery,
-        1.0,
-    );
+    @location(3) indirect: vec3f,
 }
 
 @vertex
-fn place(corner: Corner, @builtin(vertex_index) index: u32) -> Surface {
+fn place(corner: Corner) -> Surface {
+    return placed(corner);
+}
+
+fn placed(corner: Corner) -> Surface {
     let point = vec4f(corner.position, 1.0);
     return Surface(
         clip_from_point(view, point),
@@ -48,7 +37,6 @@ fn place(corner: Corner, @builtin(vertex_index) index: u32) -> Surface {
         (view.camera_from_anchor * vec4f(corner.normal, 0.0)).xyz,
         corner.material,
         corner.indirect,
-        one(index),
     );
 }
 

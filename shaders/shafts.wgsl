@@ -1,6 +1,6 @@
 // Soft shadows of a room's light (Gibson et al. 2003, section 7): what virtual things hide of the light of real surfaces, what
 // they throw back, and the light on them.
-//!include "shading.wgsl"
+//!include "sampled_surface.wgsl"
 //!include "source.wgsl"
 
 struct Frame {
@@ -50,6 +50,7 @@ struct ThrownSurface {
     @builtin(position) clip: vec4f,
     @location(0) @interpolate(perspective, centroid) irradiance: vec3f,
     @location(1) @interpolate(perspective, centroid) one: f32,
+    @location(2) @interpolate(flat) first_irradiance: vec3f,
 }
 
 struct PatchSurface {
@@ -59,6 +60,8 @@ struct PatchSurface {
     @location(2) @interpolate(flat) rows: vec3u,
     @location(3) @interpolate(flat) list: vec2u,
     @location(4) @interpolate(perspective, centroid) one: f32,
+    @location(5) @interpolate(flat) first_point_in_world: vec3f,
+    @location(6) @interpolate(flat) first_weights: vec2f,
 }
 
 struct Light {
@@ -78,12 +81,19 @@ fn place_patch(corner: PatchCorner, @builtin(vertex_index) index: u32) -> PatchS
         corner.rows,
         corner.list,
         one(index),
+        corner.position,
+        corner.weights,
     );
 }
 
 @vertex
 fn place_thrown(corner: ThrownCorner, @builtin(vertex_index) index: u32) -> ThrownSurface {
-    return ThrownSurface(clip_from_point(view, vec4f(corner.position, 1.0)), corner.irradiance, one(index));
+    return ThrownSurface(
+        clip_from_point(view, vec4f(corner.position, 1.0)),
+        corner.irradiance,
+        one(index),
+        corner.irradiance,
+    );
 }
 
 @vertex
@@ -146,9 +156,9 @@ fn transfer(row: u32, source: u32) -> vec3f {
 
 @fragment
 fn light_on_patch(surface: PatchSurface) -> Light {
-    let recovery = recovery(surface.one);
-    let point_in_world = surface.point_in_world * recovery;
-    let first = surface.weights * recovery;
+    let point_in_world = recovered(surface.point_in_world, surface.first_point_in_world, surface.one);
+    let of_first = vec3f(surface.first_weights, 0.0);
+    let first = recovered(vec3f(surface.weights, 0.0), of_first, surface.one).xy;
     let weights = vec3f(first, 1.0 - first.x - first.y);
     var taken = vec3f(0.0);
     for (var place = 0u; place < surface.list.y; place++) {
@@ -170,12 +180,12 @@ fn light_on_patch(surface: PatchSurface) -> Light {
 // Added to what sources take.
 @fragment
 fn thrown_back(surface: ThrownSurface) -> @location(1) vec4f {
-    return vec4f(-surface.irradiance * recovery(surface.one), 0.0);
+    return vec4f(-recovered(surface.irradiance, surface.first_irradiance, surface.one), 0.0);
 }
 
 @fragment
-fn light_on_virtual(interpolated: Surface, @builtin(front_facing) outside: bool) -> Light {
-    let surface = recovered(interpolated);
+fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: bool) -> Light {
+    let surface = surface(sampled);
     let point_in_world = (frame.world_from_camera * vec4f(surface.point_in_camera, 1.0)).xyz;
     let normal_in_camera = unit(surface.normal_in_camera) * select(-1.0, 1.0, outside);
     let normal = (frame.world_from_camera * vec4f(normal_in_camera, 0.0)).xyz;

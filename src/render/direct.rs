@@ -100,7 +100,6 @@ impl Direct {
         let constants = [
             ("GLOSSY", f64::from(glossy)),
             ("DISTORTS", f64::from(background.distorts)),
-            ("MULTISAMPLED", 0.0),
         ];
         let target = |format, write_mask| {
             Some(wgpu::ColorTargetState {
@@ -127,7 +126,7 @@ impl Direct {
             usage.pipelines(device, &geometry, &module, gpu.depth_format, 1)
         };
         let lit = |seen| {
-            let constants = [constants[0], constants[2], ("SEEN", seen)];
+            let constants = [constants[0], ("SEEN", seen)];
             surface("place", "light_on_virtual", &constants, all)
         };
         let hidden = |fragment, format| {

@@ -1,7 +1,15 @@
 //! The WGSL sources, built into the program; a line `//!include "NAME.wgsl"` stands for that file.
 
 /// What others include, each after those that it is included by.
-const INCLUDED: [(&str, &str); 5] = [
+const INCLUDED: [(&str, &str); 7] = [
+    (
+        "//!include \"sampled_surface.wgsl\"",
+        include_str!("../../shaders/sampled_surface.wgsl"),
+    ),
+    (
+        "//!include \"partly_covered.wgsl\"",
+        include_str!("../../shaders/partly_covered.wgsl"),
+    ),
     (
         "//!include \"shading.wgsl\"",
         include_str!("../../shaders/shading.wgsl"),

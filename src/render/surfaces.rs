@@ -152,7 +152,7 @@ impl Surfaces {
                 })
             };
             let usage = Use {
-                vertex: "place",
+                vertex: "place_sampled",
                 fragment,
                 writes_depth,
                 stencil,

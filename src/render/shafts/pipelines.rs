@@ -168,7 +168,7 @@ impl Pipelines {
             ),
             depth_of_real: Sided::both(build("place", &corners, None, true, false, flush)),
             light_on_virtual: Sided::both(build(
-                "place",
+                "place_sampled",
                 &corners,
                 Some("light_on_virtual"),
                 true,
