@@ -27,7 +27,7 @@ test-camera: setup
 
 # An hour's worth of frames through the live pipeline, as fast as they go; fails where memory grows.
 soak: setup
-	cargo test --release --test soak -- --ignored --nocapture
+	cargo test --release --test program soak -- --ignored --nocapture
 
 # Speed against accuracy on this machine: charts/.
 charts: setup

@@ -11,6 +11,7 @@ pub mod shapes;
 pub mod sheets;
 #[cfg(unix)]
 pub mod signals;
+pub mod waiting;
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};

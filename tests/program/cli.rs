@@ -1,0 +1,694 @@
+//! The command held against DESIGN's contract: what it writes, what it says, and that it leaves nothing half-done.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::{Command as Process, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::common::project_file;
+#[cfg(unix)]
+use crate::common::signals::{self, Signal};
+use assert_cmd::Command;
+use gnomon::capture::FrameSource;
+
+const HEADER: &str =
+    "frame,time_s,anchor,status,markers,tx_m,ty_m,tz_m,rx,ry,rz,track_ms,render_ms";
+
+/// gnomon in a folder of its own.
+fn gnomon(folder: &Path) -> Command {
+    let mut command = Command::cargo_bin("gnomon").expect("the program");
+    command.current_dir(folder);
+    command
+}
+
+fn config(name: &str) -> String {
+    let path = project_file(&format!("config/{name}.toml"));
+    path.to_str().expect("a plain path").to_owned()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Runs `replay`, which must do its job; what it says.
+fn replay(folder: &Path, arguments: &[&str]) -> String {
+    let output = gnomon(folder)
+        .arg("replay")
+        .args(arguments)
+        .output()
+        .expect("a run");
+    let said = stderr(&output);
+    assert!(output.status.success(), "{arguments:?}: {said}");
+    assert!(output.stdout.is_empty(), "results go to files");
+    said
+}
+
+/// Runs `replay`, which must fail, say each of `parts`, and print nothing; what it says.
+fn refused(folder: &Path, arguments: &[&str], parts: &[&str]) -> String {
+    let output = gnomon(folder)
+        .arg("replay")
+        .args(arguments)
+        .output()
+        .expect("a run");
+    let said = stderr(&output);
+    assert!(!output.status.success(), "{arguments:?} succeeded: {said}");
+    assert!(output.stdout.is_empty(), "talk goes to stderr");
+    assert!(!said.contains("panicked"), "{said}");
+    for part in parts {
+        assert!(said.contains(part), "{arguments:?} lacks {part:?}: {said}");
+    }
+    said
+}
+
+/// All files under a folder, by their relative names.
+fn files(folder: &Path) -> BTreeSet<String> {
+    let mut found = BTreeSet::new();
+    let mut waiting = vec![folder.to_owned()];
+    while let Some(next) = waiting.pop() {
+        for entry in std::fs::read_dir(&next).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                waiting.push(path);
+            } else {
+                let name = path.strip_prefix(folder).expect("below");
+                found.insert(name.to_str().expect("a plain name").to_owned());
+            }
+        }
+    }
+    found
+}
+
+fn read(path: PathBuf) -> Vec<u8> {
+    std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+fn text(path: PathBuf) -> String {
+    String::from_utf8(read(path)).expect("text")
+}
+
+/// A scene like `config/lamp.toml` that plays another recording of the same camera.
+fn lamp_scene_with(folder: &Path, source: &Path) -> String {
+    let replaced = |key: &str| format!("source = \"{key}\"");
+    let text = text(project_file("config/lamp.toml"))
+        .replace(
+            &replaced("recordings/lamp"),
+            &format!(
+                "{}\ncalibration = \"{}\"",
+                replaced(&source.display().to_string()),
+                project_file("recordings/lamp/camera.toml").display()
+            ),
+        )
+        .replace(
+            "\"models/",
+            &format!("\"{}/", project_file("models").display()),
+        );
+    let scene = folder.join("scene.toml");
+    std::fs::write(&scene, text).expect("a scene");
+    scene.to_str().expect("a plain path").to_owned()
+}
+
+#[test]
+fn help_shows_examples() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = gnomon(folder.path()).arg("--help").output().unwrap();
+    assert!(output.status.success());
+    let help = String::from_utf8(output.stdout).unwrap();
+    let commands: Vec<&str> = help
+        .lines()
+        .skip_while(|line| *line != "Commands:")
+        .skip(1)
+        .take_while(|line| line.starts_with("  "))
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|command| *command != "help")
+        .collect();
+    assert!(
+        commands.contains(&"replay") && commands.contains(&"check"),
+        "{help}"
+    );
+    for command in commands {
+        let output = gnomon(folder.path())
+            .args([command, "--help"])
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{command}");
+        let help = String::from_utf8(output.stdout).unwrap();
+        let shows = ["Example", "Examples"].map(|title| format!("{title}:\n  gnomon {command} "));
+        assert!(
+            shows.iter().any(|example| help.contains(example)),
+            "{command}: {help}"
+        );
+    }
+}
+
+#[test]
+fn check_names_the_anchors_of_each_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut scenes = 0;
+    for entry in std::fs::read_dir(project_file("config")).unwrap() {
+        let path = entry.unwrap().path();
+        let output = gnomon(folder.path())
+            .arg("check")
+            .arg(&path)
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", stderr(&output));
+        assert!(output.stderr.is_empty(), "{}", stderr(&output));
+        let said = String::from_utf8(output.stdout).unwrap();
+        let scene = gnomon::scene::Scene::load(&path).unwrap();
+        for anchor in &scene.anchors {
+            assert!(
+                said.split_whitespace().any(|word| word == anchor.name),
+                "{said}"
+            );
+        }
+        scenes += 1;
+    }
+    assert!(scenes >= 3);
+}
+
+#[test]
+fn check_tells_what_a_frame_budget_means_on_this_machine() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = lamp_scene_with(folder.path(), &project_file("recordings/lamp"));
+    let written = text(PathBuf::from(&scene));
+    // No machine does anything in a microsecond, or takes a quarter of an hour.
+    for (budget_ms, meant) in [
+        ("0.001", "outlines within 8 px"),
+        ("1000000", "outlines within 0.5 px"),
+    ] {
+        let budget = format!("{written}\n[shadows]\nframe_budget_ms = {budget_ms}\n");
+        std::fs::write(&scene, budget).unwrap();
+        let output = gnomon(folder.path())
+            .args(["check", &scene])
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", stderr(&output));
+        let said = String::from_utf8(output.stdout).unwrap();
+        let line = said.lines().find(|line| line.starts_with("budget"));
+        assert!(line.is_some_and(|line| line.contains(meant)), "{said}");
+    }
+}
+
+#[test]
+fn check_points_at_a_typo() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = lamp_scene_with(folder.path(), &project_file("recordings/lamp"));
+    let bad = folder.path().join("bad.toml");
+    let good = text(good.into());
+    std::fs::write(&bad, good.replace("intensity =", "intensty =")).unwrap();
+    let line = 1 + good
+        .lines()
+        .position(|line| line.starts_with("intensity"))
+        .unwrap();
+    let output = gnomon(folder.path())
+        .args(["check", "bad.toml"])
+        .output()
+        .unwrap();
+    let said = stderr(&output);
+    assert!(!output.status.success() && output.stdout.is_empty());
+    assert!(said.contains(&format!("bad.toml:{line}:1: ")), "{said}");
+    assert!(
+        said.contains("unknown key; did you mean \"intensity\"?"),
+        "a suggestion: {said}"
+    );
+    refused(
+        folder.path(),
+        &["bad.toml", "--out", "DIR"],
+        &["bad.toml:", "intensty"],
+    );
+    assert!(!folder.path().join("DIR").exists());
+}
+
+#[test]
+fn a_light_in_a_thing_is_warned_of_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = lamp_scene_with(folder.path(), &project_file("recordings/lamp"));
+    let lit_from_the_house = text(scene.clone().into()).replace(
+        "position_m = [-0.26, 0.24, 0.46]",
+        "position_m = [-0.055, 0.035, 0.03]",
+    );
+    std::fs::write(&scene, lit_from_the_house).unwrap();
+    let said = replay(
+        folder.path(),
+        &[&scene, "--frames", "0,2", "--poses", "poses.csv"],
+    );
+    let warning =
+        "warning: light 0 is inside \"house\": everything outside of it is in its shadow\n";
+    assert_eq!(said.matches(warning).count(), 1, "{said}");
+    assert_eq!(said.matches("warning").count(), 1, "{said}");
+}
+
+#[test]
+fn layers_are_the_contract_s() {
+    let folder = tempfile::tempdir().unwrap();
+    let layers = ["--layers", "role,shadow,gain,depth"];
+    let lamp = config("lamp");
+    let mut arguments = vec![lamp.as_str(), "--frames", "0,3", "--out", "DIR"];
+    arguments.extend(layers);
+    arguments.extend(["--poses", "poses.csv", "--stats", "stats.json"]);
+    replay(folder.path(), &arguments);
+    let mut expected = BTreeSet::from(["poses.csv".to_owned(), "stats.json".to_owned()]);
+    for frame in ["000000", "000003"] {
+        for suffix in [
+            ".png",
+            "_role.png",
+            "_shadow_0.png",
+            "_gain.png",
+            "_depth.exr",
+        ] {
+            expected.insert(format!("DIR/{frame}{suffix}"));
+        }
+    }
+    assert_eq!(files(folder.path()), expected);
+
+    let picture = |name: &str| {
+        let picture = image::open(folder.path().join("DIR").join(name)).unwrap();
+        assert_eq!((picture.width(), picture.height()), (640, 480), "{name}");
+        picture
+    };
+    let color = |name: &str| picture(name).color();
+    for frame in ["000000", "000003"] {
+        assert_eq!(color(&format!("{frame}.png")), image::ColorType::Rgb8);
+        assert_eq!(color(&format!("{frame}_gain.png")), image::ColorType::Rgb16);
+        assert_eq!(color(&format!("{frame}_role.png")), image::ColorType::L8);
+        assert_eq!(
+            color(&format!("{frame}_shadow_0.png")),
+            image::ColorType::L8
+        );
+        let roles = picture(&format!("{frame}_role.png"))
+            .into_luma8()
+            .into_raw();
+        let values: BTreeSet<u8> = roles.iter().copied().collect();
+        assert!(values.is_subset(&BTreeSet::from([0, 100, 200])) && values.contains(&200));
+        let bits = picture(&format!("{frame}_shadow_0.png")).into_luma8();
+        let values: BTreeSet<u8> = bits.into_raw().into_iter().collect();
+        assert!(values.is_subset(&BTreeSet::from([0, 1, 2, 3])) && values.contains(&2));
+        let gain = picture(&format!("{frame}_gain.png"))
+            .into_rgb16()
+            .into_raw();
+        assert_eq!(gain.iter().max(), Some(&32768), "1 is the most");
+        assert!(gain.iter().min().is_some_and(|&least| least < 20_000));
+
+        let exr = folder.path().join(format!("DIR/{frame}_depth.exr"));
+        let depth = exr::prelude::read_first_flat_layer_from_file(&exr).unwrap();
+        assert_eq!(
+            (depth.layer_data.size.x(), depth.layer_data.size.y()),
+            (640, 480)
+        );
+        let [channel] = &depth.layer_data.channel_data.list[..] else {
+            panic!("one channel")
+        };
+        for (depth_m, role) in channel.sample_data.values_as_f32().zip(&roles) {
+            // The camera is 0.7 m from the table.
+            let holds = if *role == 0 {
+                depth_m == 0.0
+            } else {
+                (0.3..2.0).contains(&depth_m)
+            };
+            assert!(holds, "{depth_m} m where the role is {role}");
+        }
+    }
+
+    let poses = text(folder.path().join("poses.csv"));
+    let rows: Vec<Vec<&str>> = poses
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').collect())
+        .collect();
+    assert_eq!(poses.lines().next(), Some(HEADER));
+    assert_eq!(
+        rows.len(),
+        4,
+        "a row for each frame up to the last asked for"
+    );
+    for (index, row) in rows.iter().enumerate() {
+        assert_eq!(row.len(), 13);
+        assert_eq!(
+            (row[0], row[2], row[3]),
+            (&*index.to_string(), "table", "tracked")
+        );
+        let drawn = [0, 3].contains(&index);
+        assert_eq!(
+            row[12].parse::<f64>().is_ok(),
+            drawn,
+            "render_ms of {index}"
+        );
+        assert!(row[11].parse::<f64>().is_ok(), "track_ms of {index}");
+    }
+
+    let stats: serde_json::Value =
+        serde_json::from_slice(&read(folder.path().join("stats.json"))).unwrap();
+    assert_eq!(
+        (&stats["frames"], &stats["drawn"], &stats["drops"]),
+        (&4.into(), &2.into(), &0.into())
+    );
+    assert!(stats["detector"].as_str().unwrap().contains("apriltag"));
+    assert_eq!(stats["technique"], "volumes");
+    assert!(!stats["adapter"].as_str().unwrap().is_empty());
+    assert!(stats["peak_memory_mib"].as_f64().unwrap() > 1.0);
+    for stage in ["decode", "track", "render", "encode"] {
+        let stage = &stats["stages"][stage];
+        let [median, p95, max] =
+            ["median_ms", "p95_ms", "max_ms"].map(|key| stage[key].as_f64().unwrap());
+        assert!(0.0 < median && median <= p95 && p95 <= max, "{stage}");
+    }
+}
+
+/// The poses without the two times, which no two runs share.
+fn without_times(poses: &str) -> Vec<Vec<&str>> {
+    poses
+        .lines()
+        .map(|line| line.split(',').take(11).collect())
+        .collect()
+}
+
+#[test]
+fn replays_repeat_bit_for_bit_and_poses_replace_the_tracker() {
+    let folder = tempfile::tempdir().unwrap();
+    let hand = config("hand");
+    let run = |out: &str, poses: &str, more: &[&str]| {
+        let mut arguments = vec![hand.as_str(), "--frames", "0,2,5", "--out", out];
+        arguments.extend(["--layers", "role,shadow,gain,depth", "--poses", poses]);
+        arguments.extend(more);
+        replay(folder.path(), &arguments);
+    };
+    run("first", "first.csv", &[]);
+    run("again", "again.csv", &[]);
+    run("given", "given.csv", &["--poses-from", "first.csv"]);
+    run("bare", "bare.csv", &["--bare"]);
+    let names = files(&folder.path().join("first"));
+    assert_eq!(names.len(), 3 * 5);
+    let of = |out: &str, name: &str| read(folder.path().join(out).join(name));
+    for other in ["again", "given"] {
+        assert_eq!(files(&folder.path().join(other)), names);
+    }
+    for name in &names {
+        assert!(of("first", name) == of("again", name), "again: {name}");
+        assert!(of("first", name) == of("given", name), "given: {name}");
+    }
+    assert!(of("first", "000005.png") != of("bare", "000005.png"));
+    let poses = |name: &str| text(folder.path().join(name));
+    let first = poses("first.csv");
+    assert_eq!(without_times(&first), without_times(&poses("again.csv")));
+    assert_eq!(
+        without_times(&first).len(),
+        1 + 2 * 6,
+        "two anchors a frame"
+    );
+    let given = poses("given.csv");
+    assert!(
+        given
+            .lines()
+            .skip(1)
+            .all(|line| line.split(',').nth(11) == Some("")),
+        "no tracker, no time for it"
+    );
+}
+
+#[test]
+fn mistakes_are_told_and_leave_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let lamp = config("lamp");
+    let cases: [(&[&str], &[&str]); 8] = [
+        (
+            &["--layers", "role", "--out", "a.mp4"],
+            &["--layers", "folder", "a.mp4"],
+        ),
+        (
+            &["--adapter", "no such card", "--out", "a.mp4"],
+            &["no such card", "there are: "],
+        ),
+        (
+            &["--layers", "roll", "--out", "DIR"],
+            &["roll", "role", "shadow", "gain", "depth"],
+        ),
+        (&["--poses-from", "none.csv", "--out", "DIR"], &["none.csv"]),
+        (&["--out", "a.webm"], &["a.webm", ".mp4"]),
+        (&[], &["nothing to do", "--out"]),
+        (&["--layers", "role"], &["--out"]),
+        (&["--frames", "-1", "--out", "DIR"], &["-1"]),
+    ];
+    for (arguments, parts) in cases {
+        let all: Vec<&str> = [lamp.as_str()].iter().chain(arguments).copied().collect();
+        refused(folder.path(), &all, parts);
+        assert_eq!(files(folder.path()), BTreeSet::new(), "{arguments:?}");
+    }
+    for elsewhere in [["--sheet", "a.png"], ["--poses", "a.csv"]] {
+        let mut arguments = vec![lamp.as_str(), "--frames", "0", "--layers", "role"];
+        arguments.extend(elsewhere);
+        refused(folder.path(), &arguments, &["--layers", "--out"]);
+        assert_eq!(files(folder.path()), BTreeSet::new(), "{elsewhere:?}");
+    }
+    refused(
+        folder.path(),
+        &["none.toml", "--out", "DIR"],
+        &["none.toml"],
+    );
+    assert_eq!(files(folder.path()), BTreeSet::new());
+}
+
+#[test]
+fn frame_beyond_the_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let lamp = config("lamp");
+    let said = refused(
+        folder.path(),
+        &[&lamp, "--frames", "1,500", "--out", "a.mp4"],
+        &["frame 500", "120 frames"],
+    );
+    assert!(said.contains("--frames"), "{said}");
+    // What was done is kept, and whole.
+    assert_eq!(files(folder.path()), BTreeSet::from(["a.mp4".to_owned()]));
+    let video = folder.path().join("a.mp4");
+    let mut source = FrameSource::open(video.to_str().unwrap()).unwrap();
+    while source.next_frame().unwrap().is_some() {}
+    assert_eq!(source.good_frames(), 1);
+}
+
+/// A recording of 30 frames whose file is cut after its 20th or so.
+#[test]
+fn truncated_video() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = folder.path().join("whole.mkv");
+    let made = Process::new("ffmpeg")
+        .args(["-v", "error", "-i"])
+        .arg(project_file("recordings/lamp/video.mp4"))
+        .args(["-frames:v", "30", "-c:v", "libx264", "-g", "10", "-bf", "0"])
+        .arg(&whole)
+        .status()
+        .unwrap();
+    assert!(made.success());
+    let bytes = read(whole);
+    let cut = folder.path().join("cut.mkv");
+    std::fs::write(&cut, &bytes[..bytes.len() * 2 / 3]).unwrap();
+    let mut source = FrameSource::open(cut.to_str().unwrap()).unwrap();
+    let mut good = BTreeSet::new();
+    while let Some(frame) = source.next_frame().unwrap() {
+        good.insert(format!("{:06}.png", frame.index));
+    }
+    assert!((10..30).contains(&good.len()), "{} good frames", good.len());
+
+    let scene = lamp_scene_with(folder.path(), &cut);
+    refused(
+        folder.path(),
+        &[&scene, "--out", "DIR", "--poses", "poses.csv", "--bare"],
+        &["damaged", "all good frames"],
+    );
+    assert_eq!(files(&folder.path().join("DIR")), good);
+    let rows = text(folder.path().join("poses.csv")).lines().count();
+    assert_eq!(rows, 1 + good.len());
+}
+
+/// One picture of a folder cannot be read; those after it keep their places.
+#[test]
+fn damaged_picture_in_a_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = folder.path().join("recording");
+    std::fs::create_dir(&recording).unwrap();
+    for index in 0..6 {
+        let path = recording.join(format!("{index:06}.png"));
+        if index == 2 {
+            std::fs::write(path, "no picture").unwrap();
+        } else {
+            let grey = image::RgbImage::from_pixel(640, 480, image::Rgb([90; 3]));
+            grey.save(path).unwrap();
+        }
+    }
+    let scene = lamp_scene_with(folder.path(), &recording);
+    let said = refused(
+        folder.path(),
+        &[&scene, "--frames", "0,4", "--bare", "--out", "DIR"],
+        &["damaged", "000002.png"],
+    );
+    assert!(!said.contains("ends after"), "{said}");
+    assert_eq!(
+        files(&folder.path().join("DIR")),
+        BTreeSet::from(["000000.png".to_owned(), "000004.png".to_owned()])
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn interrupt_leaves_a_whole_video() {
+    stop_midway(Signal::INT);
+}
+
+#[cfg(unix)]
+#[test]
+fn termination_leaves_a_whole_video() {
+    stop_midway(Signal::TERM);
+}
+
+#[cfg(unix)]
+fn stop_midway(signal: Signal) {
+    let folder = tempfile::tempdir().expect("a run that can be stopped");
+    // Long enough for any card to be in the midst of it.
+    let inputs = tempfile::tempdir().expect("a folder");
+    let long = inputs.path().join("long.mp4");
+    let made = Process::new("ffmpeg")
+        .args(["-v", "error", "-stream_loop", "9", "-i"])
+        .arg(project_file("recordings/lamp/video.mp4"))
+        .args(["-c", "copy"])
+        .arg(&long)
+        .status()
+        .expect("ffmpeg");
+    assert!(made.success());
+    let scene = lamp_scene_with(inputs.path(), &long);
+    let started = Instant::now();
+    let child = Process::new(assert_cmd::cargo::cargo_bin("gnomon"))
+        .args(["replay", &scene, "--out", "a.mp4", "--poses", "poses.csv"])
+        .current_dir(folder.path())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("a run that can be stopped");
+    let has_begun = |name: &String| name.starts_with(".gnomon-") && name.ends_with(".mp4");
+    while !files(folder.path()).iter().any(has_begun) {
+        assert!(
+            started.elapsed() < Duration::from_secs(30),
+            "it never began"
+        );
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    std::thread::sleep(Duration::from_millis(1500));
+    signals::send(signal, child.id()).expect("a run that can be stopped");
+    let output = child.wait_with_output().expect("a run that can be stopped");
+    let said = stderr(&output);
+    assert!(!output.status.success(), "{said}");
+    assert!(output.status.code().is_some(), "it ended by itself: {said}");
+    assert!(said.contains("interrupted"), "{said}");
+    assert_eq!(
+        files(folder.path()),
+        BTreeSet::from(["a.mp4".to_owned(), "poses.csv".to_owned()])
+    );
+    let video = folder.path().join("a.mp4");
+    let mut source = FrameSource::open(video.to_str().expect("a run that can be stopped"))
+        .expect("a run that can be stopped");
+    while source
+        .next_frame()
+        .expect("a run that can be stopped")
+        .is_some()
+    {}
+    assert!(source.notices().is_empty(), "{:?}", source.notices());
+    let frames = source.good_frames();
+    assert!((1..1200).contains(&frames), "{frames} frames");
+    let rows = text(folder.path().join("poses.csv")).lines().count();
+    assert_eq!(rows, 1 + frames as usize, "a row for each frame");
+}
+
+#[test]
+fn only_drawing_needs_a_gpu() {
+    let folder = tempfile::tempdir().unwrap();
+    let lamp = config("lamp");
+    let without_gpu = |arguments: &[&str]| {
+        gnomon(folder.path())
+            .args(["replay", &lamp])
+            .args(arguments)
+            .env("VK_DRIVER_FILES", "/nonexistent")
+            .env("VK_ICD_FILENAMES", "/nonexistent")
+            .output()
+            .unwrap()
+    };
+    let output = without_gpu(&["--out", "DIR"]);
+    let said = stderr(&output);
+    assert!(!output.status.success());
+    assert!(
+        said.contains("no graphics adapter") && !said.contains("panicked"),
+        "{said}"
+    );
+    assert_eq!(files(folder.path()), BTreeSet::new());
+    assert!(!folder.path().join("DIR").exists());
+
+    let output = without_gpu(&[
+        "--frames",
+        "2",
+        "--poses",
+        "poses.csv",
+        "--stats",
+        "stats.json",
+    ]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let poses = text(folder.path().join("poses.csv"));
+    assert_eq!(poses.lines().next(), Some(HEADER));
+    assert_eq!(poses.lines().count(), 4);
+    let stats: serde_json::Value =
+        serde_json::from_slice(&read(folder.path().join("stats.json"))).unwrap();
+    assert_eq!(stats["adapter"], serde_json::Value::Null);
+    assert_eq!(stats["drawn"], 0);
+}
+
+#[test]
+fn a_recording_is_never_written_over() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let recording = folder.path().join("recording");
+    std::fs::create_dir(&recording).expect("a folder");
+    for file in ["video.mp4", "camera.toml"] {
+        let from = project_file("recordings/lamp").join(file);
+        std::fs::copy(from, recording.join(file)).expect("a copy");
+    }
+    let before = read(recording.join("video.mp4"));
+    let scene = lamp_scene_with(folder.path(), &recording);
+    let targets = [
+        ["--out", "recording/video.mp4"],
+        ["--out", "recording"],
+        ["--out", "recording/new/place"],
+        ["--poses", "recording/camera.toml"],
+    ];
+    for target in targets {
+        refused(
+            folder.path(),
+            &[&[scene.as_str()], &target[..]].concat(),
+            &["write elsewhere"],
+        );
+    }
+    assert_eq!(read(recording.join("video.mp4")), before);
+    assert_eq!(
+        files(&recording),
+        BTreeSet::from(["camera.toml".to_owned(), "video.mp4".to_owned()])
+    );
+}
+
+#[test]
+fn bare_layers_know_no_virtual_thing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let lamp = config("lamp");
+    let arguments = [
+        lamp.as_str(),
+        "--bare",
+        "--frames",
+        "0",
+        "--layers",
+        "role,shadow,gain",
+        "--out",
+        "out",
+    ];
+    replay(folder.path(), &arguments);
+    let layer = |name: &str| {
+        let path = folder.path().join("out").join(format!("000000_{name}.png"));
+        image::open(path).expect("a layer")
+    };
+    let (role, shadow) = (layer("role").to_luma8(), layer("shadow_0").to_luma8());
+    assert!(role.iter().all(|&role| role == 0 || role == 100));
+    assert!(shadow.iter().all(|&bits| bits & 2 == 0) && shadow.contains(&1));
+    assert!(layer("gain").to_rgb16().iter().all(|&gain| gain == 32768));
+}

@@ -1,0 +1,533 @@
+//! The live pipeline without a window: the newest frame wins, what is shown is what a fresh renderer draws, files that
+//! change are followed, and what is recorded replays.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, Weak};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use crate::common::{gpu, project_file};
+use glam::DVec3;
+use gnomon::app::authoring::Edit;
+use gnomon::app::live::Plan;
+use gnomon::app::live::beginning::Opening;
+use gnomon::app::live::look::Look;
+use gnomon::app::live::meters::Sample;
+use gnomon::app::live::pipeline::{Input, Pipeline};
+use gnomon::app::live::studio::Studio;
+use gnomon::app::live::views::View;
+use gnomon::app::live::wish::{Clicks, Wish};
+use gnomon::app::live_capture::Tapped;
+use gnomon::app::live_input::LiveInput;
+use gnomon::app::mailbox::Taken;
+use gnomon::app::stopwatch::Stopwatch;
+use gnomon::capture::{Frame, FrameSource};
+use gnomon::geometry::light_placing::{Freedom, Sight};
+use gnomon::light::Light;
+use gnomon::render::{Renderer, Shown};
+use gnomon::scene::{CameraSettings, Placement, Scene};
+use gnomon::tracking::Status;
+
+const SOON: Duration = Duration::from_secs(60);
+
+/// The scene of the lamp in a folder of its own.
+fn lamp_in(folder: &Path) -> PathBuf {
+    let path = folder.join("lamp.toml");
+    let text = std::fs::read_to_string(project_file("config/lamp.toml")).unwrap();
+    let root = project_file("");
+    let text = text.replace("\"recordings/", &format!("\"{}recordings/", root.display()));
+    let text = text.replace("\"models/", &format!("\"{}models/", root.display()));
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+fn open(path: &Path, out: &Path, repeats: bool) -> Studio {
+    let opening = Opening::scene(path).unwrap();
+    let now = Arc::new(Stopwatch::clock());
+    Studio::open(opening, gpu(), out, repeats, (now, Arc::new(|| ())))
+}
+
+/// Moves a studio on, as a window does, until something holds.
+fn run_until(studio: &mut Studio, look: &Look, what: &str, holds: impl Fn(&Studio) -> bool) {
+    let began = Instant::now();
+    while !holds(studio) {
+        assert!(began.elapsed() < SOON, "not in time: {what}");
+        step(studio, look);
+    }
+}
+
+fn step(studio: &mut Studio, look: &Look) {
+    if studio.step(look).unwrap() {
+        let now_secs = studio.now_secs();
+        studio.was_shown(now_secs).unwrap();
+    } else {
+        thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// What a renderer made for this scene and nothing before draws of the studio's frame.
+fn drawn_afresh(studio: &Studio, scene: &Scene) -> Vec<u8> {
+    let picture = studio.picture().unwrap();
+    let mut renderer = Renderer::new(gpu(), scene, picture.intrinsics).unwrap();
+    renderer.upload(&picture.frame).unwrap();
+    let poses = picture.poses.iter();
+    let (placed, visibility): (Vec<_>, Vec<_>) = poses
+        .map(|pose| (pose.camera_from_anchor, pose.visibility))
+        .unzip();
+    renderer.draw_fading(&placed, &visibility, Shown::Composite);
+    renderer.read_picture().unwrap()
+}
+
+fn shown(studio: &Studio) -> Vec<u8> {
+    let (renderer, ..) = studio.renderer().unwrap();
+    renderer.read_picture().unwrap()
+}
+
+/// The torus of the lamp's scene, elsewhere.
+fn moved_torus() -> Edit {
+    Edit::Place {
+        thing: "torus".to_owned(),
+        placement: Placement {
+            position_m: DVec3::new(-0.1, -0.06, 0.036),
+            rotation_deg: DVec3::new(70.0, 0.0, -20.0),
+            scale: DVec3::splat(1.25),
+        },
+    }
+}
+
+#[test]
+fn a_slow_window_gets_the_newest_frame_and_nothing_queues() {
+    let camera = CameraSettings {
+        source: project_file("recordings/lamp").to_str().unwrap().to_owned(),
+        ..CameraSettings::default()
+    };
+    let input = LiveInput::of(&camera).unwrap();
+    let scene = Scene::load(&project_file("config/lamp.toml")).unwrap();
+    let plan = Plan::Follow {
+        settings: scene.tracking,
+        anchors: scene.anchors.into(),
+    };
+    let pipeline_input = Input {
+        source: camera.source,
+        options: input.options(false),
+        calibration: input.calibration,
+    };
+    let now = Arc::new(Stopwatch::clock());
+    let pipeline = Pipeline::start(&pipeline_input, plan, &(now as _), Arc::new(|| ()));
+    let frames: Arc<Mutex<Vec<Weak<Frame>>>> = Arc::default();
+    pipeline.set_tap(Some(Box::new({
+        let frames = Arc::clone(&frames);
+        move |tapped| {
+            if let Tapped::Frame(frame) = tapped {
+                frames.lock().unwrap().push(Arc::downgrade(frame));
+            }
+        }
+    })));
+    let (mut shown, mut last) = (0, None);
+    loop {
+        let captured_before = pipeline.captured();
+        let picture = match pipeline.tracked().take_within(Duration::from_millis(100)) {
+            Taken::New(picture) => picture,
+            Taken::Nothing => continue,
+            Taken::Closed => break,
+        };
+        let index = picture.frame.index;
+        assert!(last < Some(index), "in order");
+        last = Some(index);
+        shown += 1;
+        // One at the window, one on its way there, one in tracking, one on its way there, one being captured.
+        let alive = frames
+            .lock()
+            .unwrap()
+            .iter()
+            .filter(|f| f.strong_count() > 0)
+            .count();
+        assert!(alive <= 5, "{alive} frames are held");
+        // Two may be on their way when the newest was captured; a third would be a queue.
+        assert!(
+            u64::from(index) + 3 >= captured_before,
+            "frame {index} came when {captured_before} were captured"
+        );
+        // A very slow renderer.
+        thread::sleep(Duration::from_millis(150));
+    }
+    assert_eq!(last, Some(119), "the last frame is shown");
+    let [tracking, window, broken] = pipeline.dropped();
+    assert_eq!(
+        shown + tracking + window + broken,
+        120,
+        "each is shown or counted"
+    );
+    assert!(window > 60, "{window} were dropped before the window");
+}
+
+#[test]
+fn a_recording_is_shown_in_time_with_the_poses_of_its_own_images() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = lamp_in(folder.path());
+    let mut source = FrameSource::open(project_file("recordings/lamp").to_str().unwrap()).unwrap();
+    let mut recorded = Vec::new();
+    while let Some(frame) = source.next_frame().unwrap() {
+        recorded.push(frame);
+    }
+    let began = Instant::now();
+    let mut studio = open(&path, folder.path(), false);
+    let look = Look::new();
+    let mut seen = 0;
+    while studio.is_live() {
+        assert!(began.elapsed() < SOON, "it ends");
+        step(&mut studio, &look);
+        let Some(picture) = studio.picture() else {
+            continue;
+        };
+        let index = picture.frame.index as usize;
+        if index < seen {
+            continue;
+        }
+        seen = index + 1;
+        assert_eq!(picture.frame.rgba, recorded[index].rgba, "frame {index}");
+        let [pose] = &picture.poses[..] else {
+            panic!("one anchor");
+        };
+        assert_eq!(pose.status, Status::Tracked, "frame {index}");
+        // The pose of another image would put the markers pixels off.
+        assert!(
+            pose.reprojection_px < 0.5,
+            "frame {index}: {}",
+            pose.reprojection_px
+        );
+    }
+    assert!(
+        began.elapsed().as_secs_f64() >= 119.0 / 30.0,
+        "in real time"
+    );
+    let idle_ms = studio.meters.median(Sample::idle_ms).unwrap();
+    let latency_ms = studio.meters.median(|sample| sample.latency_ms).unwrap();
+    eprintln!("latency {latency_ms:.1} ms, of which waiting {idle_ms:.1} ms");
+    assert!(latency_ms > 0.0);
+    assert!(
+        idle_ms <= 1000.0 / 30.0,
+        "beyond the stages' own time at most one interval of frames: {idle_ms} ms"
+    );
+}
+
+#[test]
+fn what_is_edited_is_drawn_as_if_it_had_always_been_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = lamp_in(folder.path());
+    let mut studio = open(&path, folder.path(), true);
+    let look = Look::new();
+    run_until(&mut studio, &look, "the scene is drawn", |studio| {
+        studio.picture().is_some() && studio.is_settled()
+    });
+    let before = Scene::load(&path).unwrap();
+    assert!(
+        shown(&studio) == drawn_afresh(&studio, &before),
+        "the scene"
+    );
+
+    // While it is dragged, the file is as it was and what can be shown at once is shown.
+    let text_before = std::fs::read_to_string(&path).unwrap();
+    studio.fulfil(Wish::Preview(moved_torus()), &look);
+    step(&mut studio, &look);
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), text_before);
+    let mut dragged = before.clone();
+    assert!(moved_torus().show_in(&mut dragged));
+    let exact = drawn_afresh(&studio, &dragged);
+    let off = shown(&studio)
+        .iter()
+        .zip(&exact)
+        .filter(|(a, b)| a.abs_diff(**b) > 24)
+        .count();
+    // Only what surroundings throw on the torus may be that of the place it was at.
+    assert!(off * 1000 < exact.len(), "{off} of {} bytes", exact.len());
+
+    let dimmed = Edit::Light {
+        index: 0,
+        light: Light::Point {
+            position_m: DVec3::new(0.2, 0.2, 0.5),
+            intensity: DVec3::splat(0.8),
+        },
+    };
+    studio.fulfil(Wish::Commit(moved_torus()), &look);
+    studio.fulfil(Wish::Commit(dimmed), &look);
+    run_until(
+        &mut studio,
+        &look,
+        "the edits are drawn",
+        Studio::is_settled,
+    );
+    step(&mut studio, &look);
+    let written = Scene::load(&path).unwrap();
+    assert_ne!(written.lights, before.lights);
+    assert!(
+        shown(&studio) == drawn_afresh(&studio, &written),
+        "the edits"
+    );
+
+    studio.fulfil(Wish::Undo, &look);
+    studio.fulfil(Wish::Undo, &look);
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), text_before);
+    run_until(&mut studio, &look, "the scene is back", Studio::is_settled);
+    step(&mut studio, &look);
+    assert!(shown(&studio) == drawn_afresh(&studio, &before), "undone");
+}
+
+#[test]
+fn a_saved_scene_shows_within_half_a_second_and_a_mistake_keeps_the_last() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = lamp_in(folder.path());
+    let mut studio = open(&path, folder.path(), true);
+    let look = Look::new();
+    run_until(&mut studio, &look, "the scene is drawn", Studio::is_settled);
+    let text = std::fs::read_to_string(&path).unwrap();
+
+    std::fs::write(
+        &path,
+        text.replace("[-0.26, 0.24, 0.46]", "[0.3, 0.1, 0.4]"),
+    )
+    .unwrap();
+    let saved = Instant::now();
+    let is_taken = |studio: &Studio| {
+        let light = studio.scene().unwrap().lights[0];
+        matches!(light, Light::Point { position_m, .. } if position_m.x == 0.3)
+    };
+    run_until(&mut studio, &look, "the file is taken", is_taken);
+    step(&mut studio, &look);
+    let took = saved.elapsed();
+    assert!(took < Duration::from_millis(500), "{took:?}");
+
+    std::fs::write(
+        &path,
+        text.replace("samples", "sample")
+            .replace("kind = ", "kinnd = "),
+    )
+    .unwrap();
+    run_until(&mut studio, &look, "the mistake is told", |studio| {
+        studio.notices.scene.is_some()
+    });
+    let told = studio.notices.scene.clone().unwrap();
+    let line = text
+        .lines()
+        .position(|line| line.starts_with("kind = "))
+        .unwrap()
+        + 1;
+    assert!(told.contains(&format!("lamp.toml:{line}:")), "{told}");
+    assert!(is_taken(&studio), "the last good scene stays");
+
+    std::fs::write(&path, &text).unwrap();
+    run_until(&mut studio, &look, "the mistake is mended", |studio| {
+        studio.notices.scene.is_none()
+    });
+}
+
+#[test]
+fn what_is_recorded_is_what_came() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = lamp_in(folder.path());
+    let out = folder.path().join("recorded");
+    let mut studio = open(&path, &out, false);
+    let look = Look::new();
+    run_until(&mut studio, &look, "a picture", |studio| {
+        studio.picture().is_some()
+    });
+    studio.fulfil(Wish::ToggleSession, &look);
+    studio.fulfil(Wish::ToggleVideo, &look);
+    assert_eq!(studio.records(), [true, true]);
+    studio.fulfil(Wish::Screenshot, &look);
+    let picture = image::open(out.join("picture-001.png")).unwrap().to_rgba8();
+    assert_eq!(picture.as_raw(), &shown(&studio));
+    run_until(&mut studio, &look, "the recording's end", |studio| {
+        !studio.is_live()
+    });
+    for said in studio.finish() {
+        said.unwrap();
+    }
+    let mut lamp = FrameSource::open(project_file("recordings/lamp").to_str().unwrap()).unwrap();
+    let mut session = FrameSource::open(out.join("session-001").to_str().unwrap()).unwrap();
+    let mut frames = 0;
+    while let Some(frame) = session.next_frame().unwrap() {
+        let same = std::iter::from_fn(|| lamp.next_frame().unwrap())
+            .find(|recorded| recorded.rgba == frame.rgba);
+        assert!(same.is_some(), "frame {} of the session", frame.index);
+        frames += 1;
+    }
+    assert!(frames > 30, "{frames} frames");
+    assert!(out.join("session-001/poses.csv").is_file());
+    let mut video = FrameSource::open(out.join("composite-001.mkv").to_str().unwrap()).unwrap();
+    let mut seconds = 0.0;
+    while let Some(frame) = video.next_frame().unwrap() {
+        seconds = frame.time_secs;
+    }
+    assert!(
+        (1.0..4.1).contains(&seconds),
+        "as long as it was recorded: {seconds}"
+    );
+}
+
+#[test]
+fn first_use_puts_something_on_a_marker_and_saves_a_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let camera = CameraSettings {
+        source: project_file("recordings/lamp").to_str().unwrap().to_owned(),
+        ..CameraSettings::default()
+    };
+    let opening = Opening::camera(camera).unwrap();
+    let now = Arc::new(Stopwatch::clock());
+    let clock = (now as _, Arc::new(|| ()) as _);
+    let mut studio = Studio::open(opening, gpu(), folder.path(), true, clock);
+    let look = Look::new();
+    let sees = |studio: &Studio| {
+        let seen = studio.picture().map(|picture| &picture.detections);
+        seen.is_some_and(|seen| seen.iter().any(|marker| marker.id == 4))
+    };
+    run_until(&mut studio, &look, "markers are seen", sees);
+    assert!(studio.scene().is_none());
+    let nothing = Scene::default();
+    assert!(
+        shown(&studio) == drawn_afresh(&studio, &nothing),
+        "the video alone"
+    );
+
+    let (id, size_m) = (4, 0.044);
+    studio.fulfil(Wish::Demonstrate { id, size_m }, &look);
+    let is_there = |studio: &Studio| {
+        let pose = studio.picture().and_then(|p| p.poses.first());
+        studio.is_settled() && pose.is_some_and(|pose| pose.camera_from_anchor.is_some())
+    };
+    run_until(&mut studio, &look, "the marker is tracked", is_there);
+    assert!(studio.is_unsaved());
+    let scene = studio.scene().unwrap().clone();
+    assert!(shown(&studio) == drawn_afresh(&studio, &scene));
+    let (renderer, ..) = studio.renderer().unwrap();
+    let with_it = renderer.read_picture().unwrap();
+    let video = &studio.picture().unwrap().frame.rgba;
+    let red = with_it
+        .chunks(4)
+        .zip(video.chunks(4))
+        .filter(|(pixel, before)| pixel != before && pixel[0] > 2 * pixel[1])
+        .count();
+    assert!(red > 200, "a red torus is seen: {red} pixels");
+
+    let saved = folder.path().join("mine.toml");
+    studio.fulfil(Wish::Save(saved.clone()), &look);
+    assert!(!studio.is_unsaved());
+    assert_eq!(Scene::load(&saved).unwrap().anchors[0].markers[0].id, 4);
+    assert!(folder.path().join("torus.obj").is_file());
+}
+
+#[test]
+fn a_light_is_found_by_clicks_on_corners_and_their_shadows() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = lamp_in(folder.path());
+    let text = std::fs::read_to_string(&path).unwrap();
+    // Nobody knows yet where the lamp is.
+    let true_m = DVec3::new(-0.26, 0.24, 0.46);
+    std::fs::write(
+        &path,
+        text.replace("[-0.26, 0.24, 0.46]", "[0.4, -0.1, 0.3]"),
+    )
+    .unwrap();
+    let mut studio = open(&path, folder.path(), true);
+    let mut look = Look::new();
+    let is_tracked = |studio: &Studio| {
+        let pose = studio.picture().and_then(|picture| picture.poses.first());
+        pose.is_some_and(|pose| pose.camera_from_anchor.is_some())
+    };
+    run_until(&mut studio, &look, "the world is seen", is_tracked);
+    look.holds = true;
+    let frame = studio.picture().unwrap().frame.index;
+    studio.fulfil(Wish::Clicks(Clicks::Begin), &look);
+    let picture = studio.picture().unwrap().clone();
+    let sight = Sight {
+        intrinsics: picture.intrinsics,
+        camera_from_world: picture.poses[0].camera_from_anchor.unwrap(),
+    };
+    // What a person sees: corners high up on the house, and where their shadows fall on the table.
+    let house = &studio.scene().unwrap().phantoms;
+    let house = house
+        .iter()
+        .find(|phantom| phantom.name == "house")
+        .unwrap();
+    let mut corners: Vec<DVec3> = house
+        .mesh
+        .positions
+        .iter()
+        .map(|p| house.anchor_from_object.transform_point3(p.as_dvec3()))
+        .collect();
+    corners.sort_by(|a, b| b.z.total_cmp(&a.z));
+    for corner_m in &corners[..2] {
+        let away = corner_m - true_m;
+        let shadow_m = corner_m - away * (corner_m.z / away.z);
+        for (clicked_m, off_px) in [(*corner_m, 2.0), (shadow_m, -1.0)] {
+            let pixel = sight.pixel(clicked_m).unwrap() + off_px;
+            studio.fulfil(Wish::Clicks(Clicks::At(pixel)), &look);
+        }
+    }
+    assert_eq!(studio.clicks().unwrap().pairs_px().len(), 2);
+    for _ in 0..20 {
+        step(&mut studio, &look);
+    }
+    assert_eq!(studio.picture().unwrap().frame.index, frame, "it is held");
+    studio.fulfil(Wish::Clicks(Clicks::Find(Freedom::Point)), &look);
+    assert!(studio.clicks().is_none(), "{:?}", studio.notices);
+    let written = Scene::load(&path).unwrap();
+    let Light::Point { position_m, .. } = written.lights[0] else {
+        panic!("a lamp");
+    };
+    let off_m = position_m.distance(true_m);
+    assert!(off_m < 0.03, "{position_m} is {off_m} m off");
+}
+
+#[test]
+fn every_view_shows_something_else_and_leads_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = lamp_in(folder.path());
+    let mut studio = open(&path, folder.path(), false);
+    let mut look = Look::new();
+    // The camera's end is known before its last frame is tracked.
+    run_until(&mut studio, &look, "the end", |studio| {
+        let last = studio.picture().map(|picture| picture.frame.index);
+        !studio.is_live() && studio.is_settled() && last == Some(119)
+    });
+    step(&mut studio, &look);
+    let composite = shown(&studio);
+    let mut pictures: Vec<(View, Vec<u8>)> = Vec::new();
+    for (name, view) in View::BY_NAME {
+        look.view = view;
+        step(&mut studio, &look);
+        let picture = shown(&studio);
+        // Lines over the composite are the window's.
+        let is_composite = matches!(view, View::Composite | View::Silhouettes | View::Volumes);
+        assert_eq!(picture == composite, is_composite, "{name}");
+        if !is_composite {
+            for (other, before) in &pictures {
+                assert!(picture != *before, "{name} and {other:?}");
+            }
+            pictures.push((view, picture));
+        }
+    }
+    look.view = View::Composite;
+    step(&mut studio, &look);
+    assert!(shown(&studio) == composite, "back again");
+}
+
+#[test]
+fn it_ends_at_once_whatever_it_is_at() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = lamp_in(folder.path());
+    for steps in [0, 1, 40] {
+        let mut studio = open(&path, folder.path(), true);
+        let look = Look::new();
+        for _ in 0..steps {
+            step(&mut studio, &look);
+        }
+        let began = Instant::now();
+        drop(studio);
+        let took = began.elapsed();
+        assert!(
+            took < Duration::from_secs(10),
+            "after {steps} steps: {took:?}"
+        );
+    }
+}

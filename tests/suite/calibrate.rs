@@ -1,0 +1,509 @@
+//! `gnomon calibrate`: printed targets photographed through known cameras, and photographs of real ones.
+
+use std::path::Path;
+use std::process::Output;
+
+use crate::common::photographs;
+use crate::common::prints::{
+    BENT_CAMERA, CHARUCO, CHESSBOARD, Photographer, Print, good_poses, pose, ray,
+};
+use crate::common::sheets::CAMERA;
+use assert_cmd::Command;
+use glam::{DAffine3, DMat3, DVec2};
+use gnomon::app::picture_files::{grey_png, write_bytes};
+use gnomon::calibration::{
+    CalibrateError, Calibration, Lack, Look, Target, TargetFinder, TargetMarkers, Views, solve,
+};
+use gnomon::capture::load_calibration;
+use gnomon::geometry::camera::Intrinsics;
+use gnomon::scene::Family;
+use gnomon::tracking::printed_cells;
+
+fn chessboard() -> Target {
+    Target::chessboard([8, 5], 0.025).expect("a target")
+}
+
+fn charuco() -> Target {
+    charuco_of([9, 6], 0.025, 0.018, "DICT_5X5_100")
+}
+
+fn charuco_of(squares: [u32; 2], square_m: f64, size_m: f64, family: &str) -> Target {
+    let family = Family::from_name(family).expect("a family");
+    Target::charuco(squares, square_m, TargetMarkers { family, size_m }).expect("a target")
+}
+
+fn gnomon(folder: &Path, arguments: &str) -> Output {
+    Command::cargo_bin("gnomon")
+        .expect("the program")
+        .current_dir(folder)
+        .args(arguments.split_whitespace())
+        .output()
+        .expect("a run")
+}
+
+fn shown(photographer: &Photographer, print: &Print, target: Target, poses: &[DAffine3]) -> Views {
+    let mut views = Views::new(target).expect("a finder");
+    for (number, pose) in (0..).zip(poses) {
+        let grey = photographer.photograph(print, pose, 1.0);
+        views
+            .look(number, &grey, photographer.camera.size_px)
+            .expect("a look");
+    }
+    views
+}
+
+/// How far off the found camera sees what the true one sees at a pixel, at most over the whole picture, once it is turned
+/// to see the same: a turn is the pose's to tell.
+fn farthest_px(found: &Intrinsics, truth: &Intrinsics) -> f64 {
+    let [width, height] = truth.size_px;
+    let pixels: Vec<DVec2> = (0..height)
+        .step_by(16)
+        .flat_map(|y| {
+            (0..width)
+                .step_by(16)
+                .map(move |x| DVec2::new(f64::from(x), f64::from(y)))
+        })
+        .collect();
+    let rays: Vec<DVec2> = pixels.iter().map(|&pixel| ray(truth, pixel)).collect();
+    let mut turn = DMat3::IDENTITY;
+    let mut farthest = f64::INFINITY;
+    for _ in 0..10 {
+        let off: Vec<DVec2> = (rays.iter().zip(&pixels))
+            .map(|(ray, pixel)| {
+                let turned = turn * ray.extend(1.0);
+                found.pixel_from_plane(found.distort(turned.truncate() / turned.z)) - *pixel
+            })
+            .collect();
+        farthest = off.iter().map(|off| off.length()).fold(0.0, f64::max);
+        let mean = off.iter().sum::<DVec2>() / off.len() as f64 / found.focal_px;
+        turn = DMat3::from_rotation_y(-mean.x) * DMat3::from_rotation_x(mean.y) * turn;
+    }
+    farthest
+}
+
+fn assert_camera(found: &Calibration, truth: &Intrinsics, within_px: f64) {
+    let off = (found.intrinsics.focal_px / truth.focal_px - 1.0).abs();
+    assert!(off.max_element() < 1e-3, "{:?}", found.intrinsics);
+    let off_px = farthest_px(&found.intrinsics, truth);
+    eprintln!(
+        "focal lengths off by {off:.5}, the farthest pixel by {off_px:.3} px, rms {:.3} px, deviation {}",
+        found.rms_px, found.focal_deviation_px
+    );
+    assert!(
+        off_px < within_px,
+        "{off_px:.3} px off: {:?}",
+        found.intrinsics
+    );
+    // As sure as it says, and not wildly modest.
+    let sigmas = (found.intrinsics.focal_px - truth.focal_px).abs() / found.focal_deviation_px;
+    assert!(sigmas.max_element() < 4.0, "{sigmas}");
+    assert!(
+        found.focal_deviation_px.max_element() < 1.0,
+        "{}",
+        found.focal_deviation_px
+    );
+}
+
+fn write_grey_png(path: &Path, size_px: [u32; 2], grey: &[u8]) {
+    let picture = grey_png(path, size_px, grey).expect("a picture");
+    write_bytes(path, &picture).expect("a picture");
+}
+
+#[test]
+fn a_chessboard_tells_a_straight_lens() {
+    let print = Print::chessboard();
+    let poses = good_poses(print);
+    let views = shown(Photographer::straight(), print, chessboard(), &poses);
+    assert_eq!(views.kept().len(), poses.len());
+    assert_eq!(views.lacks(), []);
+    let found = solve(&views).expect("a calibration");
+    assert_camera(&found, &CAMERA, 0.3);
+    assert!(found.rms_px < 0.06, "{}", found.rms_px);
+    assert!(
+        found.dropped.is_empty() && found.lacks.is_empty(),
+        "{:?}",
+        found.lacks
+    );
+    // Where the target was, up to the chessboard's half turn; none of these is needed to have one.
+    for (view, pose) in found.views.iter().zip(&poses) {
+        let tilt = pose.matrix3.z_axis.z.abs().acos();
+        assert!((view.tilt_rad() - tilt).abs() < 2e-3);
+    }
+}
+
+#[test]
+fn a_charuco_board_tells_a_bent_lens_by_parts_of_it() {
+    let print = Print::charuco();
+    let mut poses = good_poses(print);
+    // Into the corners, with parts of the board outside.
+    for place in [[-0.8, -0.8], [0.8, -0.8], [0.8, 0.8], [-0.8, 0.8]] {
+        poses.push(pose(
+            print,
+            place,
+            0.4,
+            [15.0 * place[1], -15.0 * place[0]],
+            0.0,
+        ));
+    }
+    let views = shown(Photographer::bent(), print, charuco(), &poses);
+    assert!(
+        views.kept().len() >= poses.len() - 1,
+        "{}",
+        views.kept().len()
+    );
+    assert!(views.kept().iter().any(|view| view.corners.len() < 40));
+    let found = solve(&views).expect("a calibration");
+    assert_camera(&found, &BENT_CAMERA, 0.3);
+    assert!(found.rms_px < 0.1, "{}", found.rms_px);
+}
+
+#[test]
+fn boards_of_all_releases_of_opencv_are_found() {
+    const SQUARE_PX: u32 = 70;
+    let (rim_px, cell_px) = (40, 7);
+    // An even number of rows: before 4.6 such boards began with a white square.
+    let target = charuco_of([5, 6], 0.07, 0.049, "DICT_5X5_100");
+    let family = target.markers.expect("markers").family;
+    for starts_white in [false, true] {
+        let [width, height] = target.squares.map(|count| count * SQUARE_PX + 2 * rim_px);
+        let mut picture = image::GrayImage::from_pixel(width, height, image::Luma([230]));
+        let mut blacken = |left: u32, top: u32, side: u32| {
+            for (x, y) in (0..side).flat_map(|y| (0..side).map(move |x| (x, y))) {
+                picture.put_pixel(rim_px + left + x, rim_px + top + y, image::Luma([20]));
+            }
+        };
+        for row in 0..target.squares[1] {
+            for column in 0..target.squares[0] {
+                if ((row + column) % 2 == 0) != starts_white {
+                    blacken(column * SQUARE_PX, row * SQUARE_PX, SQUARE_PX);
+                }
+            }
+        }
+        for (id, [column, row]) in (0..).zip(target.marker_squares(starts_white)) {
+            let white = printed_cells(family, id).expect("a marker");
+            let inset = (SQUARE_PX - 7 * cell_px) / 2;
+            for (k, _) in (0..).zip(&white).filter(|(_, white)| !**white) {
+                let left = column * SQUARE_PX + inset + k % 7 * cell_px;
+                blacken(left, row * SQUARE_PX + inset + k / 7 * cell_px, cell_px);
+            }
+        }
+        let mut finder = TargetFinder::new(target).expect("a finder");
+        let corners = finder
+            .find(picture.as_raw(), [width, height])
+            .expect("corners");
+        assert_eq!(corners.len(), 20, "starts white: {starts_white}");
+        for corner in corners {
+            // A square of 70 mm is one of 70 pixels; the picture begins half a pixel before its first pixel's centre.
+            let expected_px = corner.target_m * 1000.0 + f64::from(rim_px) - 0.5;
+            let off_px = corner.pixel.distance(expected_px);
+            assert!(off_px < 0.02, "{off_px} px off at {expected_px}");
+        }
+    }
+}
+
+#[test]
+fn a_board_whose_first_column_is_outside_the_picture_keeps_its_own_corners() {
+    // With an even number of rows what is left looks like the other layout without its last column.
+    let print = Print::charuco();
+    let mut finder = TargetFinder::new(charuco()).expect("a finder");
+    for (place, tilt_deg) in [
+        (-0.62, [15.0, -15.0]),
+        (-0.6, [0.0, 0.0]),
+        (0.62, [5.0, 20.0]),
+    ] {
+        let camera_from_target = pose(print, [place, 0.1], 0.42, tilt_deg, 2.0);
+        let grey = Photographer::straight().photograph(print, &camera_from_target, 1.0);
+        let corners = finder.find(&grey, CAMERA.size_px).expect("corners");
+        assert!(corners.len() >= 25, "{}", corners.len());
+        for corner in corners {
+            let place = camera_from_target.transform_point3(corner.target_m.extend(0.0));
+            let expected_px = CAMERA.pixel_from_plane(place.truncate() / place.z);
+            let off_px = corner.pixel.distance(expected_px);
+            assert!(off_px < 0.15, "{off_px} px off at {expected_px}");
+        }
+    }
+}
+
+#[test]
+fn a_view_that_does_not_fit_is_left_out() {
+    let print = Print::chessboard();
+    let photographer = Photographer::bent();
+    let poses = good_poses(print);
+    let mut views = shown(photographer, print, chessboard(), &poses);
+    // Another print, from a printer that stretches.
+    let odd = pose(print, [0.1, 0.1], 0.42, [-20.0, 14.0], 12.0);
+    let grey = photographer.photograph(print, &odd, 1.03);
+    assert_eq!(
+        views.look(99, &grey, CAMERA.size_px).expect("a look"),
+        Look::Kept
+    );
+    let found = solve(&views).expect("a calibration");
+    let dropped: Vec<u32> = found.dropped.iter().map(|&(picture, _)| picture).collect();
+    assert_eq!(dropped, [99]);
+    assert_camera(&found, &BENT_CAMERA, 0.5);
+}
+
+#[test]
+fn a_view_like_another_adds_nothing() {
+    let print = Print::chessboard();
+    let photographer = Photographer::straight();
+    let mut views = Views::new(chessboard()).expect("a finder");
+    for (number, shift) in [(0, 0.0), (1, 0.004), (2, 0.4)] {
+        let pose = pose(print, [shift, 0.0], 0.5, [20.0, 0.0], 0.0);
+        let grey = photographer.photograph(print, &pose, 1.0);
+        let expected = if number == 1 { Look::Alike } else { Look::Kept };
+        assert_eq!(
+            views.look(number, &grey, CAMERA.size_px).expect("a look"),
+            expected
+        );
+    }
+    let blank = vec![128; 640 * 480];
+    assert_eq!(
+        views.look(3, &blank, [640, 480]).expect("a look"),
+        Look::NoTarget
+    );
+    assert_eq!(
+        (views.looked(), views.found(), views.kept().len()),
+        (4, 3, 2)
+    );
+    let lacks = views.lacks();
+    assert!(
+        lacks.contains(&Lack::Views { have: 2 }) && lacks.contains(&Lack::Tilt { have: 2 }),
+        "{lacks:?}"
+    );
+    let missing = lacks.iter().find_map(|lack| match lack {
+        Lack::Coverage { missing, .. } => Some(missing),
+        _ => None,
+    });
+    assert!(missing.expect("little coverage").contains(&"top left"));
+    let error = solve(&views).expect_err("too few");
+    assert!(
+        matches!(
+            error,
+            CalibrateError::TooFewViews {
+                looked: 4,
+                found: 3
+            }
+        ),
+        "{error}"
+    );
+}
+
+#[test]
+fn what_tells_no_focal_length_is_refused() {
+    let print = Print::chessboard();
+    let frontal: Vec<DAffine3> = [
+        [-0.3, -0.3],
+        [0.3, -0.3],
+        [0.3, 0.3],
+        [-0.3, 0.3],
+        [0.0, 0.0],
+        [0.0, 0.2],
+    ]
+    .into_iter()
+    .map(|place| pose(print, place, 0.5, [0.0, 0.0], 0.0))
+    .collect();
+    let views = shown(Photographer::straight(), print, chessboard(), &frontal);
+    assert!(views.lacks().contains(&Lack::Tilt { have: 0 }));
+    let error = solve(&views).expect_err("no focal length");
+    assert!(
+        matches!(error, CalibrateError::Degenerate { .. }),
+        "{error}"
+    );
+    let still = [pose(print, [0.0, 0.0], 0.5, [20.0, 5.0], 0.0); 6];
+    let views = shown(Photographer::straight(), print, chessboard(), &still);
+    let error = solve(&views).expect_err("one view");
+    assert!(
+        matches!(
+            error,
+            CalibrateError::Alike {
+                found: 6,
+                different: 1
+            }
+        ),
+        "{error}"
+    );
+}
+
+#[test]
+fn the_command_writes_what_scenes_read() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let print = Print::chessboard();
+    for (k, pose) in good_poses(print).iter().enumerate() {
+        let grey = Photographer::bent().photograph(print, pose, 1.0);
+        let path = folder.path().join(format!("views/{k}.png"));
+        write_grey_png(&path, CAMERA.size_px, &grey);
+    }
+    let output = gnomon(
+        folder.path(),
+        &format!("calibrate views {CHESSBOARD} --out camera.toml --coverage coverage.png"),
+    );
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    assert!(said.is_empty(), "{said}");
+    let printed = String::from_utf8_lossy(&output.stdout);
+    for part in ["frame 14", "15 used", "focal length", "±", "k1 -0.2"] {
+        assert!(printed.contains(part), "{part:?} is not in {printed}");
+    }
+    let found = load_calibration(&folder.path().join("camera.toml")).expect("a calibration");
+    assert!(farthest_px(&found, &BENT_CAMERA) < 0.5, "{found:?}");
+    let coverage = image::open(folder.path().join("coverage.png"))
+        .expect("a picture")
+        .into_rgb8();
+    assert!(coverage.width() >= 640 && coverage.height() > 480);
+}
+
+#[test]
+fn mistakes_are_told_and_leave_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let grey = |side: usize| vec![90; side * 480];
+    let path = |name: &str| folder.path().join(name);
+    write_grey_png(&path("wall/0.png"), [640, 480], &grey(640));
+    write_grey_png(&path("sizes/0.png"), [640, 480], &grey(640));
+    write_grey_png(&path("sizes/1.png"), [600, 480], &grey(600));
+    std::fs::create_dir(path("empty")).expect("a folder");
+    let written = "--out out/camera.toml --coverage out/c.png";
+    let chessboard = format!("{CHESSBOARD} {written}");
+    for (arguments, parts) in [
+        (
+            format!("wall {chessboard}"),
+            vec!["none of 1 pictures", "8 x 5 inner corners", "whole"],
+        ),
+        (
+            format!("sizes {chessboard}"),
+            vec!["1.png", "600 x 480", "one size"],
+        ),
+        (
+            format!("sizes/0.png sizes/1.png {chessboard}"),
+            vec!["1.png", "600 x 480", "640 x 480"],
+        ),
+        (
+            format!("empty {chessboard}"),
+            vec!["empty", "neither a video"],
+        ),
+        (
+            format!("nowhere {chessboard}"),
+            vec!["nowhere", "no such file"],
+        ),
+        (
+            format!("wall {CHESSBOARD} --out out/camera.yml"),
+            vec![".toml"],
+        ),
+        (
+            format!("wall --chessboard 2x5 --square-mm 25 {written}"),
+            vec!["2 x 5 inner corners", "at least 3 x 3"],
+        ),
+        (
+            format!("wall --chessboard 8x5 --square-mm 0 {written}"),
+            vec!["0 mm", "1 to 2000 mm"],
+        ),
+        (
+            format!("wall --chessboard 8x5 {written}"),
+            vec!["--square-mm"],
+        ),
+        (
+            format!("wall --charuco 9x6 --square-mm 25 {written}"),
+            vec!["--marker-mm"],
+        ),
+        (
+            format!("wall --charuco 9x6 --square-mm 25 --marker-mm 24 {written}"),
+            vec!["24 mm", "7.5 to 22.5 mm"],
+        ),
+        (
+            format!("wall {CHARUCO} {CHESSBOARD} {written}"),
+            vec!["cannot be used"],
+        ),
+        (
+            format!("wall {CHARUCO} {written}"),
+            vec!["9 x 6 squares", "dictionary"],
+        ),
+        (format!("wall {written}"), vec!["--chessboard", "--charuco"]),
+        (
+            format!("wall {CHESSBOARD} --out wall/camera.toml"),
+            vec!["wall/camera.toml", "write elsewhere"],
+        ),
+    ] {
+        let output = gnomon(folder.path(), &format!("calibrate {arguments}"));
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(
+            !output.status.success() && !said.contains("panicked"),
+            "{arguments:?}: {said}"
+        );
+        assert!(output.stdout.is_empty());
+        for part in parts {
+            assert!(said.contains(part), "{arguments:?} lacks {part:?}: {said}");
+        }
+        assert!(
+            !path("out").exists() && !path("wall/camera.toml").exists(),
+            "{arguments:?}"
+        );
+    }
+}
+
+#[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
+fn the_photographs_of_a_wall_give_their_cameras_calibration() {
+    let folder = photographs::photographs("swatbotics/mapping_feb_2014/calibration");
+    let here = tempfile::tempdir().expect("a folder");
+    let arguments = "--chessboard 7x5 --square-mm 30 --out camera.toml";
+    let output = gnomon(
+        here.path(),
+        &format!("calibrate {} {arguments}", folder.display()),
+    );
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    // The board never comes near the picture's corners.
+    assert!(said.contains("corners in 48 % of the picture"), "{said}");
+    let printed = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        printed.contains("17 pictures, 17 show the target"),
+        "{printed}"
+    );
+    let found = load_calibration(&here.path().join("camera.toml")).expect("a calibration");
+    // What its owners found: within two standard deviations, and no worse a fit than OpenCV's finder gives (0.207 px).
+    let off_px = (found.focal_px - DVec2::new(765.00, 764.18)).abs();
+    assert!(off_px.max_element() < 4.0, "{found:?}");
+    // Theirs has no tangential terms, which take 10 px of the centre's height here.
+    let off_px = (found.center_px - DVec2::new(393.72, 304.66)).abs();
+    assert!(off_px.x < 4.0 && off_px.y < 15.0, "{found:?}");
+    let rms_px = printed
+        .split("15 used: ")
+        .nth(1)
+        .and_then(|rest| rest.split(' ').next());
+    let rms_px: f64 = rms_px.expect("a total").parse().expect("a number");
+    assert!(rms_px < 0.2, "{rms_px}");
+}
+
+#[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
+fn a_photographed_charuco_board_is_found_whole() {
+    let folder = photographs::photographs("opencv_tutorial");
+    let target = charuco_of([5, 7], 0.04, 0.02, "DICT_6X6_250");
+    let mut finder = TargetFinder::new(target).expect("a finder");
+    for (name, fewest) in [("choriginal.jpg", 24), ("chocclusion_original.jpg", 12)] {
+        let frame = photographs::read_photograph(&folder.join(name));
+        let grey = crate::common::sheets::grey_of(&frame);
+        let corners = finder.find(&grey, frame.size_px).expect("corners");
+        assert!(
+            (fewest..=24).contains(&corners.len()),
+            "{name}: {}",
+            corners.len()
+        );
+        // Each column of corners is straight but for the lens.
+        for column in 1..5 {
+            let points: Vec<DVec2> = corners
+                .iter()
+                .filter(|corner| (corner.target_m.x - 0.04 * f64::from(column)).abs() < 1e-9)
+                .map(|corner| corner.pixel)
+                .collect();
+            let (Some(&first), Some(&last)) = (points.first(), points.last()) else {
+                continue;
+            };
+            let across = (last - first).perp().normalize_or_zero();
+            for point in &points {
+                let off_px = (point - first).dot(across).abs();
+                assert!(off_px < 1.0, "{name}: {off_px:.2} px off the line");
+            }
+        }
+    }
+}

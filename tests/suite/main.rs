@@ -1,0 +1,29 @@
+//! What the program knows and draws, held against oracles: one binary, for each that links everything takes its time.
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test may stop where its own files fail"
+)]
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod accuracy;
+mod architecture;
+mod authoring;
+mod board;
+mod calibrate;
+mod counting;
+mod detail;
+mod figures;
+mod light_from_picture;
+mod picture;
+mod probe;
+mod scene;
+mod shading;
+mod shafts;
+mod stability;
+mod tracking;
+mod tracking_photographs;
+mod tracking_sessions;
+mod tracking_stability;
+mod volumes;

@@ -1,0 +1,170 @@
+//! Where each mistake in a scene is pointed out, and what is said to be allowed.
+
+use super::{HEAD, load_in, project};
+
+struct Mistake {
+    /// A text of [`HEAD`] and what stands in its place.
+    change: (&'static str, &'static str),
+    added: &'static str,
+    line: usize,
+    column: usize,
+    parts: &'static [&'static str],
+}
+
+const fn added(
+    added: &'static str,
+    line: usize,
+    column: usize,
+    parts: &'static [&'static str],
+) -> Mistake {
+    Mistake {
+        change: ("", ""),
+        added,
+        line,
+        column,
+        parts,
+    }
+}
+
+const fn changed(
+    from: &'static str,
+    to: &'static str,
+    line: usize,
+    column: usize,
+    parts: &'static [&'static str],
+) -> Mistake {
+    Mistake {
+        change: (from, to),
+        added: "",
+        line,
+        column,
+        parts,
+    }
+}
+
+// A table is read by rows.
+#[rustfmt::skip]
+const MISTAKES: &[Mistake] = &[
+    // The file itself
+    added("[light\n", 6, 7, &["not TOML", "unclosed table"]),
+    added("x = \n", 6, 5, &["not TOML"]),
+    changed("name = \"table\"", "name = \"table\"\nname = \"top\"", 5, 1, &["not TOML", "duplicate key"]),
+    // Unknown keys and tables
+    added("[[lihgt]]\n", 6, 3, &["lihgt: unknown key", "did you mean \"light\"?", "allowed: camera, tracking, board"]),
+    changed("source", "sourc", 2, 1, &["camera.sourc: unknown key", "did you mean \"source\"?", "calibration"]),
+    changed("size_m", "size", 5, 22, &["board.markers.size: unknown key", "allowed: id, size_m, center_m, rotation_deg"]),
+    added("[tracking]\nzzz = 1\n", 7, 1, &["tracking.zzz: unknown key; allowed: detector, decimation"]),
+    added("[[virtual]]\nname = \"v\"\nrect_m = [0, 0, 1, 1]\n", 8, 1, &["virtual.rect_m: unknown key"]),
+    added("[[phantom]]\nname = \"p\"\nsmooth_deg = 3\n", 8, 1, &["phantom.smooth_deg: unknown key"]),
+    // Missing ones
+    changed("[camera]\nsource = \"webcam:0\"", "\n", 1, 1, &["camera: missing", "source"]),
+    changed("name = \"table\"\n", "", 3, 1, &["board.name: missing", "a name in quotes"]),
+    changed("id = 0, ", "", 5, 12, &["board.markers.id: missing"]),
+    added("[[marker]]\nname = \"m\"\nid = 1\n", 6, 1, &["marker.size_m: missing", "metres"]),
+    added("[[light]]\nkind = \"point\"\nintensity = 1\n", 6, 1, &["light.position_m: missing"]),
+    added("[[light]]\nposition_m = [0, 0, 1]\n", 6, 1, &["light.kind: missing", "directional"]),
+    added("[[phantom]]\nname = \"p\"\n", 6, 1, &["\"p\": no shape; mesh or rect_m is expected"]),
+    added("[table]\nheight_m = 1\n", 6, 1, &["table.rect_m: missing"]),
+    // Wrong types
+    changed("\"webcam:0\"", "5", 2, 10, &["camera.source = 5: a text in quotes is expected, this is an integer"]),
+    changed("[[board]]", "[board]", 3, 1, &["board: may occur more than once: write [[board]]"]),
+    added("[[ambient]]\n", 6, 1, &["ambient", "a table is expected, this is an array"]),
+    added("[ambient]\nradiance = \"dim\"\n", 7, 12, &["ambient.radiance = \"dim\": a number or 3 numbers in brackets"]),
+    added("[[phantom]]\nname = \"p\"\nposition_m = [0, 0]\n", 8, 14, &["2 entries; 3 numbers in brackets are expected"]),
+    added("[tracking]\nrefine_edges = 1\n", 7, 16, &["true or false is expected"]),
+    // Names of things
+    added("[[marker]]\nname = \"m\"\nfamily = \"tag36h12\"\n", 8, 10, &[
+        "marker.family = \"tag36h12\": unknown family; did you mean \"tag36h11\"? allowed: tag16h5, ",
+    ]),
+    added("[[marker]]\nname = \"m\"\nfamily = \"DICT_4X4_50\"\n", 8, 10, &["libapriltag", "detector = \"aruco\""]),
+    changed("name = \"table\"", "name = \"table\"\nborder_cells = 3", 5, 16, &["board.border_cells = 3: out of range; allowed: 1 to 2"]),
+    added("[[phantom]]\nname = \"p\"\non = \"tabel\"\n", 8, 6, &[
+        "phantom.on = \"tabel\": no board or marker has this name; did you mean \"table\"? allowed: table",
+    ]),
+    added("[[phantom]]\nname = \"p\"\nmesh = \"models/none.obj\"\n", 8, 8, &[
+        "phantom.mesh = \"models/none.obj\": no such file",
+        "config/models/none.obj and ",
+    ]),
+    changed("\"webcam:0\"", "\"recordings/x\"", 2, 10, &["camera.source", "config/recordings/x and "]),
+    changed("\"webcam:0\"", "\"webcam:\"", 2, 10, &["which webcam?", "webcam:1", "a part of its name"]),
+    changed("\"webcam:0\"", "\"webcam:0\"\nsize_px = [640.5, 480]", 3, 11, &["camera.size_px", "two whole numbers"]),
+    changed("\"webcam:0\"", "\"webcam:0\"\nfps = 0", 3, 7, &["camera.fps = 0: out of range; allowed: 1 to 1000"]),
+    changed("\"webcam:0\"", "\"webcam:0\"\nformat = \"YUV\"", 3, 10, &["unknown format", "did you mean \"YUYV\"?", "MJPEG"]),
+    added("[[marker]]\nname = \"table\"\nid = 1\nsize_m = 1\n", 7, 8, &["the name is taken on line 4"]),
+    added("[table]\nrect_m = [0, 0, 1, 1]\n[[virtual]]\nname = \"table\"\n", 9, 8, &["the name is taken on line 6"]),
+    added("[[marker]]\nname = \"a, b\"\n", 7, 8, &["not a name"]),
+    added("[[light]]\nkind = \"pont\"\n", 7, 8, &["unknown kind of light; did you mean \"point\"? allowed: point, directional"]),
+    added("[[light]]\nkind = \"directional\"\nposition_m = [0, 0, 1]\n", 8, 1, &["light.position_m: unknown key"]),
+    added("[tracking]\ndetector = \"apriltags\"\n", 7, 12, &["did you mean \"apriltag\"?"]),
+    // Numbers
+    changed("0.045", "-0.045", 5, 31, &["board.markers.size_m = -0.045: out of range; allowed: 0.0001 to 100 m"]),
+    changed("[0, 0]", "[0, nan]", 5, 53, &["center_m = nan: not a finite number"]),
+    changed("[0, 0]", "[1e999, 0]", 5, 50, &["not a finite number"]),
+    changed("id = 0", "id = 587", 5, 19, &["out of range; allowed: 0 to 586 (the ids of tag36h11)"]),
+    changed("id = 0", "id = -1", 5, 19, &["out of range; allowed: 0 to 586"]),
+    changed("id = 0", "id = 0.5", 5, 19, &["a whole number is expected, this is a float"]),
+    changed("[{ id = 0, size_m = 0.045, center_m = [0, 0] }]", "[]", 5, 11, &["at least one marker"]),
+    added("[[marker]]\nname = \"m\"\nid = 0\nsize_m = 1\n", 8, 6, &["marker 0 of tag36h11 is taken by \"table\" on line 5"]),
+    added("[[virtual]]\nname = \"v\"\nscale = 0\n", 8, 9, &["virtual.scale = 0: out of range"]),
+    added("[[virtual]]\nname = \"v\"\nscale = [1, -nan, 1]\n", 8, 13, &["not a finite number"]),
+    added("[[virtual]]\nname = \"v\"\nmesh = \"models/cube.obj\"\nmaterial = { albedo = 1.2 }\n", 9, 23, &[
+        "virtual.material.albedo = 1.2: out of range; allowed: 0 to 1",
+    ]),
+    added("[[virtual]]\nname = \"v\"\nmesh = \"models/cube.obj\"\nmaterial = { roughness = 0 }\n", 9, 26, &[
+        "out of range; allowed: above 0, up to 1",
+    ]),
+    added("[[light]]\nkind = \"point\"\nposition_m = [0, 0, 1]\nintensity = [1, -1, 1]\n", 9, 17, &["out of range"]),
+    added("[[light]]\nkind = \"directional\"\ndirection = [0, 0, 0]\nirradiance = 1\n", 8, 13, &["no direction"]),
+    added("[table]\nrect_m = [1, 0, 0, 1]\n", 7, 10, &["no area", "x0 < x1"]),
+    added("[tracking]\ndecimation = 0.5\n", 7, 14, &["allowed: 1 to 8"]),
+    // Shadows
+    added("[shadows]\ntechnique = \"shafts\"\n", 7, 13, &["the scene has no [probe]", "allowed: auto, volumes"]),
+    added("[shadows]\ntechnique = \"environment\"\n", 7, 13, &["this version does not render it", "auto, volumes, shafts"]),
+    added("[shadows]\nsources = 0\n", 7, 11, &["1 to 4096"]),
+    added("[shadows]\nsources = \"most\"\n", 7, 11, &["a number of sources", "\"all\""]),
+    added("[shadows]\nmap_px = 100\n", 7, 10, &["a side of maps", "64, 128"]),
+    added("[shadows]\ndifference = \"minus\"\n", 7, 14, &["way to take light away", "ratio, subtract"]),
+    added("[shadows]\ncompositing = \"hdr\"\n", 7, 15, &["way to composite", "float, ldr"]),
+    added("[shadows]\ndifference = \"ratio\"\ncompositing = \"ldr\"\n", 8, 15, &["difference is of float compositing"]),
+    added("[shadows]\nsource_power = 0\n", 7, 16, &["above 0, up to 1"]),
+    added("[shadows]\nsamples = 2\n", 7, 11, &["allowed: 1, 4"]),
+    added("[shadows]\nquality = \"best\"\n", 7, 11, &["quality", "allowed: fast, balanced, accurate"]),
+    added("[shadows]\nmax_silhouette_error_px = -1\n", 7, 27, &["out of range; allowed: 0 to 100 px"]),
+    added("[shadows]\nmax_silhouette_error_px = \"half\"\n", 7, 27, &["a number is expected"]),
+    added("[shadows]\nframe_budget_ms = 0\n", 7, 19, &["allowed: above 0, up to 1000000 ms"]),
+    added("[probe]\nimage = \"missing.hdr\"\n", 7, 9, &["missing.hdr"]),
+    added("[probe]\nposition_m = [0, 0, 0]\n", 6, 1, &["image", "linear radiance"]),
+    added("[[room]]\nbox_m = [0, 0, 0, 1, 1, 1]\n", 6, 1, &["there is none", "[probe]"]),
+];
+
+#[test]
+fn each_mistake_has_its_place_and_says_what_is_allowed() {
+    let project = project();
+    let mut failures = Vec::new();
+    for Mistake {
+        change: (from, to),
+        added,
+        line,
+        column,
+        parts,
+    } in MISTAKES
+    {
+        assert!(HEAD.contains(from));
+        let text = format!("{}{added}", HEAD.replacen(from, to, 1));
+        let error = load_in(&project, &text)
+            .map_or_else(|error| error.to_string(), |_| "accepted".to_owned());
+        let first_line = error.lines().next().unwrap();
+        let place = format!(
+            "{}:{line}:{column}: ",
+            project.path().join("config/a.toml").display()
+        );
+        let right =
+            first_line.starts_with(&place) && parts.iter().all(|part| first_line.contains(part));
+        if !right || error.lines().count() != 3 || !error.contains('^') {
+            failures.push(format!(
+                "{text}\nexpected {line}:{column} {parts:?}, got\n{error}\n"
+            ));
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
