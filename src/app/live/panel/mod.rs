@@ -18,7 +18,7 @@ use super::look::Look;
 use super::meters::Meters;
 use super::views::View;
 use super::wish::{Overlay, Wish};
-use crate::scene::{Placement, Scene, Shortcut};
+use crate::scene::{Placement, Scene, Shortcut, Shortcuts};
 use editing::Editing;
 use first_use::FirstUse;
 
@@ -137,8 +137,9 @@ fn view(ui: &mut Ui, look: &Look, wishes: &mut Vec<Wish>) {
             wishes.push(Wish::Toggle(overlay));
         }
     }
-    // Where somebody looks for a wrong shadow.
-    if matches!(look.view, View::StencilCount | View::Volumes) {
+    // Where somebody looks for a wrong shadow, and wherever one is off.
+    let one_is_off = look.without != Shortcuts::NONE;
+    if matches!(look.view, View::StencilCount | View::Volumes) || one_is_off {
         ui.label("Shortcuts of shadow volumes").on_hover_text(
             "They change no pixel: one that does when it is switched off is what a wrong pixel comes from.",
         );
