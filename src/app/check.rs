@@ -134,6 +134,10 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
         .collect();
     let mut warnings = check_room::warnings(scene);
     warnings.extend(check_degenerate::warnings(scene));
+    if let Some(probe) = &scene.probe {
+        let notes = probe.notes.iter();
+        warnings.extend(notes.map(|note| format!("{}: {note}", probe.image.display())));
+    }
     for (number, light) in scene.lights.iter().enumerate() {
         let Light::Point { position_m, .. } = light else {
             continue;

@@ -18,7 +18,8 @@ use crate::light::probe::Probe;
 use crate::light::probe_maps::{Circle, Projection, fitting_width_px, unwrap, world_from_camera};
 use crate::light::radiance_picture::RadiancePicture;
 use crate::light::response::{Exposure, Response, merge};
-use crate::scene::probe_file::{flaws_told, read_picture};
+use crate::scene::probe_file::flaws_told;
+use crate::scene::radiance_file;
 
 /// Columns of a probe unless another number is asked for: a third of a degree each, finer than a ball shows.
 const MOST_COLUMNS: usize = 1024;
@@ -200,7 +201,10 @@ impl Source {
              exposures",
             path.display()
         );
-        let mut picture = read_picture(path).map_err(anyhow::Error::msg)?;
+        let read = radiance_file::read(path, None).map_err(anyhow::Error::msg)?;
+        let told = read.notes.into_iter();
+        remarks.extend(told.map(|note| format!("{}: {note}", path.display())));
+        let mut picture = read.picture;
         if let Some(flaws) = picture.flaws() {
             remarks.push(format!(
                 "{}: {}; taken as black where negative, else as the mean of the pixels beside it",

@@ -2,6 +2,7 @@
 
 pub mod bounce;
 pub mod brightest;
+pub mod chromaticities;
 pub mod contrast;
 pub(crate) mod cores;
 pub mod prefiltered;

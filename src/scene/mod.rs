@@ -21,6 +21,7 @@ mod obj_scan;
 mod objects;
 mod probe;
 pub mod probe_file;
+pub mod radiance_file;
 mod reader;
 mod settings;
 mod shortcuts;
@@ -300,6 +301,8 @@ pub struct ProbeScene {
     pub image: PathBuf,
     /// What it saw.
     pub probe: Probe,
+    /// What its file says that is passed over or taken for something else, one sentence each.
+    pub notes: Vec<String>,
     /// Where it was taken, in the world, metres.
     pub position_m: DVec3,
     /// Display white over the probe's unit of radiance.

@@ -9,7 +9,7 @@ use super::lights::POSITION;
 use super::mesh_file::{self, Normals};
 use super::named_files::FileKind;
 use super::objects::{ALBEDO, placement};
-use super::probe_file::{ProbeKind, read};
+use super::probe_file::{ProbeFile, ProbeKind, read};
 use super::reader::{Numbers, Table, Value};
 use super::{ProbeScene, RoomPiece};
 use crate::geometry::winding::winding_number;
@@ -56,7 +56,7 @@ pub fn probe(root: &Table) -> Result<Option<ProbeScene>, SceneError> {
         "a picture in linear radiance (.hdr or .exr) is expected",
     )?;
     let path = image.existing_path(FileKind::Probe)?;
-    let probe = read(&path, kind).map_err(|message| image.error(message))?;
+    let ProbeFile { probe, notes } = read(&path, kind).map_err(|message| image.error(message))?;
     let position_m = table.vector_or("position_m", DVec3::ZERO, &POSITION)?;
     let exposure = table.number_or("exposure", 1.0, &Numbers::above(0.0, 1e9, ""))?;
     let mut room = Vec::new();
@@ -85,6 +85,7 @@ pub fn probe(root: &Table) -> Result<Option<ProbeScene>, SceneError> {
     Ok(Some(ProbeScene {
         image: path,
         probe,
+        notes,
         position_m,
         exposure,
         room,

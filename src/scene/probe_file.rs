@@ -1,23 +1,14 @@
-//! Pictures in linear radiance from files (Radiance HDR, OpenEXR), and light probes from them.
+//! Light probes from pictures in linear radiance.
 
-use std::fs;
-use std::io::{BufReader, Cursor, ErrorKind};
 use std::path::Path;
 
-use exr::prelude::{ReadChannels, ReadLayers};
-use glam::Vec3;
-use image::ImageDecoder;
-use image::codecs::hdr::HdrDecoder;
-
+use super::radiance_file::{self, RadianceFile};
 use crate::light::probe::Probe;
 use crate::light::probe_maps::{Circle, Projection, fitting_width_px, unwrap, world_from_camera};
-use crate::light::radiance_picture::{Flaw, Flaws, RadiancePicture};
+use crate::light::radiance_picture::{Flaw, Flaws};
 
 /// Columns of a probe made of an angular map or a ball.
 const MOST_COLUMNS: usize = 4096;
-/// Pixels of the largest picture that is read: 32768 x 16384 would take 6 GiB.
-const MOST_PIXELS: usize = 16384 * 8192;
-
 /// What a picture of all directions can be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ProbeKind {
@@ -29,14 +20,23 @@ pub enum ProbeKind {
     Ball,
 }
 
+/// A probe as its file has it.
+#[derive(Debug, Clone)]
+pub struct ProbeFile {
+    /// What it saw.
+    pub probe: Probe,
+    /// What was passed over or taken for something else, one sentence each, without the path.
+    pub notes: Vec<String>,
+}
+
 /// Reads a probe of any kind. Angular maps and balls are resampled; their middle looks along +y (a ball's camera did), with
 /// +z upward and +x to the right.
 ///
 /// # Errors
 /// A message that begins with the path: not there, not a picture in linear radiance, of a shape that the kind cannot
 /// have, pixels that are no radiance.
-pub fn read(path: &Path, kind: ProbeKind) -> Result<Probe, String> {
-    let picture = read_picture(path)?;
+pub fn read(path: &Path, kind: ProbeKind) -> Result<ProbeFile, String> {
+    let RadianceFile { picture, notes } = radiance_file::read(path, None)?;
     let say = |message: String| format!("{}: {message}", path.display());
     if let Some(flaws) = picture.flaws() {
         return Err(say(format!(
@@ -55,7 +55,9 @@ pub fn read(path: &Path, kind: ProbeKind) -> Result<Probe, String> {
                      map, or a mirror ball?)"
                 )));
             }
-            return Probe::new(size_px, picture.into_pixels())
+            let probe = Probe::new(size_px, picture.into_pixels());
+            return probe
+                .map(|probe| ProbeFile { probe, notes })
                 .ok_or_else(|| say("no pixels".to_owned()));
         }
         ProbeKind::Angular => Projection::Angular(circle),
@@ -76,36 +78,11 @@ pub fn read(path: &Path, kind: ProbeKind) -> Result<Probe, String> {
         world_from_camera(0.0, 0.0, 0.0),
         width_px,
     )
-    .map(|unwrapped| unwrapped.probe)
+    .map(|unwrapped| ProbeFile {
+        probe: unwrapped.probe,
+        notes,
+    })
     .ok_or_else(|| say(format!("{width} x {height} pixels are too few for a probe")))
-}
-
-/// Reads a picture in linear radiance as it is, flaws and all.
-///
-/// # Errors
-/// A message that begins with the path: not there, not Radiance HDR or OpenEXR, cut off, without red, green and blue.
-pub fn read_picture(path: &Path) -> Result<RadiancePicture, String> {
-    let say = |message: String| format!("{}: {message}", path.display());
-    let bytes = fs::read(path).map_err(|error| match error.kind() {
-        ErrorKind::NotFound => say("no such file".to_owned()),
-        _ => say(error.to_string()),
-    })?;
-    // By content: a file's name does not always tell.
-    let (size_px, pixels) = if bytes.starts_with(b"#?") {
-        read_hdr(&bytes)
-    } else if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
-        read_exr(bytes)
-    } else if image::guess_format(&bytes).is_ok() {
-        Err(
-            "a picture of display values, which is cut off where light is brightest; a probe is Radiance HDR (.hdr) or \
-             OpenEXR (.exr), and gnomon probe makes one of several exposures"
-                .to_owned(),
-        )
-    } else {
-        Err("neither Radiance HDR (.hdr) nor OpenEXR (.exr)".to_owned())
-    }
-    .map_err(say)?;
-    RadiancePicture::new(size_px, pixels).ok_or_else(|| say("the picture has no pixels".to_owned()))
 }
 
 /// What is wrong with a picture's pixels, in words.
@@ -124,65 +101,13 @@ pub fn flaws_told(flaws: Flaws) -> String {
     }
 }
 
-type Pixels = ([usize; 2], Vec<Vec3>);
-
-fn read_hdr(bytes: &[u8]) -> Result<Pixels, String> {
-    let broken = |error: image::ImageError| format!("broken as Radiance HDR: {error}");
-    let decoder = HdrDecoder::new(BufReader::new(bytes)).map_err(broken)?;
-    let (width, height) = decoder.dimensions();
-    let size_px = checked_size(width as usize, height as usize)?;
-    let mut pixels = vec![Vec3::ZERO; size_px[0] * size_px[1]];
-    decoder
-        .read_image(bytemuck::cast_slice_mut(&mut pixels))
-        .map_err(broken)?;
-    Ok((size_px, pixels))
-}
-
-fn read_exr(bytes: Vec<u8>) -> Result<Pixels, String> {
-    let broken = |error: exr::error::Error| {
-        format!("broken as OpenEXR, or without red, green and blue: {error}")
-    };
-    let image = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .rgb_channels(
-            |size_px, _| {
-                (
-                    size_px.width(),
-                    vec![Vec3::ZERO; size_px.width() * size_px.height()],
-                )
-            },
-            |(width, pixels): &mut (usize, Vec<Vec3>),
-             place,
-             (red, green, blue): (f32, f32, f32)| {
-                pixels[place.y() * *width + place.x()] = Vec3::new(red, green, blue);
-            },
-        )
-        .first_valid_layer()
-        .all_attributes()
-        .non_parallel()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(broken)?;
-    let size = image.layer_data.size;
-    let size_px = checked_size(size.width(), size.height())?;
-    Ok((size_px, image.layer_data.channel_data.pixels.1))
-}
-
-fn checked_size(width: usize, height: usize) -> Result<[usize; 2], String> {
-    match width.checked_mul(height) {
-        Some(pixels) if pixels <= MOST_PIXELS => Ok([width, height]),
-        _ => Err(format!(
-            "{width} x {height} pixels are too many; at most {MOST_PIXELS} in all"
-        )),
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::fs;
     use std::path::PathBuf;
 
     use exr::prelude::WritableImage;
-    use glam::DVec3;
+    use glam::{DVec3, Vec3};
     use image::codecs::hdr::HdrEncoder;
 
     use super::*;
@@ -221,7 +146,7 @@ mod tests {
             .collect();
         for name in ["a.hdr", "a.exr"] {
             let path = written(folder.path(), name, [8, 4], &pixels);
-            let probe = read(&path, ProbeKind::LatitudeLongitude).unwrap();
+            let probe = read(&path, ProbeKind::LatitudeLongitude).unwrap().probe;
             assert_eq!((probe.size_px(), probe.pixels()), ([8, 4], &pixels[..]));
         }
     }
@@ -245,7 +170,7 @@ mod tests {
             0.0,
         );
         for (kind, direction) in [(ProbeKind::Angular, DVec3::X), (ProbeKind::Ball, ball)] {
-            let probe = read(&path, kind).unwrap();
+            let probe = read(&path, kind).unwrap().probe;
             assert_eq!(probe.radiance(direction), Vec3::ONE, "{kind:?}");
             assert_eq!(probe.radiance(-DVec3::X), Vec3::ZERO, "{kind:?}");
         }
@@ -277,11 +202,7 @@ mod tests {
         );
         let wide = write("wide.exr", [8, 4], &[Vec3::ONE; 32]);
         refused(&wide, ProbeKind::Ball, &["8 x 4", "square"]);
-        for (value, word) in [
-            (f32::NAN, "not a number"),
-            (f32::INFINITY, "infinite"),
-            (-0.25, "negative"),
-        ] {
+        for (value, word) in [(f32::NAN, "not a number"), (-0.25, "negative")] {
             let mut pixels = [Vec3::ONE; 32];
             pixels[11].y = value;
             let path = write("flawed.exr", [8, 4], &pixels);

@@ -1,0 +1,355 @@
+//! OpenEXR, as its header says: one layer of red, green and blue (or of luminance alone) within its display window.
+
+use std::collections::BTreeMap;
+use std::io::Cursor;
+
+use exr::block::UncompressedBlock;
+use exr::block::reader::ChunksReader;
+use exr::meta::attribute::{Chromaticities as Attribute, SampleType};
+use exr::meta::header::Header;
+use exr::prelude::Vec2;
+use glam::{DMat3, DVec2, Vec3};
+use half::f16;
+
+use super::{Pixels, checked_size};
+use crate::light::chromaticities::Chromaticities;
+
+/// What the best of the format's compressions make of a constant picture.
+const MOST_PIXELS_PER_BYTE: usize = 4096;
+/// Layers that an error lists.
+const LISTED: usize = 8;
+
+/// Where a layer's colours are.
+struct Layer {
+    /// The part of the file.
+    part: usize,
+    /// In words, as `layer` may say it; empty where the channels are called R, G and B alone.
+    name: String,
+    /// Indices among the part's channels: red, green, blue; three times the same where there is luminance alone.
+    channels: [usize; 3],
+}
+
+/// Pixels in linear sRGB, the upper row first.
+///
+/// # Errors
+/// Words that follow a path: broken, no colours, several layers and none asked for, sizes that the file cannot hold.
+pub fn read(bytes: Vec<u8>, wanted: Option<&str>) -> Result<Pixels, String> {
+    let broken = |error: exr::error::Error| format!("broken as OpenEXR: {error}");
+    let length = bytes.len();
+    let reader = exr::block::read(Cursor::new(bytes), false).map_err(broken)?;
+    let layers = layers(reader.headers());
+    let Layer { part, channels, .. } = chosen(layers, wanted)?;
+    let header = reader.headers()[part].clone();
+    let window = header.shared_attributes.display_window;
+    let size_px = checked_size(window.size.width(), window.size.height())?;
+    let data_px = checked_size(header.layer_size.width(), header.layer_size.height())?;
+    let largest = (size_px[0] * size_px[1]).max(data_px[0] * data_px[1]);
+    if largest > length.saturating_mul(MOST_PIXELS_PER_BYTE) {
+        return Err(format!(
+            "cut off: {length} bytes cannot hold {} x {} pixels",
+            data_px[0], data_px[1]
+        ));
+    }
+    let corner = header.own_attributes.layer_position - window.position;
+    let mut pixels = vec![Vec3::ZERO; size_px[0] * size_px[1]];
+    let full = Vec2(0, 0);
+    let mut chunks = reader
+        .filter_chunks(false, |_, _, block| {
+            block.layer == part && block.level == full
+        })
+        .map_err(broken)?;
+    while let Some(chunk) = chunks.next() {
+        let block =
+            UncompressedBlock::decompress_chunk(chunk.map_err(broken)?, chunks.meta_data(), false)
+                .map_err(broken)?;
+        for line in block.lines(&header.channels) {
+            let index = line.location.channel;
+            let mine: Vec<usize> = (0..3).filter(|&colour| channels[colour] == index).collect();
+            let row = corner.y() + line.location.position.y() as i32;
+            let Some(row) = usize::try_from(row).ok().filter(|row| *row < size_px[1]) else {
+                continue;
+            };
+            if mine.is_empty() {
+                continue;
+            }
+            let mut put = |at: usize, value: f32| {
+                let column = corner.x() + (line.location.position.x() + at) as i32;
+                if let Some(column) = usize::try_from(column).ok().filter(|at| *at < size_px[0]) {
+                    for &colour in &mine {
+                        pixels[row * size_px[0] + column][colour] = value;
+                    }
+                }
+            };
+            match header.channels.list[index].sample_type {
+                SampleType::F16 => {
+                    for (at, value) in line.read_samples::<f16>().enumerate() {
+                        put(at, value.map_err(broken)?.to_f32());
+                    }
+                }
+                SampleType::F32 => {
+                    for (at, value) in line.read_samples::<f32>().enumerate() {
+                        put(at, value.map_err(broken)?);
+                    }
+                }
+                SampleType::U32 => {
+                    for (at, value) in line.read_samples::<u32>().enumerate() {
+                        put(at, value.map_err(broken)? as f32);
+                    }
+                }
+            }
+        }
+    }
+    let is_colour = channels[0] != channels[1];
+    if let (Some(primaries), true) = (header.shared_attributes.chromaticities, is_colour) {
+        let matrix = srgb_from(primaries)
+            .ok_or("its chromaticities span no colours: places in the CIE diagram are meant")?;
+        if !matrix.abs_diff_eq(DMat3::IDENTITY, 1e-3) {
+            for pixel in &mut pixels {
+                *pixel = (matrix * pixel.as_dvec3()).as_vec3();
+            }
+        }
+    }
+    Ok(Pixels {
+        size_px,
+        pixels,
+        notes: Vec::new(),
+    })
+}
+
+fn srgb_from(attribute: Attribute) -> Option<DMat3> {
+    let place = |at: Vec2<f32>| DVec2::new(f64::from(at.x()), f64::from(at.y()));
+    Chromaticities {
+        primaries: [attribute.red, attribute.green, attribute.blue].map(place),
+        white: place(attribute.white),
+    }
+    .srgb_from_these()
+}
+
+/// All layers of colours, or else of luminance, in the order of the file.
+fn layers(headers: &[Header]) -> Vec<Layer> {
+    let mut colours = Vec::new();
+    let mut greys = Vec::new();
+    for (part, header) in headers
+        .iter()
+        .enumerate()
+        .filter(|(_, header)| !header.deep)
+    {
+        let of_part = header.own_attributes.layer_name.as_ref();
+        let of_part = of_part.map_or_else(String::new, ToString::to_string);
+        let mut named: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
+        for (index, channel) in header.channels.list.iter().enumerate() {
+            // Chroma at half resolution is no colour of a pixel.
+            if channel.sampling != Vec2(1, 1) {
+                continue;
+            }
+            let whole = channel.name.to_string();
+            let (group, colour) = whole.rsplit_once('.').unwrap_or(("", &whole));
+            let channels = named.entry(group.to_owned()).or_default();
+            channels.insert(colour.to_uppercase(), index);
+        }
+        for (group, channels) in named {
+            // A file of one part by a name of its own has one layer all the same.
+            let name = match (headers.len() > 1, of_part.as_str(), group.as_str()) {
+                (false, ..) | (true, "", _) => group.clone(),
+                (true, part, "") => part.to_owned(),
+                (true, part, group) if group.starts_with(part) => group.to_owned(),
+                (true, part, group) => format!("{part}.{group}"),
+            };
+            let index =
+                |names: [&str; 2]| names.iter().find_map(|name| channels.get(*name)).copied();
+            let rgb = [["R", "RED"], ["G", "GREEN"], ["B", "BLUE"]].map(index);
+            match (rgb, index(["Y", "LUMINANCE"])) {
+                ([Some(red), Some(green), Some(blue)], _) => colours.push(Layer {
+                    part,
+                    name,
+                    channels: [red, green, blue],
+                }),
+                (_, Some(luminance)) if channels.len() <= 2 => greys.push(Layer {
+                    part,
+                    name,
+                    channels: [luminance; 3],
+                }),
+                _ => {}
+            }
+        }
+    }
+    if colours.is_empty() { greys } else { colours }
+}
+
+/// The layer by a name; without one that of the file itself, what a renderer calls combined, or the only one.
+fn chosen(mut layers: Vec<Layer>, wanted: Option<&str>) -> Result<Layer, String> {
+    let listed = || {
+        let names: Vec<String> = layers
+            .iter()
+            .map(|layer| format!("{:?}", layer.name))
+            .collect();
+        match names.get(LISTED) {
+            Some(_) => format!(
+                "{} and {} more",
+                names[..LISTED].join(", "),
+                names.len() - LISTED
+            ),
+            None => names.join(", "),
+        }
+    };
+    let is_combined = |layer: &Layer| layer.name.to_lowercase().ends_with("combined");
+    let place = match wanted {
+        _ if layers.is_empty() => {
+            return Err(
+                "no layer with red, green and blue (chroma at half resolution, depth or ids are no radiance)"
+                    .to_owned(),
+            );
+        }
+        Some(wanted) => match layers.iter().position(|layer| layer.name == wanted) {
+            Some(place) => place,
+            None => {
+                return Err(format!(
+                    "no layer by the name of {wanted:?}; there are: {}",
+                    listed()
+                ));
+            }
+        },
+        None => match layers.iter().position(|layer| layer.name.is_empty()) {
+            Some(place) => place,
+            None if layers.len() == 1 => 0,
+            None => match layers.iter().filter(|layer| is_combined(layer)).count() {
+                1 => layers.iter().position(is_combined).unwrap_or(0),
+                _ => {
+                    return Err(format!(
+                        "several layers: {}; which one is meant says `layer`",
+                        listed()
+                    ));
+                }
+            },
+        },
+    };
+    Ok(layers.swap_remove(place))
+}
+
+#[cfg(test)]
+mod tests {
+    use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image};
+    use exr::meta::attribute::{IntegerBounds, Text};
+    use exr::meta::header::{ImageAttributes, LayerAttributes};
+    use exr::prelude::WritableImage;
+
+    use super::*;
+
+    fn file(
+        layers: Vec<exr::image::Layer<AnyChannels<FlatSamples>>>,
+        window: IntegerBounds,
+    ) -> Vec<u8> {
+        let mut attributes = ImageAttributes::new(window);
+        attributes.chromaticities = None;
+        let mut bytes = Vec::new();
+        Image::from_layers(attributes, layers)
+            .write()
+            .to_buffered(Cursor::new(&mut bytes))
+            .unwrap();
+        bytes
+    }
+
+    /// 4 x 2 pixels: all red channels 1, green 2, blue 4, times `scale`.
+    fn layer(
+        name: Option<&str>,
+        prefix: &str,
+        scale: f32,
+    ) -> exr::image::Layer<AnyChannels<FlatSamples>> {
+        let channel = |name: &str, value: f32| {
+            AnyChannel::new(
+                Text::new_or_panic(format!("{prefix}{name}").as_str()),
+                FlatSamples::F32(vec![value * scale; 8]),
+            )
+        };
+        let channels = AnyChannels::sort(
+            [channel("R", 1.0), channel("G", 2.0), channel("B", 4.0)]
+                .into_iter()
+                .collect(),
+        );
+        let mut attributes = LayerAttributes::default();
+        attributes.layer_name = name.map(|name| Text::new_or_panic(name));
+        exr::image::Layer::new((4, 2), attributes, Encoding::FAST_LOSSLESS, channels)
+    }
+
+    fn whole() -> IntegerBounds {
+        IntegerBounds::from_dimensions((4, 2))
+    }
+
+    #[test]
+    fn the_layer_is_the_only_one_the_combined_one_or_the_one_asked_for() {
+        let colour = |bytes: &[u8], wanted: Option<&str>| {
+            read(bytes.to_vec(), wanted).map(|read| read.pixels[7])
+        };
+        let rgb = Vec3::new(1.0, 2.0, 4.0);
+        let combined = file(vec![layer(None, "ViewLayer.Combined.", 1.0)], whole());
+        assert_eq!(colour(&combined, None), Ok(rgb));
+        let several = file(
+            vec![
+                layer(Some("Scene.Diffuse"), "Scene.Diffuse.", 2.0),
+                layer(Some("Scene.Combined"), "Scene.Combined.", 1.0),
+                layer(Some("left"), "", 3.0),
+            ],
+            whole(),
+        );
+        assert_eq!(colour(&several, None), Ok(rgb));
+        assert_eq!(colour(&several, Some("Scene.Diffuse")), Ok(2.0 * rgb));
+        assert_eq!(colour(&several, Some("left")), Ok(3.0 * rgb));
+        let error = colour(&several, Some("right")).unwrap_err();
+        assert!(
+            error.contains("\"left\"") && error.contains("\"right\""),
+            "{error}"
+        );
+        let doubtful = file(
+            vec![layer(Some("left"), "", 1.0), layer(Some("right"), "", 1.0)],
+            whole(),
+        );
+        let error = colour(&doubtful, None).unwrap_err();
+        assert!(
+            error.contains("several layers") && error.contains("`layer`"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_data_window_lies_where_it_is_in_the_display_window() {
+        let mut cropped = layer(None, "", 1.0);
+        cropped.attributes.layer_position = Vec2(3, -1);
+        let read = read(
+            file(vec![cropped], IntegerBounds::from_dimensions((6, 4))),
+            None,
+        )
+        .unwrap();
+        assert_eq!(read.size_px, [6, 4]);
+        let lit: Vec<usize> = (0..24)
+            .filter(|&index| read.pixels[index] != Vec3::ZERO)
+            .collect();
+        assert_eq!(
+            lit,
+            [3, 4, 5],
+            "one row and three columns of it are in the window"
+        );
+    }
+
+    #[test]
+    fn headers_that_lie_are_errors_and_cost_nothing() {
+        let mut bytes = file(vec![layer(None, "", 1.0)], whole());
+        // The windows are told in the header, low and high corners.
+        let place = |name: &[u8], bytes: &[u8]| {
+            bytes
+                .windows(name.len())
+                .position(|window| window == name)
+                .unwrap()
+                + name.len()
+        };
+        for name in [&b"dataWindow\0box2i\0"[..], &b"displayWindow\0box2i\0"[..]] {
+            let corner = place(name, &bytes) + 4 + 8;
+            bytes[corner..corner + 4].copy_from_slice(&9999_i32.to_le_bytes());
+            bytes[corner + 4..corner + 8].copy_from_slice(&9999_i32.to_le_bytes());
+        }
+        let error = read(bytes, None).err().unwrap();
+        assert!(
+            error.contains("cut off") || error.contains("broken"),
+            "{error}"
+        );
+    }
+}
