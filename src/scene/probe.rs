@@ -43,6 +43,7 @@ pub fn probe(root: &Table) -> Result<Option<ProbeScene>, SceneError> {
     };
     let kinds = [
         ("latitude-longitude", ProbeKind::LatitudeLongitude),
+        ("panorama", ProbeKind::Panorama),
         ("angular", ProbeKind::Angular),
         ("ball", ProbeKind::Ball),
     ];

@@ -1,11 +1,14 @@
 //! Light probes from pictures in linear radiance.
 
+use std::f64::consts::TAU;
 use std::path::Path;
+
+use glam::Vec3;
 
 use super::radiance_file::{self, RadianceFile};
 use crate::light::probe::Probe;
 use crate::light::probe_maps::{Circle, Projection, fitting_width_px, unwrap, world_from_camera};
-use crate::light::radiance_picture::{Flaw, Flaws};
+use crate::light::radiance_picture::{Flaw, Flaws, RadiancePicture};
 
 /// Columns of a probe made of an angular map or a ball.
 const MOST_COLUMNS: usize = 4096;
@@ -14,6 +17,9 @@ const MOST_COLUMNS: usize = 4096;
 pub enum ProbeKind {
     /// As [`Probe`] keeps it: row 0 looks up (+z), u = (atan2(y, x) + π) / 2π.
     LatitudeLongitude,
+    /// As one sees it from inside, twice as wide as high: its middle column looks along +y, columns to the right of it
+    /// farther to the right.
+    Panorama,
     /// Debevec's angular map: the distance from the middle is proportional to the angle from the direction looked along.
     Angular,
     /// A mirror ball that fills the picture, photographed from afar.
@@ -29,14 +35,36 @@ pub struct ProbeFile {
     pub notes: Vec<String>,
 }
 
+/// How a file is to be read as a probe.
+#[derive(Debug, Clone, Copy)]
+pub struct ProbeReading<'a> {
+    /// What the picture is.
+    pub kind: ProbeKind,
+    /// By how much all of it is turned to the left, seen from above, radians.
+    pub turn: f64,
+    /// Which layer of an OpenEXR file.
+    pub layer: Option<&'a str>,
+}
+
+impl From<ProbeKind> for ProbeReading<'_> {
+    fn from(kind: ProbeKind) -> Self {
+        Self {
+            kind,
+            turn: 0.0,
+            layer: None,
+        }
+    }
+}
+
 /// Reads a probe of any kind. Angular maps and balls are resampled; their middle looks along +y (a ball's camera did), with
-/// +z upward and +x to the right.
+/// +z upward and +x to the right. Of the other kinds columns are moved, so that no light is lost.
 ///
 /// # Errors
 /// A message that begins with the path: not there, not a picture in linear radiance, of a shape that the kind cannot
-/// have, pixels that are no radiance.
-pub fn read(path: &Path, kind: ProbeKind) -> Result<ProbeFile, String> {
-    let RadianceFile { picture, notes } = radiance_file::read(path, None)?;
+/// have, pixels that are no radiance, no such layer.
+pub fn read<'a>(path: &Path, reading: impl Into<ProbeReading<'a>>) -> Result<ProbeFile, String> {
+    let ProbeReading { kind, turn, layer } = reading.into();
+    let RadianceFile { picture, notes } = radiance_file::read(path, layer)?;
     let say = |message: String| format!("{}: {message}", path.display());
     if let Some(flaws) = picture.flaws() {
         return Err(say(format!(
@@ -48,15 +76,15 @@ pub fn read(path: &Path, kind: ProbeKind) -> Result<ProbeFile, String> {
     let size_px @ [width, height] = picture.size_px();
     let circle = Circle::inscribed(size_px);
     let projection = match kind {
-        ProbeKind::LatitudeLongitude => {
+        ProbeKind::LatitudeLongitude | ProbeKind::Panorama => {
             if width != 2 * height {
                 return Err(say(format!(
-                    "{width} x {height} pixels; a latitude-longitude picture is twice as wide as high (is it an angular \
-                     map, or a mirror ball?)"
+                    "{width} x {height} pixels; a picture of latitude and longitude is twice as wide as high (is it an \
+                     angular map, or a mirror ball?)"
                 )));
             }
-            let probe = Probe::new(size_px, picture.into_pixels());
-            return probe
+            let turned = turned(&picture, kind == ProbeKind::Panorama, turn);
+            return Probe::new(size_px, turned)
                 .map(|probe| ProbeFile { probe, notes })
                 .ok_or_else(|| say("no pixels".to_owned()));
         }
@@ -75,7 +103,7 @@ pub fn read(path: &Path, kind: ProbeKind) -> Result<ProbeFile, String> {
     unwrap(
         &picture,
         projection,
-        world_from_camera(0.0, 0.0, 0.0),
+        world_from_camera(turn, 0.0, 0.0),
         width_px,
     )
     .map(|unwrapped| ProbeFile {
@@ -83,6 +111,46 @@ pub fn read(path: &Path, kind: ProbeKind) -> Result<ProbeFile, String> {
         notes,
     })
     .ok_or_else(|| say(format!("{width} x {height} pixels are too few for a probe")))
+}
+
+/// Pixels of a probe from a picture of latitude and longitude, turned to the left by an angle. A column that falls between two
+/// is shared out between them, so that each row keeps its light.
+fn turned(picture: &RadiancePicture, is_panorama: bool, turn: f64) -> Vec<Vec3> {
+    let [width, _] = picture.size_px();
+    let columns = width as f64 * (turn / TAU).rem_euclid(1.0);
+    // A panorama runs the other way, and its middle looks along +y: u = 3/4.
+    let columns = match is_panorama {
+        true => columns + 0.25 * width as f64,
+        false => columns,
+    };
+    let whole = columns.floor();
+    let mut part = (columns - whole) as f32;
+    let mut whole = whole as usize;
+    // (Turns by whole columns are exact, but for rounding.)
+    if !(1e-6..1.0 - 1e-6).contains(&part) {
+        whole += part.round() as usize;
+        part = 0.0;
+    }
+    let rows = picture.pixels().chunks(width);
+    rows.flat_map(|row| {
+        (0..width).map(move |column| {
+            // What is now in this column, and what comes after it, was that many columns before.
+            let from = |column: usize| {
+                let before = (column + 2 * width - whole % width) % width;
+                row[if is_panorama {
+                    width - 1 - before
+                } else {
+                    before
+                }]
+            };
+            let here = from(column);
+            match part > 0.0 {
+                true => here * (1.0 - part) + from(column + width - 1) * part,
+                false => here,
+            }
+        })
+    })
+    .collect()
 }
 
 /// What is wrong with a picture's pixels, in words.
@@ -107,7 +175,7 @@ mod tests {
     use std::path::PathBuf;
 
     use exr::prelude::WritableImage;
-    use glam::{DVec3, Vec3};
+    use glam::{DMat3, DVec3};
     use image::codecs::hdr::HdrEncoder;
 
     use super::*;
@@ -173,6 +241,60 @@ mod tests {
             let probe = read(&path, kind).unwrap().probe;
             assert_eq!(probe.radiance(direction), Vec3::ONE, "{kind:?}");
             assert_eq!(probe.radiance(-DVec3::X), Vec3::ZERO, "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn a_turned_probe_is_the_same_light_from_elsewhere() {
+        let folder = tempfile::tempdir().unwrap();
+        let [width, height] = [16, 8];
+        let pixels: Vec<Vec3> = (0..width * height)
+            .map(|index| Vec3::splat(f32::exp2((index * 7 % 13) as f32)))
+            .collect();
+        let path = written(folder.path(), "a.exr", [width, height], &pixels);
+        let turned = |kind, degrees: f64| {
+            let reading = ProbeReading {
+                turn: degrees.to_radians(),
+                ..ProbeReading::from(kind)
+            };
+            read(&path, reading).unwrap().probe
+        };
+        let plain = turned(ProbeKind::LatitudeLongitude, 0.0);
+        let about_z = |at: DVec3, degrees: f64| DMat3::from_rotation_z(degrees.to_radians()) * at;
+        for degrees in [0.0, 22.5, 90.0, -45.0, 720.0 + 67.5] {
+            let found = turned(ProbeKind::LatitudeLongitude, degrees);
+            let seen = turned(ProbeKind::Panorama, degrees);
+            for row in 0..height {
+                for column in 0..width {
+                    let at = plain.direction(column as f64 + 0.5, row as f64 + 0.5);
+                    let expected = plain.radiance(at);
+                    assert_eq!(found.radiance(about_z(at, degrees)), expected, "{degrees}");
+                    // From inside: as far right of the middle, which looks along +y, as the column is.
+                    let right = (column as f64 + 0.5) / width as f64 * 360.0 - 180.0;
+                    let level = DVec3::new(0.0, at.truncate().length(), at.z);
+                    let place = about_z(level, degrees - right);
+                    assert_eq!(
+                        seen.radiance(place),
+                        pixels[row * width + column],
+                        "{degrees}"
+                    );
+                }
+            }
+        }
+        // Between columns each row keeps its light.
+        let between = turned(ProbeKind::Panorama, 7.3);
+        for row in 0..height {
+            let sum = |pixels: &[Vec3]| {
+                pixels[row * width..][..width]
+                    .iter()
+                    .map(|p| p.x)
+                    .sum::<f32>()
+            };
+            let (found, expected) = (sum(between.pixels()), sum(&pixels));
+            assert!(
+                (found / expected - 1.0).abs() < 1e-5,
+                "{found} for {expected}"
+            );
         }
     }
 

@@ -250,7 +250,9 @@ fn a_photographed_ball_gives_its_surroundings_back() {
     eprintln!("response: at worst {:.1} % off", 100.0 * worst);
     assert!(worst < 0.05, "{worst}");
 
-    let probe = read(&file("probe.exr"), ProbeKind::LatitudeLongitude).unwrap();
+    let probe = read(&file("probe.exr"), ProbeKind::LatitudeLongitude)
+        .unwrap()
+        .probe;
     let truth = truth();
     // No better than the response that was estimated.
     for (name, weight) in measures() {
@@ -306,7 +308,9 @@ fn a_photographed_ball_gives_its_surroundings_back() {
         .arg(file("own.csv"))
         .arg("--out")
         .arg(file("again.hdr")));
-    let again = read(&file("again.hdr"), ProbeKind::LatitudeLongitude).unwrap();
+    let again = read(&file("again.hdr"), ProbeKind::LatitudeLongitude)
+        .unwrap()
+        .probe;
     for (name, weight) in measures() {
         let ratio = integral(&again, weight) / integral(&truth, weight);
         eprintln!("{name}, response known: {ratio}");
@@ -350,7 +354,7 @@ fn a_hand_that_moved_is_made_good() {
         .arg(&probe));
     eprintln!("{err}");
     let ratio = integral(
-        &read(&probe, ProbeKind::LatitudeLongitude).unwrap(),
+        &read(&probe, ProbeKind::LatitudeLongitude).unwrap().probe,
         near_lamp,
     ) / integral(&truth(), near_lamp);
     assert!((ratio - 1.0).abs().max_element() < 0.08, "{ratio}");
@@ -403,7 +407,9 @@ fn a_panorama_and_an_angular_map_in_radiance_are_turned_into_the_world() {
                 "--out",
             ])
             .arg(file("probe.hdr")));
-        let probe = read(&file("probe.hdr"), ProbeKind::LatitudeLongitude).unwrap();
+        let probe = read(&file("probe.hdr"), ProbeKind::LatitudeLongitude)
+            .unwrap()
+            .probe;
         let weights: [fn(DVec3) -> f64; 2] = [|direction| direction.z.max(0.0), near_lamp];
         for weight in weights {
             let ratio = unit() * integral(&probe, weight) / integral(&truth, weight);
