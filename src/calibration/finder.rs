@@ -13,8 +13,8 @@ use opencv::core::{
 use opencv::prelude::*;
 use opencv::{boxed_ref::BoxedRef, calib3d, imgproc};
 
-use super::homography::{homography, mapped};
 use super::{CalibrateError, Corner, Target, TargetMarkers};
+use crate::geometry::homography::{best_homography, mapped};
 use crate::scene::{DetectorKind, TrackingSettings};
 use crate::tracking::{Detector, TrackingError};
 
@@ -178,7 +178,7 @@ fn charuco_corners(
             continue;
         }
         let pairs: Vec<(DVec2, DVec2)> = near.into_iter().flatten().copied().collect();
-        let Some(picture_from_target) = homography(&pairs)? else {
+        let Some(picture_from_target) = best_homography(&pairs) else {
             continue;
         };
         let at = |point_m: DVec2| mapped(&picture_from_target, point_m);
@@ -222,7 +222,7 @@ fn placed_markers(
             })
             .collect();
         let pairs = placed.concat();
-        let Some(picture_from_target) = homography(&pairs)? else {
+        let Some(picture_from_target) = best_homography(&pairs) else {
             continue;
         };
         let squared = |&(target_m, pixel): &(DVec2, DVec2)| {

@@ -7,7 +7,6 @@ mod coverage;
 mod coverage_picture;
 mod deviations;
 mod finder;
-mod homography;
 mod solve;
 mod taker;
 mod target;

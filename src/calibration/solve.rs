@@ -1,17 +1,18 @@
 //! The calibration itself: OpenCV's bundle adjustment (Zhang, "A flexible new technique for camera calibration", 2000),
 //! without the views that do not fit, with no more of the lens model than the views tell.
 
-use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 use opencv::calib3d;
 use opencv::core::{
     Mat, Point2f, Point3f, Size, TermCriteria, TermCriteria_COUNT, TermCriteria_EPS, Vec3d, Vector,
 };
 use opencv::prelude::*;
 
-use super::deviations::{Parameters, deviations, parameters_of, pixel_of};
+use super::deviations::{Parameters, deviations, parameters_of};
 use super::views::{FEWEST_VIEWS, TILTED_RAD, View, Views, coverage_of, lacks_of};
 use super::{CalibrateError, Coverage, Lack};
 use crate::geometry::camera::Intrinsics;
+use crate::geometry::pose::pose_from_rodrigues;
 
 /// A camera, and how it is known.
 #[derive(Debug, Clone, PartialEq)]
@@ -265,7 +266,11 @@ impl Fit {
         let poses = turns.iter().zip(&shifts);
         Ok(Self {
             intrinsics,
-            camera_from_target: poses.map(|(turn, shift)| pose_of(turn, shift)).collect(),
+            camera_from_target: poses
+                .map(|(turn, shift)| {
+                    pose_from_rodrigues(DVec3::from_array(shift.0), DVec3::from_array(turn.0))
+                })
+                .collect(),
             view_rms_px: view_rms_px.data_typed::<f64>()?.to_vec(),
             rms_px,
         })
@@ -286,7 +291,8 @@ impl Fit {
         let camera_from_target = self.camera_from_target[k];
         let intrinsics = &self.intrinsics;
         let residuals = view.corners.iter().map(|corner| {
-            let expected_px = pixel_of(intrinsics, &camera_from_target, corner.target_m);
+            let in_camera_m = camera_from_target.transform_point3(corner.target_m.extend(0.0));
+            let expected_px = intrinsics.pixel_of(in_camera_m).unwrap_or(DVec2::NAN);
             (corner.pixel, corner.pixel - expected_px)
         });
         FittedView {
@@ -296,12 +302,6 @@ impl Fit {
             residuals: residuals.collect(),
         }
     }
-}
-
-/// A pose from a Rodrigues vector and a shift.
-fn pose_of(turn: Vec3d, shift: Vec3d) -> DAffine3 {
-    let (turn, shift) = (DVec3::from_array(turn.0), DVec3::from_array(shift.0));
-    DAffine3::from_mat3_translation(DMat3::from_quat(DQuat::from_scaled_axis(turn)), shift)
 }
 
 /// Whether the radial distortion turns back on itself within the picture: two rays would share a pixel.

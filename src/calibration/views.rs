@@ -2,8 +2,8 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::homography::{homography, mapped};
 use super::{CalibrateError, Corner, Coverage, Target, TargetFinder};
+use crate::geometry::homography::{best_homography, mapped};
 
 /// Fewer different views are no calibration.
 pub const FEWEST_VIEWS: usize = 4;
@@ -310,7 +310,7 @@ impl View {
             .iter()
             .map(|corner| (corner.target_m, corner.pixel))
             .collect();
-        let Some(picture_from_target) = homography(&pairs)? else {
+        let Some(picture_from_target) = best_homography(&pairs) else {
             return Ok(None);
         };
         let squared: f64 = pairs

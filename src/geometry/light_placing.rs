@@ -2,11 +2,13 @@
 //!
 //! The light is looked for as a direction and an inverse distance, seen from among the casters: that is as good for a
 //! lamp as for the sun, and how sure the inverse distance is tells them apart. What is made small are pixels between
-//! where shadows are seen and where they would fall (Gauss-Newton with Levenberg's damping).
+//! where shadows are seen and where they would fall (Levenberg-Marquardt).
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
 use super::camera::Intrinsics;
+use super::least_squares::{LevenbergMarquardt, NormalEquations, Problem};
+use super::matrix::dot;
 
 /// The camera and where it stands, for what has no distortion left.
 #[derive(Debug, Clone, Copy)]
@@ -20,8 +22,8 @@ pub struct Sight {
 impl Sight {
     /// The undistorted pixel of a point in the world; `None` behind the camera.
     pub fn pixel(&self, world_m: DVec3) -> Option<DVec2> {
-        let point = self.camera_from_world.transform_point3(world_m);
-        (point.z > 1e-6).then(|| self.intrinsics.pixel_from_plane(point.truncate() / point.z))
+        let in_camera_m = self.camera_from_world.transform_point3(world_m);
+        self.intrinsics.undistorted_pixel_of(in_camera_m)
     }
 
     /// The camera's place and the unit direction of the ray through an undistorted pixel, in the world.
@@ -105,6 +107,16 @@ pub enum Freedom {
     Point,
     /// Infinitely far.
     Directional,
+}
+
+impl Freedom {
+    /// 1 for each of two tangents of the light's direction and its inverse distance that may change, else 0.
+    fn axes(self) -> DVec3 {
+        match self {
+            Self::Point => DVec3::ONE,
+            Self::Directional => DVec3::new(1.0, 1.0, 0.0),
+        }
+    }
 }
 
 /// A light that was placed.
@@ -218,87 +230,104 @@ pub fn refine(
     start: FarLight,
     freedom: Freedom,
 ) -> Option<Placed> {
-    const ROUNDS: usize = 50;
-    let free = match freedom {
-        Freedom::Point => DVec3::ONE,
-        Freedom::Directional => DVec3::new(1.0, 1.0, 0.0),
+    const METHOD: LevenbergMarquardt = LevenbergMarquardt {
+        first_damping: 1e-6,
+        rounds: 50,
+        least_gain: 0.0,
     };
-    let mut light = start;
-    let mut damping = 1e-6;
-    let mut normal = DMat3::ZERO;
-    let mut now = residuals(sight, pairs, weights, &light)?;
-    for _ in 0..ROUNDS {
-        let columns = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| {
-            const STEP: f64 = 1e-6;
-            let ahead = residuals(sight, pairs, weights, &light.moved(axis * free * STEP));
-            let behind = residuals(sight, pairs, weights, &light.moved(-axis * free * STEP));
-            let slope = |(a, b): (&f64, &f64)| (a - b) / (2.0 * STEP);
-            Some(ahead?.iter().zip(&behind?).map(slope).collect::<Vec<f64>>())
-        });
-        let [Some(x), Some(y), Some(z)] = columns else {
-            return None;
-        };
-        let columns = [x, y, z];
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        normal = DMat3::from_cols_array_2d(
-            &columns
-                .each_ref()
-                .map(|row| columns.each_ref().map(|column| dot(row, column))),
-        );
-        let gradient = DVec3::from_array(columns.each_ref().map(|column| dot(column, &now)));
-        let fixed = DMat3::from_diagonal(DVec3::ONE - free);
-        let damped = normal + DMat3::from_diagonal(normal.diagonal() * damping) + fixed;
-        let step = -(damped.inverse() * gradient) * free;
-        if !step.is_finite() {
-            return None;
-        }
-        let tried = light.moved(step);
-        match residuals(sight, pairs, weights, &tried) {
-            Some(residuals) if dot(&residuals, &residuals) <= dot(&now, &now) => {
-                (light, now, damping) = (tried, residuals, damping * 0.1);
-                if step.abs().max_element() < 1e-10 {
-                    break;
-                }
-            }
-            _ if damping > 1e6 => break,
-            _ => damping = damping.max(1e-9) * 10.0,
-        }
-    }
-    let fixed = DMat3::from_diagonal(DVec3::ONE - free);
+    let found = METHOD.minimize(ShadowFit {
+        sight,
+        pairs,
+        weights,
+        freedom,
+        light: start,
+    })?;
+    let equations = found.problem.linearized()?;
+    let normal = DMat3::from_cols_array_2d(&equations.matrix.0);
     // Scaled, so that what is small is so for its units alone.
-    let scale = (normal + fixed).diagonal().map(f64::sqrt);
-    let unit = DMat3::from_diagonal(scale.recip());
-    let scaled = unit * (normal + fixed) * unit;
+    let unit = DMat3::from_diagonal(normal.diagonal().map(|entry| entry.sqrt().recip()));
+    let scaled = unit * normal * unit;
     if !scaled.is_finite() || scaled.determinant() < 1e-9 {
         return None;
     }
-    let free = DMat3::from_diagonal(free);
+    let free = DMat3::from_diagonal(freedom.axes());
     let total: f64 = weights.iter().sum();
     Some(Placed {
-        light,
-        rms_px: (now.iter().map(|r| r * r).sum::<f64>() / total.max(1e-12)).sqrt(),
+        light: found.problem.light,
+        rms_px: (found.cost / total.max(1e-12)).sqrt(),
         covariance: free * (unit * scaled.inverse() * unit) * free,
     })
 }
 
-/// Pixels between where shadows would fall and where they are seen, times the roots of their weights; `None` where one
-/// falls nowhere.
-fn residuals(
-    sight: &Sight,
-    pairs: &[ShadowPair],
-    weights: &[f64],
-    light: &FarLight,
-) -> Option<Vec<f64>> {
-    let mut residuals = Vec::with_capacity(2 * pairs.len());
-    for (pair, weight) in pairs.iter().zip(weights) {
-        let shadow_m = light.shadow_of(pair.caster_m, &pair.receiver)?;
-        let off_px = (sight.pixel(shadow_m)? - pair.shadow_px) * weight.sqrt();
-        match pair.along {
-            Some(along) => residuals.push(off_px.dot(along)),
-            None => residuals.extend(off_px.to_array()),
+/// A light that is moved to where its shadows are seen.
+struct ShadowFit<'a> {
+    sight: &'a Sight,
+    pairs: &'a [ShadowPair],
+    weights: &'a [f64],
+    freedom: Freedom,
+    light: FarLight,
+}
+
+impl ShadowFit<'_> {
+    /// Pixels between where a light's shadows would fall and where they are seen, times the roots of their weights; `None`
+    /// where one falls nowhere.
+    fn residuals(&self, light: &FarLight) -> Option<Vec<f64>> {
+        let mut residuals = Vec::with_capacity(2 * self.pairs.len());
+        for (pair, weight) in self.pairs.iter().zip(self.weights) {
+            let shadow_m = light.shadow_of(pair.caster_m, &pair.receiver)?;
+            let off_px = (self.sight.pixel(shadow_m)? - pair.shadow_px) * weight.sqrt();
+            match pair.along {
+                Some(along) => residuals.push(off_px.dot(along)),
+                None => residuals.extend(off_px.to_array()),
+            }
+        }
+        Some(residuals)
+    }
+
+    /// The derivative of the residuals along an axis of the light's freedom.
+    fn slopes(&self, axis: DVec3) -> Option<Vec<f64>> {
+        const STEP: f64 = 1e-6;
+        let step = axis * self.freedom.axes() * STEP;
+        let ahead = self.residuals(&self.light.moved(step))?;
+        let behind = self.residuals(&self.light.moved(-step))?;
+        let slope = |(a, b): (&f64, &f64)| (a - b) / (2.0 * STEP);
+        Some(ahead.iter().zip(&behind).map(slope).collect())
+    }
+}
+
+impl Problem for ShadowFit<'_> {
+    type Linearized = NormalEquations<3>;
+
+    fn cost(&self) -> Option<f64> {
+        let residuals = self.residuals(&self.light)?;
+        let cost = dot(&residuals, &residuals);
+        cost.is_finite().then_some(cost)
+    }
+
+    fn linearized(&self) -> Option<NormalEquations<3>> {
+        let residuals = self.residuals(&self.light)?;
+        let [x, y, z] = DVec3::AXES.map(|axis| self.slopes(axis));
+        let (x, y, z) = (x?, y?, z?);
+        let mut equations = NormalEquations::ZERO;
+        for (k, residual) in residuals.iter().enumerate() {
+            equations.add(&[x[k], y[k], z[k]], -residual);
+        }
+        if self.freedom == Freedom::Directional {
+            equations.add_prior(2, 0.0, 1.0);
+        }
+        Some(equations)
+    }
+
+    fn moved(&self, step: &[f64; 3]) -> Self {
+        Self {
+            light: self.light.moved(DVec3::from(*step)),
+            ..*self
         }
     }
-    Some(residuals)
+
+    fn is_negligible(&self, step: &[f64; 3]) -> bool {
+        DVec3::from(*step).abs().max_element() < 1e-10
+    }
 }
 
 #[cfg(test)]

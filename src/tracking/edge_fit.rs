@@ -8,9 +8,9 @@ use std::sync::LazyLock;
 
 use glam::{DMat2, DVec2};
 
-use super::least_squares::inverse;
 use super::light::Grey;
 use super::print::{COLUMNS, Edge, ROWS};
+use crate::geometry::matrix::{Matrix, dot};
 
 /// Half the window across an edge: at most so many pixels,
 const ACROSS_PX: f64 = 3.0;
@@ -187,7 +187,8 @@ impl Steps {
     }
 }
 
-/// The normal equations of black, contrast, contrast · offset and contrast · blur.
+/// The normal equations of black, contrast, contrast · offset and contrast · blur; their lower triangle in single
+/// precision, since they are added to for each pixel.
 #[derive(Default)]
 struct Sums {
     normal: [[f32; 4]; 4],
@@ -216,11 +217,10 @@ impl Sums {
         let entry = |i: usize, j: usize| f64::from(self.normal[i.max(j)][i.min(j)]);
         let normal: [[f64; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
         let right: [f64; 3] = std::array::from_fn(|i| f64::from(self.right[i]));
-        let inverse = inverse(&normal)?;
-        let solution: [f64; 3] =
-            std::array::from_fn(|i| (0..3).map(|j| inverse[i][j] * right[j]).sum());
+        let inverse = Matrix(normal).inverse()?;
+        let solution = inverse * right;
         let [_, contrast, shift] = solution;
-        let explained: f64 = (0..3).map(|i| solution[i] * right[i]).sum();
+        let explained = dot(&solution, &right);
         let unexplained = (f64::from(self.squares) - explained).max(0.0);
         let noise = unexplained / f64::from(self.count - 3) + NOISE_FLOOR;
         if contrast < LEAST_CONTRAST {
@@ -229,12 +229,8 @@ impl Sums {
         }
         // What is left of the fourth equation once the other three are solved.
         let blurring: [f64; 3] = std::array::from_fn(|i| entry(i, 3));
-        let blur_left =
-            f64::from(self.right[3]) - (0..3).map(|i| blurring[i] * solution[i]).sum::<f64>();
-        let blur_information = entry(3, 3)
-            - (0..3)
-                .map(|i| blurring[i] * (0..3).map(|j| inverse[i][j] * blurring[j]).sum::<f64>())
-                .sum::<f64>();
+        let blur_left = f64::from(self.right[3]) - dot(&blurring, &solution);
+        let blur_information = entry(3, 3) - dot(&blurring, &(inverse * blurring));
         // By the logarithm of the deviation, hence twice the variance.
         let (unit, certainty) = (
             2.0 * blur_variance,
@@ -252,7 +248,7 @@ impl Sums {
         };
         Some(EdgeView::Seen(EdgeFit {
             offset_cells: shift / contrast,
-            variance_cells: inverse[2][2] * noise / (contrast * contrast),
+            variance_cells: inverse.0[2][2] * noise / (contrast * contrast),
             blur_error,
         }))
     }

@@ -7,7 +7,7 @@
 use glam::{DAffine3, DVec2};
 
 use super::light::Grey;
-use super::pixel_pose::project;
+use super::pixel_pose::pixel_of;
 use super::print::Print;
 use crate::geometry::camera::Intrinsics;
 
@@ -46,7 +46,7 @@ pub(super) fn find_shift(
     pose: &DAffine3,
     reach: &Reach,
 ) -> Option<DVec2> {
-    let place = |point_m: DVec2| Some(project(intrinsics, pose, point_m)?.pixel);
+    let place = |point_m: DVec2| pixel_of(intrinsics, pose, point_m);
     let corners = print.corners_m().map(place);
     let [Some(a), Some(b), Some(c), Some(d)] = corners else {
         return None;

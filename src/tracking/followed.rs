@@ -6,14 +6,14 @@ use super::condition::Condition;
 use super::filter::Filter;
 use super::follow::{REACHES, find_shift};
 use super::layout::{Layout, Located};
-use super::least_squares::Matrix6;
 use super::light::Grey;
-use super::pixel_pose::{PixelPose, difference, fit_pose, moved, project};
-use super::pose::{Sighting, refine, rotation_between};
+use super::pixel_pose::{PixelPose, fit_pose, pixel_of};
+use super::pose::{Sighting, refine};
 use super::twin::{Twin, twin_of};
-use super::undistort::undistorted_pixel;
 use super::{Alternative, AnchorPose, Status, Why};
 use crate::geometry::camera::Intrinsics;
+use crate::geometry::matrix::Matrix;
+use crate::geometry::pose::{PoseStep, difference, moved, rotation_between};
 
 /// What was seen longer ago than this decides nothing any more, seconds.
 const MEMORY_SECS: f64 = 0.5;
@@ -73,7 +73,7 @@ struct Sight {
 }
 
 /// A turn (left of the rotation, rad/s) and a shift (m/s).
-type Motion = [f64; 6];
+type Motion = PoseStep;
 
 impl Followed {
     pub(super) fn new(layout: Layout, smooths: bool) -> Self {
@@ -113,15 +113,15 @@ impl Followed {
         intrinsics: &Intrinsics,
         now_secs: f64,
         pose: DAffine3,
-        covariance: Matrix6,
-    ) -> (DAffine3, Matrix6) {
+        covariance: Matrix<6>,
+    ) -> (DAffine3, Matrix<6>) {
         let Some(Smoothing { filter, shown }) = &mut self.smoothing else {
             return (pose, covariance);
         };
         let is_new = filter.is_none();
-        let filter = filter.get_or_insert_with(|| Filter::new(now_secs, pose, &covariance));
+        let filter = filter.get_or_insert_with(|| Filter::new(now_secs, pose, covariance));
         if !is_new {
-            filter.add(now_secs, &pose, &covariance);
+            filter.add(now_secs, &pose, covariance);
         }
         // Where nothing moves, not a bit of the picture does.
         if is_new || self.layout.distance_px(intrinsics, shown, filter.pose()) > INVISIBLE_PX {
@@ -176,9 +176,11 @@ impl Followed {
         for (print, shift) in self.layout.prints.iter().zip(shifts) {
             let Some(shift) = shift else { continue };
             for point_m in print.corners_m() {
-                let pixel = project(intrinsics, &pose, point_m)?.pixel + *shift;
-                let pixel = undistorted_pixel(intrinsics, pixel)?;
-                sightings.push(Sighting { point_m, pixel });
+                let distorted_px = pixel_of(intrinsics, &pose, point_m)? + *shift;
+                sightings.push(Sighting {
+                    point_m: point_m.extend(0.0),
+                    pixel: intrinsics.undistorted_pixel(distorted_px)?,
+                });
             }
         }
         Some(refine(intrinsics, &sightings, pose)?.camera_from_anchor)
@@ -260,7 +262,7 @@ impl Followed {
             why: (!believed).then_some(Why::TwoPoses),
             markers: fitted.seen.iter().filter(|&&seen| seen).count() as u32,
             camera_from_anchor: Some(camera_from_anchor),
-            covariance: Some(covariance),
+            covariance: Some(covariance.0),
             // An edge tells one coordinate of a corner's two.
             reprojection_px: fitted.rms_px * std::f64::consts::SQRT_2,
             alternative: twin.map(|twin| Alternative {
@@ -313,7 +315,7 @@ impl Followed {
             why: solutions.ambiguous.then_some(Why::TwoPoses),
             markers: located.markers as u32,
             camera_from_anchor: Some(camera_from_anchor),
-            covariance: Some(covariance),
+            covariance: Some(covariance.0),
             reprojection_px: chosen.rms_px(corners),
             alternative: other.map(|solution| Alternative {
                 camera_from_anchor: solution.camera_from_anchor,
@@ -398,8 +400,8 @@ impl Sight {
 }
 
 /// Of a turn, whatever its direction, rad².
-fn turn_variance(covariance: &Matrix6) -> f64 {
-    (0..3).map(|k| covariance[k][k]).sum()
+fn turn_variance(covariance: &Matrix<6>) -> f64 {
+    (0..3).map(|k| covariance.0[k][k]).sum()
 }
 
 /// ln(eᵃ + eᵇ)

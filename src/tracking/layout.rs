@@ -3,13 +3,12 @@
 use glam::{DAffine3, DVec2};
 
 use super::aruco::printed_cells;
-use super::least_squares::Matrix6;
-use super::pixel_pose::project;
-use super::pose::{self, Sighting, Solutions, pixel_of};
+use super::pixel_pose::pixel_of;
+use super::pose::{self, Sighting, Solutions};
 use super::print::Print;
-use super::undistort::undistorted_pixel;
 use super::{Detection, TrackingError, Why};
 use crate::geometry::camera::Intrinsics;
+use crate::geometry::matrix::Matrix;
 use crate::scene::{Anchor, Family};
 
 /// A board's pose that leaves more than this is looked through for a marker that does not fit, pixels.
@@ -29,7 +28,7 @@ pub(super) struct Layout {
 pub(super) struct Located {
     pub(super) solutions: Solutions,
     /// Of the better one: a turn about the anchor's origin (left of the rotation) and a shift.
-    pub(super) covariance: Matrix6,
+    pub(super) covariance: Matrix<6>,
     /// Markers that they rest on.
     pub(super) markers: usize,
 }
@@ -65,7 +64,7 @@ impl Layout {
         let corners = self.prints.iter().flat_map(Print::corners_m);
         corners
             .map(|point_m| {
-                let place = |pose| Some(project(intrinsics, pose, point_m)?.pixel);
+                let place = |pose| pixel_of(intrinsics, pose, point_m);
                 match (place(a), place(b)) {
                     (Some(a), Some(b)) => a.distance(b),
                     _ => f64::INFINITY,
@@ -136,27 +135,25 @@ impl Layout {
 impl SeenMarker {
     /// `None` where the lens distortion has no inverse.
     fn new(intrinsics: &Intrinsics, corners_m: [DVec2; 4], corners_px: [DVec2; 4]) -> Option<Self> {
-        let mut sightings = [Sighting {
-            point_m: DVec2::ZERO,
-            pixel: DVec2::ZERO,
-        }; 4];
-        for (sighting, (point_m, corner_px)) in sightings
-            .iter_mut()
-            .zip(corners_m.into_iter().zip(corners_px))
-        {
-            let pixel = undistorted_pixel(intrinsics, corner_px)?;
-            *sighting = Sighting { point_m, pixel };
-        }
-        Some(Self { sightings })
+        let [a, b, c, d] = std::array::from_fn(|k| {
+            Some(Sighting {
+                point_m: corners_m[k].extend(0.0),
+                pixel: intrinsics.undistorted_pixel(corners_px[k])?,
+            })
+        });
+        Some(Self {
+            sightings: [a?, b?, c?, d?],
+        })
     }
 
-    /// Of the farthest corner from where the pose puts it.
+    /// The distance of the farthest corner from where the pose puts it, pixels; infinite behind the camera.
     fn distance_px(&self, intrinsics: &Intrinsics, camera_from_anchor: &DAffine3) -> f64 {
         self.sightings
             .iter()
             .map(|sighting| {
-                (pixel_of(intrinsics, camera_from_anchor, sighting.point_m) - sighting.pixel)
-                    .length()
+                let in_camera_m = camera_from_anchor.transform_point3(sighting.point_m);
+                let expected_px = intrinsics.undistorted_pixel_of(in_camera_m);
+                expected_px.map_or(f64::INFINITY, |pixel| pixel.distance(sighting.pixel))
             })
             .fold(0.0, f64::max)
     }

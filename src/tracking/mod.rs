@@ -17,7 +17,6 @@ mod filter;
 mod follow;
 mod followed;
 mod layout;
-mod least_squares;
 mod light;
 pub mod mapping;
 mod pixel_pose;
@@ -26,14 +25,12 @@ mod print;
 mod refine;
 mod tracker;
 mod twin;
-mod undistort;
 
 use glam::DAffine3;
 
 pub use aruco::{Quad, printed_cells, rejected_quads};
 pub use detector::{Detection, Detector};
 pub use tracker::{Tracker, grey_from_rgba};
-pub use undistort::undistorted_pixel;
 
 /// How far a pose can be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,15 +6,17 @@
 //! shadow's edge across a marker has no say. (Edges that steer a pose: C. Harris, "Tracking with rigid models", in
 //! Active Vision, 1992; the M-estimator is Tukey's.)
 
-use glam::{DAffine3, DMat2, DMat3, DQuat, DVec2, DVec3};
+use glam::{DAffine3, DMat2, DVec2, DVec3};
 
 use super::condition::Condition;
 use super::edge_fit::{BlurError, EdgeView, fit_edge};
-use super::least_squares::{accumulate, inverse, solve_positive_definite};
 use super::light::Grey;
 use super::print::Print;
-use super::undistort::distortion_jacobian;
-use crate::geometry::camera::Intrinsics;
+use crate::geometry::camera::{Intrinsics, Projection};
+use crate::geometry::least_squares::NormalEquations;
+use crate::geometry::matrix::Matrix;
+use crate::geometry::pose::{PoseStep, by_step, moved};
+use crate::geometry::robust::{deviation, tukey_weight};
 
 /// Parameters of a step: a turn about the anchor's origin (left of the rotation), a shift, how far all edges lie
 /// toward the black (ink runs, and light that the camera does not encode as it says spills), and by what part of its
@@ -28,8 +30,6 @@ const SIZE: usize = 7;
 const SPILL_PX: f64 = 0.1;
 /// An edge is never known better than this, pixels: paper bends, sheets are not printed to the micrometre.
 const FLOOR_PX: f64 = 0.02;
-/// Tukey's constant, standard deviations.
-const TUKEY: f64 = 4.685;
 /// Once a step moves no edge by more than this (root mean square), the pose is found, pixels.
 const SETTLED_PX: f64 = 0.05;
 /// and once the blur is known: with too small a one, whole prints are taken for something else. Change of its variance,
@@ -46,8 +46,8 @@ const MOST_REVERSED: f64 = 0.15;
 /// A pose that the pixels agree on.
 pub(super) struct PixelPose {
     pub(super) camera_from_anchor: DAffine3,
-    /// Of a turn about the anchor's origin (left of the rotation; radians) and a shift (metres).
-    pub(super) covariance: [[f64; POSE_PARAMETERS]; POSE_PARAMETERS],
+    /// Covariance of a step from the pose.
+    pub(super) covariance: Matrix<POSE_PARAMETERS>,
     /// Per print, whether it was seen.
     pub(super) seen: Vec<bool>,
     /// Root mean square distance, pixels, of the edges from where the pose and the scene put them; without those that
@@ -90,77 +90,40 @@ impl Edge {
     }
 }
 
-/// Where a pose puts a point of the anchor's plane, and the derivative by its place in camera space.
-pub(super) struct Projected {
-    /// Distorted pixel.
-    pub(super) pixel: DVec2,
-    /// By x, y and z, pixels per metre.
-    by_place: [DVec2; 3],
+/// A point of the anchor as the camera sees it (distorted).
+pub(super) struct AnchorPoint {
+    pub(super) projection: Projection,
     /// The point from the anchor's origin, in camera axes.
-    turned: DVec3,
+    turned_m: DVec3,
 }
 
-impl Projected {
-    /// The derivative of the pixel along a direction of the picture by a turn about the anchor's origin and a shift.
-    pub(super) fn row(&self, direction: DVec2) -> [f64; POSE_PARAMETERS] {
-        let gradient = DVec3::from(self.by_place.map(|column| column.dot(direction)));
-        // gradient · (turn × turned) = turn · (turned × gradient)
-        let by_turn = self.turned.cross(gradient);
-        [
-            by_turn.x, by_turn.y, by_turn.z, gradient.x, gradient.y, gradient.z,
-        ]
-    }
-
-    /// The step in the picture, pixels, for one of the point in camera axes, metres.
-    fn step_px(&self, step_m: DVec3) -> DVec2 {
-        let [x, y, z] = self.by_place;
-        x * step_m.x + y * step_m.y + z * step_m.z
+impl AnchorPoint {
+    /// The derivative of the pixel along a direction of the picture by a step of the pose.
+    pub(super) fn by_step(&self, direction: DVec2) -> PoseStep {
+        by_step(self.turned_m, self.projection.gradient(direction))
     }
 }
 
-/// `None` behind the camera.
+/// Where a pose puts a point of the anchor's plane; `None` behind the camera.
 pub(super) fn project(
     intrinsics: &Intrinsics,
     camera_from_anchor: &DAffine3,
     point_m: DVec2,
-) -> Option<Projected> {
-    let turned = camera_from_anchor.matrix3 * point_m.extend(0.0);
-    let in_camera = turned + camera_from_anchor.translation;
-    if in_camera.z <= 1e-6 {
-        return None;
-    }
-    let image = in_camera.truncate() / in_camera.z;
-    let lens = distortion_jacobian(intrinsics, image);
-    let scale = DMat2::from_diagonal(intrinsics.focal_px / in_camera.z) * lens;
-    Some(Projected {
-        pixel: intrinsics.pixel_from_plane(intrinsics.distort(image)),
-        by_place: [scale.x_axis, scale.y_axis, -(scale * image)],
-        turned,
+) -> Option<AnchorPoint> {
+    let turned_m = camera_from_anchor.matrix3 * point_m.extend(0.0);
+    Some(AnchorPoint {
+        projection: intrinsics.project(turned_m + camera_from_anchor.translation)?,
+        turned_m,
     })
 }
 
-/// A pose after a turn about the anchor's origin (left of the rotation, radians) and a shift (metres).
-pub(super) fn moved(pose: &DAffine3, step: [f64; POSE_PARAMETERS]) -> DAffine3 {
-    let [rx, ry, rz, tx, ty, tz] = step;
-    let turn = DQuat::from_scaled_axis(DVec3::new(rx, ry, rz));
-    let rotation = (turn * DQuat::from_mat3(&pose.matrix3)).normalize();
-    DAffine3::from_mat3_translation(
-        DMat3::from_quat(rotation),
-        pose.translation + DVec3::new(tx, ty, tz),
-    )
-}
-
-/// The turn (left of the rotation) and the shift from one pose to another.
-pub(super) fn difference(to: &DAffine3, from: &DAffine3) -> [f64; 6] {
-    let rotation = DQuat::from_mat3(&(to.matrix3 * from.matrix3.transpose())).normalize();
-    let turn = rotation.to_scaled_axis();
-    // The short way round.
-    let turn = match turn.length() > std::f64::consts::PI {
-        true => turn * (1.0 - std::f64::consts::TAU / turn.length()),
-        false => turn,
-    };
-    let shift_m: DVec3 = to.translation - from.translation;
-    [turn.x, turn.y, turn.z, shift_m.x, shift_m.y, shift_m.z]
+/// The distorted pixel of a point of the anchor's plane; `None` behind the camera.
+pub(super) fn pixel_of(
+    intrinsics: &Intrinsics,
+    camera_from_anchor: &DAffine3,
+    point_m: DVec2,
+) -> Option<DVec2> {
+    intrinsics.pixel_of(camera_from_anchor.transform_point3(point_m.extend(0.0)))
 }
 
 /// The pose near `start` that puts the edges of the prints where the picture has them. `None` when too few edges are
@@ -253,10 +216,12 @@ fn measure(
     for edge in &print.edges {
         let outward_m = edge.point_m - print.center_m();
         let point_m = print.center_m() + scale * outward_m;
-        let Some(projected) = project(intrinsics, pose, point_m) else {
+        let Some(point) = project(intrinsics, pose, point_m) else {
             continue;
         };
-        let in_picture = |step_m: DVec2| projected.step_px(pose.matrix3 * step_m.extend(0.0));
+        let expected_px = point.projection.pixel;
+        let in_picture =
+            |step_m: DVec2| point.projection.step_px(pose.matrix3 * step_m.extend(0.0));
         let pixels_from_cells =
             scale * DMat2::from_cols(in_picture(edge.across_m), in_picture(edge.along_m));
         // The gradient of the place across.
@@ -267,13 +232,7 @@ fn measure(
         }
         let normal = gradient / length;
         let blur_variance = condition.blur_variance_along(normal);
-        let fit = match fit_edge(
-            picture,
-            edge,
-            projected.pixel,
-            pixels_from_cells,
-            blur_variance,
-        ) {
+        let fit = match fit_edge(picture, edge, expected_px, pixels_from_cells, blur_variance) {
             EdgeView::Seen(fit) => fit,
             EdgeView::Reversed => {
                 reversed += 1;
@@ -282,13 +241,13 @@ fn measure(
             EdgeView::Blank => continue,
         };
         let offset_px = fit.offset_cells / length;
-        let [rx, ry, rz, tx, ty, tz] = projected.row(normal);
+        let [rx, ry, rz, tx, ty, tz] = point.by_step(normal);
         let by_size = normal.dot(in_picture(outward_m));
         let toward_black = if edge.brightens { -1.0 } else { 1.0 };
         edges.push(Edge {
             print: index,
             point_m: edge.point_m,
-            seen_px: projected.pixel + normal * offset_px,
+            seen_px: expected_px + normal * offset_px,
             normal,
             offset_px,
             variance: fit.variance_cells / (length * length) + FLOOR_PX * FLOOR_PX,
@@ -315,41 +274,27 @@ fn solve(edges: &mut [Edge], condition: &Condition, guess: &Guess) -> Option<Sol
     let mut found = None;
     let mut scale = f64::INFINITY;
     for _ in 0..ROUNDS {
-        let mut normal = [[0.0; PARAMETERS]; PARAMETERS];
-        let mut right = [0.0; PARAMETERS];
+        let mut equations = NormalEquations::<PARAMETERS>::ZERO;
         for edge in edges.iter() {
-            let certainty = (edge.weight / edge.variance).sqrt();
-            let row = edge.row.map(|entry| entry * certainty);
-            accumulate(&mut normal, &mut right, &row, edge.offset_px * certainty);
+            equations.add_weighted(&edge.row, edge.offset_px, edge.weight / edge.variance);
         }
         let (size_error, size_certainty) = condition.size();
-        normal[SPILL][SPILL] += 1.0 / (SPILL_PX * SPILL_PX);
-        normal[SIZE][SIZE] += size_certainty;
-        right[SIZE] += size_certainty * (size_error - guess.size_error);
-        let step = solve_positive_definite(&normal, &right)?;
+        equations.add_prior(SPILL, 0.0, 1.0 / (SPILL_PX * SPILL_PX));
+        equations.add_prior(SIZE, size_error - guess.size_error, size_certainty);
+        let step = equations.solve()?;
 
         let left = |edge: &Edge| edge.left_px(&step) / edge.variance.sqrt();
         scale = deviation(edges.iter().map(left)).clamp(1.0, scale);
         for edge in edges.iter_mut() {
-            let share = left(edge) / (TUKEY * scale);
-            edge.weight = (1.0 - share * share).max(0.0).powi(2);
+            edge.weight = tukey_weight(left(edge), scale);
         }
-        found = Some((step, normal));
+        found = Some((step, equations));
     }
-    let (step, normal) = found?;
+    let (step, equations) = found?;
     Some(Solved {
         step,
-        size_certainty: 1.0 / inverse(&normal)?[SIZE][SIZE],
+        size_certainty: 1.0 / equations.covariance()?.0[SIZE][SIZE],
     })
-}
-
-/// The standard deviation of a Gaussian with the median of these distances from 0; there must be one.
-fn deviation(distances: impl Iterator<Item = f64>) -> f64 {
-    let mut distances: Vec<f64> = distances.map(f64::abs).collect();
-    let middle = distances.len() / 2;
-    let (_, median, _) = distances.select_nth_unstable_by(middle, f64::total_cmp);
-    // The median of |x| of a unit Gaussian.
-    *median / 0.6745
 }
 
 fn fitted(
@@ -382,22 +327,19 @@ fn fitted(
     if !seen.contains(&true) {
         return None;
     }
-    let mut normal = [[0.0; POSE_PARAMETERS]; POSE_PARAMETERS];
+    let mut equations = NormalEquations::<POSE_PARAMETERS>::ZERO;
     let (mut squares, mut used) = (0.0, 0.0);
     for edge in &edges {
-        let certainty = (edge.weight / edge.variance).sqrt();
-        let row = pose_part(&edge.row).map(|entry| entry * certainty);
-        accumulate(&mut normal, &mut [0.0; POSE_PARAMETERS], &row, 0.0);
+        equations.add_weighted(&pose_part(&edge.row), 0.0, edge.weight / edge.variance);
         let left_px = edge.left_px(&solved.step);
         squares += edge.weight * left_px * left_px / edge.variance;
         used += edge.weight;
     }
     // Edges err more than their pixels' noise says where a codec has been at work.
     let excess = (squares / (used - PARAMETERS as f64).max(1.0)).max(1.0);
-    let covariance = inverse(&normal)?.map(|row| row.map(|entry| entry * excess));
     Some(PixelPose {
         camera_from_anchor: guess.camera_from_anchor,
-        covariance,
+        covariance: equations.covariance()? * excess,
         seen,
         rms_px: (squares_px / f64::max(counted, 1.0)).sqrt(),
         excess,

@@ -6,7 +6,7 @@ use opencv::imgproc;
 use super::followed::Followed;
 use super::layout::{Layout, Located};
 use super::light::Grey;
-use super::pixel_pose::{PixelPose, project};
+use super::pixel_pose::{PixelPose, pixel_of};
 use super::{AnchorPose, Detection, Detector, TrackingError, Why};
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
@@ -227,7 +227,7 @@ fn add_seen(
     {
         let corners = print
             .corners_m()
-            .map(|corner_m| Some(project(intrinsics, &fitted.camera_from_anchor, corner_m)?.pixel));
+            .map(|corner_m| pixel_of(intrinsics, &fitted.camera_from_anchor, corner_m));
         let is_there = detections
             .iter()
             .any(|detection| (detection.family, detection.id) == (family, id));

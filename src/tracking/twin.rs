@@ -5,11 +5,12 @@
 
 use glam::DAffine3;
 
-use super::least_squares::{accumulate, solve_positive_definite};
-use super::pixel_pose::{Edge, PixelPose, moved, project};
-use super::pose::{Sighting, ippe_starts, pixel_of, rotation_between};
+use super::pixel_pose::{Edge, PixelPose, pixel_of, project};
+use super::pose::{Sighting, ippe_starts};
 use super::print::Print;
 use crate::geometry::camera::Intrinsics;
+use crate::geometry::least_squares::{NormalEquations, Problem, gauss_newton};
+use crate::geometry::pose::{PoseStep, moved, rotation_between};
 
 /// Poses nearer to each other are one, radians.
 const SAME: f64 = 0.01;
@@ -31,14 +32,15 @@ pub(super) struct Twin {
 pub(super) fn twin_of(pose: &PixelPose, intrinsics: &Intrinsics, prints: &[Print]) -> Option<Twin> {
     let here = &pose.camera_from_anchor;
     let seen = prints.iter().zip(&pose.seen).filter(|(_, seen)| **seen);
-    let sightings: Vec<Sighting> = seen
-        .flat_map(|(print, _)| print.corners_m())
-        .map(|point_m| Sighting {
-            point_m,
-            pixel: pixel_of(intrinsics, here, point_m),
+    let corners_m = seen.flat_map(|(print, _)| print.corners_m());
+    let sightings: Option<Vec<Sighting>> = corners_m
+        .map(|corner_m| {
+            let point_m = corner_m.extend(0.0);
+            let pixel = intrinsics.undistorted_pixel_of(here.transform_point3(point_m))?;
+            Some(Sighting { point_m, pixel })
         })
         .collect();
-    let start = ippe_starts(intrinsics, &sightings)?
+    let start = ippe_starts(intrinsics, &sightings?)?
         .into_iter()
         .max_by(|a, b| rotation_between(a, here).total_cmp(&rotation_between(b, here)))?;
     if rotation_between(&start, here) < SAME {
@@ -51,50 +53,83 @@ pub(super) fn twin_of(pose: &PixelPose, intrinsics: &Intrinsics, prints: &[Print
     let other = refined(pose, intrinsics, start)
         .filter(is_other)
         .unwrap_or(start);
-    let here = distances(pose, intrinsics, &here)?;
-    let there = distances(pose, intrinsics, &other)?;
-    let error = |distances_px: &[f64]| -> f64 {
-        let edges = pose.edges.iter().zip(distances_px);
-        edges
-            .map(|(edge, px)| edge.weight * px * px / edge.variance)
-            .sum()
-    };
+    let edges = &pose.edges;
+    let here = distances(edges, intrinsics, &here)?;
+    let there = distances(edges, intrinsics, &other)?;
     Some(Twin {
         camera_from_anchor: other,
-        odds: 0.5 * (error(&there) - error(&here)) / pose.excess,
+        odds: 0.5 * (error(edges, &there) - error(edges, &here)) / pose.excess,
         rms_px: (there.iter().map(|px| px * px).sum::<f64>() / there.len() as f64).sqrt(),
     })
 }
 
-/// Gauss-Newton steps on the distances of the edges, each with the weight that it has.
+/// The pose near `start` that fits the edges best, each with the weight that it has.
 fn refined(pose: &PixelPose, intrinsics: &Intrinsics, start: DAffine3) -> Option<DAffine3> {
     const ROUNDS: usize = 8;
-    let mut place = start;
-    for _ in 0..ROUNDS {
-        let mut normal = [[0.0; 6]; 6];
-        let mut right = [0.0; 6];
-        for edge in &pose.edges {
-            let projected = project(intrinsics, &place, edge.point_m)?;
-            let certainty = (edge.weight / edge.variance).sqrt();
-            let row = projected.row(edge.normal).map(|entry| entry * certainty);
-            let distance_px = edge.normal.dot(edge.seen_px - projected.pixel);
-            accumulate(&mut normal, &mut right, &row, distance_px * certainty);
-        }
-        let step = solve_positive_definite(&normal, &right)?;
-        place = moved(&place, step);
-        if step.iter().all(|entry| entry.abs() < SETTLED) {
-            break;
-        }
-    }
+    let start = EdgeFit {
+        edges: &pose.edges,
+        intrinsics,
+        place: start,
+    };
+    let EdgeFit { place, .. } = gauss_newton(start, ROUNDS)?;
     let faces = place.matrix3.z_axis.dot(place.translation) < 0.0;
     (place.is_finite() && faces).then_some(place)
 }
 
-/// Of each edge from where a pose puts it, pixels.
-fn distances(pose: &PixelPose, intrinsics: &Intrinsics, place: &DAffine3) -> Option<Vec<f64>> {
+/// A pose that is moved to where edges fit it.
+struct EdgeFit<'a> {
+    edges: &'a [Edge],
+    intrinsics: &'a Intrinsics,
+    place: DAffine3,
+}
+
+impl Problem for EdgeFit<'_> {
+    type Linearized = NormalEquations<6>;
+
+    fn cost(&self) -> Option<f64> {
+        let distances_px = distances(self.edges, self.intrinsics, &self.place)?;
+        Some(error(self.edges, &distances_px))
+    }
+
+    fn linearized(&self) -> Option<NormalEquations<6>> {
+        let mut equations = NormalEquations::ZERO;
+        for edge in self.edges {
+            let point = project(self.intrinsics, &self.place, edge.point_m)?;
+            let distance_px = edge.normal.dot(edge.seen_px - point.projection.pixel);
+            equations.add_weighted(
+                &point.by_step(edge.normal),
+                distance_px,
+                edge.weight / edge.variance,
+            );
+        }
+        Some(equations)
+    }
+
+    fn moved(&self, step: &PoseStep) -> Self {
+        Self {
+            place: moved(&self.place, *step),
+            ..*self
+        }
+    }
+
+    fn is_negligible(&self, step: &PoseStep) -> bool {
+        step.iter().all(|entry| entry.abs() < SETTLED)
+    }
+}
+
+/// The weighted squares of the edges' distances, beside their variances.
+fn error(edges: &[Edge], distances_px: &[f64]) -> f64 {
+    let edges = edges.iter().zip(distances_px);
+    edges
+        .map(|(edge, px)| edge.weight * px * px / edge.variance)
+        .sum()
+}
+
+/// How far each edge lies from where a pose puts it, pixels.
+fn distances(edges: &[Edge], intrinsics: &Intrinsics, place: &DAffine3) -> Option<Vec<f64>> {
     let distance_px = |edge: &Edge| {
-        let projected = project(intrinsics, place, edge.point_m)?;
-        Some(edge.normal.dot(edge.seen_px - projected.pixel))
+        let place_px = pixel_of(intrinsics, place, edge.point_m)?;
+        Some(edge.normal.dot(edge.seen_px - place_px))
     };
-    pose.edges.iter().map(distance_px).collect()
+    edges.iter().map(distance_px).collect()
 }

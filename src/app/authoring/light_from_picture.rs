@@ -12,6 +12,7 @@ use crate::geometry::camera::Intrinsics;
 use crate::geometry::light_placing::{
     Facet, FarLight, Freedom, Placed, ShadowPair, Sight, Unplaced, place_light, refine,
 };
+use crate::geometry::robust::{deviation, tukey_weight};
 use crate::geometry::shadow_outline::{OutlinePoint, Standing};
 use crate::light::bounce::{Reflector, Surroundings};
 use crate::light::contrast::{ContrastSample, Strengths, strengths};
@@ -285,14 +286,8 @@ impl PicturedThings {
             let off_px = self.sight.pixel(shadow_m)? - pair.shadow_px;
             off.push(off_px.dot(pair.along.unwrap_or_default()).abs());
         }
-        let mut sorted = off.clone();
-        sorted.sort_by(f64::total_cmp);
-        let scale_px = (1.4826 * sorted[sorted.len() / 2]).max(LEAST_SCALE_PX);
-        let weight = |off_px: &f64| {
-            (1.0 - (off_px / (4.685 * scale_px)).powi(2))
-                .max(0.0)
-                .powi(2)
-        };
+        let scale_px = deviation(off.iter().copied()).max(LEAST_SCALE_PX);
+        let weight = |off_px: &f64| tukey_weight(*off_px, scale_px);
         Some(off.iter().map(weight).collect())
     }
 

@@ -13,7 +13,7 @@ use super::views::View;
 use super::wish::Overlay;
 use crate::geometry::light_placing::Sight;
 use crate::scene::Scene;
-use crate::tracking::{Quad, Status, undistorted_pixel};
+use crate::tracking::{Quad, Status};
 
 const AXIS_COLOURS: [Color32; 3] = [
     Color32::from_rgb(230, 70, 60),
@@ -237,7 +237,8 @@ impl Overlays<'_> {
 
     /// The picture is shown without distortion, markers are found with it.
     fn place_of_distorted(&self, pixel: DVec2) -> Option<Pos2> {
-        undistorted_pixel(&self.picture.intrinsics, pixel).map(|pixel| self.fit.place_of(pixel))
+        let undistorted_px = self.picture.intrinsics.undistorted_pixel(pixel)?;
+        Some(self.fit.place_of(undistorted_px))
     }
 
     fn place(&self, camera_from_anchor: &DAffine3, point_m: DVec3) -> Option<Pos2> {

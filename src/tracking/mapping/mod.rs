@@ -6,7 +6,6 @@ use std::collections::BTreeMap;
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::Detection;
-use super::undistort::undistorted_pixel;
 use crate::geometry::camera::Intrinsics;
 use crate::scene::{Family, Marker};
 use bundle::{Bundle, Certainty, Freedom, MARKER_UNKNOWNS, Placed, Seen, View};
@@ -306,7 +305,7 @@ fn once_seen(
         .filter_map(|detection| {
             let corners = detection
                 .corners_px
-                .map(|corner| undistorted_pixel(intrinsics, corner));
+                .map(|corner| intrinsics.undistorted_pixel(corner));
             let [Some(a), Some(b), Some(c), Some(d)] = corners else {
                 return None;
             };

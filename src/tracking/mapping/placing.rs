@@ -3,11 +3,10 @@
 //! A lone square has two poses that explain its picture about equally well; the wrong one of them differs from picture
 //! to picture, the right one does not. So each new marker is put where one picture says, and the other pictures vote.
 
-use glam::{DAffine3, DVec2, DVec3};
+use glam::DAffine3;
 
-use super::super::least_squares::{accumulate, solve_positive_definite};
 use super::super::pose::{self, Sighting};
-use super::bundle::{Placed, Seen, UNIT_CORNERS, View, project, turned};
+use super::bundle::{Placed, Seen, UNIT_CORNERS, View};
 use crate::geometry::camera::Intrinsics;
 
 /// Pictures that say where a new marker may be, and those that vote.
@@ -79,7 +78,7 @@ pub(super) fn place(
 
 fn lone_poses(intrinsics: &Intrinsics, seen: &Seen, size_m: f64) -> Vec<DAffine3> {
     let sightings: [Sighting; 4] = std::array::from_fn(|corner| Sighting {
-        point_m: UNIT_CORNERS[corner].truncate() * size_m,
+        point_m: UNIT_CORNERS[corner] * size_m,
         pixel: seen.corners_px[corner],
     });
     let Some(solutions) = pose::solve(intrinsics, &sightings) else {
@@ -208,10 +207,9 @@ impl Placing<'_> {
                 let squares = (hypothesis.corners_m().into_iter())
                     .zip(voter.picture.seen[voter.at].corners_px)
                     .map(|(point_m, pixel)| {
-                        Some(
-                            project(self.intrinsics, camera_from_world, point_m)?
-                                .distance_squared(pixel),
-                        )
+                        let in_camera_m = camera_from_world.transform_point3(point_m);
+                        let expected_px = self.intrinsics.undistorted_pixel_of(in_camera_m)?;
+                        Some(expected_px.distance_squared(pixel))
                     });
                 squares
                     .sum::<Option<f64>>()
@@ -278,79 +276,19 @@ impl Placing<'_> {
                 _ => self.placed[seen.marker].as_ref(),
             };
             if let Some(placed) = placed {
-                points.extend(placed.corners_m().into_iter().zip(seen.corners_px));
+                let corners = placed.corners_m().into_iter().zip(seen.corners_px);
+                points.extend(corners.map(|(point_m, pixel)| Sighting { point_m, pixel }));
             }
         }
         self.starts(picture)
             .into_iter()
-            .filter_map(|start| resected(self.intrinsics, &points, start))
-            .min_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(camera_from_world, squares_px)| {
-                (camera_from_world, (squares_px / points.len() as f64).sqrt())
-            })
+            .filter_map(|start| pose::refine_roughly(self.intrinsics, &points, start))
+            .min_by(|a, b| a.squared_error_px.total_cmp(&b.squared_error_px))
+            .map(|found| (found.camera_from_anchor, found.rms_px(points.len())))
     }
 }
 
 fn area_px(picture: &Picture, at: usize) -> f64 {
     let [a, b, c, d] = picture.seen[at].corners_px;
     0.5 * (c - a).perp_dot(d - b).abs()
-}
-
-/// The camera that sees points where they were seen, by Levenberg-Marquardt from a start, and the sum of its squared
-/// errors, pixels; `None` when a point falls behind it.
-fn resected(
-    intrinsics: &Intrinsics,
-    points: &[(DVec3, DVec2)],
-    start: DAffine3,
-) -> Option<(DAffine3, f64)> {
-    const ROUNDS: usize = 15;
-    let squares_px = |camera: &DAffine3| {
-        let squares = points.iter().map(|&(point_m, pixel)| {
-            Some(project(intrinsics, camera, point_m)?.distance_squared(pixel))
-        });
-        squares.sum::<Option<f64>>()
-    };
-    let mut camera = start;
-    let mut error = squares_px(&camera)?;
-    let mut damping = 1e-3;
-    for _ in 0..ROUNDS {
-        let (mut normal, mut right) = ([[0.0; 6]; 6], [0.0; 6]);
-        for &(point_m, pixel) in points {
-            let turned_m = camera.matrix3 * point_m;
-            let in_camera_m = turned_m + camera.translation;
-            let image = in_camera_m.truncate() / in_camera_m.z;
-            let missing_px = pixel - intrinsics.pixel_from_plane(image);
-            let gradients = [
-                DVec3::new(1.0, 0.0, -image.x) * (intrinsics.focal_px.x / in_camera_m.z),
-                DVec3::new(0.0, 1.0, -image.y) * (intrinsics.focal_px.y / in_camera_m.z),
-            ];
-            for (gradient, value) in gradients.into_iter().zip(missing_px.to_array()) {
-                let by_turn = turned_m.cross(gradient);
-                let row = [
-                    by_turn.x, by_turn.y, by_turn.z, gradient.x, gradient.y, gradient.z,
-                ];
-                accumulate(&mut normal, &mut right, &row, value);
-            }
-        }
-        for (k, row) in normal.iter_mut().enumerate() {
-            row[k] *= 1.0 + damping;
-        }
-        let [rx, ry, rz, tx, ty, tz] = solve_positive_definite(&normal, &right)?;
-        let candidate = DAffine3::from_rotation_translation(
-            turned(&camera, DVec3::new(rx, ry, rz)),
-            camera.translation + DVec3::new(tx, ty, tz),
-        );
-        match squares_px(&candidate) {
-            Some(lower) if lower < error => {
-                let settled = error - lower < 1e-6 * error;
-                (camera, error) = (candidate, lower);
-                damping = (damping / 10.0).max(1e-9);
-                if settled {
-                    break;
-                }
-            }
-            _ => damping *= 10.0,
-        }
-    }
-    Some((camera, error))
 }
