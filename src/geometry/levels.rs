@@ -14,7 +14,7 @@ use super::bounds::Bounds;
 use super::mesh::Mesh;
 use super::normals::face_normal;
 use super::soup::{by_edge, edge_uses};
-use super::surface_distance::Surface;
+use super::surface_distance::SampledSurface;
 
 /// A coarser version of a mesh. Its vertices are some of the mesh's.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,7 +22,7 @@ pub struct Level {
     /// Closed if the mesh is.
     pub mesh: Mesh,
     /// No point of either surface lies farther from the other, so no outline is off by more, metres; as
-    /// [`Surface::distance_to`] finds it.
+    /// [`SampledSurface::distance_to`] finds it.
     pub max_error_m: f64,
     /// How far outlines are off on the average over their length and over all directions of view, metres.
     pub mean_error_m: f64,
@@ -63,7 +63,7 @@ pub fn is_close_enough(max_px: f64, mean_px: f64, max_silhouette_error_px: f64) 
 fn chain(mesh: &Mesh, fewest: usize) -> Vec<Level> {
     let mut levels = Vec::new();
     let bounds = Bounds::around(mesh.positions.iter().map(|position| position.as_dvec3()));
-    let (Some(surface), Some(bounds)) = (Surface::new(mesh), bounds) else {
+    let (Some(surface), Some(bounds)) = (SampledSurface::new(mesh), bounds) else {
         return levels;
     };
     let largest_error_m = LARGEST_ERROR * (bounds.high - bounds.low).length();
@@ -85,7 +85,8 @@ fn chain(mesh: &Mesh, fewest: usize) -> Vec<Level> {
         if coarse.closed_and_consistent() != closed {
             continue;
         }
-        let Some(distance) = Surface::new(&coarse).map(|coarse| surface.distance_to(&coarse))
+        let Some(distance) =
+            SampledSurface::new(&coarse).map(|coarse| surface.distance_to(&coarse))
         else {
             return levels;
         };

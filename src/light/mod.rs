@@ -3,7 +3,6 @@
 pub mod bounce;
 pub mod brightest;
 pub mod contrast;
-pub(crate) mod cores;
 pub mod prefiltered;
 pub mod probe;
 pub mod probe_maps;
