@@ -6,12 +6,12 @@
 
 use glam::{DAffine3, DVec2};
 
-use super::Corner;
+use super::TargetCorner;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::matrix::{DynamicMatrix, dot};
 use crate::geometry::pose::by_step;
 
-/// fx, fy, cx, cy, k1, k2, p1, p2, k3.
+/// A camera's parameters: fx, fy, cx, cy, k1, k2, p1, p2, k3.
 pub(super) type Parameters = [f64; 9];
 
 /// The number of a pose's unknowns.
@@ -28,12 +28,12 @@ pub(super) fn parameters_of(intrinsics: &Intrinsics) -> Parameters {
 /// without one of them do not determine the camera.
 pub(super) fn deviations<'a>(
     intrinsics: &Intrinsics,
-    views: impl Iterator<Item = (&'a [Corner], DAffine3)>,
+    views: impl Iterator<Item = (&'a [TargetCorner], DAffine3)>,
     free: [bool; 9],
 ) -> Parameters {
     let free: Vec<usize> = (0..9).filter(|&k| free[k]).collect();
-    let views: Option<Vec<Reduced>> = views
-        .map(|(corners, pose)| Reduced::of(intrinsics, corners, &pose, &free))
+    let views: Option<Vec<ReducedView>> = views
+        .map(|(corners, pose)| ReducedView::of(intrinsics, corners, &pose, &free))
         .collect();
     let steps = views.and_then(|views| steps_without_each(&views));
     let mut deviations = [f64::INFINITY; 9];
@@ -51,9 +51,9 @@ pub(super) fn deviations<'a>(
 }
 
 /// What each view left out would change; `None` where the others do not determine the camera.
-fn steps_without_each(views: &[Reduced]) -> Option<Vec<Vec<f64>>> {
+fn steps_without_each(views: &[ReducedView]) -> Option<Vec<Vec<f64>>> {
     let side = views.first()?.slope.len();
-    let mut all = Reduced::zero(side);
+    let mut all = ReducedView::zero(side);
     for view in views {
         all.add(view, 1.0);
     }
@@ -69,12 +69,12 @@ fn steps_without_each(views: &[Reduced]) -> Option<Vec<Vec<f64>>> {
 
 /// A view's part in the normal equations of the camera's parameters, its pose eliminated (Schur complement).
 #[derive(Clone)]
-struct Reduced {
+struct ReducedView {
     curvature: DynamicMatrix,
     slope: Vec<f64>,
 }
 
-impl Reduced {
+impl ReducedView {
     fn zero(side: usize) -> Self {
         Self {
             curvature: DynamicMatrix::zero(side),
@@ -94,7 +94,7 @@ impl Reduced {
     /// `None` where the corners do not determine the pose.
     fn of(
         intrinsics: &Intrinsics,
-        corners: &[Corner],
+        corners: &[TargetCorner],
         camera_from_target: &DAffine3,
         free: &[usize],
     ) -> Option<Self> {

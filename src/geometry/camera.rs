@@ -17,14 +17,14 @@ pub struct Intrinsics {
 
 /// A point as a camera sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Projection {
+pub struct ProjectedPoint {
     /// Where it is in the picture.
     pub pixel: DVec2,
     /// The derivative of the pixel by the point's x, y and z in camera space, pixels per metre.
     pub by_place: [DVec2; 3],
 }
 
-impl Projection {
+impl ProjectedPoint {
     /// The derivative by the place in camera space of how far the pixel lies along a direction of the picture.
     #[inline]
     pub fn gradient(&self, direction: DVec2) -> DVec3 {
@@ -71,10 +71,10 @@ impl Intrinsics {
 
     /// The undistorted pixel of a point in camera space, with its derivative; `None` behind the camera.
     #[inline]
-    pub fn project_undistorted(&self, in_camera_m: DVec3) -> Option<Projection> {
+    pub fn project_undistorted(&self, in_camera_m: DVec3) -> Option<ProjectedPoint> {
         let point = Self::plane_from_camera(in_camera_m)?;
         let scale = self.focal_px / in_camera_m.z;
-        Some(Projection {
+        Some(ProjectedPoint {
             pixel: self.pixel_from_plane(point),
             by_place: [
                 DVec2::new(scale.x, 0.0),
@@ -86,11 +86,11 @@ impl Intrinsics {
 
     /// The distorted pixel of a point in camera space, with its derivative; `None` behind the camera.
     #[inline]
-    pub fn project(&self, in_camera_m: DVec3) -> Option<Projection> {
+    pub fn project(&self, in_camera_m: DVec3) -> Option<ProjectedPoint> {
         let point = Self::plane_from_camera(in_camera_m)?;
         let lens = self.distortion_jacobian(point);
         let scale = DMat2::from_diagonal(self.focal_px / in_camera_m.z) * lens;
-        Some(Projection {
+        Some(ProjectedPoint {
             pixel: self.pixel_from_plane(self.distort(point)),
             by_place: [scale.x_axis, scale.y_axis, -(scale * point)],
         })

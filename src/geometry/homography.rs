@@ -31,7 +31,7 @@ pub fn best_homography(pairs: &[(DVec2, DVec2)]) -> Option<DMat3> {
     let scaled = |&(point, image): &(DVec2, DVec2)| (scale.scaled(point), image);
     let pairs: Vec<(DVec2, DVec2)> = pairs.iter().map(scaled).collect();
     let fit = METHOD.minimize(HomographyFit::linear(&pairs)?)?.problem;
-    let best = fit.homography() * scale.from_scaled().inverse();
+    let best = fit.homography() * scale.unscaling().inverse();
     best.is_finite().then_some(best)
 }
 
@@ -60,7 +60,8 @@ impl PointScale {
         (point - self.mean) / self.spread
     }
 
-    fn from_scaled(&self) -> DMat3 {
+    /// The map from scaled points back to these.
+    fn unscaling(&self) -> DMat3 {
         DMat3::from_cols(
             DVec3::new(self.spread, 0.0, 0.0),
             DVec3::new(0.0, self.spread, 0.0),
@@ -114,7 +115,7 @@ impl<'a> HomographyFit<'a> {
     }
 
     fn homography(&self) -> DMat3 {
-        self.image_scale.from_scaled() * self.between_scaled()
+        self.image_scale.unscaling() * self.between_scaled()
     }
 }
 
@@ -185,7 +186,7 @@ mod tests {
                 .iter()
                 .map(|&(point, image)| (scale.scaled(point), image))
                 .collect();
-            let linear = linear_homography(&scaled).unwrap() * scale.from_scaled().inverse();
+            let linear = linear_homography(&scaled).unwrap() * scale.unscaling().inverse();
             for found in [linear, best_homography(some).unwrap()] {
                 let off_px =
                     |&(point, image): &(DVec2, DVec2)| mapped(&found, point).distance(image);

@@ -10,16 +10,16 @@ use super::camera::Intrinsics;
 use super::least_squares::{LevenbergMarquardt, NormalEquations, Problem};
 use super::matrix::dot;
 
-/// The camera and where it stands, for what has no distortion left.
+/// A camera and where it stands, for pictures that are undistorted.
 #[derive(Debug, Clone, Copy)]
-pub struct Sight {
+pub struct PosedCamera {
     /// The camera.
     pub intrinsics: Intrinsics,
     /// Where it stands.
     pub camera_from_world: DAffine3,
 }
 
-impl Sight {
+impl PosedCamera {
     /// The undistorted pixel of a point in the world; `None` behind the camera.
     pub fn pixel(&self, world_m: DVec3) -> Option<DVec2> {
         let in_camera_m = self.camera_from_world.transform_point3(world_m);
@@ -42,7 +42,7 @@ impl Sight {
 pub struct Facet {
     /// A point of it, metres.
     pub point_m: DVec3,
-    /// Its unit normal.
+    /// The surface's unit normal.
     pub normal: DVec3,
 }
 
@@ -102,14 +102,14 @@ impl FarLight {
 
 /// What a light may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Freedom {
+pub enum LightFreedom {
     /// At any distance.
     Point,
     /// Infinitely far.
     Directional,
 }
 
-impl Freedom {
+impl LightFreedom {
     /// 1 for each of two tangents of the light's direction and its inverse distance that may change, else 0.
     fn axes(self) -> DVec3 {
         match self {
@@ -121,7 +121,7 @@ impl Freedom {
 
 /// A light that was placed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Placed {
+pub struct PlacedLight {
     /// The light.
     pub light: FarLight,
     /// Root mean square of what is left, pixels.
@@ -130,7 +130,7 @@ pub struct Placed {
     pub covariance: DMat3,
 }
 
-impl Placed {
+impl PlacedLight {
     /// Covariance of its position in the world for shadows known to `sigma_px`, square metres; `None` for one that is
     /// infinitely far.
     pub fn position_covariance(&self, sigma_px: f64) -> Option<DMat3> {
@@ -175,7 +175,7 @@ pub enum Unplaced {
     Undecided,
 }
 
-/// Of how many standard deviations an inverse distance must be, for a light not to be infinitely far.
+/// The number of standard deviations that an inverse distance must be, for a light not to be infinitely far.
 const SURE: f64 = 3.0;
 
 /// Places a light by pairs whose pixels are known to `sigma_px`.
@@ -183,14 +183,14 @@ const SURE: f64 = 3.0;
 /// # Errors
 /// Why the pairs fix none.
 pub fn place_light(
-    sight: &Sight,
+    camera: &PosedCamera,
     pairs: &[ShadowPair],
-    freedom: Freedom,
+    freedom: LightFreedom,
     sigma_px: f64,
-) -> Result<Placed, Unplaced> {
+) -> Result<PlacedLight, Unplaced> {
     let needed = match freedom {
-        Freedom::Point => 2,
-        Freedom::Directional => 1,
+        LightFreedom::Point => 2,
+        LightFreedom::Directional => 1,
     };
     if pairs.len() < needed {
         return Err(Unplaced::TooFewPairs {
@@ -212,8 +212,8 @@ pub fn place_light(
         inverse_distance: 0.0,
     };
     let weights = vec![1.0; pairs.len()];
-    let placed = refine(sight, pairs, &weights, start, freedom).ok_or(Unplaced::Undecided)?;
-    if freedom == Freedom::Point {
+    let placed = refine(camera, pairs, &weights, start, freedom).ok_or(Unplaced::Undecided)?;
+    if freedom == LightFreedom::Point {
         let sigma = placed.covariance.z_axis.z.sqrt() * sigma_px;
         if placed.light.inverse_distance < SURE * sigma {
             return Err(Unplaced::TooFar(placed.light));
@@ -224,19 +224,19 @@ pub fn place_light(
 
 /// Moves a light to where weighted pairs fit it best; `None` where they do not fix it.
 pub fn refine(
-    sight: &Sight,
+    camera: &PosedCamera,
     pairs: &[ShadowPair],
     weights: &[f64],
     start: FarLight,
-    freedom: Freedom,
-) -> Option<Placed> {
+    freedom: LightFreedom,
+) -> Option<PlacedLight> {
     const METHOD: LevenbergMarquardt = LevenbergMarquardt {
         first_damping: 1e-6,
         rounds: 50,
         least_gain: 0.0,
     };
     let found = METHOD.minimize(ShadowFit {
-        sight,
+        camera,
         pairs,
         weights,
         freedom,
@@ -252,7 +252,7 @@ pub fn refine(
     }
     let free = DMat3::from_diagonal(freedom.axes());
     let total: f64 = weights.iter().sum();
-    Some(Placed {
+    Some(PlacedLight {
         light: found.problem.light,
         rms_px: (found.cost / total.max(1e-12)).sqrt(),
         covariance: free * (unit * scaled.inverse() * unit) * free,
@@ -261,10 +261,10 @@ pub fn refine(
 
 /// A light that is moved to where its shadows are seen.
 struct ShadowFit<'a> {
-    sight: &'a Sight,
+    camera: &'a PosedCamera,
     pairs: &'a [ShadowPair],
     weights: &'a [f64],
-    freedom: Freedom,
+    freedom: LightFreedom,
     light: FarLight,
 }
 
@@ -275,7 +275,7 @@ impl ShadowFit<'_> {
         let mut residuals = Vec::with_capacity(2 * self.pairs.len());
         for (pair, weight) in self.pairs.iter().zip(self.weights) {
             let shadow_m = light.shadow_of(pair.caster_m, &pair.receiver)?;
-            let off_px = (self.sight.pixel(shadow_m)? - pair.shadow_px) * weight.sqrt();
+            let off_px = (self.camera.pixel(shadow_m)? - pair.shadow_px) * weight.sqrt();
             match pair.along {
                 Some(along) => residuals.push(off_px.dot(along)),
                 None => residuals.extend(off_px.to_array()),
@@ -312,7 +312,7 @@ impl Problem for ShadowFit<'_> {
         for (k, residual) in residuals.iter().enumerate() {
             equations.add(&[x[k], y[k], z[k]], -residual);
         }
-        if self.freedom == Freedom::Directional {
+        if self.freedom == LightFreedom::Directional {
             equations.add_prior(2, 0.0, 1.0);
         }
         Some(equations)
@@ -340,8 +340,8 @@ mod tests {
         normal: DVec3::Z,
     };
 
-    fn sight() -> Sight {
-        Sight {
+    fn camera() -> PosedCamera {
+        PosedCamera {
             intrinsics: Intrinsics {
                 size_px: [640, 480],
                 focal_px: DVec2::new(615.0, 613.0),
@@ -366,7 +366,7 @@ mod tests {
                     point_m: shadow_m,
                     ..TABLE
                 },
-                shadow_px: sight().pixel(shadow_m).unwrap(),
+                shadow_px: camera().pixel(shadow_m).unwrap(),
                 along: None,
             }
         };
@@ -384,7 +384,7 @@ mod tests {
         for lamp_m in [DVec3::new(-0.26, 0.24, 0.46), DVec3::new(0.4, -0.1, 0.3)] {
             for count in 2..=3 {
                 let pairs = pairs(lamp_m, &VERTICES[..count]);
-                let placed = place_light(&sight(), &pairs, Freedom::Point, 1.0).unwrap();
+                let placed = place_light(&camera(), &pairs, LightFreedom::Point, 1.0).unwrap();
                 let found_m = placed.light.position_m().unwrap();
                 assert!((found_m - lamp_m).length() < 1e-7, "{found_m}");
                 assert!(placed.rms_px < 1e-6);
@@ -392,7 +392,7 @@ mod tests {
         }
         let far_m = DVec3::new(-3e7, 2e7, 5e7);
         let sun = pairs(far_m, &VERTICES[..1]);
-        let placed = place_light(&sight(), &sun, Freedom::Directional, 1.0).unwrap();
+        let placed = place_light(&camera(), &sun, LightFreedom::Directional, 1.0).unwrap();
         assert!(placed.light.towards.angle_between(far_m.normalize()) < 1e-7);
         assert_eq!(placed.light.position_m(), None);
     }
@@ -401,7 +401,7 @@ mod tests {
     fn the_covariance_is_what_many_noisy_clicks_scatter_by() {
         let lamp_m = DVec3::new(-0.26, 0.24, 0.46);
         let exact = pairs(lamp_m, &VERTICES);
-        let predicted = place_light(&sight(), &exact, Freedom::Point, 0.2)
+        let predicted = place_light(&camera(), &exact, LightFreedom::Point, 0.2)
             .unwrap()
             .position_covariance(0.2)
             .unwrap();
@@ -421,7 +421,7 @@ mod tests {
             for pair in &mut noisy {
                 pair.shadow_px += 0.2 * DVec2::new(normal(), normal());
             }
-            let placed = place_light(&sight(), &noisy, Freedom::Point, 0.2).unwrap();
+            let placed = place_light(&camera(), &noisy, LightFreedom::Point, 0.2).unwrap();
             let off_m = placed.light.position_m().unwrap() - lamp_m;
             scatter += DMat3::from_cols(off_m * off_m.x, off_m * off_m.y, off_m * off_m.z)
                 * (1.0 / ROUNDS as f64);
@@ -434,18 +434,22 @@ mod tests {
 
     #[test]
     fn what_does_not_fix_a_light_is_refused() {
-        let refused =
-            |pairs: &[ShadowPair], freedom| place_light(&sight(), pairs, freedom, 1.0).unwrap_err();
+        let refused = |pairs: &[ShadowPair], freedom| {
+            place_light(&camera(), pairs, freedom, 1.0).unwrap_err()
+        };
         let near = pairs(DVec3::new(-0.2, 0.2, 0.4), &VERTICES);
         let too_few = Unplaced::TooFewPairs {
             found: 1,
             needed: 2,
         };
-        assert_eq!(refused(&near[..1], Freedom::Point), too_few);
-        assert_eq!(refused(&[near[0]; 2], Freedom::Point), Unplaced::Undecided);
+        assert_eq!(refused(&near[..1], LightFreedom::Point), too_few);
+        assert_eq!(
+            refused(&[near[0]; 2], LightFreedom::Point),
+            Unplaced::Undecided
+        );
         let far = refused(
             &pairs(DVec3::new(-9.0, 6.0, 20.0), &VERTICES),
-            Freedom::Point,
+            LightFreedom::Point,
         );
         let Unplaced::TooFar(light) = far else {
             panic!("{far}")
@@ -453,6 +457,9 @@ mod tests {
         assert!(light.towards.angle_between(DVec3::new(-9.0, 6.0, 20.0)) < 0.02);
         let mut below = near.clone();
         below[1].caster_m.z = -0.01;
-        assert_eq!(refused(&below, Freedom::Point), Unplaced::NotItsShadow(1));
+        assert_eq!(
+            refused(&below, LightFreedom::Point),
+            Unplaced::NotItsShadow(1)
+        );
     }
 }

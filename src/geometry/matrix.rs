@@ -246,11 +246,11 @@ mod tests {
         ]);
         let inverse = KNOWN.inverse().unwrap();
         let diagonal = dynamic(&KNOWN).cholesky().unwrap().inverse_diagonal();
-        for i in 0..3 {
-            for j in 0..3 {
-                assert!((inverse.0[i][j] - cofactors.0[i][j] / 36.0).abs() < 1e-12);
+        for (i, (found, cofactors)) in inverse.0.iter().zip(cofactors.0).enumerate() {
+            for (found, cofactor) in found.iter().zip(cofactors) {
+                assert!((found - cofactor / 36.0).abs() < 1e-12);
             }
-            assert_eq!(diagonal[i], inverse.0[i][i]);
+            assert_eq!(diagonal[i], found[i]);
         }
     }
 

@@ -16,7 +16,7 @@ const BLUR_FLOOR: f64 = 0.1;
 const BLUR_CHANGE: f64 = 0.1;
 /// The largest correction that one edge can ask for, pixels².
 const MOST_BLUR_CHANGE: f64 = 2.0;
-/// Standard deviation of a print's size against the scene's, as a part of it.
+/// Standard deviation of a printed marker's size against the scene's, as a part of it.
 const SIZE_DEVIATION: f64 = 0.03;
 /// However many pictures agree, the size is not believed more firmly than this.
 const LEAST_SIZE_DEVIATION: f64 = 0.001;

@@ -1,6 +1,6 @@
-//! Where an edge of the print lies in the picture, from the light of the pixels around it.
+//! Where an edge of a marker lies in the picture, from the light of the pixels around it.
 //!
-//! A pixel's light is `black + contrast · whiteness`: the whiteness is that of the print's cells, blurred by the lens,
+//! A pixel's light is `black + contrast · whiteness`: the whiteness is that of the marker's cells, blurred by the lens,
 //! the motion and the pixel itself; black and contrast are the edge's own, since a shadow may lie across the marker.
 //! Light, not encoded values, for that is what blurs.
 
@@ -9,14 +9,14 @@ use std::sync::LazyLock;
 use glam::{DMat2, DVec2};
 
 use super::light::Grey;
-use super::print::{COLUMNS, Edge, ROWS};
+use super::marker_template::{COLUMNS, ROWS, TemplateEdge};
 use crate::geometry::matrix::{Matrix, dot};
 
-/// Half the window across an edge: at most so many pixels,
+/// The most that the window reaches across an edge to either side, pixels.
 const ACROSS_PX: f64 = 3.0;
-/// and so many cells.
+/// The most that the window reaches across an edge to either side, cells.
 const ACROSS_CELLS: f64 = 1.0;
-/// Half the window along it, pixels; a longer edge tells as much in its middle.
+/// The most that the window reaches along an edge to either side, pixels; a longer edge tells as much in its middle.
 const ALONG_PX: f64 = 6.0;
 /// An edge with fewer pixels tells nothing.
 const FEWEST_PIXELS: u32 = 8;
@@ -27,7 +27,7 @@ const NOISE_FLOOR: f64 = 1e-6;
 
 /// What the picture says of an edge.
 pub(super) enum EdgeView {
-    /// It is there.
+    /// The edge is there.
     Seen(EdgeFit),
     /// The side that should be white is the darker one.
     Reversed,
@@ -57,7 +57,7 @@ pub(super) struct EdgeFit {
 /// and one along it there (distorted pixels); `blur_variance` is the blur's across the edge, pixels².
 pub(super) fn fit_edge(
     picture: Grey<'_>,
-    edge: &Edge,
+    edge: &TemplateEdge,
     middle_px: DVec2,
     pixels_from_cells: DMat2,
     blur_variance: f64,
@@ -87,7 +87,7 @@ pub(super) fn fit_edge(
     let steps = Steps::new(edge);
     let reach = reach.as_vec2();
     let to_cells = cells_from_pixels.as_mat2();
-    let mut sums = Sums::default();
+    let mut sums = EdgeSums::default();
     for y in low.y as u32..=high.y as u32 {
         let row = picture.row(y);
         let start = DVec2::new(low.x, f64::from(y)) - middle_px;
@@ -152,7 +152,7 @@ struct Steps {
 }
 
 impl Steps {
-    fn new(edge: &Edge) -> Self {
+    fn new(edge: &TemplateEdge) -> Self {
         Self {
             first: edge.around.map(|row| row[0]),
             steps: edge
@@ -190,14 +190,14 @@ impl Steps {
 /// The normal equations of black, contrast, contrast · offset and contrast · blur; their lower triangle in single
 /// precision, since they are added to for each pixel.
 #[derive(Default)]
-struct Sums {
+struct EdgeSums {
     normal: [[f32; 4]; 4],
     right: [f32; 4],
     squares: f32,
     count: u32,
 }
 
-impl Sums {
+impl EdgeSums {
     fn add(&mut self, row: [f32; 4], light: f32) {
         for i in 0..4 {
             for j in 0..=i {
@@ -258,7 +258,7 @@ impl Sums {
 mod tests {
     use super::*;
     use crate::scene::{Family, Marker};
-    use crate::tracking::print::Print;
+    use crate::tracking::marker_template::MarkerTemplate;
 
     const SIDE: u32 = 64;
 
@@ -301,7 +301,7 @@ mod tests {
     }
 
     /// An edge between large cells, which goes from black to white.
-    fn edge() -> Edge {
+    fn edge() -> TemplateEdge {
         let marker = Marker {
             family: Family::TAG16H5,
             id: 0,
@@ -311,8 +311,8 @@ mod tests {
         };
         // Black, two columns of it, then white.
         let white = (0..16).map(|k| k % 4 > 1).collect();
-        let print = Print::new(&marker, white);
-        print
+        let template = MarkerTemplate::new(&marker, white);
+        template
             .edges
             .into_iter()
             .find(|edge| edge.brightens && edge.around == [[0.0, 0.0, 1.0, 1.0]; ROWS])

@@ -17,12 +17,14 @@ use crate::geometry::pose::{PoseStep, difference, moved};
 /// Standard deviation of the acceleration of something that a hand holds: of its turn, rad/s²; the shift's is that times
 /// the distance.
 const TURN_ACCELERATION: f64 = 5.0;
-/// The variance of the acceleration that is expected, as a part of the above: at rest, and at most.
+/// The least variance of the acceleration that is expected, at rest, as a part of a hand's.
 const CALM: f64 = 1e-10;
+/// The largest variance of the acceleration that is expected, as a part of a hand's.
 const WILD: f64 = 100.0;
-/// Squared innovation over what is expected of it, per degree of freedom: above this the anchor accelerates,
+/// The squared innovation over what is expected of it, per degree of freedom, above which the anchor accelerates.
 const SURPRISE: f64 = 2.5;
-/// and that much more acceleration is expected that it is no more than this.
+/// The squared innovation over what is expected of it, per degree of freedom, down to which the expected acceleration then
+/// rises.
 const EXPECTED: f64 = 1.0;
 /// What is left of the expected acceleration after a frame without surprise.
 const CALMING: f64 = 0.8;

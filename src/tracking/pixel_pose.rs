@@ -1,4 +1,4 @@
-//! An anchor's pose from the pixels: all edges of all its prints at once, each by its own light (`edge_fit.rs`).
+//! An anchor's pose from the pixels: all edges of all its markers at once, each by its own light (`edge_fit.rs`).
 //!
 //! A detector's four corners use a marker's outline alone, and each marker for itself. Here every boundary between
 //! black and white cells tells how far across itself it lies from where the pose puts it, with a variance of its own;
@@ -11,8 +11,8 @@ use glam::{DAffine3, DMat2, DVec2, DVec3};
 use super::condition::Condition;
 use super::edge_fit::{BlurError, EdgeView, fit_edge};
 use super::light::Grey;
-use super::print::Print;
-use crate::geometry::camera::{Intrinsics, Projection};
+use super::marker_template::MarkerTemplate;
+use crate::geometry::camera::{Intrinsics, ProjectedPoint};
 use crate::geometry::least_squares::NormalEquations;
 use crate::geometry::matrix::Matrix;
 use crate::geometry::pose::{PoseStep, by_step, moved};
@@ -22,25 +22,28 @@ use crate::geometry::robust::{deviation, tukey_weight};
 /// toward the black (ink runs, and light that the camera does not encode as it says spills), and by what part of its
 /// size each marker is larger than the scene says (a page printed to fit, a rule read wrongly).
 const PARAMETERS: usize = 8;
-/// Those of them that move the anchor.
+/// The parameters of a step that move the anchor.
 pub(super) const POSE_PARAMETERS: usize = 6;
+/// The parameter by which all edges lie toward the black.
 const SPILL: usize = 6;
+/// The parameter by which markers are larger.
 const SIZE: usize = 7;
 /// Standard deviation of what edges are expected to lie toward the black, pixels.
 const SPILL_PX: f64 = 0.1;
 /// An edge is never known better than this, pixels: paper bends, sheets are not printed to the micrometre.
 const FLOOR_PX: f64 = 0.02;
-/// Once a step moves no edge by more than this (root mean square), the pose is found, pixels.
+/// The pose is found once a step moves the edges by no more than this (root mean square), pixels.
 const SETTLED_PX: f64 = 0.05;
-/// and once the blur is known: with too small a one, whole prints are taken for something else. Change of its variance,
-/// as a part of it.
+/// The blur is known once its variance changes by no more than this part of itself: with too small a one, whole markers are
+/// taken for something else.
 const SETTLED_BLUR: f64 = 0.3;
 /// Weight from which on an edge counts as being where it should be.
 const FITTING: f64 = 0.3;
-/// A marker is seen when so large a part of its edges fits, and so many of them,
+/// The part of a marker's edges that must fit for it to be seen.
 const SEEN_SHARE: f64 = 0.4;
+/// The number of a marker's edges that must fit for it to be seen.
 const SEEN_EDGES: usize = 10;
-/// and of those that are to be seen no larger part is the wrong way round: of a marker that is not there, half are.
+/// The largest part of a marker's edges that may be the wrong way round: of a marker that is not there, half are.
 const MOST_REVERSED: f64 = 0.15;
 
 /// A pose that the pixels agree on.
@@ -48,36 +51,36 @@ pub(super) struct PixelPose {
     pub(super) camera_from_anchor: DAffine3,
     /// Covariance of a step from the pose.
     pub(super) covariance: Matrix<POSE_PARAMETERS>,
-    /// Per print, whether it was seen.
+    /// Whether the marker of each template was seen.
     pub(super) seen: Vec<bool>,
     /// Root mean square distance, pixels, of the edges from where the pose and the scene put them; without those that
     /// something else lies across.
     pub(super) rms_px: f64,
     /// By what factor the edges vary more than their pixels' noise says.
     pub(super) excess: f64,
-    pub(super) edges: Vec<Edge>,
+    pub(super) edges: Vec<MeasuredEdge>,
 }
 
-/// An edge of a print as one picture shows it.
-pub(super) struct Edge {
-    print: usize,
-    /// Its middle in the anchor's plane, metres.
+/// An edge of a marker as one picture shows it.
+pub(super) struct MeasuredEdge {
+    template: usize,
+    /// The edge's middle in the anchor's plane, metres.
     pub(super) point_m: DVec2,
-    /// Where a point of it was seen, distorted pixels; that the print spills or is of another size is taken out.
+    /// Where a point of the edge was seen, distorted pixels; that the ink spills or the marker is of another size is taken out.
     pub(super) seen_px: DVec2,
-    /// Across it, a unit vector of the picture.
+    /// A unit vector of the picture across the edge.
     pub(super) normal: DVec2,
-    /// From where the pose puts it to where it was seen, along the normal, pixels.
+    /// The way from where the pose puts the edge to where it was seen, along the normal, pixels.
     offset_px: f64,
     pub(super) variance: f64,
     /// Derivative of the offset that a step explains.
     row: [f64; PARAMETERS],
     blur_error: BlurError,
-    /// Tukey's, 0 to 1.
+    /// Tukey's weight, 0 to 1.
     pub(super) weight: f64,
 }
 
-impl Edge {
+impl MeasuredEdge {
     /// What a step does not explain of the offset, pixels.
     fn left_px(&self, step: &[f64; PARAMETERS]) -> f64 {
         let explained: f64 = self
@@ -92,7 +95,7 @@ impl Edge {
 
 /// A point of the anchor as the camera sees it (distorted).
 pub(super) struct AnchorPoint {
-    pub(super) projection: Projection,
+    pub(super) projection: ProjectedPoint,
     /// The point from the anchor's origin, in camera axes.
     turned_m: DVec3,
 }
@@ -126,12 +129,12 @@ pub(super) fn pixel_of(
     intrinsics.pixel_of(camera_from_anchor.transform_point3(point_m.extend(0.0)))
 }
 
-/// The pose near `start` that puts the edges of the prints where the picture has them. `None` when too few edges are
+/// The pose near `start` that puts the edges of the markers where the picture has them. `None` when too few edges are
 /// where they should be; `condition` is then as it was.
 pub(super) fn fit_pose(
     picture: Grey<'_>,
     intrinsics: &Intrinsics,
-    prints: &[Print],
+    templates: &[MarkerTemplate],
     start: DAffine3,
     condition: &mut Condition,
 ) -> Option<PixelPose> {
@@ -146,11 +149,11 @@ pub(super) fn fit_pose(
     let mut solution = None;
     for _ in 0..ROUNDS {
         edges.clear();
-        for (index, print) in prints.iter().enumerate() {
+        for (index, template) in templates.iter().enumerate() {
             measure(
                 picture,
                 intrinsics,
-                (index, print),
+                (index, template),
                 &guess,
                 &learned,
                 &mut edges,
@@ -184,7 +187,7 @@ pub(super) fn fit_pose(
         }
     }
     let solution = solution?;
-    let fitted = fitted(prints, &guess, edges, &solution)?;
+    let fitted = fitted(templates, &guess, edges, &solution)?;
     if fitted.seen.iter().filter(|&&seen| seen).count() > 1 {
         learned.learn_size(guess.size_error, solution.size_certainty / fitted.excess);
     }
@@ -196,26 +199,26 @@ fn pose_part(step: &[f64; PARAMETERS]) -> [f64; POSE_PARAMETERS] {
     std::array::from_fn(|k| step[k])
 }
 
-/// Where the prints are expected, and by what part of its size each is larger than the scene says.
+/// Where the markers are expected, and by what part of its size each is larger than the scene says.
 struct Guess {
     camera_from_anchor: DAffine3,
     size_error: f64,
 }
 
-/// Adds the edges of one print that the picture shows near where they are expected; none of a print that is not there.
+/// Adds the edges of one marker that the picture shows near where they are expected; none of a marker that is not there.
 fn measure(
     picture: Grey<'_>,
     intrinsics: &Intrinsics,
-    (index, print): (usize, &Print),
+    (index, template): (usize, &MarkerTemplate),
     guess: &Guess,
     condition: &Condition,
-    edges: &mut Vec<Edge>,
+    edges: &mut Vec<MeasuredEdge>,
 ) {
     let (known, mut reversed) = (edges.len(), 0);
     let (pose, scale) = (&guess.camera_from_anchor, 1.0 + guess.size_error);
-    for edge in &print.edges {
-        let outward_m = edge.point_m - print.center_m();
-        let point_m = print.center_m() + scale * outward_m;
+    for edge in &template.edges {
+        let outward_m = edge.point_m - template.center_m();
+        let point_m = template.center_m() + scale * outward_m;
         let Some(point) = project(intrinsics, pose, point_m) else {
             continue;
         };
@@ -244,8 +247,8 @@ fn measure(
         let [rx, ry, rz, tx, ty, tz] = point.by_step(normal);
         let by_size = normal.dot(in_picture(outward_m));
         let toward_black = if edge.brightens { -1.0 } else { 1.0 };
-        edges.push(Edge {
-            print: index,
+        edges.push(MeasuredEdge {
+            template: index,
             point_m: edge.point_m,
             seen_px: expected_px + normal * offset_px,
             normal,
@@ -262,14 +265,14 @@ fn measure(
     }
 }
 
-struct Solved {
+struct EdgeSolution {
     step: [f64; PARAMETERS],
     /// Inverse of the variance of the size in the step.
     size_certainty: f64,
 }
 
 /// The step that explains the offsets, robustly. Leaves each edge its weight.
-fn solve(edges: &mut [Edge], condition: &Condition, guess: &Guess) -> Option<Solved> {
+fn solve(edges: &mut [MeasuredEdge], condition: &Condition, guess: &Guess) -> Option<EdgeSolution> {
     const ROUNDS: usize = 5;
     let mut found = None;
     let mut scale = f64::INFINITY;
@@ -283,7 +286,7 @@ fn solve(edges: &mut [Edge], condition: &Condition, guess: &Guess) -> Option<Sol
         equations.add_prior(SIZE, size_error - guess.size_error, size_certainty);
         let step = equations.solve()?;
 
-        let left = |edge: &Edge| edge.left_px(&step) / edge.variance.sqrt();
+        let left = |edge: &MeasuredEdge| edge.left_px(&step) / edge.variance.sqrt();
         scale = deviation(edges.iter().map(left)).clamp(1.0, scale);
         for edge in edges.iter_mut() {
             edge.weight = tukey_weight(left(edge), scale);
@@ -291,20 +294,21 @@ fn solve(edges: &mut [Edge], condition: &Condition, guess: &Guess) -> Option<Sol
         found = Some((step, equations));
     }
     let (step, equations) = found?;
-    Some(Solved {
+    Some(EdgeSolution {
         step,
         size_certainty: 1.0 / equations.covariance()?.0[SIZE][SIZE],
     })
 }
 
 fn fitted(
-    prints: &[Print],
+    templates: &[MarkerTemplate],
     guess: &Guess,
-    mut edges: Vec<Edge>,
-    solved: &Solved,
+    mut edges: Vec<MeasuredEdge>,
+    solved: &EdgeSolution,
 ) -> Option<PixelPose> {
-    let not_by_pose_px =
-        |edge: &Edge| edge.row[SPILL] * solved.step[SPILL] + edge.row[SIZE] * guess.size_error;
+    let not_by_pose_px = |edge: &MeasuredEdge| {
+        edge.row[SPILL] * solved.step[SPILL] + edge.row[SIZE] * guess.size_error
+    };
     let (mut squares_px, mut counted) = (0.0, 0.0);
     for edge in edges.iter().filter(|edge| edge.weight > 0.0) {
         squares_px += (edge.left_px(&solved.step) + not_by_pose_px(edge)).powi(2);
@@ -313,15 +317,15 @@ fn fitted(
     for edge in &mut edges {
         edge.seen_px -= edge.normal * not_by_pose_px(edge);
     }
-    let mut fitting = vec![0; prints.len()];
+    let mut fitting = vec![0; templates.len()];
     for edge in edges.iter().filter(|edge| edge.weight > FITTING) {
-        fitting[edge.print] += 1;
+        fitting[edge.template] += 1;
     }
-    let seen: Vec<bool> = prints
+    let seen: Vec<bool> = templates
         .iter()
         .zip(fitting)
-        .map(|(print, fitting)| {
-            fitting >= SEEN_EDGES && fitting as f64 >= SEEN_SHARE * print.edges.len() as f64
+        .map(|(template, fitting)| {
+            fitting >= SEEN_EDGES && fitting as f64 >= SEEN_SHARE * template.edges.len() as f64
         })
         .collect();
     if !seen.contains(&true) {

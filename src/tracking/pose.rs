@@ -14,14 +14,14 @@ use crate::geometry::pose::{PoseStep, by_step, moved, rotation_between};
 
 /// A point of an anchor and where it was seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Sighting {
+pub(super) struct CornerObservation {
     /// The point in the anchor's space, metres; z = 0 in its plane.
     pub(super) point_m: DVec3,
     /// Undistorted pixel.
     pub(super) pixel: DVec2,
 }
 
-/// A pose and how well it explains the sightings.
+/// A pose and how well it explains the observations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Solution {
     pub(super) camera_from_anchor: DAffine3,
@@ -39,8 +39,8 @@ pub(super) struct Solutions {
 
 impl Solution {
     /// Root mean square distance of a corner from where the pose puts it, pixels.
-    pub(super) fn rms_px(&self, sightings: usize) -> f64 {
-        (self.squared_error_px / sightings as f64).sqrt()
+    pub(super) fn rms_px(&self, observations: usize) -> f64 {
+        (self.squared_error_px / observations as f64).sqrt()
     }
 }
 
@@ -52,20 +52,23 @@ const CORNER_NOISE_PX: f64 = 0.2;
 /// variance σ² the odds of two poses are exp(difference of their squared errors / 2σ²).
 const DECISIVE: f64 = 9.2;
 
-/// Both poses of a plane. `None` when no pose in front of the camera, facing it, explains the sightings.
-pub(super) fn solve(intrinsics: &Intrinsics, sightings: &[Sighting]) -> Option<Solutions> {
-    let starts = ippe_starts(intrinsics, sightings)?;
+/// The two poses of a plane. `None` when no pose in front of the camera, facing it, explains the observations.
+pub(super) fn solve(
+    intrinsics: &Intrinsics,
+    observations: &[CornerObservation],
+) -> Option<Solutions> {
+    let starts = ippe_starts(intrinsics, observations)?;
     let mut solutions = starts
         .into_iter()
-        .filter_map(|start| refine(intrinsics, sightings, start))
-        .filter(|solution| is_seen_from_the_front(&solution.camera_from_anchor, sightings))
+        .filter_map(|start| refine(intrinsics, observations, start))
+        .filter(|solution| is_seen_from_the_front(&solution.camera_from_anchor, observations))
         .collect::<Vec<_>>();
     solutions.sort_by(|a, b| a.squared_error_px.total_cmp(&b.squared_error_px));
     let best = *solutions.first()?;
     let alternative = solutions.get(1).copied().filter(|other| {
         rotation_between(&best.camera_from_anchor, &other.camera_from_anchor) > 1e-4
     });
-    let degrees_of_freedom = (2 * sightings.len()).saturating_sub(6).max(1) as f64;
+    let degrees_of_freedom = (2 * observations.len()).saturating_sub(6).max(1) as f64;
     let variance =
         (best.squared_error_px / degrees_of_freedom).max(CORNER_NOISE_PX * CORNER_NOISE_PX);
     let ambiguous = alternative
@@ -77,10 +80,13 @@ pub(super) fn solve(intrinsics: &Intrinsics, sightings: &[Sighting]) -> Option<S
     })
 }
 
-fn is_seen_from_the_front(camera_from_anchor: &DAffine3, sightings: &[Sighting]) -> bool {
+fn is_seen_from_the_front(
+    camera_from_anchor: &DAffine3,
+    observations: &[CornerObservation],
+) -> bool {
     let toward_viewer = camera_from_anchor.matrix3.z_axis;
-    sightings.iter().all(|sighting| {
-        let in_camera = camera_from_anchor.transform_point3(sighting.point_m);
+    observations.iter().all(|observation| {
+        let in_camera = camera_from_anchor.transform_point3(observation.point_m);
         in_camera.z > 0.0 && toward_viewer.dot(in_camera) < 0.0
     })
 }
@@ -89,16 +95,16 @@ fn is_seen_from_the_front(camera_from_anchor: &DAffine3, sightings: &[Sighting])
 /// the anchor's plane.
 pub(super) fn ippe_starts(
     intrinsics: &Intrinsics,
-    sightings: &[Sighting],
+    observations: &[CornerObservation],
 ) -> Option<[DAffine3; 2]> {
-    let in_plane = |sighting: &Sighting| sighting.point_m.truncate();
-    let scale = PointScale::of(sightings.iter().map(in_plane));
-    let pairs = sightings
+    let in_plane = |observation: &CornerObservation| observation.point_m.truncate();
+    let scale = PointScale::of(observations.iter().map(in_plane));
+    let pairs = observations
         .iter()
-        .map(|sighting| {
+        .map(|observation| {
             (
-                scale.scaled(in_plane(sighting)),
-                intrinsics.plane_from_pixel(sighting.pixel),
+                scale.scaled(in_plane(observation)),
+                intrinsics.plane_from_pixel(observation.pixel),
             )
         })
         .collect::<Vec<_>>();
@@ -111,13 +117,13 @@ pub(super) fn ippe_starts(
     let rotations = ippe_rotations(image_center, jacobian)?;
     let mut poses = [DAffine3::IDENTITY; 2];
     for (pose, rotation) in poses.iter_mut().zip(rotations) {
-        let translation_m = translation_for(intrinsics, sightings, &rotation)?;
+        let translation_m = translation_for(intrinsics, observations, &rotation)?;
         *pose = DAffine3::from_mat3_translation(rotation, translation_m);
     }
     Some(poses)
 }
 
-/// Both rotations of a plane whose centre is seen at `image_center` with the derivative `jacobian` (up to scale).
+/// The two rotations of a plane whose centre is seen at `image_center` with the derivative `jacobian` (up to scale).
 fn ippe_rotations(image_center: DVec2, jacobian: DMat2) -> Option<[DMat3; 2]> {
     // The rotation that turns the optical axis to the centre's ray.
     let ray = image_center.extend(1.0).normalize();
@@ -162,23 +168,23 @@ fn ippe_rotations(image_center: DVec2, jacobian: DMat2) -> Option<[DMat3; 2]> {
 /// The translation that fits best, linearly, once the rotation is known.
 fn translation_for(
     intrinsics: &Intrinsics,
-    sightings: &[Sighting],
+    observations: &[CornerObservation],
     rotation: &DMat3,
 ) -> Option<DVec3> {
     let mut equations = NormalEquations::<3>::ZERO;
-    for sighting in sightings {
-        let image = intrinsics.plane_from_pixel(sighting.pixel);
-        let turned = *rotation * sighting.point_m;
+    for observation in observations {
+        let image = intrinsics.plane_from_pixel(observation.pixel);
+        let turned = *rotation * observation.point_m;
         equations.add(&[1.0, 0.0, -image.x], image.x * turned.z - turned.x);
         equations.add(&[0.0, 1.0, -image.y], image.y * turned.z - turned.y);
     }
     equations.solve().map(DVec3::from)
 }
 
-/// A pose that is moved to where it explains the sightings.
+/// A pose that is moved to where it explains the observations.
 struct CornerFit<'a> {
     intrinsics: &'a Intrinsics,
-    sightings: &'a [Sighting],
+    observations: &'a [CornerObservation],
     camera_from_anchor: DAffine3,
 }
 
@@ -187,21 +193,23 @@ impl Problem for CornerFit<'_> {
 
     fn cost(&self) -> Option<f64> {
         let mut squares_px = 0.0;
-        for sighting in self.sightings {
-            let in_camera_m = self.camera_from_anchor.transform_point3(sighting.point_m);
+        for observation in self.observations {
+            let in_camera_m = self
+                .camera_from_anchor
+                .transform_point3(observation.point_m);
             let pixel = self.intrinsics.undistorted_pixel_of(in_camera_m)?;
-            squares_px += (pixel - sighting.pixel).length_squared();
+            squares_px += (pixel - observation.pixel).length_squared();
         }
         squares_px.is_finite().then_some(squares_px)
     }
 
     fn linearized(&self) -> Option<NormalEquations<6>> {
         let mut equations = NormalEquations::ZERO;
-        for sighting in self.sightings {
-            let turned_m = self.camera_from_anchor.matrix3 * sighting.point_m;
+        for observation in self.observations {
+            let turned_m = self.camera_from_anchor.matrix3 * observation.point_m;
             let in_camera_m = turned_m + self.camera_from_anchor.translation;
             let projection = self.intrinsics.project_undistorted(in_camera_m)?;
-            let missing_px = sighting.pixel - projection.pixel;
+            let missing_px = observation.pixel - projection.pixel;
             let gradients = projection.gradients();
             for (gradient, value) in gradients.into_iter().zip(missing_px.to_array()) {
                 equations.add(&by_step(turned_m, gradient), value);
@@ -226,10 +234,10 @@ impl Problem for CornerFit<'_> {
     }
 }
 
-/// The pose near `start` that explains the sightings best; `None` when it does not come to rest in front of the camera.
+/// The pose near `start` that explains the observations best; `None` when it does not come to rest in front of the camera.
 pub(super) fn refine(
     intrinsics: &Intrinsics,
-    sightings: &[Sighting],
+    observations: &[CornerObservation],
     start: DAffine3,
 ) -> Option<Solution> {
     const METHOD: LevenbergMarquardt = LevenbergMarquardt {
@@ -237,7 +245,7 @@ pub(super) fn refine(
         rounds: 100,
         least_gain: 0.0,
     };
-    let found = minimized(&METHOD, intrinsics, sightings, start)?;
+    let found = minimized(&METHOD, intrinsics, observations, start)?;
     found.is_settled.then_some(Solution {
         camera_from_anchor: found.problem.camera_from_anchor,
         squared_error_px: found.cost,
@@ -247,7 +255,7 @@ pub(super) fn refine(
 /// The pose near `start` that a few steps toward the best one come to, where many starts are to be compared.
 pub(super) fn refine_roughly(
     intrinsics: &Intrinsics,
-    sightings: &[Sighting],
+    observations: &[CornerObservation],
     start: DAffine3,
 ) -> Option<Solution> {
     const METHOD: LevenbergMarquardt = LevenbergMarquardt {
@@ -255,7 +263,7 @@ pub(super) fn refine_roughly(
         rounds: 15,
         least_gain: 1e-6,
     };
-    let found = minimized(&METHOD, intrinsics, sightings, start)?;
+    let found = minimized(&METHOD, intrinsics, observations, start)?;
     Some(Solution {
         camera_from_anchor: found.problem.camera_from_anchor,
         squared_error_px: found.cost,
@@ -265,12 +273,12 @@ pub(super) fn refine_roughly(
 fn minimized<'a>(
     method: &LevenbergMarquardt,
     intrinsics: &'a Intrinsics,
-    sightings: &'a [Sighting],
+    observations: &'a [CornerObservation],
     start: DAffine3,
 ) -> Option<Minimum<CornerFit<'a>>> {
     method.minimize(CornerFit {
         intrinsics,
-        sightings,
+        observations,
         camera_from_anchor: start,
     })
 }
@@ -278,12 +286,12 @@ fn minimized<'a>(
 /// The covariance of a pose's step, from corners.
 pub(super) fn covariance(
     intrinsics: &Intrinsics,
-    sightings: &[Sighting],
+    observations: &[CornerObservation],
     pose: &DAffine3,
 ) -> Option<Matrix<6>> {
     let fit = CornerFit {
         intrinsics,
-        sightings,
+        observations,
         camera_from_anchor: *pose,
     };
     Some(fit.linearized()?.covariance()? * (CORNER_NOISE_PX * CORNER_NOISE_PX))
@@ -324,17 +332,17 @@ mod tests {
         ]
     }
 
-    fn sightings(
+    fn observations(
         points_m: &[DVec2],
         pose: &DAffine3,
         mut noise: impl FnMut() -> f64,
-    ) -> Vec<Sighting> {
+    ) -> Vec<CornerObservation> {
         points_m
             .iter()
             .map(|point_m| {
                 let point_m = point_m.extend(0.0);
                 let pixel = CAMERA.undistorted_pixel_of(pose.transform_point3(point_m));
-                Sighting {
+                CornerObservation {
                     point_m,
                     pixel: pixel.unwrap() + DVec2::new(noise(), noise()),
                 }
@@ -359,7 +367,7 @@ mod tests {
         for tilt_deg in [0.0, 5.0, 20.0, 60.0] {
             for turn_deg in [0.0, 90.0, 137.0, 180.0, 271.0] {
                 let truth = pose(tilt_deg, turn_deg, 0.5);
-                let seen = sightings(&square(0.04), &truth, || 0.0);
+                let seen = observations(&square(0.04), &truth, || 0.0);
                 let found = solve(&CAMERA, &seen).unwrap();
                 let error_m =
                     (found.best.camera_from_anchor.translation - truth.translation).length();
@@ -376,10 +384,10 @@ mod tests {
     #[test]
     fn the_derivative_agrees_with_differences() {
         let truth = pose(30.0, 40.0, 0.6);
-        let seen = sightings(&square(0.05), &truth, gaussian(1.0));
+        let seen = observations(&square(0.05), &truth, gaussian(1.0));
         let fit = CornerFit {
             intrinsics: &CAMERA,
-            sightings: &seen,
+            observations: &seen,
             camera_from_anchor: truth,
         };
         let gradient = fit.linearized().unwrap().right;
@@ -408,7 +416,7 @@ mod tests {
                 f64::from(k * 37 % 360),
                 0.3 + f64::from(k % 7) * 0.1,
             );
-            let found = solve(&CAMERA, &sightings(&square(0.036), &truth, &mut noise)).unwrap();
+            let found = solve(&CAMERA, &observations(&square(0.036), &truth, &mut noise)).unwrap();
             let off = |solution: &Solution| rotation_between(&solution.camera_from_anchor, &truth);
             let other = found.alternative.as_ref().map(off);
             let best_is_nearer = other.is_none_or(|other| off(&found.best) <= other);
@@ -445,7 +453,7 @@ mod tests {
         .collect::<Vec<_>>();
         for k in 0..200 {
             let truth = pose(f64::from(k % 50), f64::from(k * 37 % 360), 0.6);
-            let found = solve(&CAMERA, &sightings(&board, &truth, &mut noise)).unwrap();
+            let found = solve(&CAMERA, &observations(&board, &truth, &mut noise)).unwrap();
             assert!(rotation_between(&found.best.camera_from_anchor, &truth) < 0.02);
             // Within a few degrees of frontal the two poses are one up to the noise.
             assert!(!found.ambiguous || k % 50 < 5, "tilt {}°", k % 50);
@@ -455,10 +463,10 @@ mod tests {
     #[test]
     fn nonsense_has_no_pose() {
         let truth = pose(20.0, 0.0, 0.5);
-        let seen = sightings(&square(0.04), &truth, || 0.0);
+        let seen = observations(&square(0.04), &truth, || 0.0);
         assert_eq!(solve(&CAMERA, &seen[..3]), None);
         let on_a_line = (0..4)
-            .map(|k| Sighting {
+            .map(|k| CornerObservation {
                 point_m: seen[k].point_m,
                 pixel: DVec2::splat(100.0 + 10.0 * k as f64),
             })
@@ -466,7 +474,7 @@ mod tests {
         assert_eq!(solve(&CAMERA, &on_a_line), None);
         let at_a_point = seen
             .iter()
-            .map(|s| Sighting {
+            .map(|s| CornerObservation {
                 pixel: DVec2::splat(9.0),
                 ..*s
             })
@@ -475,7 +483,7 @@ mod tests {
         // A mirrored picture shows the back of the marker.
         let mirrored = seen
             .iter()
-            .map(|s| Sighting {
+            .map(|s| CornerObservation {
                 pixel: DVec2::new(639.0 - s.pixel.x, s.pixel.y),
                 ..*s
             })

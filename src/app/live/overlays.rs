@@ -11,7 +11,7 @@ use super::shadow_clicks::ShadowClicks;
 use super::shadow_lines::ShadowLines;
 use super::views::View;
 use super::wish::Overlay;
-use crate::geometry::light_placing::Sight;
+use crate::geometry::light_placing::PosedCamera;
 use crate::scene::Scene;
 use crate::tracking::{Quad, Status};
 
@@ -74,7 +74,7 @@ impl Overlays<'_> {
     }
 
     /// The handles of what is selected.
-    pub fn handles(&self, target: &Target, sight: &Sight) {
+    pub fn handles(&self, target: &Target, sight: &PosedCamera) {
         let Some(gizmo) = Gizmo::new(target, sight) else {
             return;
         };
@@ -242,7 +242,7 @@ impl Overlays<'_> {
     }
 
     fn place(&self, camera_from_anchor: &DAffine3, point_m: DVec3) -> Option<Pos2> {
-        let sight = Sight {
+        let sight = PosedCamera {
             intrinsics: self.picture.intrinsics,
             camera_from_world: *camera_from_anchor,
         };

@@ -33,14 +33,14 @@ const HUBER: f64 = 2.0;
 
 /// A marker and where it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Placed {
+pub(super) struct PlacedMarker {
     pub world_from_marker: DAffine3,
     pub size_m: f64,
 }
 
 /// A marker as a picture shows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Seen {
+pub(super) struct MarkerObservation {
     pub marker: usize,
     /// As printed from the top left clockwise, undistorted pixels.
     pub corners_px: [DVec2; 4],
@@ -48,14 +48,14 @@ pub(super) struct Seen {
 
 /// A picture and from where it was taken.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct View {
+pub(super) struct BoardView {
     pub camera_from_world: DAffine3,
-    pub seen: Vec<Seen>,
+    pub seen: Vec<MarkerObservation>,
 }
 
 /// What may move.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Freedom {
+pub(super) enum MarkerFreedom {
     /// Markers lie anywhere.
     Space,
     /// Markers stay in the plane z = 0 of the world, facing up.
@@ -66,11 +66,11 @@ pub(super) enum Freedom {
 #[derive(Debug, Clone)]
 pub(super) struct Bundle {
     pub intrinsics: Intrinsics,
-    pub markers: Vec<Placed>,
-    pub views: Vec<View>,
+    pub markers: Vec<PlacedMarker>,
+    pub views: Vec<BoardView>,
     /// The marker that stays where and as large as it is.
     pub gauge: usize,
-    pub freedom: Freedom,
+    pub freedom: MarkerFreedom,
     pub sizes_are_free: bool,
 }
 
@@ -79,11 +79,12 @@ pub(super) struct Bundle {
 pub(super) struct Certainty {
     /// Standard deviation of a corner's coordinate, pixels.
     pub noise_px: f64,
-    /// Of each marker's unknowns, 0 for those that are given: radians, metres, and the size as a part of itself.
+    /// Standard deviations of each marker's unknowns, 0 for those that are given: radians, metres, and the size as a part of
+    /// itself.
     pub deviations: Vec<[f64; MARKER_UNKNOWNS]>,
 }
 
-impl Placed {
+impl PlacedMarker {
     pub(super) fn corners_m(&self) -> [DVec3; 4] {
         UNIT_CORNERS.map(|corner| {
             self.world_from_marker
@@ -129,7 +130,7 @@ impl Bundle {
     }
 
     /// How far a marker's corners are from where they are seen in a view, pixels; infinite behind the camera.
-    pub(super) fn distances_px(&self, view: &View, seen: &Seen) -> [f64; 4] {
+    pub(super) fn distances_px(&self, view: &BoardView, seen: &MarkerObservation) -> [f64; 4] {
         let corners_m = self.markers[seen.marker].corners_m();
         std::array::from_fn(|corner| {
             let in_camera_m = view.camera_from_world.transform_point3(corners_m[corner]);
@@ -166,8 +167,8 @@ impl Bundle {
             return &[];
         }
         let all: &'static [usize] = match self.freedom {
-            Freedom::Space => &SPACE,
-            Freedom::Plane => &PLANE,
+            MarkerFreedom::Space => &SPACE,
+            MarkerFreedom::Plane => &PLANE,
         };
         match self.sizes_are_free {
             true => all,
@@ -221,7 +222,7 @@ impl Problem for Limited {
         })
     }
 
-    fn moved(&self, step: &Step) -> Self {
+    fn moved(&self, step: &BundleStep) -> Self {
         let mut bundle = self.bundle.clone();
         for (placed, step) in bundle.markers.iter_mut().zip(&step.markers) {
             let [rx, ry, rz, tx, ty, tz, size] = *step;
@@ -239,7 +240,7 @@ impl Limited {
     /// The equations of a view; what they say of its markers alone is added to `markers`.
     fn view_block(
         &self,
-        view: &View,
+        view: &BoardView,
         markers: &mut [NormalEquations<MARKER_UNKNOWNS>],
     ) -> Option<ViewBlock> {
         let mut block = ViewBlock {
@@ -325,7 +326,7 @@ impl Unknowns {
 struct Equations {
     markers: Vec<NormalEquations<MARKER_UNKNOWNS>>,
     views: Vec<ViewBlock>,
-    /// Of each marker.
+    /// The free unknowns of each marker.
     free: Vec<Unknowns>,
     /// The number of free unknowns of all markers.
     unknowns: usize,
@@ -339,22 +340,22 @@ struct ViewBlock {
 }
 
 /// The markers' equations with the cameras eliminated.
-struct Reduced {
+struct ReducedEquations {
     matrix: DynamicMatrix,
     right: Vec<f64>,
     /// The inverse of each camera's block.
     cameras: Vec<Matrix<CAMERA_UNKNOWNS>>,
 }
 
-struct Step {
+struct BundleStep {
     markers: Vec<[f64; MARKER_UNKNOWNS]>,
     cameras: Vec<[f64; CAMERA_UNKNOWNS]>,
 }
 
 impl Equations {
     /// `None` where a view does not determine its camera.
-    fn reduced(&self, damping: f64) -> Option<Reduced> {
-        let mut reduced = Reduced {
+    fn reduced(&self, damping: f64) -> Option<ReducedEquations> {
+        let mut reduced = ReducedEquations {
             matrix: DynamicMatrix::zero(self.unknowns),
             right: vec![0.0; self.unknowns],
             cameras: Vec::with_capacity(self.views.len()),
@@ -385,7 +386,7 @@ impl Equations {
         &self,
         view: &ViewBlock,
         inverse: &Matrix<CAMERA_UNKNOWNS>,
-        reduced: &mut Reduced,
+        reduced: &mut ReducedEquations,
     ) {
         for (marker_a, cross_a) in &view.cross {
             for (i, a) in self.free[*marker_a].places() {
@@ -405,9 +406,9 @@ impl Equations {
 }
 
 impl Linearized for Equations {
-    type Step = Step;
+    type Step = BundleStep;
 
-    fn step(&self, damping: f64) -> Option<Step> {
+    fn step(&self, damping: f64) -> Option<BundleStep> {
         let reduced = self.reduced(damping)?;
         let solution = reduced.matrix.cholesky()?.solve(&reduced.right);
         let markers: Vec<[f64; MARKER_UNKNOWNS]> = self
@@ -431,7 +432,7 @@ impl Linearized for Equations {
             }
             *inverse * rest
         });
-        Some(Step {
+        Some(BundleStep {
             cameras: cameras.collect(),
             markers,
         })
