@@ -22,7 +22,7 @@ pub struct Level {
     /// Closed if the mesh is.
     pub mesh: Mesh,
     /// No point of either surface lies farther from the other, so no outline is off by more, metres; as
-    /// [`Surface::distance_to`] finds it.
+    /// [`SampledSurface::distance_to`] finds it.
     pub max_error_m: f64,
     /// How far outlines are off on the average over their length and over all directions of view, metres.
     pub mean_error_m: f64,
