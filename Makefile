@@ -1,4 +1,5 @@
 # Every target first sets up what it needs (scripts/setup) and uses the release profile, so dependencies compile once.
+# With CARGO_INCREMENTAL=1 in the environment small changes compile sooner, and what comes out is slower.
 # Mesa's layer that asks the desktop for its favourite card complains on machines without a desktop; gnomon chooses itself.
 export NODEVICE_SELECT = 1
 

@@ -202,20 +202,20 @@ fn certainty_text(learnt: &LearntBoard) -> String {
             learnt.rotation_deviation_rad.to_degrees(),
             learnt.size_deviation_m * 1e3,
             learnt.off_plane_m * 1e3,
-            learnt.sightings,
+            learnt.observations,
             learnt.dropped,
             learnt.rms_px
         );
     }
     for learnt in &learnt.markers {
         // Here and there a pencil covers a marker; one that moved fits in no more than a part of the pictures.
-        if learnt.dropped > learnt.sightings / 4 {
+        if learnt.dropped > learnt.observations / 4 {
             let _ = writeln!(
                 text,
                 "marker {} did not fit in {} of {} pictures: did it move?",
                 learnt.marker.id,
                 learnt.dropped,
-                learnt.dropped + learnt.sightings
+                learnt.dropped + learnt.observations
             );
         }
     }

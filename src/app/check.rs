@@ -9,7 +9,7 @@ use crate::app::check_degenerate;
 use crate::app::check_room::{self, room_lines};
 use crate::geometry::levels::{Level, levels};
 use crate::geometry::mesh::MeshReport;
-use crate::geometry::outline_scale::largest_stretch;
+use crate::geometry::outline_scale::largest_scale;
 use crate::light::Light;
 use crate::scene::{Anchor, DetectorKind, Object, Quality, Scene, ShadowSettings};
 
@@ -291,7 +291,7 @@ fn mesh_cell(object: &Object) -> String {
 fn levels_note(object: &Object) -> Option<String> {
     /// The finest say enough.
     const SHOWN: usize = 4;
-    let stretch = largest_stretch(&object.anchor_from_object);
+    let stretch = largest_scale(&object.anchor_from_object);
     let levels = levels(&object.mesh);
     let level = |level: &Level| {
         let [most, mean] =

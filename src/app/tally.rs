@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::stats::StageLog;
 use super::tracked::TrackedFrame;
 use crate::scene::Anchor;
-use crate::tracking::{Status, Why};
+use crate::tracking::{LossReason, Status};
 
 /// Counts and times, frame by frame.
 pub(super) struct Tally {
@@ -19,7 +19,7 @@ pub(super) struct Tally {
     pub last_read: Option<u32>,
     reprojections_px: Vec<f64>,
     /// For each anchor the frames in which something else than its absence kept it from having a pose.
-    hindered: Vec<BTreeMap<Why, u32>>,
+    hindered: Vec<BTreeMap<LossReason, u32>>,
 }
 
 impl Tally {
@@ -54,8 +54,8 @@ impl Tally {
         }
         for (hindered, pose) in self.hindered.iter_mut().zip(&tracked.poses) {
             let why = pose
-                .why
-                .filter(|why| matches!(why, Why::DoubleId | Why::NoPose));
+                .loss_reason
+                .filter(|why| matches!(why, LossReason::DoubleId | LossReason::NoPose));
             if let Some(why) = why {
                 *hindered.entry(why).or_default() += 1;
             }

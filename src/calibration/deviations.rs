@@ -4,21 +4,18 @@
 //! What the corners' scatter alone says is several times too sure: paper bends, and light changes, from view to view and
 //! not from corner to corner.
 
-use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
+use glam::{DAffine3, DVec2};
 
-use super::Corner;
+use super::TargetCorner;
 use crate::geometry::camera::Intrinsics;
-use crate::geometry::dense::Square;
+use crate::geometry::matrix::{DynamicMatrix, dot};
+use crate::geometry::pose::by_step;
 
-/// fx, fy, cx, cy, k1, k2, p1, p2, k3.
+/// A camera's parameters: fx, fy, cx, cy, k1, k2, p1, p2, k3.
 pub(super) type Parameters = [f64; 9];
 
-/// Turn about the camera's axes, then shift.
+/// The number of a pose's unknowns.
 const POSE: usize = 6;
-/// Steps of the numeric derivatives: of pixels, of coefficients, of turns (radians), of shifts as a part of the distance.
-const PIXEL_STEP: f64 = 1e-3;
-const COEFFICIENT_STEP: f64 = 1e-6;
-const POSE_STEP: f64 = 1e-6;
 
 /// The camera's parameters in their order.
 pub(super) fn parameters_of(intrinsics: &Intrinsics) -> Parameters {
@@ -31,12 +28,12 @@ pub(super) fn parameters_of(intrinsics: &Intrinsics) -> Parameters {
 /// without one of them do not determine the camera.
 pub(super) fn deviations<'a>(
     intrinsics: &Intrinsics,
-    views: impl Iterator<Item = (&'a [Corner], DAffine3)>,
+    views: impl Iterator<Item = (&'a [TargetCorner], DAffine3)>,
     free: [bool; 9],
 ) -> Parameters {
     let free: Vec<usize> = (0..9).filter(|&k| free[k]).collect();
-    let views: Option<Vec<Reduced>> = views
-        .map(|(corners, pose)| Reduced::of(intrinsics, corners, &pose, &free))
+    let views: Option<Vec<ReducedView>> = views
+        .map(|(corners, pose)| ReducedView::of(intrinsics, corners, &pose, &free))
         .collect();
     let steps = views.and_then(|views| steps_without_each(&views));
     let mut deviations = [f64::INFINITY; 9];
@@ -54,9 +51,9 @@ pub(super) fn deviations<'a>(
 }
 
 /// What each view left out would change; `None` where the others do not determine the camera.
-fn steps_without_each(views: &[Reduced]) -> Option<Vec<Vec<f64>>> {
+fn steps_without_each(views: &[ReducedView]) -> Option<Vec<Vec<f64>>> {
     let side = views.first()?.slope.len();
-    let mut all = Reduced::zero(side);
+    let mut all = ReducedView::zero(side);
     for view in views {
         all.add(view, 1.0);
     }
@@ -72,15 +69,15 @@ fn steps_without_each(views: &[Reduced]) -> Option<Vec<Vec<f64>>> {
 
 /// A view's part in the normal equations of the camera's parameters, its pose eliminated (Schur complement).
 #[derive(Clone)]
-struct Reduced {
-    curvature: Square,
+struct ReducedView {
+    curvature: DynamicMatrix,
     slope: Vec<f64>,
 }
 
-impl Reduced {
+impl ReducedView {
     fn zero(side: usize) -> Self {
         Self {
-            curvature: Square::zero(side),
+            curvature: DynamicMatrix::zero(side),
             slope: vec![0.0; side],
         }
     }
@@ -97,16 +94,18 @@ impl Reduced {
     /// `None` where the corners do not determine the pose.
     fn of(
         intrinsics: &Intrinsics,
-        corners: &[Corner],
+        corners: &[TargetCorner],
         camera_from_target: &DAffine3,
         free: &[usize],
     ) -> Option<Self> {
         let (shared, side) = (free.len(), free.len() + POSE);
-        let mut curvature = Square::zero(side);
+        let mut curvature = DynamicMatrix::zero(side);
         let mut slope = vec![0.0; side];
         for corner in corners {
-            let slopes = slopes(intrinsics, camera_from_target, corner.target_m, free);
-            let off_px = corner.pixel - pixel_of(intrinsics, camera_from_target, corner.target_m);
+            let slopes = slopes(intrinsics, camera_from_target, corner.target_m, free)?;
+            let target_m = corner.target_m.extend(0.0);
+            let expected_px = intrinsics.pixel_of(camera_from_target.transform_point3(target_m))?;
+            let off_px = corner.pixel - expected_px;
             for i in 0..side {
                 slope[i] += slopes[i].dot(off_px);
                 for j in 0..side {
@@ -114,7 +113,7 @@ impl Reduced {
                 }
             }
         }
-        let mut of_pose = Square::zero(POSE);
+        let mut of_pose = DynamicMatrix::zero(POSE);
         for i in 0..POSE {
             for j in 0..POSE {
                 *of_pose.at_mut(i, j) = curvature.at(shared + i, shared + j);
@@ -136,65 +135,77 @@ impl Reduced {
     }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// How a corner's pixel moves with the free parameters and with the pose, by central differences.
+/// How a corner's pixel moves with the free parameters and with a step of the pose; `None` behind the camera.
 fn slopes(
     intrinsics: &Intrinsics,
     camera_from_target: &DAffine3,
     target_m: DVec2,
     free: &[usize],
-) -> Vec<DVec2> {
-    let of_camera = free.iter().map(|&k| {
-        let step = if k < 4 { PIXEL_STEP } else { COEFFICIENT_STEP };
-        let at = |step: f64| pixel_of(&stepped(intrinsics, k, step), camera_from_target, target_m);
-        (at(step) - at(-step)) / (2.0 * step)
-    });
-    let distance_m = camera_from_target.translation.length();
-    let of_pose = (0..POSE).map(|k| {
-        let at = |step: f64| {
-            pixel_of(
-                intrinsics,
-                &moved(camera_from_target, k, step * distance_m),
-                target_m,
-            )
+) -> Option<Vec<DVec2>> {
+    let turned_m = camera_from_target.matrix3 * target_m.extend(0.0);
+    let in_camera_m = turned_m + camera_from_target.translation;
+    let [by_x, by_y] = intrinsics
+        .project(in_camera_m)?
+        .gradients()
+        .map(|gradient| by_step(turned_m, gradient));
+    let of_camera = by_parameters(intrinsics, in_camera_m.truncate() / in_camera_m.z);
+    let of_camera = free.iter().map(|&k| of_camera[k]);
+    let of_pose = (0..POSE).map(|k| DVec2::new(by_x[k], by_y[k]));
+    Some(of_camera.chain(of_pose).collect())
+}
+
+/// How the pixel of a point of the plane z = 1 moves with each of the camera's parameters.
+fn by_parameters(intrinsics: &Intrinsics, point: DVec2) -> [DVec2; 9] {
+    let (x, y) = (point.x, point.y);
+    let r2 = point.length_squared();
+    let bent = intrinsics.distort(point);
+    let focal_px = intrinsics.focal_px;
+    let by_k1 = focal_px * point * r2;
+    [
+        DVec2::new(bent.x, 0.0),
+        DVec2::new(0.0, bent.y),
+        DVec2::X,
+        DVec2::Y,
+        by_k1,
+        by_k1 * r2,
+        focal_px * DVec2::new(2.0 * x * y, r2 + 2.0 * y * y),
+        focal_px * DVec2::new(r2 + 2.0 * x * x, 2.0 * x * y),
+        by_k1 * r2 * r2,
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn derivatives_by_the_parameters_are_what_small_steps_make() {
+        const CAMERA: Intrinsics = Intrinsics {
+            size_px: [640, 480],
+            focal_px: DVec2::new(615.0, 613.0),
+            center_px: DVec2::new(321.4, 238.2),
+            distortion: [-0.35, 0.15, -0.002, 0.001, -0.03],
         };
-        (at(POSE_STEP) - at(-POSE_STEP)) / (2.0 * POSE_STEP)
-    });
-    of_camera.chain(of_pose).collect()
-}
-
-/// Where a camera sees a point of the target, distorted pixels.
-pub(super) fn pixel_of(
-    intrinsics: &Intrinsics,
-    camera_from_target: &DAffine3,
-    target_m: DVec2,
-) -> DVec2 {
-    let in_camera = camera_from_target.transform_point3(target_m.extend(0.0));
-    intrinsics.pixel_from_plane(intrinsics.distort(in_camera.truncate() / in_camera.z))
-}
-
-fn stepped(intrinsics: &Intrinsics, parameter: usize, step: f64) -> Intrinsics {
-    let mut stepped = *intrinsics;
-    match parameter {
-        0 => stepped.focal_px.x += step,
-        1 => stepped.focal_px.y += step,
-        2 => stepped.center_px.x += step,
-        3 => stepped.center_px.y += step,
-        coefficient => stepped.distortion[coefficient - 4] += step,
-    }
-    stepped
-}
-
-/// `way`: a turn about the camera's x, y or z, then a shift along them.
-fn moved(pose: &DAffine3, way: usize, step: f64) -> DAffine3 {
-    let axis = DVec3::AXES[way % 3];
-    if way < 3 {
-        let turn = DMat3::from_quat(DQuat::from_scaled_axis(axis * step));
-        DAffine3::from_mat3_translation(turn * pose.matrix3, pose.translation)
-    } else {
-        DAffine3::from_mat3_translation(pose.matrix3, pose.translation + axis * step)
+        const STEP: f64 = 1e-6;
+        let point = DVec2::new(0.4, -0.3);
+        let pixel = |parameter: usize, step: f64| {
+            let mut camera = CAMERA;
+            match parameter {
+                0 => camera.focal_px.x += step,
+                1 => camera.focal_px.y += step,
+                2 => camera.center_px.x += step,
+                3 => camera.center_px.y += step,
+                coefficient => camera.distortion[coefficient - 4] += step,
+            }
+            camera.pixel_from_plane(camera.distort(point))
+        };
+        let found = by_parameters(&CAMERA, point);
+        for (k, derivative) in found.into_iter().enumerate() {
+            let slope = (pixel(k, STEP) - pixel(k, -STEP)) / (2.0 * STEP);
+            assert!(
+                slope.distance(derivative) < 1e-5,
+                "{k}: {slope} {derivative}"
+            );
+        }
     }
 }

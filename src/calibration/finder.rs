@@ -13,15 +13,15 @@ use opencv::core::{
 use opencv::prelude::*;
 use opencv::{boxed_ref::BoxedRef, calib3d, imgproc};
 
-use super::homography::{homography, mapped};
-use super::{CalibrateError, Corner, Target, TargetMarkers};
+use super::{CalibrateError, Target, TargetCorner, TargetMarkers};
+use crate::geometry::homography::{best_homography, mapped};
 use crate::scene::{DetectorKind, TrackingSettings};
 use crate::tracking::{Detector, TrackingError};
 
 /// Finds one target; built once, used by one thread at a time.
 pub struct TargetFinder {
     target: Target,
-    /// Of a ChArUco board's markers.
+    /// The detector of a ChArUco board's markers.
     detector: Option<Detector>,
 }
 
@@ -69,7 +69,11 @@ impl TargetFinder {
     ///
     /// # Errors
     /// Bytes that do not make up the picture's size, or a failure of a library.
-    pub fn find(&mut self, grey: &[u8], size_px: [u32; 2]) -> Result<Vec<Corner>, CalibrateError> {
+    pub fn find(
+        &mut self,
+        grey: &[u8],
+        size_px: [u32; 2],
+    ) -> Result<Vec<TargetCorner>, CalibrateError> {
         let [width, height] = size_px;
         let fits = i32::try_from(width).is_ok() && i32::try_from(height).is_ok();
         if !fits || grey.is_empty() || grey.len() as u64 != u64::from(width) * u64::from(height) {
@@ -100,7 +104,7 @@ fn chessboard_corners(
     target: &Target,
     picture: &BoxedRef<'_, Mat>,
     soft: &Mat,
-) -> opencv::Result<Vec<Corner>> {
+) -> opencv::Result<Vec<TargetCorner>> {
     let [across, down] = target.corners().map(|corners| corners as i32);
     // Neither the exhaustive search nor the upsampled one is worth several times the time.
     let flags = calib3d::CALIB_CB_NORMALIZE_IMAGE;
@@ -127,7 +131,7 @@ fn chessboard_corners(
             .fold(f64::INFINITY, f64::min);
         // The finder's own places scatter by a tenth of a pixel, nearly twice as much as saddle points do.
         let refined = saddle_point(soft, pixels[k], REACH * spacing_px)?;
-        corners.push(Corner {
+        corners.push(TargetCorner {
             target_m,
             pixel: refined.unwrap_or(pixels[k]),
         });
@@ -159,7 +163,7 @@ fn charuco_corners(
     markers: &TargetMarkers,
     seen: &BTreeMap<u32, [DVec2; 4]>,
     soft: &Mat,
-) -> opencv::Result<Vec<Corner>> {
+) -> opencv::Result<Vec<TargetCorner>> {
     let Some(placed) = placed_markers(target, markers, seen)? else {
         return Ok(Vec::new());
     };
@@ -178,7 +182,7 @@ fn charuco_corners(
             continue;
         }
         let pairs: Vec<(DVec2, DVec2)> = near.into_iter().flatten().copied().collect();
-        let Some(picture_from_target) = homography(&pairs)? else {
+        let Some(picture_from_target) = best_homography(&pairs) else {
             continue;
         };
         let at = |point_m: DVec2| mapped(&picture_from_target, point_m);
@@ -193,7 +197,7 @@ fn charuco_corners(
         if let Some(pixel) = saddle_point(soft, guess_px, clear_px)?
             && alternates(soft, quarters_px)?
         {
-            corners.push(Corner { target_m, pixel });
+            corners.push(TargetCorner { target_m, pixel });
         }
     }
     Ok(corners)
@@ -222,7 +226,7 @@ fn placed_markers(
             })
             .collect();
         let pairs = placed.concat();
-        let Some(picture_from_target) = homography(&pairs)? else {
+        let Some(picture_from_target) = best_homography(&pairs) else {
             continue;
         };
         let squared = |&(target_m, pixel): &(DVec2, DVec2)| {

@@ -7,7 +7,6 @@ mod coverage;
 mod coverage_picture;
 mod deviations;
 mod finder;
-mod homography;
 mod solve;
 mod taker;
 mod target;
@@ -23,11 +22,11 @@ pub use finder::TargetFinder;
 pub use solve::{Calibration, FittedView, LensTerms, solve};
 pub use taker::{Moment, Taker};
 pub use target::{Target, TargetError, TargetMarkers};
-pub use views::{FEWEST_VIEWS, Lack, Look, View, Views};
+pub use views::{FEWEST_VIEWS, Lack, TargetLook, TargetView, Views};
 
 /// An inner corner of the target, and where a picture shows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Corner {
+pub struct TargetCorner {
     /// In the target's frame, metres.
     pub target_m: DVec2,
     /// Distorted pixel; an integer coordinate is a pixel's centre.

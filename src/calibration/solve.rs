@@ -1,17 +1,18 @@
 //! The calibration itself: OpenCV's bundle adjustment (Zhang, "A flexible new technique for camera calibration", 2000),
 //! without the views that do not fit, with no more of the lens model than the views tell.
 
-use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 use opencv::calib3d;
 use opencv::core::{
     Mat, Point2f, Point3f, Size, TermCriteria, TermCriteria_COUNT, TermCriteria_EPS, Vec3d, Vector,
 };
 use opencv::prelude::*;
 
-use super::deviations::{Parameters, deviations, parameters_of, pixel_of};
-use super::views::{FEWEST_VIEWS, TILTED_RAD, View, Views, coverage_of, lacks_of};
+use super::deviations::{Parameters, deviations, parameters_of};
+use super::views::{FEWEST_VIEWS, TILTED_RAD, TargetView, Views, coverage_of, lacks_of};
 use super::{CalibrateError, Coverage, Lack};
 use crate::geometry::camera::Intrinsics;
+use crate::geometry::pose::pose_from_rodrigues;
 
 /// A camera, and how it is known.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,7 +44,7 @@ pub struct Calibration {
 pub struct LensTerms {
     /// How many of k1, k2, k3: 1 to 3.
     pub radial: u32,
-    /// p1 and p2.
+    /// Whether p1 and p2 are among them.
     pub tangential: bool,
 }
 
@@ -56,17 +57,17 @@ pub struct FittedView {
     pub camera_from_target: DAffine3,
     /// Root mean square distance of its corners from where the calibration puts them, pixels.
     pub rms_px: f64,
-    /// Its corners: where they are, and how far that is from where the calibration puts them; pixels.
+    /// The view's corners: where they are, and how far that is from where the calibration puts them; pixels.
     pub residuals: Vec<(DVec2, DVec2)>,
 }
 
 /// A focal length that is less certain is none.
 const MOST_FOCAL_DEVIATION: f64 = 0.03;
-/// A view this many times worse than the median view is a bad one…
+/// How many times worse than the median view a bad view is at least.
 const BAD_TIMES: f64 = 3.0;
-/// …if it is also worse by this much, pixels.
+/// By how much a bad view is worse than the median view at least, pixels.
 const BAD_BY_PX: f64 = 0.15;
-/// Of the views no more than this part is dropped: where more do not fit, it is not the views.
+/// The largest part of the views that is dropped: where more do not fit, it is not the views.
 const MOST_DROPPED: f64 = 0.25;
 /// Fewer standard deviations from 0 a coefficient is noise: a few views are poor judges of their own scatter.
 const SIGNIFICANT: f64 = 4.0;
@@ -117,12 +118,12 @@ pub fn solve(views: &Views) -> Result<Calibration, CalibrateError> {
         radial: 2,
         tangential: true,
     };
-    let mut fit = Fit::of(&chosen, size_px, robust)?;
+    let mut fit = CameraFit::of(&chosen, size_px, robust)?;
     while dropped.len() < most_dropped && chosen.len() > FEWEST_VIEWS {
         let Some(worst) = fit.bad_view() else { break };
         let view = chosen.remove(worst);
         dropped.push((view.picture, fit.view_rms_px[worst]));
-        fit = Fit::of(&chosen, size_px, robust)?;
+        fit = CameraFit::of(&chosen, size_px, robust)?;
     }
     let (fit, lens, deviations) = simplest(&chosen, size_px)?;
     let focal_deviation_px = DVec2::new(deviations[0], deviations[1]);
@@ -157,15 +158,15 @@ pub fn solve(views: &Views) -> Result<Calibration, CalibrateError> {
 
 /// The lens with no more terms than the views tell, and the parameters' standard deviations.
 fn simplest(
-    views: &[&View],
+    views: &[&TargetView],
     size_px: [u32; 2],
-) -> Result<(Fit, LensTerms, Parameters), CalibrateError> {
+) -> Result<(CameraFit, LensTerms, Parameters), CalibrateError> {
     let mut lens = LensTerms {
         radial: 3,
         tangential: true,
     };
     loop {
-        let fit = match Fit::of(views, size_px, lens) {
+        let fit = match CameraFit::of(views, size_px, lens) {
             Ok(fit) => fit,
             Err(_) if lens.radial == 3 => {
                 lens.radial = 2;
@@ -198,15 +199,19 @@ fn simplest(
 }
 
 /// What OpenCV makes of some views.
-struct Fit {
+struct CameraFit {
     intrinsics: Intrinsics,
     camera_from_target: Vec<DAffine3>,
     view_rms_px: Vec<f64>,
     rms_px: f64,
 }
 
-impl Fit {
-    fn of(views: &[&View], size_px: [u32; 2], lens: LensTerms) -> Result<Self, CalibrateError> {
+impl CameraFit {
+    fn of(
+        views: &[&TargetView],
+        size_px: [u32; 2],
+        lens: LensTerms,
+    ) -> Result<Self, CalibrateError> {
         let object_points: Vector<Vector<Point3f>> = views
             .iter()
             .map(|view| {
@@ -265,7 +270,11 @@ impl Fit {
         let poses = turns.iter().zip(&shifts);
         Ok(Self {
             intrinsics,
-            camera_from_target: poses.map(|(turn, shift)| pose_of(turn, shift)).collect(),
+            camera_from_target: poses
+                .map(|(turn, shift)| {
+                    pose_from_rodrigues(DVec3::from_array(shift.0), DVec3::from_array(turn.0))
+                })
+                .collect(),
             view_rms_px: view_rms_px.data_typed::<f64>()?.to_vec(),
             rms_px,
         })
@@ -282,11 +291,12 @@ impl Fit {
         bad.then_some(worst)
     }
 
-    fn fitted(&self, k: usize, view: &View) -> FittedView {
+    fn fitted(&self, k: usize, view: &TargetView) -> FittedView {
         let camera_from_target = self.camera_from_target[k];
         let intrinsics = &self.intrinsics;
         let residuals = view.corners.iter().map(|corner| {
-            let expected_px = pixel_of(intrinsics, &camera_from_target, corner.target_m);
+            let in_camera_m = camera_from_target.transform_point3(corner.target_m.extend(0.0));
+            let expected_px = intrinsics.pixel_of(in_camera_m).unwrap_or(DVec2::NAN);
             (corner.pixel, corner.pixel - expected_px)
         });
         FittedView {
@@ -296,12 +306,6 @@ impl Fit {
             residuals: residuals.collect(),
         }
     }
-}
-
-/// A pose from a Rodrigues vector and a shift.
-fn pose_of(turn: Vec3d, shift: Vec3d) -> DAffine3 {
-    let (turn, shift) = (DVec3::from_array(turn.0), DVec3::from_array(shift.0));
-    DAffine3::from_mat3_translation(DMat3::from_quat(DQuat::from_scaled_axis(turn)), shift)
 }
 
 /// Whether the radial distortion turns back on itself within the picture: two rays would share a pixel.

@@ -1,6 +1,6 @@
 //! Takes views by itself while somebody holds the target to a camera: when it is held still, and where the set gains.
 
-use super::{CalibrateError, Look, Target, View, Views};
+use super::{CalibrateError, Target, TargetLook, TargetView, Views};
 
 /// A view is taken by itself when it differs from all others by this: root mean square distance of the target's own four
 /// corners, as a part of the picture's diagonal.
@@ -12,7 +12,7 @@ const STILL: f64 = 0.0025;
 /// Views, and when they are taken.
 pub struct Taker {
     views: Views,
-    before: Option<View>,
+    before: Option<TargetView>,
 }
 
 /// What became of a picture.
@@ -48,12 +48,12 @@ impl Taker {
         grey: &[u8],
         size_px: [u32; 2],
         by_hand: bool,
-    ) -> Result<(Moment, Option<View>), CalibrateError> {
+    ) -> Result<(Moment, Option<TargetView>), CalibrateError> {
         let seen = self.views.see(self.views.looked(), grey, size_px)?;
         Ok((self.judge(seen.clone(), size_px, by_hand), seen))
     }
 
-    fn judge(&mut self, seen: Option<View>, size_px: [u32; 2], by_hand: bool) -> Moment {
+    fn judge(&mut self, seen: Option<TargetView>, size_px: [u32; 2], by_hand: bool) -> Moment {
         let before = std::mem::replace(&mut self.before, seen.clone());
         let Some(view) = seen else {
             return Moment::NoTarget;
@@ -68,8 +68,8 @@ impl Taker {
             }
         }
         match self.views.take(view) {
-            Look::Kept => Moment::Taken,
-            Look::Alike | Look::NoTarget => Moment::Known,
+            TargetLook::Kept => Moment::Taken,
+            TargetLook::Alike | TargetLook::NoTarget => Moment::Known,
         }
     }
 
@@ -92,14 +92,14 @@ impl Taker {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::{Corner, Lack};
+    use crate::calibration::{Lack, TargetCorner};
     use glam::DVec2;
 
     const SIZE_PX: [u32; 2] = [640, 480];
 
     /// The target's middle at a place of the picture, upright and `wide_px` wide; farther away to the right, where it is
     /// shrunk to a part.
-    fn view(taker: &Taker, middle_px: [f64; 2], wide_px: f64, shrunk: f64) -> View {
+    fn view(taker: &Taker, middle_px: [f64; 2], wide_px: f64, shrunk: f64) -> TargetView {
         let target = taker.views().target();
         let wide_m = f64::from(target.squares[0]) * target.square_m;
         let high_m = f64::from(target.squares[1]) * target.square_m;
@@ -107,10 +107,10 @@ mod tests {
             let depth = 1.0 + (1.0 / shrunk - 1.0) * target_m.x / wide_m;
             let from_middle_m = target_m - DVec2::new(wide_m, high_m) / 2.0;
             let pixel = DVec2::from(middle_px) + from_middle_m * (wide_px / wide_m) / depth;
-            Corner { target_m, pixel }
+            TargetCorner { target_m, pixel }
         };
         let corners = target.corners_m().into_iter().map(corner).collect();
-        View::new(0, corners, target).unwrap().unwrap()
+        TargetView::new(0, corners, target).unwrap().unwrap()
     }
 
     fn taker() -> Taker {

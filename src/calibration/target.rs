@@ -66,7 +66,7 @@ pub enum TargetError {
     TooFewMarkers {
         /// How many it needs.
         needed: usize,
-        /// Of what family.
+        /// The markers' family.
         family: Family,
     },
 }

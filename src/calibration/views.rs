@@ -2,8 +2,8 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::homography::{homography, mapped};
-use super::{CalibrateError, Corner, Coverage, Target, TargetFinder};
+use super::{CalibrateError, Coverage, Target, TargetCorner, TargetFinder};
+use crate::geometry::homography::{best_homography, mapped};
 
 /// Fewer different views are no calibration.
 pub const FEWEST_VIEWS: usize = 4;
@@ -25,18 +25,18 @@ const ENOUGH_COVERAGE: f64 = 0.7;
 pub struct Views {
     finder: TargetFinder,
     size_px: Option<[u32; 2]>,
-    kept: Vec<View>,
+    kept: Vec<TargetView>,
     looked: u32,
     found: u32,
 }
 
 /// A picture of the target.
 #[derive(Debug, Clone, PartialEq)]
-pub struct View {
+pub struct TargetView {
     /// The number under which the picture was shown.
     pub picture: u32,
     /// What it shows.
-    pub corners: Vec<Corner>,
+    pub corners: Vec<TargetCorner>,
     /// Where a plain homography puts the corners of the whole target.
     outline_px: [DVec2; 4],
     /// Root mean square distance of the corners from that homography: the lens, and how sharp the picture is.
@@ -45,7 +45,7 @@ pub struct View {
 
 /// What became of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Look {
+pub enum TargetLook {
     /// The target was not found.
     NoTarget,
     /// It lies as in another picture, the sharper of which is kept.
@@ -107,9 +107,9 @@ impl Views {
         picture: u32,
         grey: &[u8],
         size_px: [u32; 2],
-    ) -> Result<Look, CalibrateError> {
+    ) -> Result<TargetLook, CalibrateError> {
         let view = self.see(picture, grey, size_px)?;
-        Ok(view.map_or(Look::NoTarget, |view| self.take(view)))
+        Ok(view.map_or(TargetLook::NoTarget, |view| self.take(view)))
     }
 
     /// Looks for the target in a picture as [`Views::look`] does, and takes nothing yet; `None` where it is not found.
@@ -121,7 +121,7 @@ impl Views {
         picture: u32,
         grey: &[u8],
         size_px: [u32; 2],
-    ) -> Result<Option<View>, CalibrateError> {
+    ) -> Result<Option<TargetView>, CalibrateError> {
         let expected_px = *self.size_px.get_or_insert(size_px);
         if size_px != expected_px {
             return Err(CalibrateError::OtherSize {
@@ -131,13 +131,13 @@ impl Views {
         }
         self.looked += 1;
         let corners = self.finder.find(grey, size_px)?;
-        let view = View::new(picture, corners, self.finder.target())?;
+        let view = TargetView::new(picture, corners, self.finder.target())?;
         self.found += u32::from(view.is_some());
         Ok(view)
     }
 
     /// Takes a view that was seen.
-    pub fn take(&mut self, view: View) -> Look {
+    pub fn take(&mut self, view: TargetView) -> TargetLook {
         let size_px = self.size_px.unwrap_or_default();
         let alike = self
             .kept
@@ -145,14 +145,14 @@ impl Views {
             .find(|kept| kept.distance(&view, size_px) < ALIKE);
         let Some(kept) = alike else {
             self.kept.push(view);
-            return Look::Kept;
+            return TargetLook::Kept;
         };
         // The lens bends both alike: what differs is blur and noise.
         let better = (view.corners.len(), -view.misfit_px) > (kept.corners.len(), -kept.misfit_px);
         if better {
             *kept = view;
         }
-        Look::Alike
+        TargetLook::Alike
     }
 
     /// Forgets the view that was taken last; false where there is none.
@@ -162,14 +162,14 @@ impl Views {
 
     /// Whether a view differs from all that were taken by this part of the picture's diagonal (root mean square distance
     /// of the target's own four corners) or more.
-    pub(super) fn is_new(&self, view: &View, by: f64) -> bool {
+    pub(super) fn is_new(&self, view: &TargetView, by: f64) -> bool {
         let size_px = self.size_px.unwrap_or_default();
         let mut kept = self.kept.iter();
         kept.all(|kept| kept.distance(view, size_px) >= by)
     }
 
     /// Whether a view would make less of something that the set lacks.
-    pub(super) fn helps(&self, view: &View) -> bool {
+    pub(super) fn helps(&self, view: &TargetView) -> bool {
         let (Some(coverage), Some(size_px)) = (self.coverage(), self.size_px) else {
             return true;
         };
@@ -203,7 +203,7 @@ impl Views {
     }
 
     /// The views that differ, in the order in which they were shown.
-    pub fn kept(&self) -> &[View] {
+    pub fn kept(&self) -> &[TargetView] {
         &self.kept
     }
 
@@ -227,7 +227,7 @@ impl Views {
     }
 
     /// The views that a calibration is made of: all, or those that cover most and differ most.
-    pub(super) fn chosen(&self) -> Result<Vec<&View>, CalibrateError> {
+    pub(super) fn chosen(&self) -> Result<Vec<&TargetView>, CalibrateError> {
         let Some(size_px) = self.size_px.filter(|_| self.found > 0) else {
             return Err(CalibrateError::NoTarget {
                 looked: self.looked,
@@ -246,14 +246,14 @@ impl Views {
                 different: self.kept.len(),
             });
         }
-        let mut rest: Vec<&View> = self.kept.iter().collect();
+        let mut rest: Vec<&TargetView> = self.kept.iter().collect();
         if rest.len() <= MOST_VIEWS {
             return Ok(rest);
         }
-        let mut chosen: Vec<&View> = Vec::new();
+        let mut chosen: Vec<&TargetView> = Vec::new();
         let mut coverage = Coverage::new(size_px);
         while chosen.len() < MOST_VIEWS {
-            let worth = |view: &View| {
+            let worth = |view: &TargetView| {
                 let nearest = chosen
                     .iter()
                     .map(|other| other.distance(view, size_px))
@@ -272,7 +272,7 @@ impl Views {
 }
 
 pub(super) fn coverage_of<'a>(
-    views: impl IntoIterator<Item = &'a View>,
+    views: impl IntoIterator<Item = &'a TargetView>,
     size_px: [u32; 2],
 ) -> Coverage {
     let mut coverage = Coverage::new(size_px);
@@ -299,18 +299,18 @@ pub(super) fn lacks_of(views: usize, coverage: &Coverage, tilted: usize) -> Vec<
     lacks
 }
 
-impl View {
+impl TargetView {
     /// `None` where the corners determine no plane.
     pub(super) fn new(
         picture: u32,
-        corners: Vec<Corner>,
+        corners: Vec<TargetCorner>,
         target: &Target,
     ) -> Result<Option<Self>, CalibrateError> {
         let pairs: Vec<(DVec2, DVec2)> = corners
             .iter()
             .map(|corner| (corner.target_m, corner.pixel))
             .collect();
-        let Some(picture_from_target) = homography(&pairs)? else {
+        let Some(picture_from_target) = best_homography(&pairs) else {
             return Ok(None);
         };
         let squared: f64 = pairs

@@ -47,17 +47,17 @@ fn cropped(rgba: &[u8], [width, height]: [usize; 2], shift: [i32; 2]) -> (Vec<u8
 
 /// Ranks from 0 to 1 and how much each counts, in ever coarser pictures.
 struct Ranks {
-    pyramid: Vec<Layer>,
+    pyramid: Vec<PyramidLayer>,
 }
 
-struct Layer {
+struct PyramidLayer {
     size_px: [usize; 2],
     /// Rank times weight, and weight.
     weighted: Vec<[f32; 2]>,
 }
 
 impl Ranks {
-    /// Of 8-bit RGBA.
+    /// The ranks of a picture of 8-bit RGBA.
     fn of(rgba: &[u8], size_px: [usize; 2]) -> Self {
         let sums = || {
             rgba.chunks_exact(4).map(|pixel| {
@@ -82,8 +82,8 @@ impl Ranks {
                 false => [0.0, 0.0],
             })
             .collect();
-        let mut pyramid = vec![Layer { size_px, weighted }];
-        while let Some(coarser) = pyramid.last().and_then(Layer::halved) {
+        let mut pyramid = vec![PyramidLayer { size_px, weighted }];
+        while let Some(coarser) = pyramid.last().and_then(PyramidLayer::halved) {
             pyramid.push(coarser);
         }
         Self { pyramid }
@@ -112,7 +112,7 @@ impl Ranks {
     }
 }
 
-impl Layer {
+impl PyramidLayer {
     fn halved(&self) -> Option<Self> {
         let size_px @ [width, height] = self.size_px.map(|side| side / 2);
         if width.min(height) < COARSEST_PX {

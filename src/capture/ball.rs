@@ -13,15 +13,15 @@ use crate::light::probe_maps::Circle;
 const SEARCHED_PX: f64 = 480.0;
 /// Steps that Canny's edges begin with: a mirror's limb shows nearly what is behind it, so it may be a faint one.
 const EDGE_STEPS: [f64; 3] = [100.0, 40.0, 15.0];
-/// Circles of each of them that are looked at.
+/// The number of circles that are looked at for each of these steps.
 const CANDIDATES: usize = 12;
 /// Rays from the middle along which the outline is looked at.
 const RAYS: usize = 360;
-/// An outline is a step of at least so many levels,
+/// The least step that an outline is, levels.
 const LEAST_STEP: f64 = 2.0;
-/// and more levels do not make it more of one: what a ball mirrors has steps that are higher than its outline.
+/// The step from which on more levels make no more of an outline: what a ball mirrors has steps higher than its outline.
 const MOST_STEP: f64 = 12.0;
-/// Part of the rays on which it must be one.
+/// The part of the rays on which an outline must be such a step.
 const LEAST_SUPPORT: f64 = 0.6;
 
 /// Finds the ball: of the circles in the mean of the exposures the one whose outline is longest in pixels and seen nearly

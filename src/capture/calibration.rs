@@ -132,14 +132,14 @@ pub fn calibration_text(intrinsics: &Intrinsics) -> String {
 }
 
 /// What a file says, before it is known to make sense.
-struct Calibration {
+struct UncheckedCalibration {
     size_px: Option<[u32; 2]>,
     focal_px: [f64; 2],
     center_px: [f64; 2],
     distortion: [f64; 5],
 }
 
-impl Calibration {
+impl UncheckedCalibration {
     fn into_intrinsics(
         self,
         path: &Path,
@@ -193,7 +193,7 @@ impl Calibration {
     }
 }
 
-fn read(path: &Path) -> Result<Calibration, CalibrationError> {
+fn read(path: &Path) -> Result<UncheckedCalibration, CalibrationError> {
     let text = std::fs::read_to_string(path).map_err(|error| CalibrationError::Io {
         path: path.to_owned(),
         error,
@@ -251,7 +251,7 @@ const WIDTH_KEYS: [&str; 2] = ["image_width", "image_Width"];
 const HEIGHT_KEYS: [&str; 2] = ["image_height", "image_Height"];
 const MODEL_KEYS: [&str; 2] = ["distortion_model", "fisheye_model"];
 
-fn calibration_of_tree(tree: &Map<String, Value>) -> Result<Calibration, String> {
+fn calibration_of_tree(tree: &Map<String, Value>) -> Result<UncheckedCalibration, String> {
     if let Some(Value::Object(camera)) = tree.get("camera") {
         return calibration_of_session(camera);
     }
@@ -262,7 +262,7 @@ fn calibration_of_tree(tree: &Map<String, Value>) -> Result<Calibration, String>
 }
 
 /// `size_px = [640, 480]`, `focal_px`, `center_px`, `distortion = [k1, k2, p1, p2, k3]`.
-fn calibration_of_own(tree: &Map<String, Value>) -> Result<Calibration, String> {
+fn calibration_of_own(tree: &Map<String, Value>) -> Result<UncheckedCalibration, String> {
     if let Some(unknown) = tree.keys().find(|key| !OWN_KEYS.contains(&key.as_str())) {
         return Err(format!(
             "unknown key '{unknown}'; a calibration has {}",
@@ -275,7 +275,7 @@ fn calibration_of_own(tree: &Map<String, Value>) -> Result<Calibration, String> 
             .ok_or_else(|| format!("{key} = [x, y] is missing"))?;
         numbers::<2>(value).ok_or_else(|| format!("{key} must be two finite numbers"))
     };
-    Ok(Calibration {
+    Ok(UncheckedCalibration {
         size_px: tree.get("size_px").map(size).transpose()?,
         focal_px: pair("focal_px")?,
         center_px: pair("center_px")?,
@@ -286,7 +286,7 @@ fn calibration_of_own(tree: &Map<String, Value>) -> Result<Calibration, String> 
 }
 
 /// `{size, K: {fx, fy, cx, cy}, dist}`.
-fn calibration_of_session(camera: &Map<String, Value>) -> Result<Calibration, String> {
+fn calibration_of_session(camera: &Map<String, Value>) -> Result<UncheckedCalibration, String> {
     let entry = |key| {
         let value = camera
             .get("K")
@@ -294,7 +294,7 @@ fn calibration_of_session(camera: &Map<String, Value>) -> Result<Calibration, St
             .and_then(Value::as_f64);
         value.ok_or_else(|| format!("camera.K.{key} must be a finite number"))
     };
-    Ok(Calibration {
+    Ok(UncheckedCalibration {
         size_px: camera.get("size").map(size).transpose()?,
         focal_px: [entry("fx")?, entry("fy")?],
         center_px: [entry("cx")?, entry("cy")?],
@@ -303,7 +303,7 @@ fn calibration_of_session(camera: &Map<String, Value>) -> Result<Calibration, St
 }
 
 /// What OpenCV's and ROS's calibration tools write.
-fn calibration_of_opencv(tree: &Map<String, Value>) -> Result<Calibration, String> {
+fn calibration_of_opencv(tree: &Map<String, Value>) -> Result<UncheckedCalibration, String> {
     if let Some(model) = find(tree, &MODEL_KEYS).and_then(|(_, model)| model.as_str())
         && !matches!(model, "" | "plumb_bob")
     {
@@ -328,7 +328,7 @@ fn calibration_of_opencv(tree: &Map<String, Value>) -> Result<Calibration, Strin
         _ => None,
     };
     let distortion = find(tree, &DISTORTION_KEYS).map(|(_, value)| data_of(value));
-    Ok(Calibration {
+    Ok(UncheckedCalibration {
         size_px,
         focal_px: [fx, fy],
         center_px: [cx, cy],

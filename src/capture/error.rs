@@ -108,7 +108,7 @@ pub enum Notice {
         path: PathBuf,
         /// Index of the frame.
         frame: u32,
-        /// Its width and height.
+        /// The picture's width and height.
         size_px: [u32; 2],
         /// Width and height of the first frame.
         expected_px: [u32; 2],

@@ -30,7 +30,7 @@ pub struct Bracket {
 
 /// A pixel that the curve could be solved from: brightness and detail are sums of levels over all exposures.
 #[derive(Clone, Copy)]
-struct Place {
+struct SamplePlace {
     brightness: u32,
     detail: u32,
     index: usize,
@@ -39,13 +39,13 @@ struct Place {
 /// What can go wrong with bracketed pictures.
 #[derive(Debug, thiserror::Error)]
 pub enum ExposureError {
-    /// Not there, or OpenCV cannot decode it.
+    /// A picture that is not there, or that OpenCV cannot decode.
     #[error("{}: {}", path.display(), if path.exists() { "not a picture that can be read" } else { "no such file" })]
     Unreadable {
         /// The picture.
         path: PathBuf,
     },
-    /// Not the first one's size.
+    /// A picture that has not the first one's size.
     #[error(
         "{}: {} x {} pixels, but {} has {} x {}; all exposures show the same view",
         path.display(), size_px[0], size_px[1], first.display(), first_px[0], first_px[1]
@@ -53,11 +53,11 @@ pub enum ExposureError {
     OtherSize {
         /// The picture.
         path: PathBuf,
-        /// Its size.
+        /// The picture's size.
         size_px: [u32; 2],
         /// The first picture.
         first: PathBuf,
-        /// That one's size.
+        /// The first picture's size.
         first_px: [u32; 2],
     },
     /// Nothing to solve the curve from.
@@ -197,7 +197,7 @@ impl Bracket {
                     }
                 }
                 if tells {
-                    places.push(Place {
+                    places.push(SamplePlace {
                         brightness,
                         detail,
                         index,
@@ -210,9 +210,10 @@ impl Bracket {
             return Vec::new();
         };
         let wanted = PLACES_A_SIDE * PLACES_A_SIDE;
-        let flattest = |places: &[Place]| places.iter().min_by_key(|place| place.detail).copied();
+        let flattest =
+            |places: &[SamplePlace]| places.iter().min_by_key(|place| place.detail).copied();
         // What is common: as many pixels for each place.
-        let common = |count: usize| -> Vec<Place> {
+        let common = |count: usize| -> Vec<SamplePlace> {
             (0..count)
                 .filter_map(|part| {
                     flattest(
@@ -228,7 +229,7 @@ impl Bracket {
         let [low, high] =
             [darkest.brightness, brightest.brightness + 1].map(|level| level as usize);
         let parts = wanted / 2;
-        let mut chosen: Vec<Place> = (0..parts)
+        let mut chosen: Vec<SamplePlace> = (0..parts)
             .filter_map(|part| {
                 let bound = |part: usize| low + (high - low) * part / parts;
                 let start =
@@ -260,7 +261,7 @@ impl Bracket {
             .try_clone()
     }
 
-    /// Of 3 x 3 pixels.
+    /// The mean level of 3 x 3 pixels.
     fn mean(&self, rgba: &[u8], index: usize, channel: usize) -> u8 {
         let columns = self.size_px[0];
         let rows = [index - columns, index, index + columns];

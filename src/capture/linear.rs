@@ -1,5 +1,6 @@
 //! Pictures as light.
 
+use std::ops::{Add, Mul};
 use std::sync::LazyLock;
 
 use glam::{DVec2, DVec3};
@@ -23,26 +24,38 @@ pub fn linear(level: u8) -> f32 {
     LINEAR[usize::from(level)]
 }
 
+/// A value between four pixels' centres, of a picture whose pixels have values by their index; `None` outside the picture.
+#[inline]
+pub fn between_pixels<T>(
+    size_px: [u32; 2],
+    place_px: DVec2,
+    value: impl Fn(usize) -> T,
+) -> Option<T>
+where
+    T: Add<Output = T> + Mul<f64, Output = T>,
+{
+    let [width, height] = size_px.map(|side| side as usize);
+    let corner = place_px.floor();
+    if !(corner.x >= 0.0 && corner.y >= 0.0) {
+        return None;
+    }
+    let (x, y) = (corner.x as usize, corner.y as usize);
+    if x + 1 >= width || y + 1 >= height {
+        return None;
+    }
+    let share = place_px - corner;
+    let first = y * width + x;
+    let top = value(first) * (1.0 - share.x) + value(first + 1) * share.x;
+    let bottom = value(first + width) * (1.0 - share.x) + value(first + width + 1) * share.x;
+    Some(top * (1.0 - share.y) + bottom * share.y)
+}
+
 impl Frame {
     /// Linear RGB between four pixels' centres; `None` outside the picture.
     pub fn linear_rgb(&self, place_px: DVec2) -> Option<DVec3> {
-        let [width, height] = self.size_px.map(|side| side as usize);
-        let corner = place_px.floor();
-        if !(corner.x >= 0.0 && corner.y >= 0.0) {
-            return None;
-        }
-        let (x, y) = (corner.x as usize, corner.y as usize);
-        if x + 1 >= width || y + 1 >= height {
-            return None;
-        }
-        let share = place_px - corner;
-        let at = |x: usize, y: usize| {
-            let pixel = 4 * (y * width + x);
-            DVec3::from_array([0, 1, 2].map(|c| f64::from(linear(self.rgba[pixel + c]))))
-        };
-        let top = at(x, y).lerp(at(x + 1, y), share.x);
-        let bottom = at(x, y + 1).lerp(at(x + 1, y + 1), share.x);
-        Some(top.lerp(bottom, share.y))
+        between_pixels(self.size_px, place_px, |pixel| {
+            DVec3::from_array([0, 1, 2].map(|c| f64::from(linear(self.rgba[4 * pixel + c]))))
+        })
     }
 }
 

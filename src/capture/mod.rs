@@ -56,7 +56,7 @@ impl Frame {
 /// the index that it has in the recording.
 pub struct FrameSource {
     path: PathBuf,
-    pictures: Pictures,
+    pictures: PictureSource,
     times: FrameTimes,
     calibration: Option<Intrinsics>,
     notices: Vec<Notice>,
@@ -64,7 +64,7 @@ pub struct FrameSource {
     mirrored: bool,
 }
 
-enum Pictures {
+enum PictureSource {
     Video(VideoFrames),
     Images(ImageFrames),
 }
@@ -106,7 +106,7 @@ impl FrameSource {
             let images = ImageFrames::open(path, vec![path.to_owned()])?;
             Ok(Self::new(
                 path,
-                Pictures::Images(images),
+                PictureSource::Images(images),
                 FrameTimes::default(),
                 None,
             ))
@@ -114,7 +114,7 @@ impl FrameSource {
             let video = VideoFrames::open(path)?;
             Ok(Self::new(
                 path,
-                Pictures::Video(video),
+                PictureSource::Video(video),
                 FrameTimes::default(),
                 None,
             ))
@@ -129,7 +129,7 @@ impl FrameSource {
         };
         let videos: Vec<&PathBuf> = files.iter().filter(|file| is_session_video(file)).collect();
         let pictures = match videos.as_slice() {
-            [] => Pictures::Images(ImageFrames::open(
+            [] => PictureSource::Images(ImageFrames::open(
                 folder,
                 files
                     .iter()
@@ -137,7 +137,7 @@ impl FrameSource {
                     .cloned()
                     .collect(),
             )?),
-            [video] => Pictures::Video(VideoFrames::open(video)?),
+            [video] => PictureSource::Video(VideoFrames::open(video)?),
             [first, second, ..] => {
                 return Err(CaptureError::SeveralVideos {
                     path: folder.to_owned(),
@@ -161,7 +161,7 @@ impl FrameSource {
 
     fn new(
         path: &Path,
-        pictures: Pictures,
+        pictures: PictureSource,
         times: FrameTimes,
         calibration: Option<Intrinsics>,
     ) -> Self {
@@ -196,16 +196,16 @@ impl FrameSource {
     /// How many frames the recording says it has; a broken one may give fewer.
     pub fn frame_count(&self) -> Option<u32> {
         match &self.pictures {
-            Pictures::Video(video) => video.announced_frames(),
-            Pictures::Images(images) => Some(images.frame_count()),
+            PictureSource::Video(video) => video.announced_frames(),
+            PictureSource::Images(images) => Some(images.frame_count()),
         }
     }
 
     /// Frames per second.
     pub fn fps(&self) -> f64 {
         let nominal = match &self.pictures {
-            Pictures::Video(video) => video.fps(),
-            Pictures::Images(_) => images::ASSUMED_FPS,
+            PictureSource::Video(video) => video.fps(),
+            PictureSource::Images(_) => images::ASSUMED_FPS,
         };
         self.times.fps().unwrap_or(nominal)
     }
@@ -218,8 +218,8 @@ impl FrameSource {
     /// The next good frame; `None` at the end.
     pub fn next_frame(&mut self) -> Result<Option<Frame>, CaptureError> {
         let picture = match &mut self.pictures {
-            Pictures::Video(video) => video.next_picture(&mut self.notices)?,
-            Pictures::Images(images) => images.next_picture(&mut self.notices)?,
+            PictureSource::Video(video) => video.next_picture(&mut self.notices)?,
+            PictureSource::Images(images) => images.next_picture(&mut self.notices)?,
         };
         let Some((index, rgba)) = picture else {
             return Ok(None);
@@ -251,13 +251,13 @@ impl FrameSource {
 
     fn nominal_fps(&self) -> f64 {
         match &self.pictures {
-            Pictures::Video(video) => video.fps(),
-            Pictures::Images(_) => images::ASSUMED_FPS,
+            PictureSource::Video(video) => video.fps(),
+            PictureSource::Images(_) => images::ASSUMED_FPS,
         }
     }
 }
 
-impl Pictures {
+impl PictureSource {
     fn size_px(&self) -> [u32; 2] {
         match self {
             Self::Video(video) => video.size_px(),

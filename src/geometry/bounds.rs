@@ -41,7 +41,7 @@ impl Bounds {
         point.cmpge(self.low).all() && point.cmple(self.high).all()
     }
 
-    /// Its eight corners.
+    /// The box's eight corners.
     pub fn corners(&self) -> [DVec3; 8] {
         let pick = |bit: usize, low: f64, high: f64| if bit == 0 { low } else { high };
         std::array::from_fn(|corner| {
@@ -69,7 +69,7 @@ impl HalfSpace {
         self.inward.dot(point) - self.offset_m
     }
 
-    /// The same in another space, which is turned and moved against this one.
+    /// The box around this one in another space, which is turned and moved against this one.
     pub fn in_space(&self, here_from_there: &DAffine3) -> Self {
         Self {
             inward: here_from_there.matrix3.transpose() * self.inward,

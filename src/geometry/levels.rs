@@ -14,7 +14,7 @@ use super::bounds::Bounds;
 use super::mesh::Mesh;
 use super::normals::face_normal;
 use super::soup::{by_edge, edge_uses};
-use super::surface_distance::Surface;
+use super::surface_distance::SampledSurface;
 
 /// A coarser version of a mesh. Its vertices are some of the mesh's.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,7 +22,7 @@ pub struct Level {
     /// Closed if the mesh is.
     pub mesh: Mesh,
     /// No point of either surface lies farther from the other, so no outline is off by more, metres; as
-    /// [`Surface::distance_to`] finds it.
+    /// [`SampledSurface::distance_to`] finds it.
     pub max_error_m: f64,
     /// How far outlines are off on the average over their length and over all directions of view, metres.
     pub mean_error_m: f64,
@@ -63,7 +63,7 @@ pub fn is_close_enough(max_px: f64, mean_px: f64, max_silhouette_error_px: f64) 
 fn chain(mesh: &Mesh, fewest: usize) -> Vec<Level> {
     let mut levels = Vec::new();
     let bounds = Bounds::around(mesh.positions.iter().map(|position| position.as_dvec3()));
-    let (Some(surface), Some(bounds)) = (Surface::new(mesh), bounds) else {
+    let (Some(surface), Some(bounds)) = (SampledSurface::new(mesh), bounds) else {
         return levels;
     };
     let largest_error_m = LARGEST_ERROR * (bounds.high - bounds.low).length();
@@ -85,7 +85,8 @@ fn chain(mesh: &Mesh, fewest: usize) -> Vec<Level> {
         if coarse.closed_and_consistent() != closed {
             continue;
         }
-        let Some(distance) = Surface::new(&coarse).map(|coarse| surface.distance_to(&coarse))
+        let Some(distance) =
+            SampledSurface::new(&coarse).map(|coarse| surface.distance_to(&coarse))
         else {
             return levels;
         };
@@ -253,8 +254,8 @@ impl<'a> Simplifier<'a> {
         Some(mesh.without_unused_positions())
     }
 
-    /// Of the normals that the source has at a vertex, the one of the corner whose face is turned most like `face`: so
-    /// creases stay, and what is smooth stays smooth.
+    /// The normal that the source has at a vertex for the corner whose face is turned most like `face`: so creases stay, and
+    /// what is smooth stays smooth.
     fn corner_normal(&self, vertex: u32, face: DVec3) -> Vec3 {
         let [start, end] = [vertex, vertex + 1].map(|vertex| self.corner_starts[vertex as usize]);
         let likeness =
@@ -641,8 +642,8 @@ mod tests {
         }
     }
 
-    #[test]
-    fn any_soup_has_levels_that_hold_or_none() {
+    /// Soups of all kinds: loose and tangled triangles, a strip with half a twist, and a torus turned, doubled, scaled and moved.
+    fn soups() -> Vec<Mesh> {
         let mut number = numbers(3);
         let mut vector = || Vec3::new(number(), number(), number());
         // Loose triangles.
@@ -696,31 +697,41 @@ mod tests {
             moved(1e-12, 0.0),
             moved(1.0, 3e3),
         ]);
+        soups
+    }
+
+    fn assert_levels_hold(index: usize, soup: &Mesh) {
+        let diagonal_m = Bounds::around(soup.positions.iter().map(|p| p.as_dvec3()))
+            .map_or(0.0, |bounds| (bounds.high - bounds.low).length());
+        let mut count = soup.triangles.len();
+        for level in levels(soup) {
+            assert!(level.mesh.triangles.len() < count, "soup {index}");
+            count = level.mesh.triangles.len();
+            assert_eq!(
+                level.mesh.closed_and_consistent(),
+                soup.closed_and_consistent()
+            );
+            assert!(
+                level.max_error_m <= LARGEST_ERROR * diagonal_m,
+                "soup {index}"
+            );
+            assert!(level.mean_error_m <= level.max_error_m, "soup {index}");
+            let unit = |normal: &Vec3| (normal.length() - 1.0).abs() < 1e-3;
+            assert!(
+                level.mesh.corner_normals.iter().flatten().all(unit),
+                "soup {index}"
+            );
+        }
+    }
+
+    #[test]
+    fn any_soup_has_levels_that_hold_or_none() {
+        let soups = soups();
         for (index, soup) in soups.iter().enumerate() {
-            let diagonal_m = Bounds::around(soup.positions.iter().map(|p| p.as_dvec3()))
-                .map_or(0.0, |bounds| (bounds.high - bounds.low).length());
-            let mut count = soup.triangles.len();
-            for level in levels(soup) {
-                assert!(level.mesh.triangles.len() < count, "soup {index}");
-                count = level.mesh.triangles.len();
-                assert_eq!(
-                    level.mesh.closed_and_consistent(),
-                    soup.closed_and_consistent()
-                );
-                assert!(
-                    level.max_error_m <= LARGEST_ERROR * diagonal_m,
-                    "soup {index}"
-                );
-                assert!(level.mean_error_m <= level.max_error_m, "soup {index}");
-                let unit = |normal: &Vec3| (normal.length() - 1.0).abs() < 1e-3;
-                assert!(
-                    level.mesh.corner_normals.iter().flatten().all(unit),
-                    "soup {index}"
-                );
-            }
+            assert_levels_hold(index, soup);
         }
         assert!(!levels(&soups[2]).is_empty() && !levels(&soups[6]).is_empty());
-        let mut broken = torus;
+        let mut broken = torus(40, 20);
         broken.positions[7].y = f32::NAN;
         assert!(levels(&broken).is_empty() && levels(&Mesh::default()).is_empty());
         assert!(

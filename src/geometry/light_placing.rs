@@ -2,26 +2,28 @@
 //!
 //! The light is looked for as a direction and an inverse distance, seen from among the casters: that is as good for a
 //! lamp as for the sun, and how sure the inverse distance is tells them apart. What is made small are pixels between
-//! where shadows are seen and where they would fall (Gauss-Newton with Levenberg's damping).
+//! where shadows are seen and where they would fall (Levenberg-Marquardt).
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
 use super::camera::Intrinsics;
+use super::least_squares::{LevenbergMarquardt, NormalEquations, Problem};
+use super::matrix::dot;
 
-/// The camera and where it stands, for what has no distortion left.
+/// A camera and where it stands, for pictures that are undistorted.
 #[derive(Debug, Clone, Copy)]
-pub struct Sight {
+pub struct PosedCamera {
     /// The camera.
     pub intrinsics: Intrinsics,
     /// Where it stands.
     pub camera_from_world: DAffine3,
 }
 
-impl Sight {
+impl PosedCamera {
     /// The undistorted pixel of a point in the world; `None` behind the camera.
     pub fn pixel(&self, world_m: DVec3) -> Option<DVec2> {
-        let point = self.camera_from_world.transform_point3(world_m);
-        (point.z > 1e-6).then(|| self.intrinsics.pixel_from_plane(point.truncate() / point.z))
+        let in_camera_m = self.camera_from_world.transform_point3(world_m);
+        self.intrinsics.undistorted_pixel_of(in_camera_m)
     }
 
     /// The camera's place and the unit direction of the ray through an undistorted pixel, in the world.
@@ -40,7 +42,7 @@ impl Sight {
 pub struct Facet {
     /// A point of it, metres.
     pub point_m: DVec3,
-    /// Its unit normal.
+    /// The surface's unit normal.
     pub normal: DVec3,
 }
 
@@ -100,16 +102,26 @@ impl FarLight {
 
 /// What a light may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Freedom {
+pub enum LightFreedom {
     /// At any distance.
     Point,
     /// Infinitely far.
     Directional,
 }
 
+impl LightFreedom {
+    /// 1 for each of two tangents of the light's direction and its inverse distance that may change, else 0.
+    fn axes(self) -> DVec3 {
+        match self {
+            Self::Point => DVec3::ONE,
+            Self::Directional => DVec3::new(1.0, 1.0, 0.0),
+        }
+    }
+}
+
 /// A light that was placed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Placed {
+pub struct PlacedLight {
     /// The light.
     pub light: FarLight,
     /// Root mean square of what is left, pixels.
@@ -118,7 +130,7 @@ pub struct Placed {
     pub covariance: DMat3,
 }
 
-impl Placed {
+impl PlacedLight {
     /// Covariance of its position in the world for shadows known to `sigma_px`, square metres; `None` for one that is
     /// infinitely far.
     pub fn position_covariance(&self, sigma_px: f64) -> Option<DMat3> {
@@ -163,7 +175,7 @@ pub enum Unplaced {
     Undecided,
 }
 
-/// Of how many standard deviations an inverse distance must be, for a light not to be infinitely far.
+/// The number of standard deviations that an inverse distance must be, for a light not to be infinitely far.
 const SURE: f64 = 3.0;
 
 /// Places a light by pairs whose pixels are known to `sigma_px`.
@@ -171,14 +183,14 @@ const SURE: f64 = 3.0;
 /// # Errors
 /// Why the pairs fix none.
 pub fn place_light(
-    sight: &Sight,
+    camera: &PosedCamera,
     pairs: &[ShadowPair],
-    freedom: Freedom,
+    freedom: LightFreedom,
     sigma_px: f64,
-) -> Result<Placed, Unplaced> {
+) -> Result<PlacedLight, Unplaced> {
     let needed = match freedom {
-        Freedom::Point => 2,
-        Freedom::Directional => 1,
+        LightFreedom::Point => 2,
+        LightFreedom::Directional => 1,
     };
     if pairs.len() < needed {
         return Err(Unplaced::TooFewPairs {
@@ -200,8 +212,8 @@ pub fn place_light(
         inverse_distance: 0.0,
     };
     let weights = vec![1.0; pairs.len()];
-    let placed = refine(sight, pairs, &weights, start, freedom).ok_or(Unplaced::Undecided)?;
-    if freedom == Freedom::Point {
+    let placed = refine(camera, pairs, &weights, start, freedom).ok_or(Unplaced::Undecided)?;
+    if freedom == LightFreedom::Point {
         let sigma = placed.covariance.z_axis.z.sqrt() * sigma_px;
         if placed.light.inverse_distance < SURE * sigma {
             return Err(Unplaced::TooFar(placed.light));
@@ -212,93 +224,110 @@ pub fn place_light(
 
 /// Moves a light to where weighted pairs fit it best; `None` where they do not fix it.
 pub fn refine(
-    sight: &Sight,
+    camera: &PosedCamera,
     pairs: &[ShadowPair],
     weights: &[f64],
     start: FarLight,
-    freedom: Freedom,
-) -> Option<Placed> {
-    const ROUNDS: usize = 50;
-    let free = match freedom {
-        Freedom::Point => DVec3::ONE,
-        Freedom::Directional => DVec3::new(1.0, 1.0, 0.0),
+    freedom: LightFreedom,
+) -> Option<PlacedLight> {
+    const METHOD: LevenbergMarquardt = LevenbergMarquardt {
+        first_damping: 1e-6,
+        rounds: 50,
+        least_gain: 0.0,
     };
-    let mut light = start;
-    let mut damping = 1e-6;
-    let mut normal = DMat3::ZERO;
-    let mut now = residuals(sight, pairs, weights, &light)?;
-    for _ in 0..ROUNDS {
-        let columns = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| {
-            const STEP: f64 = 1e-6;
-            let ahead = residuals(sight, pairs, weights, &light.moved(axis * free * STEP));
-            let behind = residuals(sight, pairs, weights, &light.moved(-axis * free * STEP));
-            let slope = |(a, b): (&f64, &f64)| (a - b) / (2.0 * STEP);
-            Some(ahead?.iter().zip(&behind?).map(slope).collect::<Vec<f64>>())
-        });
-        let [Some(x), Some(y), Some(z)] = columns else {
-            return None;
-        };
-        let columns = [x, y, z];
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        normal = DMat3::from_cols_array_2d(
-            &columns
-                .each_ref()
-                .map(|row| columns.each_ref().map(|column| dot(row, column))),
-        );
-        let gradient = DVec3::from_array(columns.each_ref().map(|column| dot(column, &now)));
-        let fixed = DMat3::from_diagonal(DVec3::ONE - free);
-        let damped = normal + DMat3::from_diagonal(normal.diagonal() * damping) + fixed;
-        let step = -(damped.inverse() * gradient) * free;
-        if !step.is_finite() {
-            return None;
-        }
-        let tried = light.moved(step);
-        match residuals(sight, pairs, weights, &tried) {
-            Some(residuals) if dot(&residuals, &residuals) <= dot(&now, &now) => {
-                (light, now, damping) = (tried, residuals, damping * 0.1);
-                if step.abs().max_element() < 1e-10 {
-                    break;
-                }
-            }
-            _ if damping > 1e6 => break,
-            _ => damping = damping.max(1e-9) * 10.0,
-        }
-    }
-    let fixed = DMat3::from_diagonal(DVec3::ONE - free);
+    let found = METHOD.minimize(ShadowFit {
+        camera,
+        pairs,
+        weights,
+        freedom,
+        light: start,
+    })?;
+    let equations = found.problem.linearized()?;
+    let normal = DMat3::from_cols_array_2d(&equations.matrix.0);
     // Scaled, so that what is small is so for its units alone.
-    let scale = (normal + fixed).diagonal().map(f64::sqrt);
-    let unit = DMat3::from_diagonal(scale.recip());
-    let scaled = unit * (normal + fixed) * unit;
+    let unit = DMat3::from_diagonal(normal.diagonal().map(|entry| entry.sqrt().recip()));
+    let scaled = unit * normal * unit;
     if !scaled.is_finite() || scaled.determinant() < 1e-9 {
         return None;
     }
-    let free = DMat3::from_diagonal(free);
+    let free = DMat3::from_diagonal(freedom.axes());
     let total: f64 = weights.iter().sum();
-    Some(Placed {
-        light,
-        rms_px: (now.iter().map(|r| r * r).sum::<f64>() / total.max(1e-12)).sqrt(),
+    Some(PlacedLight {
+        light: found.problem.light,
+        rms_px: (found.cost / total.max(1e-12)).sqrt(),
         covariance: free * (unit * scaled.inverse() * unit) * free,
     })
 }
 
-/// Pixels between where shadows would fall and where they are seen, times the roots of their weights; `None` where one
-/// falls nowhere.
-fn residuals(
-    sight: &Sight,
-    pairs: &[ShadowPair],
-    weights: &[f64],
-    light: &FarLight,
-) -> Option<Vec<f64>> {
-    let mut residuals = Vec::with_capacity(2 * pairs.len());
-    for (pair, weight) in pairs.iter().zip(weights) {
-        let shadow_m = light.shadow_of(pair.caster_m, &pair.receiver)?;
-        let off_px = (sight.pixel(shadow_m)? - pair.shadow_px) * weight.sqrt();
-        match pair.along {
-            Some(along) => residuals.push(off_px.dot(along)),
-            None => residuals.extend(off_px.to_array()),
+/// A light that is moved to where its shadows are seen.
+struct ShadowFit<'a> {
+    camera: &'a PosedCamera,
+    pairs: &'a [ShadowPair],
+    weights: &'a [f64],
+    freedom: LightFreedom,
+    light: FarLight,
+}
+
+impl ShadowFit<'_> {
+    /// Pixels between where a light's shadows would fall and where they are seen, times the roots of their weights; `None`
+    /// where one falls nowhere.
+    fn residuals(&self, light: &FarLight) -> Option<Vec<f64>> {
+        let mut residuals = Vec::with_capacity(2 * self.pairs.len());
+        for (pair, weight) in self.pairs.iter().zip(self.weights) {
+            let shadow_m = light.shadow_of(pair.caster_m, &pair.receiver)?;
+            let off_px = (self.camera.pixel(shadow_m)? - pair.shadow_px) * weight.sqrt();
+            match pair.along {
+                Some(along) => residuals.push(off_px.dot(along)),
+                None => residuals.extend(off_px.to_array()),
+            }
+        }
+        Some(residuals)
+    }
+
+    /// The derivative of the residuals along an axis of the light's freedom.
+    fn slopes(&self, axis: DVec3) -> Option<Vec<f64>> {
+        const STEP: f64 = 1e-6;
+        let step = axis * self.freedom.axes() * STEP;
+        let ahead = self.residuals(&self.light.moved(step))?;
+        let behind = self.residuals(&self.light.moved(-step))?;
+        let slope = |(a, b): (&f64, &f64)| (a - b) / (2.0 * STEP);
+        Some(ahead.iter().zip(&behind).map(slope).collect())
+    }
+}
+
+impl Problem for ShadowFit<'_> {
+    type Linearized = NormalEquations<3>;
+
+    fn cost(&self) -> Option<f64> {
+        let residuals = self.residuals(&self.light)?;
+        let cost = dot(&residuals, &residuals);
+        cost.is_finite().then_some(cost)
+    }
+
+    fn linearized(&self) -> Option<NormalEquations<3>> {
+        let residuals = self.residuals(&self.light)?;
+        let [x, y, z] = DVec3::AXES.map(|axis| self.slopes(axis));
+        let (x, y, z) = (x?, y?, z?);
+        let mut equations = NormalEquations::ZERO;
+        for (k, residual) in residuals.iter().enumerate() {
+            equations.add(&[x[k], y[k], z[k]], -residual);
+        }
+        if self.freedom == LightFreedom::Directional {
+            equations.add_prior(2, 0.0, 1.0);
+        }
+        Some(equations)
+    }
+
+    fn moved(&self, step: &[f64; 3]) -> Self {
+        Self {
+            light: self.light.moved(DVec3::from(*step)),
+            ..*self
         }
     }
-    Some(residuals)
+
+    fn is_negligible(&self, step: &[f64; 3]) -> bool {
+        DVec3::from(*step).abs().max_element() < 1e-10
+    }
 }
 
 #[cfg(test)]
@@ -311,8 +340,8 @@ mod tests {
         normal: DVec3::Z,
     };
 
-    fn sight() -> Sight {
-        Sight {
+    fn camera() -> PosedCamera {
+        PosedCamera {
             intrinsics: Intrinsics {
                 size_px: [640, 480],
                 focal_px: DVec2::new(615.0, 613.0),
@@ -337,7 +366,7 @@ mod tests {
                     point_m: shadow_m,
                     ..TABLE
                 },
-                shadow_px: sight().pixel(shadow_m).unwrap(),
+                shadow_px: camera().pixel(shadow_m).unwrap(),
                 along: None,
             }
         };
@@ -355,7 +384,7 @@ mod tests {
         for lamp_m in [DVec3::new(-0.26, 0.24, 0.46), DVec3::new(0.4, -0.1, 0.3)] {
             for count in 2..=3 {
                 let pairs = pairs(lamp_m, &VERTICES[..count]);
-                let placed = place_light(&sight(), &pairs, Freedom::Point, 1.0).unwrap();
+                let placed = place_light(&camera(), &pairs, LightFreedom::Point, 1.0).unwrap();
                 let found_m = placed.light.position_m().unwrap();
                 assert!((found_m - lamp_m).length() < 1e-7, "{found_m}");
                 assert!(placed.rms_px < 1e-6);
@@ -363,7 +392,7 @@ mod tests {
         }
         let far_m = DVec3::new(-3e7, 2e7, 5e7);
         let sun = pairs(far_m, &VERTICES[..1]);
-        let placed = place_light(&sight(), &sun, Freedom::Directional, 1.0).unwrap();
+        let placed = place_light(&camera(), &sun, LightFreedom::Directional, 1.0).unwrap();
         assert!(placed.light.towards.angle_between(far_m.normalize()) < 1e-7);
         assert_eq!(placed.light.position_m(), None);
     }
@@ -372,7 +401,7 @@ mod tests {
     fn the_covariance_is_what_many_noisy_clicks_scatter_by() {
         let lamp_m = DVec3::new(-0.26, 0.24, 0.46);
         let exact = pairs(lamp_m, &VERTICES);
-        let predicted = place_light(&sight(), &exact, Freedom::Point, 0.2)
+        let predicted = place_light(&camera(), &exact, LightFreedom::Point, 0.2)
             .unwrap()
             .position_covariance(0.2)
             .unwrap();
@@ -392,7 +421,7 @@ mod tests {
             for pair in &mut noisy {
                 pair.shadow_px += 0.2 * DVec2::new(normal(), normal());
             }
-            let placed = place_light(&sight(), &noisy, Freedom::Point, 0.2).unwrap();
+            let placed = place_light(&camera(), &noisy, LightFreedom::Point, 0.2).unwrap();
             let off_m = placed.light.position_m().unwrap() - lamp_m;
             scatter += DMat3::from_cols(off_m * off_m.x, off_m * off_m.y, off_m * off_m.z)
                 * (1.0 / ROUNDS as f64);
@@ -405,18 +434,22 @@ mod tests {
 
     #[test]
     fn what_does_not_fix_a_light_is_refused() {
-        let refused =
-            |pairs: &[ShadowPair], freedom| place_light(&sight(), pairs, freedom, 1.0).unwrap_err();
+        let refused = |pairs: &[ShadowPair], freedom| {
+            place_light(&camera(), pairs, freedom, 1.0).unwrap_err()
+        };
         let near = pairs(DVec3::new(-0.2, 0.2, 0.4), &VERTICES);
         let too_few = Unplaced::TooFewPairs {
             found: 1,
             needed: 2,
         };
-        assert_eq!(refused(&near[..1], Freedom::Point), too_few);
-        assert_eq!(refused(&[near[0]; 2], Freedom::Point), Unplaced::Undecided);
+        assert_eq!(refused(&near[..1], LightFreedom::Point), too_few);
+        assert_eq!(
+            refused(&[near[0]; 2], LightFreedom::Point),
+            Unplaced::Undecided
+        );
         let far = refused(
             &pairs(DVec3::new(-9.0, 6.0, 20.0), &VERTICES),
-            Freedom::Point,
+            LightFreedom::Point,
         );
         let Unplaced::TooFar(light) = far else {
             panic!("{far}")
@@ -424,6 +457,9 @@ mod tests {
         assert!(light.towards.angle_between(DVec3::new(-9.0, 6.0, 20.0)) < 0.02);
         let mut below = near.clone();
         below[1].caster_m.z = -0.01;
-        assert_eq!(refused(&below, Freedom::Point), Unplaced::NotItsShadow(1));
+        assert_eq!(
+            refused(&below, LightFreedom::Point),
+            Unplaced::NotItsShadow(1)
+        );
     }
 }

@@ -20,7 +20,7 @@ const MOST_SOLID_ANGLES: usize = 10_000_000;
 /// - each closed part faces outwards, but for a cavity: a part that faces inwards inside another.
 pub(super) fn turned_triangles(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<bool> {
     let uses = edge_uses(triangles.iter().copied());
-    let mut patches = Patches::flood(&uses, triangles.len());
+    let mut patches = SurfacePatches::flood(&uses, triangles.len());
     patches.settle(&uses);
     let parts = patches.closed_parts(&uses);
     patches.face_outwards(positions, triangles, &parts);
@@ -28,14 +28,14 @@ pub(super) fn turned_triangles(positions: &[Vec3], triangles: &[[u32; 3]]) -> Ve
 }
 
 /// Triangles joined over edges that have just two.
-struct Patches {
+struct SurfacePatches {
     /// For each triangle whether it has to be turned.
     turned: Vec<bool>,
     patch_of: Vec<u32>,
-    patches: Vec<Patch>,
+    patches: Vec<SurfacePatch>,
 }
 
-struct Patch {
+struct SurfacePatch {
     triangles: Vec<u32>,
     orientable: bool,
 }
@@ -47,7 +47,7 @@ struct Rim {
     sum: i64,
 }
 
-impl Patches {
+impl SurfacePatches {
     fn flood(uses: &[EdgeUse], count: usize) -> Self {
         // Up to three neighbours of each triangle, and whether both pass the common edge the same way.
         let mut neighbours: Vec<[Option<(u32, bool)>; 3]> = vec![[None; 3]; count];
@@ -98,7 +98,7 @@ impl Patches {
                 .iter()
                 .filter(|&&triangle| flooded.turned[triangle as usize])
                 .count();
-            flooded.patches.push(Patch {
+            flooded.patches.push(SurfacePatch {
                 triangles,
                 orientable,
             });

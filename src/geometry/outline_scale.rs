@@ -18,7 +18,7 @@ const LEAST_COSINE: f64 = 0.5;
 
 /// What the camera sees.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct View {
+pub struct OutlineView {
     /// The camera; pictures are without its distortion.
     pub intrinsics: Intrinsics,
     /// Its pose.
@@ -28,7 +28,7 @@ pub struct View {
 }
 
 /// By how much a placement lengthens at most.
-pub fn largest_stretch(world_from_object: &DAffine3) -> f64 {
+pub fn largest_scale(world_from_object: &DAffine3) -> f64 {
     let gram = world_from_object.matrix3.transpose() * world_from_object.matrix3;
     // No eigenvalue is above the largest sum of a row's sizes; for a rotation after a scale it is the largest exactly.
     let sums = gram
@@ -38,7 +38,7 @@ pub fn largest_stretch(world_from_object: &DAffine3) -> f64 {
 }
 
 /// How many pixels a point within `bounds` (world space) moves at most for a metre; 0 if none is seen.
-pub fn outline_px_per_m(bounds: &Bounds, view: &View) -> f64 {
+pub fn outline_px_per_m(bounds: &Bounds, view: &OutlineView) -> f64 {
     let seen = seen_corners(bounds, view);
     let nearest_m = seen
         .iter()
@@ -60,7 +60,7 @@ pub fn shadow_px_per_m(
     caster: &Bounds,
     light: LightPlace,
     receivers: impl IntoIterator<Item = [DVec3; 3]>,
-    view: &View,
+    view: &OutlineView,
 ) -> f64 {
     receivers
         .into_iter()
@@ -165,7 +165,7 @@ fn farthest_m(bounds: &Bounds, point: DVec3) -> f64 {
 
 /// In camera space the corners of what is both within the bounds and seen, [`LARGEST_MOVE_PX`] beyond the picture
 /// included.
-fn seen_corners(bounds: &Bounds, view: &View) -> Vec<DVec3> {
+fn seen_corners(bounds: &Bounds, view: &OutlineView) -> Vec<DVec3> {
     let [width, height] = view.intrinsics.size_px.map(f64::from);
     let margin = glam::DVec2::splat(0.5 + LARGEST_MOVE_PX);
     let low = view.intrinsics.plane_from_pixel(-margin);
@@ -238,12 +238,12 @@ mod tests {
     use glam::{DQuat, DVec2};
 
     /// From half a metre above the table's near edge, looking down at its middle.
-    fn view() -> View {
+    fn view() -> OutlineView {
         let camera_from_world = DAffine3::from_rotation_translation(
             DQuat::from_rotation_x(std::f64::consts::PI - 0.8),
             DVec3::ZERO,
         ) * DAffine3::from_translation(-DVec3::new(0.02, -0.5, 0.5));
-        View {
+        OutlineView {
             intrinsics: Intrinsics {
                 size_px: [640, 480],
                 focal_px: DVec2::new(600.0, 590.0),
@@ -291,7 +291,7 @@ mod tests {
         })
     }
 
-    fn pixel(view: &View, point: DVec3) -> Option<DVec2> {
+    fn pixel(view: &OutlineView, point: DVec3) -> Option<DVec2> {
         let place = view.camera_from_world.transform_point3(point);
         let pixel = view.intrinsics.pixel_from_plane(place.truncate() / place.z);
         let in_picture =
@@ -308,7 +308,7 @@ mod tests {
     fn largest_share(
         pairs: impl Iterator<Item = [DVec3; 2]>,
         px_per_m: f64,
-        view: &View,
+        view: &OutlineView,
         cast: impl Fn(DVec3) -> Option<DVec3>,
         strength: impl Fn(DVec3) -> f64,
     ) -> f64 {
@@ -432,7 +432,7 @@ mod tests {
     fn a_placement_lengthens_by_its_largest_scale() {
         let turned = DAffine3::from_quat(DQuat::from_rotation_y(0.7) * DQuat::from_rotation_x(1.1));
         let scaled = turned * DAffine3::from_scale(DVec3::new(0.5, -3.0, 2.0));
-        assert!((largest_stretch(&scaled) - 3.0).abs() < 1e-12);
-        assert!(largest_stretch(&(scaled * turned)) >= 3.0 - 1e-12);
+        assert!((largest_scale(&scaled) - 3.0).abs() < 1e-12);
+        assert!(largest_scale(&(scaled * turned)) >= 3.0 - 1e-12);
     }
 }

@@ -4,23 +4,25 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 
-use super::light_placing::{Facet, FarLight, Sight};
+use super::light_placing::{Facet, FarLight, PosedCamera};
 use super::ray_caster::RayCaster;
 
 /// Things that stand in the world, with what is needed to follow rays among them.
-pub struct Standing {
+pub struct StandingThings {
     /// Corners, metres, counter-clockwise seen from outside.
     triangles: Vec<[DVec3; 3]>,
-    /// Of each triangle the thing that it is of.
+    /// The thing that each triangle belongs to.
     thing_of: Vec<usize>,
     all: RayCaster,
     casters: RayCaster,
-    /// Of each edge of a caster the triangles on both its sides, and its ends.
-    edges: Vec<Edge>,
+    /// The edges of casters.
+    edges: Vec<CasterEdge>,
 }
 
-struct Edge {
+/// An edge of a caster.
+struct CasterEdge {
     ends: [DVec3; 2],
+    /// The triangles on its two sides.
     sides: [usize; 2],
 }
 
@@ -51,12 +53,12 @@ pub struct OutlinePoint {
 /// How far rays start from where they would meet what they start on.
 const START_OFFSET_M: f64 = 1e-5;
 
-impl Standing {
+impl StandingThings {
     /// Prepares things: each its triangles in the world, and whether it casts.
     pub fn new(things: &[(Vec<[DVec3; 3]>, bool)]) -> Self {
         let mut triangles = Vec::new();
         let mut thing_of = Vec::new();
-        let mut edges: HashMap<[[u64; 3]; 2], (Edge, usize)> = HashMap::new();
+        let mut edges: HashMap<[[u64; 3]; 2], (CasterEdge, usize)> = HashMap::new();
         for (thing, (own, casts)) in things.iter().enumerate() {
             for corners in own {
                 let triangle = triangles.len();
@@ -68,7 +70,7 @@ impl Standing {
                     key.sort_unstable();
                     if *casts {
                         let edge = edges.entry(key).or_insert((
-                            Edge {
+                            CasterEdge {
                                 ends,
                                 sides: [triangle; 2],
                             },
@@ -80,7 +82,7 @@ impl Standing {
                 }
             }
         }
-        let mut edges: Vec<Edge> = edges
+        let mut edges: Vec<CasterEdge> = edges
             .into_values()
             .filter(|(_, uses)| *uses == 2)
             .map(|(edge, _)| edge)
@@ -141,7 +143,7 @@ impl Standing {
     /// at least `clear_m` from where another outline crosses.
     pub fn outline(
         &self,
-        sight: &Sight,
+        camera: &PosedCamera,
         light: &FarLight,
         spacing_m: f64,
         clear_m: f64,
@@ -161,7 +163,7 @@ impl Standing {
                 let caster_m = from.lerp(to, (step as f64 + 0.5) / count as f64);
                 let caster = self.thing_of[edge.sides[0]];
                 points.extend(self.outline_point(
-                    sight,
+                    camera,
                     light,
                     (caster, caster_m, to - from),
                     clear_m,
@@ -173,7 +175,7 @@ impl Standing {
 
     fn outline_point(
         &self,
-        sight: &Sight,
+        camera: &PosedCamera,
         light: &FarLight,
         (caster, caster_m, edge): (usize, DVec3, DVec3),
         clear_m: f64,
@@ -199,7 +201,7 @@ impl Standing {
             (near == middle && middle == far).then_some(far)
         });
         let (behind, ahead) = (behind?, ahead?);
-        if behind == ahead || !self.sees(sight, &met.facet) {
+        if behind == ahead || !self.sees(camera, &met.facet) {
             return None;
         }
         Some(OutlinePoint {
@@ -211,11 +213,11 @@ impl Standing {
     }
 
     /// Whether the camera sees a point of a surface.
-    pub fn sees(&self, sight: &Sight, place: &Facet) -> bool {
-        let Some(pixel) = sight.pixel(place.point_m) else {
+    pub fn sees(&self, camera: &PosedCamera, place: &Facet) -> bool {
+        let Some(pixel) = camera.pixel(place.point_m) else {
             return false;
         };
-        let (eye_m, direction) = sight.ray(pixel);
+        let (eye_m, direction) = camera.ray(pixel);
         let tolerance_m = 1e-4 + 1e-3 * (place.point_m - eye_m).length();
         self.first_met(eye_m, direction)
             .is_some_and(|met| (met.facet.point_m - place.point_m).length() < tolerance_m)
@@ -260,7 +262,7 @@ mod tests {
     #[test]
     fn the_outline_of_a_slab_is_a_square_of_known_size() {
         let (half_m, high_m, lamp_m) = (0.05, 0.1, 0.5);
-        let standing = Standing::new(&[
+        let standing = StandingThings::new(&[
             (square(1.0, 0.0).to_vec(), false),
             (slab(half_m, 0.08, high_m), true),
         ]);
@@ -277,7 +279,7 @@ mod tests {
             matrix3: DMat3::from_cols(DVec3::X, down, forward).transpose(),
             translation: DVec3::ZERO,
         } * DAffine3::from_translation(-eye_m);
-        let sight = Sight {
+        let camera = PosedCamera {
             intrinsics: Intrinsics {
                 size_px: [640, 480],
                 focal_px: DVec2::splat(600.0),
@@ -286,7 +288,7 @@ mod tests {
             },
             camera_from_world,
         };
-        let outline = standing.outline(&sight, &light, 0.002, 0.004);
+        let outline = standing.outline(&camera, &light, 0.002, 0.004);
         assert!(outline.len() > 60, "{} points", outline.len());
         let side_m = half_m * lamp_m / (lamp_m - high_m);
         for point in &outline {

@@ -91,7 +91,7 @@ pub struct Silhouette {
 
 /// A part of what casts for one light.
 #[derive(Debug, Clone)]
-pub struct Part {
+pub struct VolumePart {
     /// What casts in it.
     pub silhouette: Silhouette,
     /// No point lies in more of its volumes, one in another.
@@ -183,7 +183,7 @@ impl Caster {
     /// Where all triangles cast, the outline between those that face the light and those that do not counts twice. In a
     /// mesh that is nearly closed it is cheaper to count those that face it, and apart from that how many more do not:
     /// that number changes at open edges alone. Both are 0 where nothing hides the light, and only there.
-    pub fn parts(&self, light: LightPlace, casting: Casting, most: u32) -> Vec<Part> {
+    pub fn parts(&self, light: LightPlace, casting: Casting, most: u32) -> Vec<VolumePart> {
         let facing = self.silhouette(light, [1, 0]);
         let whole = match casting {
             Casting::Facing => facing,
@@ -338,7 +338,7 @@ impl Caster {
             } else if smoothly_lit(triangle, side as f32) {
                 &mut sorted.terminator
             } else {
-                &mut sorted.averted
+                &mut sorted.back_facing
             };
             match seen_from_inside {
                 true => sides.inner.push(triangle),
@@ -352,9 +352,9 @@ impl Caster {
 /// Triangles by the side of them that an eye sees.
 #[derive(Debug, Clone, Default)]
 pub struct SeenTriangles {
-    /// Those that it may see from outside.
+    /// Triangles that the camera may see from outside.
     pub outer: Vec<usize>,
-    /// Those that it surely sees from inside.
+    /// Triangles that the camera surely sees from inside.
     pub inner: Vec<usize>,
 }
 
@@ -367,7 +367,7 @@ pub struct LitTriangles {
     /// shading lights them up to the line where the normals turn away.
     pub terminator: SeenTriangles,
     /// All others: never lit.
-    pub averted: SeenTriangles,
+    pub back_facing: SeenTriangles,
 }
 
 impl Silhouette {
@@ -387,10 +387,10 @@ impl Caster {
         silhouette: Silhouette,
         most: u32,
         counted_apart: bool,
-    ) -> Vec<Part> {
+    ) -> Vec<VolumePart> {
         let layers = self.most_layers(light, &silhouette, most);
         if layers <= most {
-            return vec![Part {
+            return vec![VolumePart {
                 silhouette,
                 layers,
                 counted_apart,
@@ -808,7 +808,7 @@ mod tests {
         let open = Caster::new(closed.positions.clone(), closed.triangles[1..].to_vec());
         let light = lights()[0];
         let parts = open.parts(light, Casting::All, 63);
-        let sides = |part: &Part| part.silhouette.edges.len();
+        let sides = |part: &VolumePart| part.silhouette.edges.len();
         assert!(parts.len() == 2 && parts[0].counted_apart && !parts[1].counted_apart);
         assert_eq!(sides(&parts[1]), 3);
         let all = open.silhouette(light, ALL).edges.len();
@@ -867,7 +867,7 @@ mod tests {
         );
         let counts = |sides: &SeenTriangles| (sides.outer.len(), sides.inner.len());
         assert_eq!(
-            (counts(&sorted.facing), counts(&sorted.averted)),
+            (counts(&sorted.facing), counts(&sorted.back_facing)),
             ((2, 0), (2, 0))
         );
         // An eye below sees the bottom from outside, and from inside the top, which the light sees from the other side, and
@@ -875,7 +875,7 @@ mod tests {
         let below = Some(DVec3::new(0.5, 0.5, -3.0));
         let sorted = caster.lit_triangles(light, below, None);
         assert_eq!(
-            (counts(&sorted.facing), counts(&sorted.averted)),
+            (counts(&sorted.facing), counts(&sorted.back_facing)),
             ((0, 8), (2, 2))
         );
     }

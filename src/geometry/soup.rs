@@ -18,7 +18,7 @@ pub(super) struct Face {
     pub vertices: [u32; 3],
     /// The side that is seen counter-clockwise.
     pub front: Side,
-    /// The same triangle the other way round; its normals follow `vertices` too.
+    /// The triangle the other way round; its normals follow `vertices` too.
     pub back: Option<Side>,
 }
 
@@ -38,7 +38,7 @@ impl Face {
         }
     }
 
-    /// Turns the front's normals if they are, as a whole, averted from the face's.
+    /// Turns the front's normals if they are, as a whole, turned away from the face's.
     pub fn turn_inverted_normals(&mut self, face_normal: DVec3) {
         let normals = self.front.normals.iter().flatten();
         let agreement: f64 = normals

@@ -5,8 +5,6 @@
 //! from it than at a corner; and between two points the distance changes by no more than the points are apart.
 
 use std::ops::Range;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
 use std::time::Duration;
 
 use glam::{DVec3, Vec3A};
@@ -14,6 +12,7 @@ use obvhs::BvhBuildParams;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2_from_tris;
 use obvhs::triangle::Triangle;
+use rayon::prelude::*;
 
 use super::mesh::Mesh;
 use super::normals::face_normal;
@@ -31,7 +30,7 @@ const PIECES: [f64; 2] = [2.0, 6.0];
 const NEEDLE_SQUARED: f64 = 1e-20;
 /// Triangles in a leaf: fewer than for rays, since a search for the nearest ends in more leaves.
 const LEAF_TRIANGLES: u32 = 2;
-/// Items of work that a thread takes at a time. It is fixed, so that the result is the same on every machine.
+/// Items of work that are done in one go. It is fixed, so that the result is the same on every machine.
 const CHUNK: usize = 128;
 
 /// How far the points of each of two surfaces lie from the other surface.
@@ -44,17 +43,17 @@ pub struct SurfaceDistance {
 }
 
 /// A mesh ready to be measured.
-pub struct Surface {
+pub struct SampledSurface {
     positions: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
     /// Indices into `edges`: those that begin at each corner.
     triangle_edges: Vec<[u32; 3]>,
-    edges: Vec<Edge>,
+    edges: Vec<SurfaceEdge>,
     mean_edge_m: f64,
     nearest: NearestTriangle,
 }
 
-struct Edge {
+struct SurfaceEdge {
     ends: [u32; 2],
     /// Part of all directions of view in which it belongs to the outline: the angle between its faces over π; all where
     /// it has not just two.
@@ -76,7 +75,7 @@ struct Piece {
     peak_m: f64,
 }
 
-impl Surface {
+impl SampledSurface {
     /// Prepares a mesh; `None` if it has no triangle, or a position that is not finite.
     pub fn new(mesh: &Mesh) -> Option<Self> {
         let finite = mesh.positions.iter().all(|position| position.is_finite());
@@ -146,7 +145,13 @@ impl Surface {
         }
     }
 
-    fn along(&self, edge: &Edge, at_vertices: &[Near], other: &Self, search: &mut Search) -> Along {
+    fn along(
+        &self,
+        edge: &SurfaceEdge,
+        at_vertices: &[Near],
+        other: &Self,
+        search: &mut NearestSearch,
+    ) -> Along {
         let near = edge.ends.map(|end| at_vertices[end as usize]);
         let ends = edge.ends.map(|end| self.positions[end as usize]);
         let ends_m = near.map(|near| near.distance_m);
@@ -175,7 +180,7 @@ impl Surface {
         at_vertices: &[Near],
         along_edges: &[Along],
         other: &Self,
-        search: &mut Search,
+        search: &mut NearestSearch,
     ) -> Piece {
         let mut piece = Piece {
             corners: self.triangles[triangle].map(|corner| self.positions[corner as usize]),
@@ -235,8 +240,8 @@ impl Piece {
         pick(a, pick(b, c))
     }
 
-    /// Its four parts, cut at the middles of its sides; none if no point of it is farther than its corners.
-    fn cut(&self, to: &NearestTriangle, search: &mut Search) -> Vec<Self> {
+    /// The piece's four parts, cut at the middles of its sides; none if no point of it is farther than its corners.
+    fn cut(&self, to: &NearestTriangle, search: &mut NearestSearch) -> Vec<Self> {
         if to.convex_over(&self.corners, &self.near) {
             return Vec::new();
         }
@@ -301,8 +306,8 @@ fn length(positions: &[DVec3], ends: [u32; 2]) -> f64 {
     (positions[ends[1] as usize] - positions[ends[0] as usize]).length()
 }
 
-/// Each edge once, and for each triangle the indices of the edges that begin at its corners.
-fn edges(mesh: &Mesh) -> (Vec<Edge>, Vec<[u32; 3]>) {
+/// The edges, each once, and for each triangle the indices of the edges that begin at its corners.
+fn edges(mesh: &Mesh) -> (Vec<SurfaceEdge>, Vec<[u32; 3]>) {
     let normals: Vec<DVec3> = mesh
         .triangles
         .iter()
@@ -336,7 +341,7 @@ fn edges(mesh: &Mesh) -> (Vec<Edge>, Vec<[u32; 3]>) {
             }
             _ => 1.0,
         };
-        edges.push(Edge {
+        edges.push(SurfaceEdge {
             ends: around[0].0,
             outline_share,
         });
@@ -360,7 +365,7 @@ struct Near {
 }
 
 /// Searches one after another, each beginning with what the last one found: points come in runs of neighbours.
-struct Search<'a> {
+struct NearestSearch<'a> {
     triangles: &'a NearestTriangle,
     last: usize,
     /// Nodes, with the squared distances of their boxes.
@@ -395,8 +400,8 @@ impl NearestTriangle {
         }
     }
 
-    fn search(&self) -> Search<'_> {
-        Search {
+    fn search(&self) -> NearestSearch<'_> {
+        NearestSearch {
             triangles: self,
             last: 0,
             pending: Vec::new(),
@@ -419,7 +424,7 @@ impl NearestTriangle {
     }
 }
 
-impl Search<'_> {
+impl NearestSearch<'_> {
     fn nearest(&mut self, point: DVec3) -> Near {
         let nodes = &self.triangles.hierarchy.nodes;
         // Boxes are compared in single precision, with the slack that makes up for its rounding.
@@ -505,34 +510,10 @@ fn distance_squared(point: DVec3, [a, b, c]: &[DVec3; 3]) -> f64 {
 
 /// Does `work` on the ranges that make up `0..count`, on all cores, and joins the results in their order.
 fn in_parallel<T: Send>(count: usize, work: impl Fn(Range<usize>) -> Vec<T> + Sync) -> Vec<T> {
-    let chunks = count.div_ceil(CHUNK);
-    let threads = thread::available_parallelism()
-        .map_or(1, usize::from)
-        .min(chunks);
-    let next = AtomicUsize::new(0);
-    let take = || {
-        let mut done = Vec::new();
-        loop {
-            let chunk = next.fetch_add(1, Ordering::Relaxed);
-            if chunk >= chunks {
-                return done;
-            }
-            done.push((chunk, work(chunk * CHUNK..count.min((chunk + 1) * CHUNK))));
-        }
-    };
-    let mut done: Vec<(usize, Vec<T>)> = thread::scope(|scope| {
-        let others: Vec<_> = (1..threads).map(|_| scope.spawn(take)).collect();
-        let mut done = take();
-        for other in others {
-            match other.join() {
-                Ok(theirs) => done.extend(theirs),
-                Err(panic) => std::panic::resume_unwind(panic),
-            }
-        }
-        done
-    });
-    done.sort_unstable_by_key(|(chunk, _)| *chunk);
-    done.into_iter().flat_map(|(_, items)| items).collect()
+    let chunks = (0..count.div_ceil(CHUNK)).into_par_iter();
+    chunks
+        .flat_map_iter(|chunk| work(chunk * CHUNK..count.min((chunk + 1) * CHUNK)))
+        .collect()
 }
 
 #[cfg(test)]
@@ -541,7 +522,7 @@ mod tests {
     use crate::geometry::mesh::RawTriangle;
     use glam::Vec3;
 
-    fn surface(corners: &[[Vec3; 3]]) -> Surface {
+    fn surface(corners: &[[Vec3; 3]]) -> SampledSurface {
         let triangles: Vec<RawTriangle> = (0..corners.len() as u32)
             .map(|triangle| RawTriangle {
                 vertices: [0, 1, 2].map(|corner| 3 * triangle + corner),
@@ -549,7 +530,8 @@ mod tests {
                 material: 0,
             })
             .collect();
-        Surface::new(&Mesh::weld(corners.as_flattened(), &triangles, 0.0).0).expect("a surface")
+        SampledSurface::new(&Mesh::weld(corners.as_flattened(), &triangles, 0.0).0)
+            .expect("a surface")
     }
 
     fn square(half: f32, z: f32) -> [[Vec3; 3]; 2] {

@@ -22,7 +22,7 @@ pub fn winding_number(
 }
 
 /// Half the solid angle of a triangle seen from the origin, positive if it is clockwise from there (its outer side is
-/// averted): equation 8 of the paper. 0 at a corner, where it is not defined.
+/// back-facing): equation 8 of the paper. 0 at a corner, where it is not defined.
 fn half_solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
     let (length_a, length_b, length_c) = (a.length(), b.length(), c.length());
     let numerator = a.dot(b.cross(c));

@@ -8,10 +8,10 @@
 use std::f64::consts::{PI, TAU};
 
 use glam::{DAffine3, DVec3, Vec3};
+use rayon::prelude::*;
 
 use crate::geometry::ray_caster::RayCaster;
 
-use super::cores::on_all_cores;
 use super::{Light, irradiance};
 
 /// Rays per point where there are few points; more change no diffuse thing by a level of the display.
@@ -111,15 +111,17 @@ impl Surroundings {
     /// Sends rays from points with unit normals, some `budget` in all.
     pub fn gather(&self, places: &[(DVec3, DVec3)], budget: usize) -> Gathering {
         let rays_per_point = (budget / places.len().max(1)).clamp(LEAST_RAYS, MOST_RAYS);
-        let shares = on_all_cores(places.len(), |range| {
+        /// Points that are looked at in one go.
+        const CHUNK: usize = 16;
+        let shares = places.par_chunks(CHUNK).map(|places| {
             let mut gathered = (Vec::new(), Vec::new());
-            for &place in &places[range] {
+            for &place in places {
                 self.gather_point(place, rays_per_point, &mut gathered);
             }
             gathered
         });
         let (mut rays, mut lit) = (Vec::new(), Vec::new());
-        for (share_rays, share_lit) in shares {
+        for (share_rays, share_lit) in shares.collect::<Vec<_>>() {
             rays.extend(share_rays);
             lit.extend(share_lit);
         }
@@ -214,12 +216,10 @@ impl Gathering {
             .iter()
             .map(|&(mover, place)| self.place(mover, place))
             .collect();
-        let shares = on_all_cores(self.starts.len(), |range| {
-            range
-                .map(|point| self.irradiance(point, &placed))
-                .collect::<Vec<_>>()
-        });
-        shares.into_iter().flatten().collect()
+        let points = (0..self.starts.len()).into_par_iter();
+        points
+            .map(|point| self.irradiance(point, &placed))
+            .collect()
     }
 
     fn place<'a>(&self, mover: &'a Mover, world_from_mover: DAffine3) -> PlacedMover<'a> {

@@ -8,7 +8,7 @@ use super::probe::Probe;
 
 /// A light is this many times as bright as the median direction.
 const STANDS_OUT: f32 = 8.0;
-/// Its edge is where it has fallen to this part of its peak.
+/// The part of a light's peak at which its edge is.
 const EDGE: f32 = 0.1;
 /// Weaker ones are not told, part of the power of all directions.
 const LEAST_SHARE: f64 = 0.003;

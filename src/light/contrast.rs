@@ -17,16 +17,16 @@ pub struct ContrastSample {
     pub of_light_lit: DVec3,
     /// What it gives the shaded place, by way of the things around alone.
     pub of_light_shaded: DVec3,
-    /// What surroundings of radiance 1 give each of the places.
+    /// What surroundings of radiance 1 give the lit place.
     pub of_ambient_lit: DVec3,
-    /// See `of_ambient_lit`.
+    /// What surroundings of radiance 1 give the shaded place.
     pub of_ambient_shaded: DVec3,
 }
 
-/// What was found.
+/// The strengths of a light and of what surrounds it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Strengths {
-    /// Of the light (W/sr, or W/m² if it is infinitely far).
+    /// The light's strength (W/sr, or W/m² if it is infinitely far).
     pub light: DVec3,
     /// Radiance of the surroundings.
     pub ambient: DVec3,
@@ -105,7 +105,7 @@ pub fn strengths(samples: &[ContrastSample]) -> Option<Strengths> {
     })
 }
 
-/// Of values with their weights; `None` with fewer than [`LEAST_SAMPLES`].
+/// The median of values with their weights; `None` with fewer than [`LEAST_SAMPLES`].
 fn median(weighted: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
     let mut weighted: Vec<(f64, f64)> = weighted.filter(|(value, _)| value.is_finite()).collect();
     if weighted.len() < LEAST_SAMPLES {

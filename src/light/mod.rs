@@ -4,7 +4,6 @@ pub mod bounce;
 pub mod brightest;
 pub mod chromaticities;
 pub mod contrast;
-pub(crate) mod cores;
 pub mod prefiltered;
 pub mod probe;
 pub mod probe_maps;

@@ -4,8 +4,8 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{DMat3, DVec3, Vec3};
+use rayon::prelude::*;
 
-use super::cores::on_all_cores;
 use super::probe::Probe;
 
 /// Columns of the sharpest level; rows are half as many, and each level has half of the one before.
@@ -17,7 +17,7 @@ const SAMPLES: usize = 256;
 
 /// A level: latitude-longitude as a probe, rows from the top.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Level {
+pub struct PrefilteredLevel {
     /// Columns and rows.
     pub size_px: [usize; 2],
     /// Radiance, linear RGB.
@@ -30,9 +30,9 @@ pub fn roughness_of(level: usize) -> f64 {
 }
 
 /// All levels, of the probe's radiance times `exposure`.
-pub fn prefiltered(probe: &Probe, exposure: f32) -> Vec<Level> {
+pub fn prefiltered(probe: &Probe, exposure: f32) -> Vec<PrefilteredLevel> {
     let sharpest = shrunk(probe, [SHARPEST_PX, SHARPEST_PX / 2], exposure);
-    let whole = |level: &Level| Probe::new(level.size_px, level.pixels.clone());
+    let whole = |level: &PrefilteredLevel| Probe::new(level.size_px, level.pixels.clone());
     // Lobes are wide: what they are drawn from need not be sharp, and a lamp in it is never missed.
     let softer = whole(&shrunk(probe, [SHARPEST_PX / 2, SHARPEST_PX / 4], exposure));
     let rough = (1..LEVELS).filter_map(|level| {
@@ -40,12 +40,12 @@ pub fn prefiltered(probe: &Probe, exposure: f32) -> Vec<Level> {
         let lobe = lobe(roughness_of(level), SAMPLES << level);
         Some(filtered(softer.as_ref()?, size_px, &lobe))
     });
-    let rough: Vec<Level> = rough.collect();
+    let rough: Vec<PrefilteredLevel> = rough.collect();
     [vec![sharpest], rough].concat()
 }
 
 /// The mean radiance over each pixel of a smaller picture.
-fn shrunk(probe: &Probe, size_px: [usize; 2], exposure: f32) -> Level {
+fn shrunk(probe: &Probe, size_px: [usize; 2], exposure: f32) -> PrefilteredLevel {
     let [width, height] = size_px;
     let [columns, rows] = probe.size_px();
     // At least a sample in each of the probe's pixels.
@@ -63,7 +63,7 @@ fn shrunk(probe: &Probe, size_px: [usize; 2], exposure: f32) -> Level {
         }
         sum * (exposure / weight)
     };
-    Level {
+    PrefilteredLevel {
         size_px,
         pixels: (0..width * height).map(mean).collect(),
     }
@@ -76,24 +76,21 @@ fn direction(column: f64, row: f64, [width, height]: [usize; 2]) -> DVec3 {
     DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), cosine)
 }
 
-fn filtered(probe: &Probe, size_px: [usize; 2], lobe: &[(DVec3, f32)]) -> Level {
+fn filtered(probe: &Probe, size_px: [usize; 2], lobe: &[(DVec3, f32)]) -> PrefilteredLevel {
     let [width, height] = size_px;
-    let shares = on_all_cores(width * height, |range| {
-        let mean = |pixel: usize| {
-            let (column, row) = ((pixel % width) as f64 + 0.5, (pixel / width) as f64 + 0.5);
-            let axis = direction(column, row, size_px);
-            let (right, down) = axis.any_orthonormal_pair();
-            let turned = DMat3::from_cols(right, down, axis);
-            let parts = lobe
-                .iter()
-                .map(|&(way, share)| probe.radiance(turned * way) * share);
-            parts.sum::<Vec3>()
-        };
-        range.map(mean).collect::<Vec<_>>()
-    });
-    Level {
+    let mean = |pixel: usize| {
+        let (column, row) = ((pixel % width) as f64 + 0.5, (pixel / width) as f64 + 0.5);
+        let axis = direction(column, row, size_px);
+        let (right, down) = axis.any_orthonormal_pair();
+        let turned = DMat3::from_cols(right, down, axis);
+        let parts = lobe
+            .iter()
+            .map(|&(way, share)| probe.radiance(turned * way) * share);
+        parts.sum::<Vec3>()
+    };
+    PrefilteredLevel {
         size_px,
-        pixels: shares.concat(),
+        pixels: (0..width * height).into_par_iter().map(mean).collect(),
     }
 }
 

@@ -6,8 +6,8 @@
 use std::f64::consts::{PI, TAU};
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
+use rayon::prelude::*;
 
-use super::cores::on_all_cores;
 use super::probe::Probe;
 use super::radiance_picture::RadiancePicture;
 
@@ -125,10 +125,8 @@ pub fn unwrap(
         }
         (2 * seen >= samples * samples).then(|| sum / seen as f32)
     };
-    let radiance = on_all_cores(grid.pixels().len(), |range| {
-        range.map(mean).collect::<Vec<_>>()
-    })
-    .concat();
+    let pixels = (0..grid.pixels().len()).into_par_iter();
+    let radiance: Vec<_> = pixels.map(mean).collect();
     fill_in(&grid, &radiance)
 }
 

@@ -131,9 +131,9 @@ pub struct Exposure<'a> {
 pub struct Merged {
     /// Linear radiance; 1 is white at an [`Exposure::amount`] of 1.
     pub picture: RadiancePicture,
-    /// Of each pixel, whether a channel is saturated even in the shortest exposure: its radiance is a lower bound.
+    /// Whether each pixel has a channel that is saturated even in the shortest exposure: its radiance is a lower bound.
     pub saturated: Vec<bool>,
-    /// Of each pixel, whether a channel is black even in the longest exposure.
+    /// Whether each pixel has a channel that is black even in the longest exposure.
     pub black: Vec<bool>,
 }
 

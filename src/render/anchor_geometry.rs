@@ -12,7 +12,7 @@ use wgpu::util::DeviceExt as _;
 use crate::geometry::bounds::Bounds;
 use crate::geometry::levels::{Level, levels};
 use crate::geometry::mesh::Mesh;
-use crate::geometry::outline_scale::largest_stretch;
+use crate::geometry::outline_scale::largest_scale;
 use crate::geometry::shadow_volume::Caster;
 use crate::geometry::solid::holes;
 use crate::light::bounce::Reflector;
@@ -187,7 +187,7 @@ fn thing(
     coarser: &[Level],
     shared: &mut SharedCorners,
 ) -> Option<Thing> {
-    let stretch = largest_stretch(&object.anchor_from_object);
+    let stretch = largest_scale(&object.anchor_from_object);
     let itself = (&object.mesh, [0.0; 3]);
     let coarser = coarser.iter().map(|level| {
         let lengths_m = [level.max_error_m, level.mean_error_m, level.largest_facet_m];

@@ -248,7 +248,7 @@ impl Shadow {
         for (sides, seen) in [
             (&mut self.lit.facing, sorted.facing),
             (&mut self.lit.terminator, sorted.terminator),
-            (&mut self.lit.averted, sorted.averted),
+            (&mut self.lit.averted, sorted.back_facing),
         ] {
             let triangles = seen.outer.iter().chain(&seen.inner);
             let corners = triangles.flat_map(|&triangle| caster.surface_triangles[triangle]);

@@ -5,7 +5,7 @@ use glam::{DAffine3, DVec3};
 use crate::geometry::bounds::Bounds;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::levels::is_close_enough;
-use crate::geometry::outline_scale::{View, outline_px_per_m, shadow_px_per_m};
+use crate::geometry::outline_scale::{OutlineView, outline_px_per_m, shadow_px_per_m};
 use crate::geometry::shadow_volume::LightPlace;
 use crate::light::Light;
 
@@ -37,7 +37,7 @@ pub(super) fn chosen_levels(
     let Some(camera_from_world) = camera_from_anchor.first().copied().flatten() else {
         return vec![0; things.len()];
     };
-    let view = View {
+    let view = OutlineView {
         intrinsics: *intrinsics,
         camera_from_world,
         near_m: f64::from(NEAR_M),

@@ -1,11 +1,11 @@
 //! What stands where in a frame: the scene's surfaces, casters and lights on the GPU, and how passes draw them.
 
 use glam::{DAffine3, Vec3};
+use rayon::prelude::*;
 
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
 use crate::light::Light;
-use crate::light::cores::on_all_cores;
 use crate::scene::{Scene, ShadowSettings, Shortcut, Technique};
 
 use super::anchor_geometry::{
@@ -243,14 +243,11 @@ impl Stage {
                 continue;
             };
             let pose = pose.as_affine3();
-            let shares = on_all_cores(corners.len(), |range| {
-                let corners = corners[range].iter();
-                let of_corner = |&(place, normal): &(Vec3, Vec3)| {
-                    irradiance(pose.transform_point3(place), pose.transform_vector3(normal))
-                };
-                corners.map(of_corner).collect::<Vec<_>>()
-            });
-            queue.write_buffer(&batch.indirect, 0, bytemuck::cast_slice(&shares.concat()));
+            let of_corner = |&(place, normal): &(Vec3, Vec3)| {
+                irradiance(pose.transform_point3(place), pose.transform_vector3(normal))
+            };
+            let arriving: Vec<_> = corners.par_iter().map(of_corner).collect();
+            queue.write_buffer(&batch.indirect, 0, bytemuck::cast_slice(&arriving));
         }
     }
 

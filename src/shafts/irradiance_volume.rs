@@ -4,10 +4,10 @@
 use std::f32::consts::PI;
 
 use glam::{UVec3, Vec3};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::ray_caster::RayCaster;
-use crate::light::cores::on_all_cores;
 
 use super::harmonics::{Radiance9, sphere};
 use super::patches::Patches;
@@ -46,12 +46,10 @@ impl IrradianceVolume {
             points,
             radiance: Vec::new(),
         };
-        let shares = on_all_cores(points.element_product() as usize, |range| {
-            range
-                .map(|index| gathered(volume.point(index as u32), patches, caster, radiance))
-                .collect::<Vec<_>>()
-        });
-        volume.radiance = shares.into_iter().flatten().collect();
+        volume.radiance = (0..points.element_product())
+            .into_par_iter()
+            .map(|index| gathered(volume.point(index), patches, caster, radiance))
+            .collect();
         volume
     }
 

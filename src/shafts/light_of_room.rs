@@ -5,10 +5,10 @@
 use std::f32::consts::{PI, TAU};
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::ray_caster::RayCaster;
-use crate::light::cores::on_all_cores;
 use crate::light::probe::Probe;
 
 use super::patches::{Patch, Patches};
@@ -151,22 +151,19 @@ fn irradiances(
     chosen: &[usize],
     radiance: &[Option<Vec3>],
 ) -> Vec<Vec3> {
-    let shares = on_all_cores(chosen.len(), |range| {
-        let irradiance = |&index: &usize| {
-            let patch = &patches.patches[index];
-            let normal = patches.normal(patch);
-            let start = patches.center(patch) + normal * START_OFFSET_M;
-            let arriving = |direction: Vec3| {
-                let hit = caster.first_hit(start, direction, f32::INFINITY)?;
-                let sender = &patches.patches[hit.triangle];
-                (patches.normal(sender).dot(direction) < 0.0)
-                    .then_some(radiance[hit.triangle].unwrap_or(Vec3::ZERO))
-            };
-            hemisphere(normal, RAYS).filter_map(arriving).sum::<Vec3>() * (PI / RAYS as f32)
+    let irradiance = |&index: &usize| {
+        let patch = &patches.patches[index];
+        let normal = patches.normal(patch);
+        let start = patches.center(patch) + normal * START_OFFSET_M;
+        let arriving = |direction: Vec3| {
+            let hit = caster.first_hit(start, direction, f32::INFINITY)?;
+            let sender = &patches.patches[hit.triangle];
+            (patches.normal(sender).dot(direction) < 0.0)
+                .then_some(radiance[hit.triangle].unwrap_or(Vec3::ZERO))
         };
-        chosen[range].iter().map(irradiance).collect::<Vec<_>>()
-    });
-    shares.into_iter().flatten().collect()
+        hemisphere(normal, RAYS).filter_map(arriving).sum::<Vec3>() * (PI / RAYS as f32)
+    };
+    chosen.par_iter().map(irradiance).collect()
 }
 
 /// How far off a surface rays start, metres.

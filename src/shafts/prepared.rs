@@ -3,11 +3,11 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::bounds::Bounds;
 use crate::geometry::ray_caster::RayCaster;
-use crate::light::cores::on_all_cores;
 
 use super::hierarchy::{Arriving, Hierarchy, Marks};
 use super::irradiance_volume::IrradianceVolume;
@@ -237,13 +237,11 @@ impl Prepared {
     /// For patches with their middle in a ball the part of their light that `caster` leaves them, `None` for others.
     pub fn left_by(&self, caster: &RayCaster, center: Vec3, radius: f32) -> Vec<Option<f32>> {
         let middle = |patch: usize| self.patches.center(&self.patches.patches[patch]);
-        let shares = on_all_cores(self.patches.patches.len(), |range| {
-            let left = |patch: usize| {
-                (middle(patch).distance(center) < radius).then(|| self.left_on(patch, caster))
-            };
-            range.map(left).collect::<Vec<_>>()
-        });
-        shares.concat()
+        let left = |patch: usize| {
+            (middle(patch).distance(center) < radius).then(|| self.left_on(patch, caster))
+        };
+        let patches = (0..self.patches.patches.len()).into_par_iter();
+        patches.map(left).collect()
     }
 
     /// The part of a patch's light that `caster` leaves: sources are tried as often as they bring it light.

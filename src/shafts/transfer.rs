@@ -3,10 +3,10 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::ray_caster::RayCaster;
-use crate::light::cores::on_all_cores;
 
 use super::form_factor::form_factor;
 use super::light_of_room::START_OFFSET_M;
@@ -40,20 +40,18 @@ impl Transfers {
             })
             .collect();
         let insets = insets(patches);
-        let rows = on_all_cores(patches.vertices.len(), |range| {
-            let mut rows = Vec::with_capacity(range.len() * senders.len());
-            for vertex in range {
-                let PatchVertex { position, normal } = patches.vertices[vertex];
-                let start = position + insets[vertex] + normal * START_OFFSET_M;
-                rows.extend(sender_corners.iter().map(|(corners, sender_normal)| {
-                    visible_form_factor(start, normal, *corners, *sender_normal, caster)
-                }));
-            }
-            rows
+        let vertices = patches.vertices.par_iter().zip(&insets);
+        let form_factors = vertices.flat_map_iter(|(vertex, inset)| {
+            let PatchVertex { position, normal } = *vertex;
+            let start = position + *inset + normal * START_OFFSET_M;
+            let row = sender_corners.iter();
+            row.map(move |(corners, sender_normal)| {
+                visible_form_factor(start, normal, *corners, *sender_normal, caster)
+            })
         });
         Self {
             sender_count: senders.len(),
-            form_factors: rows.concat(),
+            form_factors: form_factors.collect(),
         }
     }
 

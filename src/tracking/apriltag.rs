@@ -19,20 +19,20 @@ const LOG_OFFSET: f64 = 64.0;
 /// A detector for some families; built once, used by one thread at a time.
 pub(super) struct AprilTagDetector {
     /// One for each width of border.
-    searches: Vec<Search>,
+    searches: Vec<BorderSearch>,
     min_margin: f64,
     /// The picture with [`between_corner_squares`] applied.
     parted: Vec<u8>,
 }
 
 /// libapriltag's detector with the families of one border.
-struct Search {
+struct BorderSearch {
     raw: NonNull<RawDetector>,
     families: Vec<Family>,
 }
 
 // SAFETY: the shim keeps no thread-local or shared state; `&mut self` on every use keeps it to one thread at a time.
-unsafe impl Send for Search {}
+unsafe impl Send for BorderSearch {}
 
 impl AprilTagDetector {
     pub(super) fn new(
@@ -54,7 +54,7 @@ impl AprilTagDetector {
                 .filter(|family| family.border_cells() == border_cells)
                 .collect::<Vec<_>>();
             if !of_border.is_empty() {
-                searches.push(Search::new(settings, of_border)?);
+                searches.push(BorderSearch::new(settings, of_border)?);
             }
         }
         Ok(Self {
@@ -99,7 +99,7 @@ fn between_corner_squares() -> &'static [u8; 256] {
     &LEVELS
 }
 
-impl Search {
+impl BorderSearch {
     fn new(settings: &TrackingSettings, families: Vec<Family>) -> Result<Self, TrackingError> {
         let names = families
             .iter()
@@ -196,7 +196,7 @@ impl Search {
     }
 }
 
-impl Drop for Search {
+impl Drop for BorderSearch {
     fn drop(&mut self) {
         // SAFETY: `raw` came from `gnomon_apriltag_create` and is freed once; the shim frees the detector first, then
         // its families.

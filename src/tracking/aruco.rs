@@ -13,7 +13,7 @@ use crate::scene::{ArucoRefinement, Codes, Dictionary, Family, TrackingSettings}
 
 /// OpenCV's detector for some dictionaries, each with the turn of its pictures against the prints.
 pub(super) struct ArucoDetector {
-    dictionaries: Vec<(Family, usize, installed::Dictionary)>,
+    dictionaries: Vec<(Family, usize, installed::DetectorDictionary)>,
     refinement: ArucoRefinement,
 }
 
@@ -35,7 +35,7 @@ impl ArucoDetector {
                     }
                 })?;
                 let bits = settings.corrected_bits.min(family.correctable_bits()) as i32;
-                let dictionary = installed::Dictionary::new(
+                let dictionary = installed::DetectorDictionary::new(
                     codes,
                     family.border_cells() as i32,
                     bits,
@@ -95,7 +95,8 @@ pub fn rejected_quads(frame: &Frame, family: Family) -> Result<Vec<Quad>, Tracki
     let mut grey = Vec::new();
     super::grey_from_rgba(frame, &mut grey)?;
     let border_cells = family.border_cells() as i32;
-    let dictionary = installed::Dictionary::new(codes, border_cells, 0, ArucoRefinement::None)?;
+    let dictionary =
+        installed::DetectorDictionary::new(codes, border_cells, 0, ArucoRefinement::None)?;
     let mut rejected = Vector::<Vector<Point2f>>::new();
     let image =
         Mat::new_rows_cols_with_data(frame.size_px[1] as i32, frame.size_px[0] as i32, &grey)?;
@@ -131,14 +132,15 @@ pub fn printed_cells(family: Family, id: u32) -> Result<Vec<bool>, TrackingError
         .filter(|_| id < family.id_count())
         .ok_or_else(no_such_marker)?;
     let border_cells = family.border_cells() as i32;
-    let dictionary = installed::Dictionary::new(codes, border_cells, 0, ArucoRefinement::None)?;
+    let dictionary =
+        installed::DetectorDictionary::new(codes, border_cells, 0, ArucoRefinement::None)?;
     Ok(dictionary.cells(id as i32, family.cells_across() as usize)?)
 }
 
 /// The turn of the installed dictionary against the prints; its own pictures are the prints of OpenCV's families.
 fn quarter_turns(
     family: Family,
-    dictionary: &installed::Dictionary,
+    dictionary: &installed::DetectorDictionary,
 ) -> Result<usize, TrackingError> {
     if !family.is_april_tag() {
         return Ok(0);
@@ -146,7 +148,7 @@ fn quarter_turns(
     let side = family.cells_across() as usize;
     let opencv = dictionary.cells(0, side)?;
     apriltag::printed_cells(family, 0)
-        .and_then(|print| quarter_turns_between(&print, &opencv, side))
+        .and_then(|template| quarter_turns_between(&template, &opencv, side))
         .ok_or_else(|| {
             TrackingError::Library(format!("OpenCV's {} is not AprilTag's", family.name()))
         })
@@ -224,12 +226,12 @@ mod installed {
     use super::{InstalledCodes, byte_list, refinement_number, white_cells};
     use crate::scene::ArucoRefinement;
 
-    pub(super) struct Dictionary {
+    pub(super) struct DetectorDictionary {
         dictionary: Ptr<aruco::Dictionary>,
         parameters: Ptr<aruco::DetectorParameters>,
     }
 
-    impl Dictionary {
+    impl DetectorDictionary {
         pub(super) fn new(
             codes: InstalledCodes,
             border_cells: i32,
@@ -297,12 +299,12 @@ mod installed {
     use super::{InstalledCodes, byte_list, refinement_number, white_cells};
     use crate::scene::ArucoRefinement;
 
-    pub(super) struct Dictionary {
+    pub(super) struct DetectorDictionary {
         dictionary: objdetect::Dictionary,
         detector: objdetect::ArucoDetector,
     }
 
-    impl Dictionary {
+    impl DetectorDictionary {
         pub(super) fn new(
             codes: InstalledCodes,
             border_cells: i32,
@@ -365,10 +367,10 @@ mod installed {
 mod tests {
     use super::*;
 
-    fn installed_dictionary(family: Family) -> installed::Dictionary {
+    fn installed_dictionary(family: Family) -> installed::DetectorDictionary {
         let codes = installed_codes(family.codes()).unwrap();
         let border_cells = family.border_cells() as i32;
-        installed::Dictionary::new(codes, border_cells, 0, ArucoRefinement::None).unwrap()
+        installed::DetectorDictionary::new(codes, border_cells, 0, ArucoRefinement::None).unwrap()
     }
 
     #[test]
@@ -385,10 +387,10 @@ mod tests {
             let side = family.cells_across() as usize;
             let turn = quarter_turns(family, &dictionary).unwrap();
             for id in 0..family.id_count() {
-                let print = apriltag::printed_cells(family, id).unwrap();
+                let template = apriltag::printed_cells(family, id).unwrap();
                 let opencv = dictionary.cells(id as i32, side).unwrap();
                 assert_eq!(
-                    quarter_turns_between(&print, &opencv, side),
+                    quarter_turns_between(&template, &opencv, side),
                     Some(turn),
                     "{family} {id}"
                 );

@@ -4,7 +4,7 @@
 use glam::DVec2;
 
 use super::edge_fit::BlurError;
-use super::least_squares::{accumulate, solve_positive_definite};
+use crate::geometry::least_squares::NormalEquations;
 
 /// The variance of the blur that a lens in focus leaves, the pixel's own square included, pixels².
 const SHARP_VARIANCE: f64 = 0.25;
@@ -16,7 +16,7 @@ const BLUR_FLOOR: f64 = 0.1;
 const BLUR_CHANGE: f64 = 0.1;
 /// The largest correction that one edge can ask for, pixels².
 const MOST_BLUR_CHANGE: f64 = 2.0;
-/// Standard deviation of a print's size against the scene's, as a part of it.
+/// Standard deviation of a printed marker's size against the scene's, as a part of it.
 const SIZE_DEVIATION: f64 = 0.03;
 /// However many pictures agree, the size is not believed more firmly than this.
 const LEAST_SIZE_DEVIATION: f64 = 0.001;
@@ -55,20 +55,17 @@ impl Condition {
         &mut self,
         edges: impl Iterator<Item = (DVec2, f64, BlurError)>,
     ) -> f64 {
-        let mut normal = [[0.0; 3]; 3];
-        let mut right = [0.0; 3];
+        let mut equations = NormalEquations::<3>::ZERO;
         for (DVec2 { x, y }, weight, missing) in edges {
             let BlurError { error, certainty } = missing;
             let known = certainty / (1.0 + BLUR_FLOOR * BLUR_FLOOR * certainty);
-            let scale = (weight * known).sqrt();
-            let row = [x * x, 2.0 * x * y, y * y].map(|entry| entry * scale);
             let error = error.clamp(-MOST_BLUR_CHANGE, MOST_BLUR_CHANGE);
-            accumulate(&mut normal, &mut right, &row, error * scale);
+            equations.add_weighted(&[x * x, 2.0 * x * y, y * y], error, weight * known);
         }
-        for (k, row) in normal.iter_mut().enumerate() {
-            row[k] += 1.0 / (BLUR_CHANGE * BLUR_CHANGE);
+        for unknown in 0..3 {
+            equations.add_prior(unknown, 0.0, 1.0 / (BLUR_CHANGE * BLUR_CHANGE));
         }
-        let Some(change) = solve_positive_definite(&normal, &right) else {
+        let Some(change) = equations.solve() else {
             return 0.0;
         };
         let [least, most] = BLUR_VARIANCES;

@@ -64,11 +64,15 @@ fn edge_from_contour(corners: [DVec2; 4]) -> [DVec2; 4] {
 ///
 /// Up to 4.x OpenCV's pictures of the AprilTag families stand on their heads, from 5 on they do not, so the installed
 /// dictionary is asked.
-pub(super) fn quarter_turns_between(print: &[bool], opencv: &[bool], side: usize) -> Option<usize> {
-    if print.len() != side * side || opencv.len() != side * side {
+pub(super) fn quarter_turns_between(
+    template: &[bool],
+    opencv: &[bool],
+    side: usize,
+) -> Option<usize> {
+    if template.len() != side * side || opencv.len() != side * side {
         return None;
     }
-    let mut turned = print.to_vec();
+    let mut turned = template.to_vec();
     for quarter_turns in 0..4 {
         if turned == opencv {
             return Some(quarter_turns);

@@ -17,7 +17,7 @@ use crate::scene::{ArucoRefinement, DetectorKind, Family, TrackingSettings};
 pub struct Detection {
     /// Family of the marker.
     pub family: Family,
-    /// Its number in the family.
+    /// The marker's number in the family.
     pub id: u32,
     /// Corners of the black square as printed: top left, top right, bottom right, bottom left; distorted pixels, a
     /// pixel's integer coordinate is its centre.
@@ -72,7 +72,7 @@ pub struct Detector {
 
 /// What a slower search does.
 #[derive(Clone, Copy, PartialEq)]
-enum Care {
+enum SearchEffort {
     FullResolution,
     LightToo,
 }
@@ -157,7 +157,7 @@ impl Detector {
         grey: &[u8],
         size_px: [u32; 2],
     ) -> Result<Vec<Detection>, TrackingError> {
-        self.detect_with(Care::FullResolution, grey, size_px)
+        self.detect_with(SearchEffort::FullResolution, grey, size_px)
     }
 
     /// As [`detect`](Self::detect), but at full resolution and at any price: in the picture as it is, and in one of
@@ -168,7 +168,7 @@ impl Detector {
         grey: &[u8],
         size_px: [u32; 2],
     ) -> Result<Vec<Detection>, TrackingError> {
-        self.detect_with(Care::LightToo, grey, size_px)
+        self.detect_with(SearchEffort::LightToo, grey, size_px)
     }
 
     /// Whether the slower searches can find what [`detect`](Self::detect) does not.
@@ -178,7 +178,7 @@ impl Detector {
 
     fn detect_with(
         &mut self,
-        care: Care,
+        effort: SearchEffort,
         grey: &[u8],
         size_px: [u32; 2],
     ) -> Result<Vec<Detection>, TrackingError> {
@@ -192,7 +192,7 @@ impl Detector {
             return Ok(Vec::new());
         }
         let mut detections = detector.detect(grey, size_px)?;
-        if care == Care::LightToo {
+        if effort == SearchEffort::LightToo {
             self.encoded_anew.clear();
             let as_light = grey.iter().map(|&level| LIGHT[usize::from(level)]);
             self.encoded_anew.extend(as_light);

@@ -1,6 +1,6 @@
-//! Where an edge of the print lies in the picture, from the light of the pixels around it.
+//! Where an edge of a marker lies in the picture, from the light of the pixels around it.
 //!
-//! A pixel's light is `black + contrast · whiteness`: the whiteness is that of the print's cells, blurred by the lens,
+//! A pixel's light is `black + contrast · whiteness`: the whiteness is that of the marker's cells, blurred by the lens,
 //! the motion and the pixel itself; black and contrast are the edge's own, since a shadow may lie across the marker.
 //! Light, not encoded values, for that is what blurs.
 
@@ -8,15 +8,15 @@ use std::sync::LazyLock;
 
 use glam::{DMat2, DVec2};
 
-use super::least_squares::inverse;
 use super::light::Grey;
-use super::print::{COLUMNS, Edge, ROWS};
+use super::marker_template::{COLUMNS, ROWS, TemplateEdge};
+use crate::geometry::matrix::{Matrix, dot};
 
-/// Half the window across an edge: at most so many pixels,
+/// The most that the window reaches across an edge to either side, pixels.
 const ACROSS_PX: f64 = 3.0;
-/// and so many cells.
+/// The most that the window reaches across an edge to either side, cells.
 const ACROSS_CELLS: f64 = 1.0;
-/// Half the window along it, pixels; a longer edge tells as much in its middle.
+/// The most that the window reaches along an edge to either side, pixels; a longer edge tells as much in its middle.
 const ALONG_PX: f64 = 6.0;
 /// An edge with fewer pixels tells nothing.
 const FEWEST_PIXELS: u32 = 8;
@@ -27,7 +27,7 @@ const NOISE_FLOOR: f64 = 1e-6;
 
 /// What the picture says of an edge.
 pub(super) enum EdgeView {
-    /// It is there.
+    /// The edge is there.
     Seen(EdgeFit),
     /// The side that should be white is the darker one.
     Reversed,
@@ -57,7 +57,7 @@ pub(super) struct EdgeFit {
 /// and one along it there (distorted pixels); `blur_variance` is the blur's across the edge, pixels².
 pub(super) fn fit_edge(
     picture: Grey<'_>,
-    edge: &Edge,
+    edge: &TemplateEdge,
     middle_px: DVec2,
     pixels_from_cells: DMat2,
     blur_variance: f64,
@@ -87,7 +87,7 @@ pub(super) fn fit_edge(
     let steps = Steps::new(edge);
     let reach = reach.as_vec2();
     let to_cells = cells_from_pixels.as_mat2();
-    let mut sums = Sums::default();
+    let mut sums = EdgeSums::default();
     for y in low.y as u32..=high.y as u32 {
         let row = picture.row(y);
         let start = DVec2::new(low.x, f64::from(y)) - middle_px;
@@ -152,7 +152,7 @@ struct Steps {
 }
 
 impl Steps {
-    fn new(edge: &Edge) -> Self {
+    fn new(edge: &TemplateEdge) -> Self {
         Self {
             first: edge.around.map(|row| row[0]),
             steps: edge
@@ -187,16 +187,17 @@ impl Steps {
     }
 }
 
-/// The normal equations of black, contrast, contrast · offset and contrast · blur.
+/// The normal equations of black, contrast, contrast · offset and contrast · blur; their lower triangle in single
+/// precision, since they are added to for each pixel.
 #[derive(Default)]
-struct Sums {
+struct EdgeSums {
     normal: [[f32; 4]; 4],
     right: [f32; 4],
     squares: f32,
     count: u32,
 }
 
-impl Sums {
+impl EdgeSums {
     fn add(&mut self, row: [f32; 4], light: f32) {
         for i in 0..4 {
             for j in 0..=i {
@@ -216,11 +217,10 @@ impl Sums {
         let entry = |i: usize, j: usize| f64::from(self.normal[i.max(j)][i.min(j)]);
         let normal: [[f64; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
         let right: [f64; 3] = std::array::from_fn(|i| f64::from(self.right[i]));
-        let inverse = inverse(&normal)?;
-        let solution: [f64; 3] =
-            std::array::from_fn(|i| (0..3).map(|j| inverse[i][j] * right[j]).sum());
+        let inverse = Matrix(normal).inverse()?;
+        let solution = inverse * right;
         let [_, contrast, shift] = solution;
-        let explained: f64 = (0..3).map(|i| solution[i] * right[i]).sum();
+        let explained = dot(&solution, &right);
         let unexplained = (f64::from(self.squares) - explained).max(0.0);
         let noise = unexplained / f64::from(self.count - 3) + NOISE_FLOOR;
         if contrast < LEAST_CONTRAST {
@@ -229,12 +229,8 @@ impl Sums {
         }
         // What is left of the fourth equation once the other three are solved.
         let blurring: [f64; 3] = std::array::from_fn(|i| entry(i, 3));
-        let blur_left =
-            f64::from(self.right[3]) - (0..3).map(|i| blurring[i] * solution[i]).sum::<f64>();
-        let blur_information = entry(3, 3)
-            - (0..3)
-                .map(|i| blurring[i] * (0..3).map(|j| inverse[i][j] * blurring[j]).sum::<f64>())
-                .sum::<f64>();
+        let blur_left = f64::from(self.right[3]) - dot(&blurring, &solution);
+        let blur_information = entry(3, 3) - dot(&blurring, &(inverse * blurring));
         // By the logarithm of the deviation, hence twice the variance.
         let (unit, certainty) = (
             2.0 * blur_variance,
@@ -252,7 +248,7 @@ impl Sums {
         };
         Some(EdgeView::Seen(EdgeFit {
             offset_cells: shift / contrast,
-            variance_cells: inverse[2][2] * noise / (contrast * contrast),
+            variance_cells: inverse.0[2][2] * noise / (contrast * contrast),
             blur_error,
         }))
     }
@@ -262,7 +258,7 @@ impl Sums {
 mod tests {
     use super::*;
     use crate::scene::{Family, Marker};
-    use crate::tracking::print::Print;
+    use crate::tracking::marker_template::MarkerTemplate;
 
     const SIDE: u32 = 64;
 
@@ -305,7 +301,7 @@ mod tests {
     }
 
     /// An edge between large cells, which goes from black to white.
-    fn edge() -> Edge {
+    fn edge() -> TemplateEdge {
         let marker = Marker {
             family: Family::TAG16H5,
             id: 0,
@@ -315,8 +311,8 @@ mod tests {
         };
         // Black, two columns of it, then white.
         let white = (0..16).map(|k| k % 4 > 1).collect();
-        let print = Print::new(&marker, white);
-        print
+        let template = MarkerTemplate::new(&marker, white);
+        template
             .edges
             .into_iter()
             .find(|edge| edge.brightens && edge.around == [[0.0, 0.0, 1.0, 1.0]; ROWS])

@@ -11,18 +11,20 @@
 
 use glam::DAffine3;
 
-use super::least_squares::{Matrix6, inverse, product, sum, times, transposed};
-use super::pixel_pose::{difference, moved};
+use crate::geometry::matrix::{Matrix, dot};
+use crate::geometry::pose::{PoseStep, difference, moved};
 
 /// Standard deviation of the acceleration of something that a hand holds: of its turn, rad/s²; the shift's is that times
 /// the distance.
 const TURN_ACCELERATION: f64 = 5.0;
-/// The variance of the acceleration that is expected, as a part of the above: at rest, and at most.
+/// The least variance of the acceleration that is expected, at rest, as a part of a hand's.
 const CALM: f64 = 1e-10;
+/// The largest variance of the acceleration that is expected, as a part of a hand's.
 const WILD: f64 = 100.0;
-/// Squared innovation over what is expected of it, per degree of freedom: above this the anchor accelerates,
+/// The squared innovation over what is expected of it, per degree of freedom, above which the anchor accelerates.
 const SURPRISE: f64 = 2.5;
-/// and that much more acceleration is expected that it is no more than this.
+/// The squared innovation over what is expected of it, per degree of freedom, down to which the expected acceleration then
+/// rises.
 const EXPECTED: f64 = 1.0;
 /// What is left of the expected acceleration after a frame without surprise.
 const CALMING: f64 = 0.8;
@@ -39,11 +41,11 @@ pub(super) struct Filter {
     time_secs: f64,
     pose: DAffine3,
     /// Turn (left of the rotation) and shift per second.
-    velocity: [f64; 6],
-    by_pose: Matrix6,
+    velocity: PoseStep,
+    by_pose: Matrix<6>,
     /// Row: pose, column: velocity.
-    mixed: Matrix6,
-    by_velocity: Matrix6,
+    mixed: Matrix<6>,
+    by_velocity: Matrix<6>,
     /// Variance of the acceleration, as a part of a hand's.
     liveliness: f64,
 }
@@ -51,14 +53,14 @@ pub(super) struct Filter {
 impl Filter {
     /// Starts at a pose. Covariances are of a turn about the anchor's origin in camera axes, left of the rotation, and a
     /// shift; radians and metres.
-    pub(super) fn new(time_secs: f64, pose: DAffine3, covariance: &Matrix6) -> Self {
+    pub(super) fn new(time_secs: f64, pose: DAffine3, covariance: Matrix<6>) -> Self {
         let speed = scaled_by_distance(&pose, UNKNOWN_SPEED * UNKNOWN_SPEED);
         Self {
             time_secs,
             pose,
             velocity: [0.0; 6],
-            by_pose: times(covariance, CAUTION),
-            mixed: [[0.0; 6]; 6],
+            by_pose: covariance * CAUTION,
+            mixed: Matrix::ZERO,
             by_velocity: speed,
             liveliness: 1.0,
         }
@@ -68,17 +70,17 @@ impl Filter {
         &self.pose
     }
 
-    pub(super) fn covariance(&self) -> &Matrix6 {
+    pub(super) fn covariance(&self) -> &Matrix<6> {
         &self.by_pose
     }
 
     /// Turn (left of the rotation, rad/s) and shift (m/s).
-    pub(super) fn velocity(&self) -> [f64; 6] {
+    pub(super) fn velocity(&self) -> PoseStep {
         self.velocity
     }
 
     /// Takes a pose of a later time.
-    pub(super) fn add(&mut self, time_secs: f64, pose: &DAffine3, covariance: &Matrix6) {
+    pub(super) fn add(&mut self, time_secs: f64, pose: &DAffine3, covariance: Matrix<6>) {
         let step_secs = time_secs - self.time_secs;
         if !(step_secs > 0.0 && step_secs <= LONGEST_STEP_SECS) {
             *self = Self::new(time_secs, *pose, covariance);
@@ -86,29 +88,17 @@ impl Filter {
         }
         let expected = moved(&self.pose, self.velocity.map(|speed| speed * step_secs));
         let innovation = difference(pose, &expected);
-        let noise = times(covariance, CAUTION);
+        let noise = covariance * CAUTION;
         // What the velocity's covariance adds, before any acceleration.
-        let to_mixed = sum(&self.mixed, &times(&self.by_velocity, step_secs));
-        let mixed_twice = sum(&self.mixed, &transposed(&self.mixed));
-        let drifted = sum(
-            &self.by_pose,
-            &sum(
-                &times(&mixed_twice, step_secs),
-                &times(&self.by_velocity, step_secs * step_secs),
-            ),
-        );
+        let to_mixed = self.mixed + self.by_velocity * step_secs;
+        let mixed_twice = self.mixed + self.mixed.transposed();
+        let drifted =
+            self.by_pose + (mixed_twice * step_secs + self.by_velocity * (step_secs * step_secs));
         let acceleration = scaled_by_distance(pose, TURN_ACCELERATION * TURN_ACCELERATION);
         let weigh = |liveliness: f64| {
-            let jolt = times(&acceleration, liveliness * step_secs.powi(4) / 4.0);
-            let by_pose = sum(&drifted, &jolt);
-            let certainty = inverse(&sum(&by_pose, &noise))?;
-            let weighed = product_with(&certainty, &innovation);
-            let surprise = innovation
-                .iter()
-                .zip(weighed)
-                .map(|(a, b)| a * b)
-                .sum::<f64>()
-                / 6.0;
+            let by_pose = drifted + acceleration * (liveliness * step_secs.powi(4) / 4.0);
+            let certainty = (by_pose + noise).inverse()?;
+            let surprise = dot(&innovation, &(certainty * innovation)) / 6.0;
             Some((by_pose, certainty, surprise))
         };
         let mut weighed = weigh(self.liveliness);
@@ -128,41 +118,29 @@ impl Filter {
             return;
         };
         let variance = self.liveliness * step_secs * step_secs;
-        let mixed = sum(&to_mixed, &times(&acceleration, 0.5 * variance * step_secs));
-        let by_velocity = sum(&self.by_velocity, &times(&acceleration, variance));
-        let gain = product(&by_pose, &certainty);
-        let velocity_gain = product(&transposed(&mixed), &certainty);
-        let correction = product_with(&gain, &innovation);
-        let faster = product_with(&velocity_gain, &innovation);
-        self.pose = moved(&expected, correction);
+        let mixed = to_mixed + acceleration * (0.5 * variance * step_secs);
+        let by_velocity = self.by_velocity + acceleration * variance;
+        let gain = by_pose * certainty;
+        let velocity_gain = mixed.transposed() * certainty;
+        let faster = velocity_gain * innovation;
+        self.pose = moved(&expected, gain * innovation);
         self.velocity = std::array::from_fn(|k| self.velocity[k] + faster[k]);
-        let less = |covariance: &Matrix6, gain: &Matrix6, with: &Matrix6| {
-            sum(covariance, &times(&product(gain, with), -1.0))
-        };
-        self.by_velocity = symmetric(&less(&by_velocity, &velocity_gain, &mixed));
-        self.mixed = less(&mixed, &gain, &mixed);
-        self.by_pose = symmetric(&less(&by_pose, &gain, &by_pose));
+        self.by_velocity = symmetric(by_velocity - velocity_gain * mixed);
+        self.mixed = mixed - gain * mixed;
+        self.by_pose = symmetric(by_pose - gain * by_pose);
         self.time_secs = time_secs;
     }
 }
 
 /// A variance for each of a turn and, times the squared distance, of a shift.
-fn scaled_by_distance(pose: &DAffine3, variance: f64) -> Matrix6 {
+fn scaled_by_distance(pose: &DAffine3, variance: f64) -> Matrix<6> {
     let by_shift = variance * pose.translation.length_squared();
-    let mut matrix = [[0.0; 6]; 6];
-    for (k, row) in matrix.iter_mut().enumerate() {
-        row[k] = if k < 3 { variance } else { by_shift };
-    }
-    matrix
-}
-
-fn product_with(matrix: &Matrix6, vector: &[f64; 6]) -> [f64; 6] {
-    matrix.map(|row| row.iter().zip(vector).map(|(a, b)| a * b).sum())
+    Matrix::diagonal([variance, variance, variance, by_shift, by_shift, by_shift])
 }
 
 /// Rounding must not make a covariance lopsided.
-fn symmetric(matrix: &Matrix6) -> Matrix6 {
-    times(&sum(matrix, &transposed(matrix)), 0.5)
+fn symmetric(matrix: Matrix<6>) -> Matrix<6> {
+    (matrix + matrix.transposed()) * 0.5
 }
 
 #[cfg(test)]
@@ -170,18 +148,14 @@ mod tests {
     use glam::{DQuat, DVec3};
 
     use super::*;
-    use crate::tracking::pose::rotation_between;
+    use crate::geometry::pose::rotation_between;
 
     const FRAME_SECS: f64 = 1.0 / 30.0;
     /// Standard deviations of a lone marker's pose: of its turn, rad, and its shift, m.
     const NOISE: [f64; 2] = [2e-3, 3e-4];
 
-    fn covariance() -> Matrix6 {
-        let mut matrix = [[0.0; 6]; 6];
-        for (k, row) in matrix.iter_mut().enumerate() {
-            row[k] = NOISE[k / 3] * NOISE[k / 3];
-        }
-        matrix
+    fn covariance() -> Matrix<6> {
+        Matrix::diagonal(std::array::from_fn(|k| NOISE[k / 3] * NOISE[k / 3]))
     }
 
     fn start() -> DAffine3 {
@@ -206,14 +180,14 @@ mod tests {
     #[test]
     fn what_rests_comes_to_rest() {
         let mut seed = 7;
-        let mut filter = Filter::new(0.0, noisy(&start(), &mut seed), &covariance());
+        let mut filter = Filter::new(0.0, noisy(&start(), &mut seed), covariance());
         let mut steps = Vec::new();
         for frame in 1..=300 {
             let before = filter.pose().translation;
             filter.add(
                 f64::from(frame) * FRAME_SECS,
                 &noisy(&start(), &mut seed),
-                &covariance(),
+                covariance(),
             );
             steps.push(before.distance(filter.pose().translation));
         }
@@ -233,19 +207,19 @@ mod tests {
 
     #[test]
     fn a_step_is_shown_in_the_frame_that_sees_it() {
-        let mut filter = Filter::new(0.0, start(), &covariance());
+        let mut filter = Filter::new(0.0, start(), covariance());
         for frame in 1..100 {
-            filter.add(f64::from(frame) * FRAME_SECS, &start(), &covariance());
+            filter.add(f64::from(frame) * FRAME_SECS, &start(), covariance());
         }
         // Two to a thousand times what noise does.
         for factor in [8.0, 30.0, 300.0, 3000.0] {
             let mut stepped = filter.clone();
             let there = moved(&start(), std::array::from_fn(|k| factor * NOISE[k / 3]));
-            stepped.add(100.0 * FRAME_SECS, &there, &covariance());
+            stepped.add(100.0 * FRAME_SECS, &there, covariance());
             let left = stepped.pose().translation.distance(there.translation)
                 / start().translation.distance(there.translation);
             assert!(left < 0.25, "factor {factor}: {left} of the step is left");
-            stepped.add(101.0 * FRAME_SECS, &there, &covariance());
+            stepped.add(101.0 * FRAME_SECS, &there, covariance());
             let left = stepped.pose().translation.distance(there.translation)
                 / start().translation.distance(there.translation);
             assert!(
@@ -257,12 +231,12 @@ mod tests {
 
     #[test]
     fn a_steady_motion_is_not_held_back() {
-        let mut filter = Filter::new(0.0, start(), &covariance());
+        let mut filter = Filter::new(0.0, start(), covariance());
         let speed = [0.5, -0.2, 0.1, 0.1, 0.05, -0.02];
         for frame in 1..60 {
             let time_secs = f64::from(frame) * FRAME_SECS;
             let there = moved(&start(), speed.map(|speed| speed * time_secs));
-            filter.add(time_secs, &there, &covariance());
+            filter.add(time_secs, &there, covariance());
             let lag_m = filter.pose().translation.distance(there.translation);
             assert!(
                 frame < 10 || lag_m < 0.1 * NOISE[1],
@@ -276,9 +250,9 @@ mod tests {
     #[test]
     fn odd_times_start_it_anew() {
         for time_secs in [0.0, -1.0, 10.0, f64::NAN] {
-            let mut filter = Filter::new(0.0, start(), &covariance());
+            let mut filter = Filter::new(0.0, start(), covariance());
             let there = moved(&start(), [0.3, 0.0, 0.0, 0.0, 0.1, 0.0]);
-            filter.add(time_secs, &there, &covariance());
+            filter.add(time_secs, &there, covariance());
             assert_eq!(*filter.pose(), there, "{time_secs} s");
         }
     }

@@ -3,69 +3,70 @@
 use glam::{DAffine3, DVec2};
 
 use super::aruco::printed_cells;
-use super::least_squares::Matrix6;
-use super::pixel_pose::project;
-use super::pose::{self, Sighting, Solutions, pixel_of};
-use super::print::Print;
-use super::undistort::undistorted_pixel;
-use super::{Detection, TrackingError, Why};
+use super::marker_template::MarkerTemplate;
+use super::pixel_pose::pixel_of;
+use super::pose::{self, CornerObservation, Solutions};
+use super::{Detection, LossReason, TrackingError};
 use crate::geometry::camera::Intrinsics;
+use crate::geometry::matrix::Matrix;
 use crate::scene::{Anchor, Family};
 
 /// A board's pose that leaves more than this is looked through for a marker that does not fit, pixels.
 const SUSPICIOUS_RMS_PX: f64 = 1.5;
 
-/// Of several markers with one id the rest of the board picks the one whose corners lie this near, pixels.
+/// How near the corners of one of several markers with one id lie to where the rest of the board puts them, pixels.
 const SAME_MARKER_PX: f64 = 3.0;
 
 /// The markers of an anchor.
 pub(super) struct Layout {
     markers: Vec<(Family, u32)>,
-    /// In the same order.
-    pub(super) prints: Vec<Print>,
+    /// The markers' templates, in the same order.
+    pub(super) templates: Vec<MarkerTemplate>,
 }
 
 /// Poses that a detector's corners allow.
 pub(super) struct Located {
     pub(super) solutions: Solutions,
-    /// Of the better one: a turn about the anchor's origin (left of the rotation) and a shift.
-    pub(super) covariance: Matrix6,
+    /// The covariance of a step from the better pose.
+    pub(super) covariance: Matrix<6>,
     /// Markers that they rest on.
     pub(super) markers: usize,
 }
 
 /// A marker of an anchor as one frame shows it.
 struct SeenMarker {
-    sightings: [Sighting; 4],
+    observations: [CornerObservation; 4],
 }
 
 impl Layout {
     pub(super) fn new(anchor: &Anchor) -> Result<Self, TrackingError> {
-        let prints = anchor
-            .markers
-            .iter()
-            .map(|marker| Ok(Print::new(marker, printed_cells(marker.family, marker.id)?)));
+        let templates = anchor.markers.iter().map(|marker| {
+            Ok(MarkerTemplate::new(
+                marker,
+                printed_cells(marker.family, marker.id)?,
+            ))
+        });
         Ok(Self {
             markers: anchor
                 .markers
                 .iter()
                 .map(|marker| (marker.family, marker.id))
                 .collect(),
-            prints: prints.collect::<Result<_, TrackingError>>()?,
+            templates: templates.collect::<Result<_, TrackingError>>()?,
         })
     }
 
-    /// Family and id of each print.
+    /// The family and id of each template's marker.
     pub(super) fn markers(&self) -> impl Iterator<Item = (Family, u32)> {
         self.markers.iter().copied()
     }
 
     /// How far the two poses put the same corner from each other at most, pixels; infinite behind the camera.
     pub(super) fn distance_px(&self, intrinsics: &Intrinsics, a: &DAffine3, b: &DAffine3) -> f64 {
-        let corners = self.prints.iter().flat_map(Print::corners_m);
+        let corners = self.templates.iter().flat_map(MarkerTemplate::corners_m);
         corners
             .map(|point_m| {
-                let place = |pose| Some(project(intrinsics, pose, point_m)?.pixel);
+                let place = |pose| pixel_of(intrinsics, pose, point_m);
                 match (place(a), place(b)) {
                     (Some(a), Some(b)) => a.distance(b),
                     _ => f64::INFINITY,
@@ -79,17 +80,17 @@ impl Layout {
         &self,
         intrinsics: &Intrinsics,
         detections: &[Detection],
-    ) -> Result<Located, Why> {
+    ) -> Result<Located, LossReason> {
         let mut seen = Vec::new();
         let mut doubled = Vec::new();
-        for (marker, print) in self.markers().zip(&self.prints) {
+        for (marker, template) in self.markers().zip(&self.templates) {
             let of = |detection: &Detection| (detection.family, detection.id);
             let start = detections.partition_point(|detection| of(detection) < marker);
             let mut candidates = detections[start..]
                 .iter()
                 .take_while(|detection| of(detection) == marker)
                 .filter_map(|detection| {
-                    SeenMarker::new(intrinsics, print.corners_m(), detection.corners_px)
+                    SeenMarker::new(intrinsics, template.corners_m(), detection.corners_px)
                 })
                 .collect::<Vec<_>>();
             match candidates.len() {
@@ -100,9 +101,9 @@ impl Layout {
         }
         let Some(mut solutions) = solve_without_misfits(intrinsics, &mut seen) else {
             return Err(match (seen.is_empty(), doubled.is_empty()) {
-                (true, true) => Why::NoMarker,
-                (true, false) => Why::DoubleId,
-                (false, _) => Why::NoPose,
+                (true, true) => LossReason::NoMarker,
+                (true, false) => LossReason::DoubleId,
+                (false, _) => LossReason::NoPose,
             });
         };
         // The rest of the board decides which of several markers with one id is its own.
@@ -123,10 +124,12 @@ impl Layout {
                 solutions = better;
             }
         }
-        let sightings: Vec<Sighting> = seen.iter().flat_map(|marker| marker.sightings).collect();
+        let observations: Vec<CornerObservation> =
+            seen.iter().flat_map(|marker| marker.observations).collect();
         let best = &solutions.best.camera_from_anchor;
         Ok(Located {
-            covariance: pose::covariance(intrinsics, &sightings, best).ok_or(Why::NoPose)?,
+            covariance: pose::covariance(intrinsics, &observations, best)
+                .ok_or(LossReason::NoPose)?,
             solutions,
             markers: seen.len(),
         })
@@ -136,27 +139,25 @@ impl Layout {
 impl SeenMarker {
     /// `None` where the lens distortion has no inverse.
     fn new(intrinsics: &Intrinsics, corners_m: [DVec2; 4], corners_px: [DVec2; 4]) -> Option<Self> {
-        let mut sightings = [Sighting {
-            point_m: DVec2::ZERO,
-            pixel: DVec2::ZERO,
-        }; 4];
-        for (sighting, (point_m, corner_px)) in sightings
-            .iter_mut()
-            .zip(corners_m.into_iter().zip(corners_px))
-        {
-            let pixel = undistorted_pixel(intrinsics, corner_px)?;
-            *sighting = Sighting { point_m, pixel };
-        }
-        Some(Self { sightings })
+        let [a, b, c, d] = std::array::from_fn(|k| {
+            Some(CornerObservation {
+                point_m: corners_m[k].extend(0.0),
+                pixel: intrinsics.undistorted_pixel(corners_px[k])?,
+            })
+        });
+        Some(Self {
+            observations: [a?, b?, c?, d?],
+        })
     }
 
-    /// Of the farthest corner from where the pose puts it.
+    /// The distance of the farthest corner from where the pose puts it, pixels; infinite behind the camera.
     fn distance_px(&self, intrinsics: &Intrinsics, camera_from_anchor: &DAffine3) -> f64 {
-        self.sightings
+        self.observations
             .iter()
-            .map(|sighting| {
-                (pixel_of(intrinsics, camera_from_anchor, sighting.point_m) - sighting.pixel)
-                    .length()
+            .map(|observation| {
+                let in_camera_m = camera_from_anchor.transform_point3(observation.point_m);
+                let expected_px = intrinsics.undistorted_pixel_of(in_camera_m);
+                expected_px.map_or(f64::INFINITY, |pixel| pixel.distance(observation.pixel))
             })
             .fold(0.0, f64::max)
     }
@@ -166,11 +167,11 @@ impl SeenMarker {
 /// (a wrong id, a corner under a pencil or a shadow's edge), as long as two others agree.
 fn solve_without_misfits(intrinsics: &Intrinsics, seen: &mut Vec<SeenMarker>) -> Option<Solutions> {
     let solve_for = |markers: &mut dyn Iterator<Item = &SeenMarker>| {
-        let sightings = markers
-            .flat_map(|marker| marker.sightings)
+        let observations = markers
+            .flat_map(|marker| marker.observations)
             .collect::<Vec<_>>();
-        let solutions = pose::solve(intrinsics, &sightings)?;
-        Some((solutions, solutions.best.rms_px(sightings.len())))
+        let solutions = pose::solve(intrinsics, &observations)?;
+        Some((solutions, solutions.best.rms_px(observations.len())))
     };
     loop {
         let all = solve_for(&mut seen.iter());

@@ -14,26 +14,23 @@ mod conventions;
 mod detector;
 mod edge_fit;
 mod filter;
-mod follow;
-mod followed;
+mod flipped_pose;
 mod layout;
-mod least_squares;
 mod light;
 pub mod mapping;
+mod marker_template;
 mod pixel_pose;
 mod pose;
-mod print;
 mod refine;
+mod template_match;
+mod tracked_anchor;
 mod tracker;
-mod twin;
-mod undistort;
 
 use glam::DAffine3;
 
 pub use aruco::{Quad, printed_cells, rejected_quads};
 pub use detector::{Detection, Detector};
 pub use tracker::{Tracker, grey_from_rgba};
-pub use undistort::undistorted_pixel;
 
 /// How far a pose can be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,13 +45,13 @@ pub enum Status {
     Lost,
 }
 
-/// Why an anchor is not simply tracked.
+/// The reason why an anchor is not simply tracked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
-pub enum Why {
+pub enum LossReason {
     /// The usual one.
     #[error("none of its markers is in the picture")]
     NoMarker,
-    /// Of several markers with one id none is trusted unless the rest of a board decides.
+    /// More than one marker with its id: none is trusted unless the rest of a board decides.
     #[error("several markers in the picture have its id")]
     DoubleId,
     /// A mirrored picture, or markers that do not lie as the scene says.
@@ -70,8 +67,8 @@ pub enum Why {
 pub struct AnchorPose {
     /// How far the pose can be trusted.
     pub status: Status,
-    /// Why it is not simply tracked; `None` when it is.
-    pub why: Option<Why>,
+    /// The reason why it is not simply tracked; `None` when it is.
+    pub loss_reason: Option<LossReason>,
     /// Markers that the pose rests on.
     pub markers: u32,
     /// `None` when lost.
@@ -93,7 +90,7 @@ impl AnchorPose {
     /// An anchor that was not found.
     pub const LOST: Self = Self {
         status: Status::Lost,
-        why: None,
+        loss_reason: None,
         markers: 0,
         camera_from_anchor: None,
         covariance: None,

@@ -1,4 +1,4 @@
-//! An anchor's pose from the pixels: all edges of all its prints at once, each by its own light (`edge_fit.rs`).
+//! An anchor's pose from the pixels: all edges of all its markers at once, each by its own light (`edge_fit.rs`).
 //!
 //! A detector's four corners use a marker's outline alone, and each marker for itself. Here every boundary between
 //! black and white cells tells how far across itself it lies from where the pose puts it, with a variance of its own;
@@ -6,78 +6,81 @@
 //! shadow's edge across a marker has no say. (Edges that steer a pose: C. Harris, "Tracking with rigid models", in
 //! Active Vision, 1992; the M-estimator is Tukey's.)
 
-use glam::{DAffine3, DMat2, DMat3, DQuat, DVec2, DVec3};
+use glam::{DAffine3, DMat2, DVec2, DVec3};
 
 use super::condition::Condition;
 use super::edge_fit::{BlurError, EdgeView, fit_edge};
-use super::least_squares::{accumulate, inverse, solve_positive_definite};
 use super::light::Grey;
-use super::print::Print;
-use super::undistort::distortion_jacobian;
-use crate::geometry::camera::Intrinsics;
+use super::marker_template::MarkerTemplate;
+use crate::geometry::camera::{Intrinsics, ProjectedPoint};
+use crate::geometry::least_squares::NormalEquations;
+use crate::geometry::matrix::Matrix;
+use crate::geometry::pose::{PoseStep, by_step, moved};
+use crate::geometry::robust::{deviation, tukey_weight};
 
 /// Parameters of a step: a turn about the anchor's origin (left of the rotation), a shift, how far all edges lie
 /// toward the black (ink runs, and light that the camera does not encode as it says spills), and by what part of its
 /// size each marker is larger than the scene says (a page printed to fit, a rule read wrongly).
 const PARAMETERS: usize = 8;
-/// Those of them that move the anchor.
+/// The parameters of a step that move the anchor.
 pub(super) const POSE_PARAMETERS: usize = 6;
+/// The parameter by which all edges lie toward the black.
 const SPILL: usize = 6;
+/// The parameter by which markers are larger.
 const SIZE: usize = 7;
 /// Standard deviation of what edges are expected to lie toward the black, pixels.
 const SPILL_PX: f64 = 0.1;
 /// An edge is never known better than this, pixels: paper bends, sheets are not printed to the micrometre.
 const FLOOR_PX: f64 = 0.02;
-/// Tukey's constant, standard deviations.
-const TUKEY: f64 = 4.685;
-/// Once a step moves no edge by more than this (root mean square), the pose is found, pixels.
+/// The pose is found once a step moves the edges by no more than this (root mean square), pixels.
 const SETTLED_PX: f64 = 0.05;
-/// and once the blur is known: with too small a one, whole prints are taken for something else. Change of its variance,
-/// as a part of it.
+/// The blur is known once its variance changes by no more than this part of itself: with too small a one, whole markers are
+/// taken for something else.
 const SETTLED_BLUR: f64 = 0.3;
 /// Weight from which on an edge counts as being where it should be.
 const FITTING: f64 = 0.3;
-/// A marker is seen when so large a part of its edges fits, and so many of them,
+/// The part of a marker's edges that must fit for it to be seen.
 const SEEN_SHARE: f64 = 0.4;
+/// The number of a marker's edges that must fit for it to be seen.
 const SEEN_EDGES: usize = 10;
-/// and of those that are to be seen no larger part is the wrong way round: of a marker that is not there, half are.
+/// The largest part of a marker's edges that may be the wrong way round: of a marker that is not there, half are.
 const MOST_REVERSED: f64 = 0.15;
 
 /// A pose that the pixels agree on.
 pub(super) struct PixelPose {
     pub(super) camera_from_anchor: DAffine3,
-    /// Of a turn about the anchor's origin (left of the rotation; radians) and a shift (metres).
-    pub(super) covariance: [[f64; POSE_PARAMETERS]; POSE_PARAMETERS],
-    /// Per print, whether it was seen.
+    /// Covariance of a step from the pose.
+    pub(super) covariance: Matrix<POSE_PARAMETERS>,
+    /// Whether the marker of each template was seen.
     pub(super) seen: Vec<bool>,
     /// Root mean square distance, pixels, of the edges from where the pose and the scene put them; without those that
     /// something else lies across.
     pub(super) rms_px: f64,
     /// By what factor the edges vary more than their pixels' noise says.
     pub(super) excess: f64,
-    pub(super) edges: Vec<Edge>,
+    pub(super) edges: Vec<MeasuredEdge>,
 }
 
-/// An edge of a print as one picture shows it.
-pub(super) struct Edge {
-    print: usize,
-    /// Its middle in the anchor's plane, metres.
+/// An edge of a marker as one picture shows it.
+pub(super) struct MeasuredEdge {
+    template: usize,
+    /// The edge's middle in the anchor's plane, metres.
     pub(super) point_m: DVec2,
-    /// Where a point of it was seen, distorted pixels; that the print spills or is of another size is taken out.
+    /// Where a point of the edge was seen, distorted pixels; that the ink spills or the marker is of another size is taken out.
     pub(super) seen_px: DVec2,
-    /// Across it, a unit vector of the picture.
+    /// A unit vector of the picture across the edge.
     pub(super) normal: DVec2,
-    /// From where the pose puts it to where it was seen, along the normal, pixels.
+    /// The way from where the pose puts the edge to where it was seen, along the normal, pixels.
     offset_px: f64,
     pub(super) variance: f64,
     /// Derivative of the offset that a step explains.
     row: [f64; PARAMETERS],
     blur_error: BlurError,
-    /// Tukey's, 0 to 1.
+    /// Tukey's weight, 0 to 1.
     pub(super) weight: f64,
 }
 
-impl Edge {
+impl MeasuredEdge {
     /// What a step does not explain of the offset, pixels.
     fn left_px(&self, step: &[f64; PARAMETERS]) -> f64 {
         let explained: f64 = self
@@ -90,85 +93,48 @@ impl Edge {
     }
 }
 
-/// Where a pose puts a point of the anchor's plane, and the derivative by its place in camera space.
-pub(super) struct Projected {
-    /// Distorted pixel.
-    pub(super) pixel: DVec2,
-    /// By x, y and z, pixels per metre.
-    by_place: [DVec2; 3],
+/// A point of the anchor as the camera sees it (distorted).
+pub(super) struct AnchorPoint {
+    pub(super) projection: ProjectedPoint,
     /// The point from the anchor's origin, in camera axes.
-    turned: DVec3,
+    turned_m: DVec3,
 }
 
-impl Projected {
-    /// The derivative of the pixel along a direction of the picture by a turn about the anchor's origin and a shift.
-    pub(super) fn row(&self, direction: DVec2) -> [f64; POSE_PARAMETERS] {
-        let gradient = DVec3::from(self.by_place.map(|column| column.dot(direction)));
-        // gradient · (turn × turned) = turn · (turned × gradient)
-        let by_turn = self.turned.cross(gradient);
-        [
-            by_turn.x, by_turn.y, by_turn.z, gradient.x, gradient.y, gradient.z,
-        ]
-    }
-
-    /// The step in the picture, pixels, for one of the point in camera axes, metres.
-    fn step_px(&self, step_m: DVec3) -> DVec2 {
-        let [x, y, z] = self.by_place;
-        x * step_m.x + y * step_m.y + z * step_m.z
+impl AnchorPoint {
+    /// The derivative of the pixel along a direction of the picture by a step of the pose.
+    pub(super) fn by_step(&self, direction: DVec2) -> PoseStep {
+        by_step(self.turned_m, self.projection.gradient(direction))
     }
 }
 
-/// `None` behind the camera.
+/// Where a pose puts a point of the anchor's plane; `None` behind the camera.
 pub(super) fn project(
     intrinsics: &Intrinsics,
     camera_from_anchor: &DAffine3,
     point_m: DVec2,
-) -> Option<Projected> {
-    let turned = camera_from_anchor.matrix3 * point_m.extend(0.0);
-    let in_camera = turned + camera_from_anchor.translation;
-    if in_camera.z <= 1e-6 {
-        return None;
-    }
-    let image = in_camera.truncate() / in_camera.z;
-    let lens = distortion_jacobian(intrinsics, image);
-    let scale = DMat2::from_diagonal(intrinsics.focal_px / in_camera.z) * lens;
-    Some(Projected {
-        pixel: intrinsics.pixel_from_plane(intrinsics.distort(image)),
-        by_place: [scale.x_axis, scale.y_axis, -(scale * image)],
-        turned,
+) -> Option<AnchorPoint> {
+    let turned_m = camera_from_anchor.matrix3 * point_m.extend(0.0);
+    Some(AnchorPoint {
+        projection: intrinsics.project(turned_m + camera_from_anchor.translation)?,
+        turned_m,
     })
 }
 
-/// A pose after a turn about the anchor's origin (left of the rotation, radians) and a shift (metres).
-pub(super) fn moved(pose: &DAffine3, step: [f64; POSE_PARAMETERS]) -> DAffine3 {
-    let [rx, ry, rz, tx, ty, tz] = step;
-    let turn = DQuat::from_scaled_axis(DVec3::new(rx, ry, rz));
-    let rotation = (turn * DQuat::from_mat3(&pose.matrix3)).normalize();
-    DAffine3::from_mat3_translation(
-        DMat3::from_quat(rotation),
-        pose.translation + DVec3::new(tx, ty, tz),
-    )
+/// The distorted pixel of a point of the anchor's plane; `None` behind the camera.
+pub(super) fn pixel_of(
+    intrinsics: &Intrinsics,
+    camera_from_anchor: &DAffine3,
+    point_m: DVec2,
+) -> Option<DVec2> {
+    intrinsics.pixel_of(camera_from_anchor.transform_point3(point_m.extend(0.0)))
 }
 
-/// The turn (left of the rotation) and the shift from one pose to another.
-pub(super) fn difference(to: &DAffine3, from: &DAffine3) -> [f64; 6] {
-    let rotation = DQuat::from_mat3(&(to.matrix3 * from.matrix3.transpose())).normalize();
-    let turn = rotation.to_scaled_axis();
-    // The short way round.
-    let turn = match turn.length() > std::f64::consts::PI {
-        true => turn * (1.0 - std::f64::consts::TAU / turn.length()),
-        false => turn,
-    };
-    let shift_m: DVec3 = to.translation - from.translation;
-    [turn.x, turn.y, turn.z, shift_m.x, shift_m.y, shift_m.z]
-}
-
-/// The pose near `start` that puts the edges of the prints where the picture has them. `None` when too few edges are
+/// The pose near `start` that puts the edges of the markers where the picture has them. `None` when too few edges are
 /// where they should be; `condition` is then as it was.
 pub(super) fn fit_pose(
     picture: Grey<'_>,
     intrinsics: &Intrinsics,
-    prints: &[Print],
+    templates: &[MarkerTemplate],
     start: DAffine3,
     condition: &mut Condition,
 ) -> Option<PixelPose> {
@@ -183,11 +149,11 @@ pub(super) fn fit_pose(
     let mut solution = None;
     for _ in 0..ROUNDS {
         edges.clear();
-        for (index, print) in prints.iter().enumerate() {
+        for (index, template) in templates.iter().enumerate() {
             measure(
                 picture,
                 intrinsics,
-                (index, print),
+                (index, template),
                 &guess,
                 &learned,
                 &mut edges,
@@ -221,7 +187,7 @@ pub(super) fn fit_pose(
         }
     }
     let solution = solution?;
-    let fitted = fitted(prints, &guess, edges, &solution)?;
+    let fitted = fitted(templates, &guess, edges, &solution)?;
     if fitted.seen.iter().filter(|&&seen| seen).count() > 1 {
         learned.learn_size(guess.size_error, solution.size_certainty / fitted.excess);
     }
@@ -233,30 +199,32 @@ fn pose_part(step: &[f64; PARAMETERS]) -> [f64; POSE_PARAMETERS] {
     std::array::from_fn(|k| step[k])
 }
 
-/// Where the prints are expected, and by what part of its size each is larger than the scene says.
+/// Where the markers are expected, and by what part of its size each is larger than the scene says.
 struct Guess {
     camera_from_anchor: DAffine3,
     size_error: f64,
 }
 
-/// Adds the edges of one print that the picture shows near where they are expected; none of a print that is not there.
+/// Adds the edges of one marker that the picture shows near where they are expected; none of a marker that is not there.
 fn measure(
     picture: Grey<'_>,
     intrinsics: &Intrinsics,
-    (index, print): (usize, &Print),
+    (index, template): (usize, &MarkerTemplate),
     guess: &Guess,
     condition: &Condition,
-    edges: &mut Vec<Edge>,
+    edges: &mut Vec<MeasuredEdge>,
 ) {
     let (known, mut reversed) = (edges.len(), 0);
     let (pose, scale) = (&guess.camera_from_anchor, 1.0 + guess.size_error);
-    for edge in &print.edges {
-        let outward_m = edge.point_m - print.center_m();
-        let point_m = print.center_m() + scale * outward_m;
-        let Some(projected) = project(intrinsics, pose, point_m) else {
+    for edge in &template.edges {
+        let outward_m = edge.point_m - template.center_m();
+        let point_m = template.center_m() + scale * outward_m;
+        let Some(point) = project(intrinsics, pose, point_m) else {
             continue;
         };
-        let in_picture = |step_m: DVec2| projected.step_px(pose.matrix3 * step_m.extend(0.0));
+        let expected_px = point.projection.pixel;
+        let in_picture =
+            |step_m: DVec2| point.projection.step_px(pose.matrix3 * step_m.extend(0.0));
         let pixels_from_cells =
             scale * DMat2::from_cols(in_picture(edge.across_m), in_picture(edge.along_m));
         // The gradient of the place across.
@@ -267,13 +235,7 @@ fn measure(
         }
         let normal = gradient / length;
         let blur_variance = condition.blur_variance_along(normal);
-        let fit = match fit_edge(
-            picture,
-            edge,
-            projected.pixel,
-            pixels_from_cells,
-            blur_variance,
-        ) {
+        let fit = match fit_edge(picture, edge, expected_px, pixels_from_cells, blur_variance) {
             EdgeView::Seen(fit) => fit,
             EdgeView::Reversed => {
                 reversed += 1;
@@ -282,13 +244,13 @@ fn measure(
             EdgeView::Blank => continue,
         };
         let offset_px = fit.offset_cells / length;
-        let [rx, ry, rz, tx, ty, tz] = projected.row(normal);
+        let [rx, ry, rz, tx, ty, tz] = point.by_step(normal);
         let by_size = normal.dot(in_picture(outward_m));
         let toward_black = if edge.brightens { -1.0 } else { 1.0 };
-        edges.push(Edge {
-            print: index,
+        edges.push(MeasuredEdge {
+            template: index,
             point_m: edge.point_m,
-            seen_px: projected.pixel + normal * offset_px,
+            seen_px: expected_px + normal * offset_px,
             normal,
             offset_px,
             variance: fit.variance_cells / (length * length) + FLOOR_PX * FLOOR_PX,
@@ -303,63 +265,50 @@ fn measure(
     }
 }
 
-struct Solved {
+struct EdgeSolution {
     step: [f64; PARAMETERS],
     /// Inverse of the variance of the size in the step.
     size_certainty: f64,
 }
 
 /// The step that explains the offsets, robustly. Leaves each edge its weight.
-fn solve(edges: &mut [Edge], condition: &Condition, guess: &Guess) -> Option<Solved> {
+fn solve(edges: &mut [MeasuredEdge], condition: &Condition, guess: &Guess) -> Option<EdgeSolution> {
     const ROUNDS: usize = 5;
     let mut found = None;
     let mut scale = f64::INFINITY;
     for _ in 0..ROUNDS {
-        let mut normal = [[0.0; PARAMETERS]; PARAMETERS];
-        let mut right = [0.0; PARAMETERS];
+        let mut equations = NormalEquations::<PARAMETERS>::ZERO;
         for edge in edges.iter() {
-            let certainty = (edge.weight / edge.variance).sqrt();
-            let row = edge.row.map(|entry| entry * certainty);
-            accumulate(&mut normal, &mut right, &row, edge.offset_px * certainty);
+            equations.add_weighted(&edge.row, edge.offset_px, edge.weight / edge.variance);
         }
         let (size_error, size_certainty) = condition.size();
-        normal[SPILL][SPILL] += 1.0 / (SPILL_PX * SPILL_PX);
-        normal[SIZE][SIZE] += size_certainty;
-        right[SIZE] += size_certainty * (size_error - guess.size_error);
-        let step = solve_positive_definite(&normal, &right)?;
+        equations.add_prior(SPILL, 0.0, 1.0 / (SPILL_PX * SPILL_PX));
+        equations.add_prior(SIZE, size_error - guess.size_error, size_certainty);
+        let step = equations.solve()?;
 
-        let left = |edge: &Edge| edge.left_px(&step) / edge.variance.sqrt();
+        let left = |edge: &MeasuredEdge| edge.left_px(&step) / edge.variance.sqrt();
         scale = deviation(edges.iter().map(left)).clamp(1.0, scale);
         for edge in edges.iter_mut() {
-            let share = left(edge) / (TUKEY * scale);
-            edge.weight = (1.0 - share * share).max(0.0).powi(2);
+            edge.weight = tukey_weight(left(edge), scale);
         }
-        found = Some((step, normal));
+        found = Some((step, equations));
     }
-    let (step, normal) = found?;
-    Some(Solved {
+    let (step, equations) = found?;
+    Some(EdgeSolution {
         step,
-        size_certainty: 1.0 / inverse(&normal)?[SIZE][SIZE],
+        size_certainty: 1.0 / equations.covariance()?.0[SIZE][SIZE],
     })
 }
 
-/// The standard deviation of a Gaussian with the median of these distances from 0; there must be one.
-fn deviation(distances: impl Iterator<Item = f64>) -> f64 {
-    let mut distances: Vec<f64> = distances.map(f64::abs).collect();
-    let middle = distances.len() / 2;
-    let (_, median, _) = distances.select_nth_unstable_by(middle, f64::total_cmp);
-    // The median of |x| of a unit Gaussian.
-    *median / 0.6745
-}
-
 fn fitted(
-    prints: &[Print],
+    templates: &[MarkerTemplate],
     guess: &Guess,
-    mut edges: Vec<Edge>,
-    solved: &Solved,
+    mut edges: Vec<MeasuredEdge>,
+    solved: &EdgeSolution,
 ) -> Option<PixelPose> {
-    let not_by_pose_px =
-        |edge: &Edge| edge.row[SPILL] * solved.step[SPILL] + edge.row[SIZE] * guess.size_error;
+    let not_by_pose_px = |edge: &MeasuredEdge| {
+        edge.row[SPILL] * solved.step[SPILL] + edge.row[SIZE] * guess.size_error
+    };
     let (mut squares_px, mut counted) = (0.0, 0.0);
     for edge in edges.iter().filter(|edge| edge.weight > 0.0) {
         squares_px += (edge.left_px(&solved.step) + not_by_pose_px(edge)).powi(2);
@@ -368,36 +317,33 @@ fn fitted(
     for edge in &mut edges {
         edge.seen_px -= edge.normal * not_by_pose_px(edge);
     }
-    let mut fitting = vec![0; prints.len()];
+    let mut fitting = vec![0; templates.len()];
     for edge in edges.iter().filter(|edge| edge.weight > FITTING) {
-        fitting[edge.print] += 1;
+        fitting[edge.template] += 1;
     }
-    let seen: Vec<bool> = prints
+    let seen: Vec<bool> = templates
         .iter()
         .zip(fitting)
-        .map(|(print, fitting)| {
-            fitting >= SEEN_EDGES && fitting as f64 >= SEEN_SHARE * print.edges.len() as f64
+        .map(|(template, fitting)| {
+            fitting >= SEEN_EDGES && fitting as f64 >= SEEN_SHARE * template.edges.len() as f64
         })
         .collect();
     if !seen.contains(&true) {
         return None;
     }
-    let mut normal = [[0.0; POSE_PARAMETERS]; POSE_PARAMETERS];
+    let mut equations = NormalEquations::<POSE_PARAMETERS>::ZERO;
     let (mut squares, mut used) = (0.0, 0.0);
     for edge in &edges {
-        let certainty = (edge.weight / edge.variance).sqrt();
-        let row = pose_part(&edge.row).map(|entry| entry * certainty);
-        accumulate(&mut normal, &mut [0.0; POSE_PARAMETERS], &row, 0.0);
+        equations.add_weighted(&pose_part(&edge.row), 0.0, edge.weight / edge.variance);
         let left_px = edge.left_px(&solved.step);
         squares += edge.weight * left_px * left_px / edge.variance;
         used += edge.weight;
     }
     // Edges err more than their pixels' noise says where a codec has been at work.
     let excess = (squares / (used - PARAMETERS as f64).max(1.0)).max(1.0);
-    let covariance = inverse(&normal)?.map(|row| row.map(|entry| entry * excess));
     Some(PixelPose {
         camera_from_anchor: guess.camera_from_anchor,
-        covariance,
+        covariance: equations.covariance()? * excess,
         seen,
         rms_px: (squares_px / f64::max(counted, 1.0)).sqrt(),
         excess,

@@ -6,19 +6,22 @@
 
 use glam::{DAffine3, DMat2, DMat3, DVec2, DVec3};
 
-use super::least_squares::{Matrix6, accumulate, inverse, solve_positive_definite, times};
 use crate::geometry::camera::Intrinsics;
+use crate::geometry::homography::{PointScale, linear_homography};
+use crate::geometry::least_squares::{LevenbergMarquardt, Minimum, NormalEquations, Problem};
+use crate::geometry::matrix::Matrix;
+use crate::geometry::pose::{PoseStep, by_step, moved, rotation_between};
 
-/// A point of the anchor's plane and where it was seen.
+/// A point of an anchor and where it was seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Sighting {
-    /// In the anchor's plane z = 0, metres.
-    pub(super) point_m: DVec2,
+pub(super) struct CornerObservation {
+    /// The point in the anchor's space, metres; z = 0 in its plane.
+    pub(super) point_m: DVec3,
     /// Undistorted pixel.
     pub(super) pixel: DVec2,
 }
 
-/// A pose and how well it explains the sightings.
+/// A pose and how well it explains the observations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Solution {
     pub(super) camera_from_anchor: DAffine3,
@@ -36,8 +39,8 @@ pub(super) struct Solutions {
 
 impl Solution {
     /// Root mean square distance of a corner from where the pose puts it, pixels.
-    pub(super) fn rms_px(&self, sightings: usize) -> f64 {
-        (self.squared_error_px / sightings as f64).sqrt()
+    pub(super) fn rms_px(&self, observations: usize) -> f64 {
+        (self.squared_error_px / observations as f64).sqrt()
     }
 }
 
@@ -49,20 +52,23 @@ const CORNER_NOISE_PX: f64 = 0.2;
 /// variance σ² the odds of two poses are exp(difference of their squared errors / 2σ²).
 const DECISIVE: f64 = 9.2;
 
-/// Both poses of a plane. `None` when no pose in front of the camera, facing it, explains the sightings.
-pub(super) fn solve(intrinsics: &Intrinsics, sightings: &[Sighting]) -> Option<Solutions> {
-    let starts = ippe_starts(intrinsics, sightings)?;
+/// The two poses of a plane. `None` when no pose in front of the camera, facing it, explains the observations.
+pub(super) fn solve(
+    intrinsics: &Intrinsics,
+    observations: &[CornerObservation],
+) -> Option<Solutions> {
+    let starts = ippe_starts(intrinsics, observations)?;
     let mut solutions = starts
         .into_iter()
-        .filter_map(|start| refine(intrinsics, sightings, start))
-        .filter(|solution| is_seen_from_the_front(&solution.camera_from_anchor, sightings))
+        .filter_map(|start| refine(intrinsics, observations, start))
+        .filter(|solution| is_seen_from_the_front(&solution.camera_from_anchor, observations))
         .collect::<Vec<_>>();
     solutions.sort_by(|a, b| a.squared_error_px.total_cmp(&b.squared_error_px));
     let best = *solutions.first()?;
     let alternative = solutions.get(1).copied().filter(|other| {
         rotation_between(&best.camera_from_anchor, &other.camera_from_anchor) > 1e-4
     });
-    let degrees_of_freedom = (2 * sightings.len()).saturating_sub(6).max(1) as f64;
+    let degrees_of_freedom = (2 * observations.len()).saturating_sub(6).max(1) as f64;
     let variance =
         (best.squared_error_px / degrees_of_freedom).max(CORNER_NOISE_PX * CORNER_NOISE_PX);
     let ambiguous = alternative
@@ -74,128 +80,50 @@ pub(super) fn solve(intrinsics: &Intrinsics, sightings: &[Sighting]) -> Option<S
     })
 }
 
-/// Where the pose puts a point of the anchor's plane, undistorted pixels.
-pub(super) fn pixel_of(
-    intrinsics: &Intrinsics,
+fn is_seen_from_the_front(
     camera_from_anchor: &DAffine3,
-    point_m: DVec2,
-) -> DVec2 {
-    let in_camera = camera_from_anchor.transform_point3(point_m.extend(0.0));
-    intrinsics.pixel_from_plane(in_camera.truncate() / in_camera.z)
-}
-
-/// Angle between the rotations of two poses, radians.
-pub(super) fn rotation_between(a: &DAffine3, b: &DAffine3) -> f64 {
-    let turned = a.matrix3.transpose() * b.matrix3;
-    // From the sine and the cosine, since each alone is blind somewhere.
-    let sine = DVec3::new(
-        turned.y_axis.z - turned.z_axis.y,
-        turned.z_axis.x - turned.x_axis.z,
-        turned.x_axis.y - turned.y_axis.x,
-    )
-    .length()
-        / 2.0;
-    let cosine = (turned.x_axis.x + turned.y_axis.y + turned.z_axis.z - 1.0) / 2.0;
-    sine.atan2(cosine)
-}
-
-fn is_seen_from_the_front(camera_from_anchor: &DAffine3, sightings: &[Sighting]) -> bool {
+    observations: &[CornerObservation],
+) -> bool {
     let toward_viewer = camera_from_anchor.matrix3.z_axis;
-    sightings.iter().all(|sighting| {
-        let in_camera = camera_from_anchor.transform_point3(sighting.point_m.extend(0.0));
+    observations.iter().all(|observation| {
+        let in_camera = camera_from_anchor.transform_point3(observation.point_m);
         in_camera.z > 0.0 && toward_viewer.dot(in_camera) < 0.0
     })
 }
 
-/// The two poses that the homography's derivative at the points' centre allows (IPPE, section 4).
+/// The two poses that the homography's derivative at the points' centre allows (IPPE, section 4); the points must lie in
+/// the anchor's plane.
 pub(super) fn ippe_starts(
     intrinsics: &Intrinsics,
-    sightings: &[Sighting],
+    observations: &[CornerObservation],
 ) -> Option<[DAffine3; 2]> {
-    if sightings.len() < 4 {
-        return None;
-    }
-    let count = sightings.len() as f64;
-    let center_m = sightings
+    let in_plane = |observation: &CornerObservation| observation.point_m.truncate();
+    let scale = PointScale::of(observations.iter().map(in_plane));
+    let pairs = observations
         .iter()
-        .map(|sighting| sighting.point_m)
-        .sum::<DVec2>()
-        / count;
-    let spread_m = (sightings
-        .iter()
-        .map(|sighting| (sighting.point_m - center_m).length_squared())
-        .sum::<f64>()
-        / count)
-        .sqrt();
-    let in_plane = |sighting: &Sighting| (sighting.point_m - center_m) / spread_m;
-    let pairs = sightings
-        .iter()
-        .map(|sighting| {
+        .map(|observation| {
             (
-                in_plane(sighting),
-                intrinsics.plane_from_pixel(sighting.pixel),
+                scale.scaled(in_plane(observation)),
+                intrinsics.plane_from_pixel(observation.pixel),
             )
         })
         .collect::<Vec<_>>();
-    let homography = homography(&pairs)?;
+    let homography = linear_homography(&pairs)?;
     // The picture of the centre, and the derivative there.
-    let image_center = homography.z_axis.truncate() / homography.z_axis.z;
-    let derivative =
-        |column: DVec3| (column.truncate() - image_center * column.z) / homography.z_axis.z;
+    let center = homography.z_axis;
+    let image_center = center.truncate() / center.z;
+    let derivative = |column: DVec3| (column.truncate() - image_center * column.z) / center.z;
     let jacobian = DMat2::from_cols(derivative(homography.x_axis), derivative(homography.y_axis));
     let rotations = ippe_rotations(image_center, jacobian)?;
     let mut poses = [DAffine3::IDENTITY; 2];
     for (pose, rotation) in poses.iter_mut().zip(rotations) {
-        let translation_m = translation_for(intrinsics, sightings, &rotation)?;
+        let translation_m = translation_for(intrinsics, observations, &rotation)?;
         *pose = DAffine3::from_mat3_translation(rotation, translation_m);
     }
     Some(poses)
 }
 
-/// The homography from points to image points (plane z = 1) by linear least squares; the points' centre must be 0 and
-/// be seen, so that its last entry can be 1.
-fn homography(pairs: &[(DVec2, DVec2)]) -> Option<DMat3> {
-    let count = pairs.len() as f64;
-    let center = pairs.iter().map(|&(_, image)| image).sum::<DVec2>() / count;
-    let spread = (pairs
-        .iter()
-        .map(|&(_, image)| (image - center).length_squared())
-        .sum::<f64>()
-        / count)
-        .sqrt();
-    let mut normal = [[0.0; 8]; 8];
-    let mut right = [0.0; 8];
-    for &(point, image) in pairs {
-        let (x, y) = (point.x, point.y);
-        let image = (image - center) / spread;
-        for (row, value) in [
-            (
-                [x, y, 1.0, 0.0, 0.0, 0.0, -image.x * x, -image.x * y],
-                image.x,
-            ),
-            (
-                [0.0, 0.0, 0.0, x, y, 1.0, -image.y * x, -image.y * y],
-                image.y,
-            ),
-        ] {
-            accumulate(&mut normal, &mut right, &row, value);
-        }
-    }
-    let h = solve_positive_definite(&normal, &right)?;
-    let normalized = DMat3::from_cols(
-        DVec3::new(h[0], h[3], h[6]),
-        DVec3::new(h[1], h[4], h[7]),
-        DVec3::new(h[2], h[5], 1.0),
-    );
-    let image_from_normalized = DMat3::from_cols(
-        DVec3::new(spread, 0.0, 0.0),
-        DVec3::new(0.0, spread, 0.0),
-        center.extend(1.0),
-    );
-    Some(image_from_normalized * normalized)
-}
-
-/// Both rotations of a plane whose centre is seen at `image_center` with the derivative `jacobian` (up to scale).
+/// The two rotations of a plane whose centre is seen at `image_center` with the derivative `jacobian` (up to scale).
 fn ippe_rotations(image_center: DVec2, jacobian: DMat2) -> Option<[DMat3; 2]> {
     // The rotation that turns the optical axis to the centre's ray.
     let ray = image_center.extend(1.0).normalize();
@@ -240,125 +168,133 @@ fn ippe_rotations(image_center: DVec2, jacobian: DMat2) -> Option<[DMat3; 2]> {
 /// The translation that fits best, linearly, once the rotation is known.
 fn translation_for(
     intrinsics: &Intrinsics,
-    sightings: &[Sighting],
+    observations: &[CornerObservation],
     rotation: &DMat3,
 ) -> Option<DVec3> {
-    let mut normal = [[0.0; 3]; 3];
-    let mut right = [0.0; 3];
-    for sighting in sightings {
-        let image = intrinsics.plane_from_pixel(sighting.pixel);
-        let turned = *rotation * sighting.point_m.extend(0.0);
-        accumulate(
-            &mut normal,
-            &mut right,
-            &[1.0, 0.0, -image.x],
-            image.x * turned.z - turned.x,
-        );
-        accumulate(
-            &mut normal,
-            &mut right,
-            &[0.0, 1.0, -image.y],
-            image.y * turned.z - turned.y,
-        );
+    let mut equations = NormalEquations::<3>::ZERO;
+    for observation in observations {
+        let image = intrinsics.plane_from_pixel(observation.pixel);
+        let turned = *rotation * observation.point_m;
+        equations.add(&[1.0, 0.0, -image.x], image.x * turned.z - turned.x);
+        equations.add(&[0.0, 1.0, -image.y], image.y * turned.z - turned.y);
     }
-    solve_positive_definite(&normal, &right).map(DVec3::from)
+    equations.solve().map(DVec3::from)
 }
 
-/// Levenberg-Marquardt on the six parameters of the pose; `None` when it does not converge to a pose in front.
+/// A pose that is moved to where it explains the observations.
+struct CornerFit<'a> {
+    intrinsics: &'a Intrinsics,
+    observations: &'a [CornerObservation],
+    camera_from_anchor: DAffine3,
+}
+
+impl Problem for CornerFit<'_> {
+    type Linearized = NormalEquations<6>;
+
+    fn cost(&self) -> Option<f64> {
+        let mut squares_px = 0.0;
+        for observation in self.observations {
+            let in_camera_m = self
+                .camera_from_anchor
+                .transform_point3(observation.point_m);
+            let pixel = self.intrinsics.undistorted_pixel_of(in_camera_m)?;
+            squares_px += (pixel - observation.pixel).length_squared();
+        }
+        squares_px.is_finite().then_some(squares_px)
+    }
+
+    fn linearized(&self) -> Option<NormalEquations<6>> {
+        let mut equations = NormalEquations::ZERO;
+        for observation in self.observations {
+            let turned_m = self.camera_from_anchor.matrix3 * observation.point_m;
+            let in_camera_m = turned_m + self.camera_from_anchor.translation;
+            let projection = self.intrinsics.project_undistorted(in_camera_m)?;
+            let missing_px = observation.pixel - projection.pixel;
+            let gradients = projection.gradients();
+            for (gradient, value) in gradients.into_iter().zip(missing_px.to_array()) {
+                equations.add(&by_step(turned_m, gradient), value);
+            }
+        }
+        Some(equations)
+    }
+
+    fn moved(&self, step: &PoseStep) -> Self {
+        Self {
+            camera_from_anchor: moved(&self.camera_from_anchor, *step),
+            ..*self
+        }
+    }
+
+    fn is_negligible(&self, step: &PoseStep) -> bool {
+        const TOLERANCE: f64 = 1e-10;
+        let [rx, ry, rz, tx, ty, tz] = *step;
+        DVec3::new(rx, ry, rz).length() < TOLERANCE
+            && DVec3::new(tx, ty, tz).length()
+                < TOLERANCE * self.camera_from_anchor.translation.length()
+    }
+}
+
+/// The pose near `start` that explains the observations best; `None` when it does not come to rest in front of the camera.
 pub(super) fn refine(
     intrinsics: &Intrinsics,
-    sightings: &[Sighting],
+    observations: &[CornerObservation],
     start: DAffine3,
 ) -> Option<Solution> {
-    const ROUNDS: usize = 100;
-    const STEP_TOLERANCE: f64 = 1e-10;
-    let mut pose = start;
-    let mut error = squared_error(intrinsics, sightings, &pose)?;
-    let mut damping = 1e-4;
-    let (mut normal, mut right) = linearize(intrinsics, sightings, &pose);
-    for _ in 0..ROUNDS {
-        let mut damped = normal;
-        for (k, row) in damped.iter_mut().enumerate() {
-            row[k] *= 1.0 + damping;
-        }
-        let [rx, ry, rz, tx, ty, tz] = solve_positive_definite(&damped, &right)?;
-        let (turn, shift_m) = (DVec3::new(rx, ry, rz), DVec3::new(tx, ty, tz));
-        let small = turn.length() < STEP_TOLERANCE
-            && shift_m.length() < STEP_TOLERANCE * pose.translation.length();
-        let rotation = (glam::DQuat::from_scaled_axis(turn)
-            * glam::DQuat::from_mat3(&pose.matrix3))
-        .normalize();
-        let candidate = DAffine3::from_rotation_translation(rotation, pose.translation + shift_m);
-        match squared_error(intrinsics, sightings, &candidate) {
-            Some(candidate_error) if candidate_error < error => {
-                pose = candidate;
-                error = candidate_error;
-                damping = (damping / 10.0).max(1e-12);
-                (normal, right) = linearize(intrinsics, sightings, &pose);
-            }
-            // At the bottom rounding alone decides.
-            _ if small => {}
-            _ => damping *= 10.0,
-        }
-        if small || damping > 1e12 {
-            return Some(Solution {
-                camera_from_anchor: pose,
-                squared_error_px: error,
-            });
-        }
-    }
-    None
+    const METHOD: LevenbergMarquardt = LevenbergMarquardt {
+        first_damping: 1e-4,
+        rounds: 100,
+        least_gain: 0.0,
+    };
+    let found = minimized(&METHOD, intrinsics, observations, start)?;
+    found.is_settled.then_some(Solution {
+        camera_from_anchor: found.problem.camera_from_anchor,
+        squared_error_px: found.cost,
+    })
 }
 
-/// `None` when a point lies behind the camera.
-fn squared_error(intrinsics: &Intrinsics, sightings: &[Sighting], pose: &DAffine3) -> Option<f64> {
-    let mut sum = 0.0;
-    for sighting in sightings {
-        if pose.transform_point3(sighting.point_m.extend(0.0)).z <= 0.0 {
-            return None;
-        }
-        sum += (pixel_of(intrinsics, pose, sighting.point_m) - sighting.pixel).length_squared();
-    }
-    sum.is_finite().then_some(sum)
+/// The pose near `start` that a few steps toward the best one come to, where many starts are to be compared.
+pub(super) fn refine_roughly(
+    intrinsics: &Intrinsics,
+    observations: &[CornerObservation],
+    start: DAffine3,
+) -> Option<Solution> {
+    const METHOD: LevenbergMarquardt = LevenbergMarquardt {
+        first_damping: 1e-3,
+        rounds: 15,
+        least_gain: 1e-6,
+    };
+    let found = minimized(&METHOD, intrinsics, observations, start)?;
+    Some(Solution {
+        camera_from_anchor: found.problem.camera_from_anchor,
+        squared_error_px: found.cost,
+    })
 }
 
-/// Covariance of a pose from corners: of a turn about the anchor's origin (left of the rotation) and a shift.
+fn minimized<'a>(
+    method: &LevenbergMarquardt,
+    intrinsics: &'a Intrinsics,
+    observations: &'a [CornerObservation],
+    start: DAffine3,
+) -> Option<Minimum<CornerFit<'a>>> {
+    method.minimize(CornerFit {
+        intrinsics,
+        observations,
+        camera_from_anchor: start,
+    })
+}
+
+/// The covariance of a pose's step, from corners.
 pub(super) fn covariance(
     intrinsics: &Intrinsics,
-    sightings: &[Sighting],
+    observations: &[CornerObservation],
     pose: &DAffine3,
-) -> Option<Matrix6> {
-    let (normal, _) = linearize(intrinsics, sightings, pose);
-    Some(times(&inverse(&normal)?, CORNER_NOISE_PX * CORNER_NOISE_PX))
-}
-
-/// The normal equations of the Gauss-Newton step: a turn about the anchor's origin (left of the rotation), a shift.
-fn linearize(
-    intrinsics: &Intrinsics,
-    sightings: &[Sighting],
-    pose: &DAffine3,
-) -> ([[f64; 6]; 6], [f64; 6]) {
-    let mut normal = [[0.0; 6]; 6];
-    let mut right = [0.0; 6];
-    for sighting in sightings {
-        let turned = pose.matrix3 * sighting.point_m.extend(0.0);
-        let in_camera = turned + pose.translation;
-        let image = in_camera.truncate() / in_camera.z;
-        let missing = sighting.pixel - intrinsics.pixel_from_plane(image);
-        let by_position = [
-            DVec3::new(1.0, 0.0, -image.x) * (intrinsics.focal_px.x / in_camera.z),
-            DVec3::new(0.0, 1.0, -image.y) * (intrinsics.focal_px.y / in_camera.z),
-        ];
-        for (gradient, value) in by_position.into_iter().zip(missing.to_array()) {
-            // gradient · (turn × turned) = turn · (turned × gradient)
-            let by_turn = turned.cross(gradient);
-            let row = [
-                by_turn.x, by_turn.y, by_turn.z, gradient.x, gradient.y, gradient.z,
-            ];
-            accumulate(&mut normal, &mut right, &row, value);
-        }
-    }
-    (normal, right)
+) -> Option<Matrix<6>> {
+    let fit = CornerFit {
+        intrinsics,
+        observations,
+        camera_from_anchor: *pose,
+    };
+    Some(fit.linearized()?.covariance()? * (CORNER_NOISE_PX * CORNER_NOISE_PX))
 }
 
 #[cfg(test)]
@@ -396,16 +332,20 @@ mod tests {
         ]
     }
 
-    fn sightings(
+    fn observations(
         points_m: &[DVec2],
         pose: &DAffine3,
         mut noise: impl FnMut() -> f64,
-    ) -> Vec<Sighting> {
+    ) -> Vec<CornerObservation> {
         points_m
             .iter()
-            .map(|&point_m| Sighting {
-                point_m,
-                pixel: pixel_of(&CAMERA, pose, point_m) + DVec2::new(noise(), noise()),
+            .map(|point_m| {
+                let point_m = point_m.extend(0.0);
+                let pixel = CAMERA.undistorted_pixel_of(pose.transform_point3(point_m));
+                CornerObservation {
+                    point_m,
+                    pixel: pixel.unwrap() + DVec2::new(noise(), noise()),
+                }
             })
             .collect()
     }
@@ -427,7 +367,7 @@ mod tests {
         for tilt_deg in [0.0, 5.0, 20.0, 60.0] {
             for turn_deg in [0.0, 90.0, 137.0, 180.0, 271.0] {
                 let truth = pose(tilt_deg, turn_deg, 0.5);
-                let seen = sightings(&square(0.04), &truth, || 0.0);
+                let seen = observations(&square(0.04), &truth, || 0.0);
                 let found = solve(&CAMERA, &seen).unwrap();
                 let error_m =
                     (found.best.camera_from_anchor.translation - truth.translation).length();
@@ -444,18 +384,18 @@ mod tests {
     #[test]
     fn the_derivative_agrees_with_differences() {
         let truth = pose(30.0, 40.0, 0.6);
-        let seen = sightings(&square(0.05), &truth, gaussian(1.0));
-        let (_, gradient) = linearize(&CAMERA, &seen, &truth);
+        let seen = observations(&square(0.05), &truth, gaussian(1.0));
+        let fit = CornerFit {
+            intrinsics: &CAMERA,
+            observations: &seen,
+            camera_from_anchor: truth,
+        };
+        let gradient = fit.linearized().unwrap().right;
         for k in 0..6 {
             let moved = |by: f64| {
                 let mut step = [0.0; 6];
                 step[k] = by;
-                let turn = DQuat::from_scaled_axis(DVec3::new(step[0], step[1], step[2]));
-                let moved = DAffine3::from_mat3_translation(
-                    DMat3::from_quat(turn) * truth.matrix3,
-                    truth.translation + DVec3::new(step[3], step[4], step[5]),
-                );
-                squared_error(&CAMERA, &seen, &moved).unwrap()
+                fit.moved(&step).cost().unwrap()
             };
             let difference = (moved(1e-6) - moved(-1e-6)) / 2e-6;
             // The error falls along the right side, by twice of it.
@@ -476,7 +416,7 @@ mod tests {
                 f64::from(k * 37 % 360),
                 0.3 + f64::from(k % 7) * 0.1,
             );
-            let found = solve(&CAMERA, &sightings(&square(0.036), &truth, &mut noise)).unwrap();
+            let found = solve(&CAMERA, &observations(&square(0.036), &truth, &mut noise)).unwrap();
             let off = |solution: &Solution| rotation_between(&solution.camera_from_anchor, &truth);
             let other = found.alternative.as_ref().map(off);
             let best_is_nearer = other.is_none_or(|other| off(&found.best) <= other);
@@ -513,7 +453,7 @@ mod tests {
         .collect::<Vec<_>>();
         for k in 0..200 {
             let truth = pose(f64::from(k % 50), f64::from(k * 37 % 360), 0.6);
-            let found = solve(&CAMERA, &sightings(&board, &truth, &mut noise)).unwrap();
+            let found = solve(&CAMERA, &observations(&board, &truth, &mut noise)).unwrap();
             assert!(rotation_between(&found.best.camera_from_anchor, &truth) < 0.02);
             // Within a few degrees of frontal the two poses are one up to the noise.
             assert!(!found.ambiguous || k % 50 < 5, "tilt {}°", k % 50);
@@ -523,10 +463,10 @@ mod tests {
     #[test]
     fn nonsense_has_no_pose() {
         let truth = pose(20.0, 0.0, 0.5);
-        let seen = sightings(&square(0.04), &truth, || 0.0);
+        let seen = observations(&square(0.04), &truth, || 0.0);
         assert_eq!(solve(&CAMERA, &seen[..3]), None);
         let on_a_line = (0..4)
-            .map(|k| Sighting {
+            .map(|k| CornerObservation {
                 point_m: seen[k].point_m,
                 pixel: DVec2::splat(100.0 + 10.0 * k as f64),
             })
@@ -534,7 +474,7 @@ mod tests {
         assert_eq!(solve(&CAMERA, &on_a_line), None);
         let at_a_point = seen
             .iter()
-            .map(|s| Sighting {
+            .map(|s| CornerObservation {
                 pixel: DVec2::splat(9.0),
                 ..*s
             })
@@ -543,7 +483,7 @@ mod tests {
         // A mirrored picture shows the back of the marker.
         let mirrored = seen
             .iter()
-            .map(|s| Sighting {
+            .map(|s| CornerObservation {
                 pixel: DVec2::new(639.0 - s.pixel.x, s.pixel.y),
                 ..*s
             })

@@ -3,34 +3,35 @@
 use opencv::core::Mat;
 use opencv::imgproc;
 
-use super::followed::Followed;
 use super::layout::{Layout, Located};
 use super::light::Grey;
-use super::pixel_pose::{PixelPose, project};
-use super::{AnchorPose, Detection, Detector, TrackingError, Why};
+use super::pixel_pose::{PixelPose, pixel_of};
+use super::tracked_anchor::TrackedAnchor;
+use super::{AnchorPose, Detection, Detector, LossReason, TrackingError};
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
 use crate::scene::{Anchor, Search, TrackingSettings};
 
 /// The whole picture is searched again after this, even when nothing is missing, seconds.
 const SEARCH_AGAIN_SECS: f64 = 2.0;
-/// An anchor that has been missing for longer than this is looked for at full resolution in every frame, as before, but
-/// in the picture of light less often, seconds,
+/// The time after which a missing anchor is looked for in the picture of light less often, seconds; at full resolution it
+/// still is in every frame.
 const LONG_GONE_SECS: f64 = 10.0;
-/// for no library finds more there: it costs the same again, seconds.
+/// The time between searches in the picture of light for anchors that are long gone, seconds: each costs as much again.
 const LIGHT_AGAIN_SECS: f64 = 1.0;
-/// A search that puts an anchor's corners farther than this from where it was followed to has found another place,
+/// A search that puts an anchor's corners farther than this from where it was tracked to has found another place,
 /// pixels.
 const ELSEWHERE_PX: f64 = 5.0;
 
 /// Finds the anchors of a scene in the frames of one camera. For one thread at a time.
 pub struct Tracker {
     detector: Detector,
-    anchors: Vec<Followed>,
+    anchors: Vec<TrackedAnchor>,
     /// Per anchor when it was looked for in vain for the first time, seconds.
     missing_since_secs: Vec<Option<f64>>,
     intrinsics: Intrinsics,
-    follows: bool,
+    /// Whether anchors are looked for near where they were, before the whole picture is searched.
+    tracks_near: bool,
     fits_pixels: bool,
     grey: Vec<u8>,
     detections: Vec<Detection>,
@@ -51,15 +52,15 @@ impl Tracker {
             .iter()
             .flat_map(|anchor| anchor.markers.iter().map(|marker| marker.family))
             .collect::<Vec<_>>();
-        let followed = anchors
+        let tracked = anchors
             .iter()
-            .map(|anchor| Ok(Followed::new(Layout::new(anchor)?, settings.filter)));
+            .map(|anchor| Ok(TrackedAnchor::new(Layout::new(anchor)?, settings.filter)));
         Ok(Self {
             detector: Detector::new(settings, &families)?,
-            anchors: followed.collect::<Result<_, TrackingError>>()?,
+            anchors: tracked.collect::<Result<_, TrackingError>>()?,
             missing_since_secs: vec![None; anchors.len()],
             intrinsics,
-            follows: settings.search == Search::Near && settings.pose_from_pixels,
+            tracks_near: settings.search == Search::Near && settings.pose_from_pixels,
             fits_pixels: settings.pose_from_pixels,
             grey: Vec::new(),
             detections: Vec::new(),
@@ -102,14 +103,18 @@ impl Tracker {
             .anchors
             .iter_mut()
             .map(|anchor| {
-                let follows = self.follows.then_some(anchor);
-                follows.and_then(|anchor| anchor.follow(picture, intrinsics, now_secs))
+                let tracked = self.tracks_near.then_some(anchor);
+                tracked.and_then(|anchor| anchor.track(picture, intrinsics, now_secs))
             })
             .collect();
         self.detections.clear();
-        let located: Vec<Result<Located, Why>> = match self.needs_search(&fits, now_secs) {
+        let located: Vec<Result<Located, LossReason>> = match self.needs_search(&fits, now_secs) {
             true => self.search(picture, now_secs, &mut fits)?,
-            false => self.anchors.iter().map(|_| Err(Why::NoMarker)).collect(),
+            false => self
+                .anchors
+                .iter()
+                .map(|_| Err(LossReason::NoMarker))
+                .collect(),
         };
         let intrinsics = &self.intrinsics;
         let mut poses = Vec::with_capacity(self.anchors.len());
@@ -120,21 +125,21 @@ impl Tracker {
                     anchor.take(picture, intrinsics, fit, now_secs)
                 }
                 (None, Ok(located)) => anchor.take_located(intrinsics, &located, now_secs),
-                (None, Err(why)) => anchor.missed(why, now_secs),
+                (None, Err(loss_reason)) => anchor.missed(loss_reason, now_secs),
             });
         }
         self.detections.sort_by(Detection::by_id_and_place);
         Ok(poses)
     }
 
-    /// Searches the whole picture. Gives each anchor that was not followed, or not to where the search has it, its pose
+    /// Searches the whole picture. Gives each anchor that was not tracked, or not to where the search has it, its pose
     /// from the pixels there; what the corners say is returned.
     fn search(
         &mut self,
         picture: Grey<'_>,
         now_secs: f64,
         fits: &mut [Option<PixelPose>],
-    ) -> Result<Vec<Result<Located, Why>>, TrackingError> {
+    ) -> Result<Vec<Result<Located, LossReason>>, TrackingError> {
         self.searched_secs = now_secs;
         let Grey { levels, size_px } = picture;
         self.detections = self.detector.detect(levels, size_px)?;
@@ -180,7 +185,7 @@ impl Tracker {
     /// Per anchor by what part of their size its markers are larger than the scene says, where pictures of several of
     /// them have told.
     pub fn size_errors(&self) -> impl Iterator<Item = Option<f64>> {
-        self.anchors.iter().map(Followed::size_error)
+        self.anchors.iter().map(TrackedAnchor::size_error)
     }
 
     /// Whether the whole picture is to be searched.
@@ -193,7 +198,7 @@ impl Tracker {
     /// Whether it is to be searched once more and better, for an anchor that is in none of what was found; and if so,
     /// whether in the picture of light too.
     fn needs_better_search(&self, fits: &[Option<PixelPose>], now_secs: f64) -> Option<bool> {
-        if !self.follows || !self.detector.can_do_better() {
+        if !self.tracks_near || !self.detector.can_do_better() {
             return None;
         }
         let all = self.anchors.iter().zip(fits).zip(&self.missing_since_secs);
@@ -219,15 +224,15 @@ fn add_seen(
     layout: &Layout,
     fitted: &PixelPose,
 ) {
-    for (((family, id), print), _) in layout
+    for (((family, id), template), _) in layout
         .markers()
-        .zip(&layout.prints)
+        .zip(&layout.templates)
         .zip(&fitted.seen)
         .filter(|(_, seen)| **seen)
     {
-        let corners = print
+        let corners = template
             .corners_m()
-            .map(|corner_m| Some(project(intrinsics, &fitted.camera_from_anchor, corner_m)?.pixel));
+            .map(|corner_m| pixel_of(intrinsics, &fitted.camera_from_anchor, corner_m));
         let is_there = detections
             .iter()
             .any(|detection| (detection.family, detection.id) == (family, id));

@@ -22,7 +22,7 @@ use gnomon::app::live_input::LiveInput;
 use gnomon::app::mailbox::Taken;
 use gnomon::app::stopwatch::Stopwatch;
 use gnomon::capture::{Frame, FrameSource};
-use gnomon::geometry::light_placing::{Freedom, Sight};
+use gnomon::geometry::light_placing::{LightFreedom, PosedCamera};
 use gnomon::light::Light;
 use gnomon::render::{Renderer, Shown};
 use gnomon::scene::{CameraSettings, Placement, Scene};
@@ -439,7 +439,7 @@ fn a_light_is_found_by_clicks_on_corners_and_their_shadows() {
     let frame = studio.picture().unwrap().frame.index;
     studio.fulfil(Wish::Clicks(Clicks::Begin), &look);
     let picture = studio.picture().unwrap().clone();
-    let sight = Sight {
+    let sight = PosedCamera {
         intrinsics: picture.intrinsics,
         camera_from_world: picture.poses[0].camera_from_anchor.unwrap(),
     };
@@ -469,7 +469,7 @@ fn a_light_is_found_by_clicks_on_corners_and_their_shadows() {
         step(&mut studio, &look);
     }
     assert_eq!(studio.picture().unwrap().frame.index, frame, "it is held");
-    studio.fulfil(Wish::Clicks(Clicks::Find(Freedom::Point)), &look);
+    studio.fulfil(Wish::Clicks(Clicks::Find(LightFreedom::Point)), &look);
     assert!(studio.clicks().is_none(), "{:?}", studio.notices);
     let written = Scene::load(&path).unwrap();
     let Light::Point { position_m, .. } = written.lights[0] else {

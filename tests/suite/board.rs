@@ -431,7 +431,7 @@ fn a_marker_that_moved_bends_no_other() {
     let learnt = learn(&pictures, &SETTINGS).unwrap();
     let moved = &learnt.markers[6];
     assert!(
-        moved.dropped > 10 && moved.dropped < moved.sightings,
+        moved.dropped > 10 && moved.dropped < moved.observations,
         "{moved:?}"
     );
     let (center_mm, turn_deg) = worst(&errors(&markers(&learnt), &before));

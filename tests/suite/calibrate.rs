@@ -12,7 +12,8 @@ use assert_cmd::Command;
 use glam::{DAffine3, DMat3, DVec2};
 use gnomon::app::picture_files::{grey_png, write_bytes};
 use gnomon::calibration::{
-    CalibrateError, Calibration, Lack, Look, Target, TargetFinder, TargetMarkers, Views, solve,
+    CalibrateError, Calibration, Lack, Target, TargetFinder, TargetLook, TargetMarkers, Views,
+    solve,
 };
 use gnomon::capture::load_calibration;
 use gnomon::geometry::camera::Intrinsics;
@@ -235,7 +236,7 @@ fn a_view_that_does_not_fit_is_left_out() {
     let grey = photographer.photograph(print, &odd, 1.03);
     assert_eq!(
         views.look(99, &grey, CAMERA.size_px).expect("a look"),
-        Look::Kept
+        TargetLook::Kept
     );
     let found = solve(&views).expect("a calibration");
     let dropped: Vec<u32> = found.dropped.iter().map(|&(picture, _)| picture).collect();
@@ -251,7 +252,11 @@ fn a_view_like_another_adds_nothing() {
     for (number, shift) in [(0, 0.0), (1, 0.004), (2, 0.4)] {
         let pose = pose(print, [shift, 0.0], 0.5, [20.0, 0.0], 0.0);
         let grey = photographer.photograph(print, &pose, 1.0);
-        let expected = if number == 1 { Look::Alike } else { Look::Kept };
+        let expected = if number == 1 {
+            TargetLook::Alike
+        } else {
+            TargetLook::Kept
+        };
         assert_eq!(
             views.look(number, &grey, CAMERA.size_px).expect("a look"),
             expected
@@ -260,7 +265,7 @@ fn a_view_like_another_adds_nothing() {
     let blank = vec![128; 640 * 480];
     assert_eq!(
         views.look(3, &blank, [640, 480]).expect("a look"),
-        Look::NoTarget
+        TargetLook::NoTarget
     );
     assert_eq!(
         (views.looked(), views.found(), views.kept().len()),

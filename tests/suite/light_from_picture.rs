@@ -7,7 +7,7 @@ use gnomon::app::authoring::{FoundLight, PicturedThings, ShadowClick};
 use gnomon::app::truth::key_frames;
 use gnomon::capture::{Frame, load_calibration};
 use gnomon::geometry::camera::Intrinsics;
-use gnomon::geometry::light_placing::{FarLight, Freedom, Sight};
+use gnomon::geometry::light_placing::{FarLight, LightFreedom, PosedCamera};
 use gnomon::light::Light;
 use gnomon::scene::Scene;
 
@@ -37,7 +37,12 @@ impl Known {
     }
 
     /// Vertices whose shadows' tips the camera sees on the table, with those tips.
-    fn tips(&self, things: &PicturedThings, sight: &Sight, scene: &Scene) -> Vec<ShadowClick> {
+    fn tips(
+        &self,
+        things: &PicturedThings,
+        sight: &PosedCamera,
+        scene: &Scene,
+    ) -> Vec<ShadowClick> {
         let light = FarLight {
             center_m: self.position_m - DVec3::Z,
             towards: DVec3::Z,
@@ -115,7 +120,7 @@ fn rounds(
 ) -> Vec<Judged> {
     let known = Known::of(scene);
     let things = PicturedThings::new(scene, intrinsics, poses).expect("a world that is seen");
-    let sight = Sight {
+    let sight = PosedCamera {
         intrinsics,
         camera_from_world: poses[0].expect("a pose"),
     };
@@ -135,7 +140,7 @@ fn rounds(
                 random.between(-off_px, off_px),
             );
         }
-        match things.find_light(frame, &clicks, Freedom::Point) {
+        match things.find_light(frame, &clicks, LightFreedom::Point) {
             Ok(found) => judged.push(judge(&known, found)),
             Err(error) => panic!("frame {} {clicks:?}: {error}", frame.index),
         }

@@ -4,7 +4,9 @@ use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 use gnomon::capture::Frame;
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::scene::{ArucoRefinement, Codes, DetectorKind, Family, Marker, TrackingSettings};
-use gnomon::tracking::{AnchorPose, Detection, Detector, Status, Tracker, TrackingError, Why};
+use gnomon::tracking::{
+    AnchorPose, Detection, Detector, LossReason, Status, Tracker, TrackingError,
+};
 
 use crate::common::sheets::{
     CAMERA, WIDE_CAMERA, anchor, angle_between_deg, camera_above, grey_of, marker, photograph,
@@ -258,8 +260,8 @@ fn a_lone_marker_is_never_sure_of_the_wrong_pose() {
                     assert!(other_deg + 2.0 > off_deg, "{what}: sure of the wrong one");
                 } else {
                     assert_eq!(
-                        (pose.status, pose.why),
-                        (Status::Ambiguous, Some(Why::TwoPoses))
+                        (pose.status, pose.loss_reason),
+                        (Status::Ambiguous, Some(LossReason::TwoPoses))
                     );
                     ambiguous += 1;
                     nearer_is_other += usize::from(other_deg < off_deg);
@@ -343,7 +345,7 @@ fn a_lost_marker_is_a_value() {
             .unwrap();
         assert_eq!(poses[0].status, Status::Tracked);
         let not_there = AnchorPose {
-            why: Some(Why::NoMarker),
+            loss_reason: Some(LossReason::NoMarker),
             ..AnchorPose::LOST
         };
         assert_eq!(poses[1], not_there);
@@ -367,8 +369,8 @@ fn of_two_markers_with_one_id_none_is_trusted_unless_the_board_decides() {
         );
         let poses = track_once(&settings(kind), &[anchor("card", &lone)], CAMERA, &twice);
         assert_eq!(
-            (poses[0].status, poses[0].why),
-            (Status::Lost, Some(Why::DoubleId))
+            (poses[0].status, poses[0].loss_reason),
+            (Status::Lost, Some(LossReason::DoubleId))
         );
         // A card with a copy of the board's own marker lies in the middle.
         let truth = camera_above(20.0, 10.0, DVec3::new(0.0, 0.0, 0.5));

@@ -6,7 +6,7 @@ use glam::{DAffine3, DVec2, DVec3};
 use gnomon::capture::Frame;
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::scene::{Anchor, DetectorKind, Marker, TrackingSettings};
-use gnomon::tracking::{AnchorPose, Detector, Status, Why};
+use gnomon::tracking::{AnchorPose, Detector, LossReason, Status};
 
 use crate::common::random::Random;
 use crate::common::sheets::{
@@ -466,7 +466,7 @@ fn the_marker_goes_and_comes_back_elsewhere() {
             };
             let pose = &tracker.track(&frame).unwrap()[0];
             statuses.push(pose.status);
-            assert_eq!(pose.why, Some(Why::NoMarker));
+            assert_eq!(pose.loss_reason, Some(LossReason::NoMarker));
             assert!(pose.visibility <= visibility, "frame {k} brightens");
             visibility = pose.visibility;
             if pose.status == Status::Predicted {
@@ -963,8 +963,8 @@ fn double_ids() {
         for k in 0..75 {
             let pose = &tracker.track(&at(&both, k)).unwrap()[0];
             assert_eq!(
-                (pose.status, pose.why),
-                (Status::Lost, Some(Why::DoubleId)),
+                (pose.status, pose.loss_reason),
+                (Status::Lost, Some(LossReason::DoubleId)),
                 "frame {k}"
             );
         }
@@ -1071,7 +1071,7 @@ fn mirrored_input() {
                 let pose = &tracker.track(&frame).unwrap()[0];
                 assert_eq!(pose.status, Status::Lost, "{kind:?}");
                 assert_eq!(pose.camera_from_anchor, None, "{kind:?}");
-                assert!(pose.why.is_some(), "{kind:?}: no reason");
+                assert!(pose.loss_reason.is_some(), "{kind:?}: no reason");
             }
         }
     }
@@ -1315,7 +1315,7 @@ fn assert_sound(pose: &AnchorPose, what: &str) {
     );
     assert_eq!(
         pose.status == Status::Tracked,
-        pose.why.is_none(),
+        pose.loss_reason.is_none(),
         "{what}: {pose:?}"
     );
     let poses = pose

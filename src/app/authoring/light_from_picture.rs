@@ -10,9 +10,11 @@ use glam::{DAffine3, DVec2, DVec3};
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::light_placing::{
-    Facet, FarLight, Freedom, Placed, ShadowPair, Sight, Unplaced, place_light, refine,
+    Facet, FarLight, LightFreedom, PlacedLight, PosedCamera, ShadowPair, Unplaced, place_light,
+    refine,
 };
-use crate::geometry::shadow_outline::{OutlinePoint, Standing};
+use crate::geometry::robust::{deviation, tukey_weight};
+use crate::geometry::shadow_outline::{OutlinePoint, StandingThings};
 use crate::light::bounce::{Reflector, Surroundings};
 use crate::light::contrast::{ContrastSample, Strengths, strengths};
 use crate::light::{Light, irradiance};
@@ -39,8 +41,8 @@ const PRINT_MARGIN: f64 = 0.15;
 
 /// A frame's real things, as its camera sees them.
 pub struct PicturedThings {
-    sight: Sight,
-    standing: Standing,
+    camera: PosedCamera,
+    standing: StandingThings,
     /// All their triangles, in the standing's order.
     reflectors: Vec<Reflector>,
     vertices: Vec<PickedVertex>,
@@ -106,7 +108,7 @@ impl PicturedThings {
     ) -> Option<Self> {
         let camera_from_world = camera_from_anchor.first().copied().flatten()?;
         let world_from_camera = camera_from_world.inverse();
-        let sight = Sight {
+        let camera = PosedCamera {
             intrinsics,
             camera_from_world,
         };
@@ -145,7 +147,7 @@ impl PicturedThings {
                     Some(PickedVertex {
                         phantom: phantom.name.clone(),
                         world_m,
-                        pixel: sight.pixel(world_m)?,
+                        pixel: camera.pixel(world_m)?,
                     })
                 }));
             }
@@ -161,8 +163,8 @@ impl PicturedThings {
             )
         });
         Some(Self {
-            sight,
-            standing: Standing::new(&things),
+            camera,
+            standing: StandingThings::new(&things),
             reflectors,
             vertices,
             prints: prints.flatten().collect(),
@@ -182,7 +184,7 @@ impl PicturedThings {
             .filter(|&off_px| off_px <= within_px)
             .min_by(f64::total_cmp)?;
         let depth = |vertex: &PickedVertex| {
-            self.sight
+            self.camera
                 .camera_from_world
                 .transform_point3(vertex.world_m)
                 .z
@@ -195,7 +197,7 @@ impl PicturedThings {
 
     /// The surface that is seen at an undistorted pixel.
     pub fn surface_at(&self, pixel: DVec2) -> Option<Facet> {
-        let (eye_m, direction) = self.sight.ray(pixel);
+        let (eye_m, direction) = self.camera.ray(pixel);
         Some(self.standing.first_met(eye_m, direction)?.facet)
     }
 
@@ -208,7 +210,7 @@ impl PicturedThings {
         &self,
         frame: &Frame,
         clicks: &[ShadowClick],
-        freedom: Freedom,
+        freedom: LightFreedom,
     ) -> Result<FoundLight, LightNotFound> {
         let mut pairs = Vec::new();
         for (index, click) in clicks.iter().enumerate() {
@@ -220,7 +222,7 @@ impl PicturedThings {
                 along: None,
             });
         }
-        let clicked = place_light(&self.sight, &pairs, freedom, CLICK_SIGMA_PX)?;
+        let clicked = place_light(&self.camera, &pairs, freedom, CLICK_SIGMA_PX)?;
         let fitted = self.fit_outlines(frame, &clicked, freedom);
         let (placed, edges) = fitted
             .as_ref()
@@ -245,9 +247,9 @@ impl PicturedThings {
     fn fit_outlines(
         &self,
         frame: &Frame,
-        clicked: &Placed,
-        freedom: Freedom,
-    ) -> Option<(Placed, usize)> {
+        clicked: &PlacedLight,
+        freedom: LightFreedom,
+    ) -> Option<(PlacedLight, usize)> {
         let mut placed = *clicked;
         let mut edges = 0;
         for reach_px in REACHES_PX {
@@ -261,7 +263,7 @@ impl PicturedThings {
             }
             let mut weights = vec![1.0; pairs.len()];
             for _ in 0..5 {
-                placed = refine(&self.sight, &pairs, &weights, placed.light, freedom)?;
+                placed = refine(&self.camera, &pairs, &weights, placed.light, freedom)?;
                 weights = self.weights(&pairs, &placed.light)?;
             }
             edges = weights.iter().filter(|&&weight| weight > 0.0).count();
@@ -273,7 +275,7 @@ impl PicturedThings {
         let clear_m = PLATEAU_PX[3] * self.pixel_m;
         let spacing_m = SPACING_PX * self.pixel_m;
         self.standing
-            .outline(&self.sight, light, spacing_m, clear_m)
+            .outline(&self.camera, light, spacing_m, clear_m)
     }
 
     /// Tukey's weights: what lies far off the others has no say.
@@ -282,17 +284,11 @@ impl PicturedThings {
         let mut off = Vec::with_capacity(pairs.len());
         for pair in pairs {
             let shadow_m = light.shadow_of(pair.caster_m, &pair.receiver)?;
-            let off_px = self.sight.pixel(shadow_m)? - pair.shadow_px;
+            let off_px = self.camera.pixel(shadow_m)? - pair.shadow_px;
             off.push(off_px.dot(pair.along.unwrap_or_default()).abs());
         }
-        let mut sorted = off.clone();
-        sorted.sort_by(f64::total_cmp);
-        let scale_px = (1.4826 * sorted[sorted.len() / 2]).max(LEAST_SCALE_PX);
-        let weight = |off_px: &f64| {
-            (1.0 - (off_px / (4.685 * scale_px)).powi(2))
-                .max(0.0)
-                .powi(2)
-        };
+        let scale_px = deviation(off.iter().copied()).max(LEAST_SCALE_PX);
+        let weight = |off_px: &f64| tukey_weight(*off_px, scale_px);
         Some(off.iter().map(weight).collect())
     }
 
@@ -359,9 +355,9 @@ impl PicturedThings {
     /// Where an outline's point is seen, and the unit way across the outline into the light.
     fn across(&self, point: &OutlinePoint) -> Option<(DVec2, DVec2)> {
         let place_m = point.receiver.point_m;
-        let middle_px = self.sight.pixel(place_m)?;
+        let middle_px = self.camera.pixel(place_m)?;
         let lit_px = self
-            .sight
+            .camera
             .pixel(place_m + point.into_light * self.pixel_m)?;
         let way = lit_px - middle_px;
         (way.length() > LEAST_SLANT).then(|| (middle_px, way.normalize()))
@@ -391,7 +387,7 @@ impl PicturedThings {
 
     /// Radiance at an undistorted pixel; `None` outside the picture.
     fn seen(&self, frame: &Frame, undistorted_px: DVec2) -> Option<DVec3> {
-        let camera = &self.sight.intrinsics;
+        let camera = &self.camera.intrinsics;
         let distorted = camera.distort(camera.plane_from_pixel(undistorted_px));
         frame.linear_rgb(camera.pixel_from_plane(distorted))
     }

@@ -51,8 +51,14 @@ impl Canvas {
         let maker = {
             let (gpu, orders, made) = (Arc::clone(&gpu), Arc::clone(&orders), Arc::clone(&made));
             thread::spawn(move || {
+                // Cores of its own to share: work for the frame at hand must not wait behind that for a renderer to come.
+                let cores = rayon::ThreadPoolBuilder::new().build().ok();
                 while let Some(order) = orders.take() {
-                    let renderer = Renderer::new(Arc::clone(&gpu), &order.scene, order.intrinsics);
+                    let make = || Renderer::new(Arc::clone(&gpu), &order.scene, order.intrinsics);
+                    let renderer = match &cores {
+                        Some(cores) => cores.install(make),
+                        None => make(),
+                    };
                     if !made.put(Made { order, renderer }) {
                         return;
                     }

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::app::authoring::Edit;
-use crate::geometry::light_placing::Sight;
+use crate::geometry::light_placing::PosedCamera;
 use crate::light::Light;
 use crate::scene::Placement;
 
@@ -53,7 +53,7 @@ pub enum Target {
 /// The handles of a target, as a camera sees them. The sight's world is the space of the target's anchor.
 pub struct Gizmo<'a> {
     target: &'a Target,
-    sight: &'a Sight,
+    sight: &'a PosedCamera,
     origin_m: DVec3,
     origin_px: DVec2,
     arrow_m: f64,
@@ -70,7 +70,7 @@ pub struct Drag {
 
 impl<'a> Gizmo<'a> {
     /// `None` where the target is behind the camera.
-    pub fn new(target: &'a Target, sight: &'a Sight) -> Option<Self> {
+    pub fn new(target: &'a Target, sight: &'a PosedCamera) -> Option<Self> {
         let origin_m = target.origin_m();
         let origin_px = sight.pixel(origin_m)?;
         let depth_m = sight.camera_from_world.transform_point3(origin_m).z;
@@ -199,7 +199,7 @@ pub fn light_place_m(light: &Light) -> DVec3 {
 
 impl Drag {
     /// What the pointer makes of the target now; `None` where its ray meets nothing.
-    pub fn edit(&self, sight: &Sight, pointer_px: DVec2) -> Option<Edit> {
+    pub fn edit(&self, sight: &PosedCamera, pointer_px: DVec2) -> Option<Edit> {
         let here = place(self.handle, &self.target, sight, pointer_px)?;
         Some(match &self.target {
             Target::Thing { name, placement } => {
@@ -242,7 +242,7 @@ impl Drag {
 }
 
 /// Where a pointer's ray meets what a handle moves along.
-fn place(handle: Handle, target: &Target, sight: &Sight, pointer_px: DVec2) -> Option<DVec3> {
+fn place(handle: Handle, target: &Target, sight: &PosedCamera, pointer_px: DVec2) -> Option<DVec3> {
     let origin_m = target.origin_m();
     let (eye_m, direction) = sight.ray(pointer_px);
     match handle {
@@ -298,7 +298,7 @@ mod tests {
     use glam::{DAffine3, DMat3};
 
     /// A camera 0.8 m away that looks down on the origin from the front.
-    fn sight() -> Sight {
+    fn sight() -> PosedCamera {
         let eye_m = DVec3::new(0.1, -0.6, 0.5);
         let forward = -eye_m.normalize();
         let right = forward.cross(DVec3::Z).normalize();
@@ -306,7 +306,7 @@ mod tests {
             matrix3: DMat3::from_cols(right, forward.cross(right), forward),
             translation: eye_m,
         };
-        Sight {
+        PosedCamera {
             intrinsics: Intrinsics {
                 size_px: [640, 480],
                 focal_px: DVec2::splat(600.0),

@@ -11,9 +11,9 @@ use super::shadow_clicks::ShadowClicks;
 use super::shadow_lines::ShadowLines;
 use super::views::View;
 use super::wish::Overlay;
-use crate::geometry::light_placing::Sight;
+use crate::geometry::light_placing::PosedCamera;
 use crate::scene::Scene;
-use crate::tracking::{Quad, Status, undistorted_pixel};
+use crate::tracking::{Quad, Status};
 
 const AXIS_COLOURS: [Color32; 3] = [
     Color32::from_rgb(230, 70, 60),
@@ -74,7 +74,7 @@ impl Overlays<'_> {
     }
 
     /// The handles of what is selected.
-    pub fn handles(&self, target: &Target, sight: &Sight) {
+    pub fn handles(&self, target: &Target, sight: &PosedCamera) {
         let Some(gizmo) = Gizmo::new(target, sight) else {
             return;
         };
@@ -237,11 +237,12 @@ impl Overlays<'_> {
 
     /// The picture is shown without distortion, markers are found with it.
     fn place_of_distorted(&self, pixel: DVec2) -> Option<Pos2> {
-        undistorted_pixel(&self.picture.intrinsics, pixel).map(|pixel| self.fit.place_of(pixel))
+        let undistorted_px = self.picture.intrinsics.undistorted_pixel(pixel)?;
+        Some(self.fit.place_of(undistorted_px))
     }
 
     fn place(&self, camera_from_anchor: &DAffine3, point_m: DVec3) -> Option<Pos2> {
-        let sight = Sight {
+        let sight = PosedCamera {
             intrinsics: self.picture.intrinsics,
             camera_from_world: *camera_from_anchor,
         };

@@ -5,7 +5,7 @@ use glam::{DVec2, Vec3};
 use super::eye::TrackedPicture;
 use super::gizmo::light_place_m;
 use super::wish::Selected;
-use crate::geometry::light_placing::Sight;
+use crate::geometry::light_placing::PosedCamera;
 use crate::geometry::ray_caster::RayCaster;
 use crate::scene::Scene;
 
@@ -53,7 +53,7 @@ pub fn selected_at(
 }
 
 fn light_at(scene: &Scene, picture: &TrackedPicture, pixel: DVec2) -> Option<usize> {
-    let sight = Sight {
+    let sight = PosedCamera {
         intrinsics: picture.intrinsics,
         camera_from_world: picture.poses.first()?.camera_from_anchor?,
     };

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::eye::TrackedPicture;
 use crate::app::authoring::{Edit, FoundLight, PickedVertex, PicturedThings, ShadowClick};
-use crate::geometry::light_placing::Freedom;
+use crate::geometry::light_placing::LightFreedom;
 use crate::light::Light;
 use crate::scene::Scene;
 
@@ -72,7 +72,11 @@ impl ShadowClicks {
     ///
     /// # Errors
     /// Why there is none, in words.
-    pub fn find(&self, picture: &TrackedPicture, freedom: Freedom) -> Result<FoundLight, String> {
+    pub fn find(
+        &self,
+        picture: &TrackedPicture,
+        freedom: LightFreedom,
+    ) -> Result<FoundLight, String> {
         let clicks: Vec<ShadowClick> = self.pairs.iter().map(|(_, click)| *click).collect();
         let found = self.things.find_light(&picture.frame, &clicks, freedom);
         found.map_err(|error| error.to_string())

@@ -22,7 +22,7 @@ use super::selection::selected_at;
 use super::shadow_lines::ShadowLines;
 use super::studio::Studio;
 use super::wish::{Clicks, Overlay, Selected, Wish};
-use crate::geometry::light_placing::Sight;
+use crate::geometry::light_placing::PosedCamera;
 
 /// The window looks at the world at least this often, even when no frame comes.
 const PULSE: Duration = Duration::from_millis(200);
@@ -208,7 +208,7 @@ impl Window {
     }
 
     /// What is selected, with the camera as its anchor sees it.
-    fn target(&self) -> Option<(Target, Sight)> {
+    fn target(&self) -> Option<(Target, PosedCamera)> {
         let (scene, picture) = (self.studio.scene()?, self.studio.picture()?);
         let (target, anchor) = match self.look.selected.as_ref()? {
             Selected::Thing(name) => {
@@ -224,7 +224,7 @@ impl Window {
                 (Target::Light { index, light }, 0)
             }
         };
-        let sight = Sight {
+        let sight = PosedCamera {
             intrinsics: picture.intrinsics,
             camera_from_world: picture.poses.get(anchor)?.camera_from_anchor?,
         };

@@ -6,7 +6,7 @@ use glam::DVec2;
 
 use super::views::View;
 use crate::app::authoring::Edit;
-use crate::geometry::light_placing::Freedom;
+use crate::geometry::light_placing::LightFreedom;
 use crate::scene::Shortcut;
 
 /// One thing that is asked for.
@@ -77,7 +77,7 @@ pub enum Clicks {
     /// Forget all.
     Cancel,
     /// Find the light.
-    Find(Freedom),
+    Find(LightFreedom),
 }
 
 /// What is selected.

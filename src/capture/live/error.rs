@@ -19,7 +19,7 @@ pub enum LiveError {
     NotThisCamera {
         /// As it was asked for.
         wanted: String,
-        /// Those that are there.
+        /// The cameras that are there.
         found: Vec<String>,
     },
     /// A part of a name that several different cameras share.
@@ -30,7 +30,7 @@ pub enum LiveError {
     Ambiguous {
         /// As it was asked for.
         wanted: String,
-        /// Those that it fits.
+        /// The cameras that it fits.
         found: Vec<String>,
     },
     /// The system does not let this user open it.

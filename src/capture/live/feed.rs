@@ -11,7 +11,7 @@ pub type Now = Arc<dyn Fn() -> f64 + Send + Sync>;
 /// What an opened source is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Opened {
-    /// Its name: the camera's own, an address, a path.
+    /// The source's name: the camera's own, an address, a path.
     pub name: String,
     /// Size and kind of its pictures, in words; the camera's format.
     pub format: String,
@@ -20,8 +20,8 @@ pub struct Opened {
 }
 
 /// A picture as it came.
-pub(super) struct Picture {
-    /// Its number in a recording; other sources do not count.
+pub(super) struct LivePicture {
+    /// The frame's number in a recording; other sources do not count.
     pub index: Option<u32>,
     /// When it came; in a recording when it was taken. Seconds.
     pub time_secs: f64,
@@ -34,7 +34,7 @@ pub(super) trait Feed {
     fn opened(&self) -> Opened;
 
     /// The next good picture; `None` where a recording ends.
-    fn next_picture(&mut self) -> Result<Option<Picture>, LiveError>;
+    fn next_picture(&mut self) -> Result<Option<LivePicture>, LiveError>;
 }
 
 /// How a source is opened, for the first time or again.

@@ -18,7 +18,7 @@ use std::time::Duration;
 
 use super::Frame;
 use crate::scene::WantedFormat;
-use feed::{Link, Opener, Picture};
+use feed::{Link, LivePicture, Opener};
 use played::PlayedOpener;
 use reader::{Message, Reader};
 use stream::StreamOpener;
@@ -273,7 +273,7 @@ impl LiveSource {
         }
     }
 
-    fn frame_of(&mut self, picture: Picture) -> Frame {
+    fn frame_of(&mut self, picture: LivePicture) -> Frame {
         let index = picture.index.unwrap_or(self.next_index);
         self.next_index = index + 1;
         let mut frame = Frame {

@@ -4,7 +4,7 @@ use std::thread;
 use std::time::Duration;
 
 use super::error::LiveError;
-use super::feed::{Feed, Link, Opened, Opener, Picture};
+use super::feed::{Feed, Link, LivePicture, Opened, Opener};
 use crate::capture::{Frame, FrameSource};
 
 /// Longest sleep between two looks at whether to stop.
@@ -94,7 +94,7 @@ impl Feed for PlayedFeed {
         }
     }
 
-    fn next_picture(&mut self) -> Result<Option<Picture>, LiveError> {
+    fn next_picture(&mut self) -> Result<Option<LivePicture>, LiveError> {
         let Some(frame) = self.next_frame()? else {
             return Ok(None);
         };
@@ -108,7 +108,7 @@ impl Feed for PlayedFeed {
             .start
             .get_or_insert_with(|| (self.link.now_secs(), time_secs));
         self.wait_until(clock_secs + time_secs - first_secs);
-        Ok(Some(Picture {
+        Ok(Some(LivePicture {
             index: Some(index),
             time_secs,
             size_px: frame.size_px,

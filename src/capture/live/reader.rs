@@ -6,7 +6,7 @@ use std::thread;
 use std::time::Duration;
 
 use super::error::LiveError;
-use super::feed::{Link, Opened, Opener, Picture};
+use super::feed::{Link, LivePicture, Opened, Opener};
 
 /// Pictures that may wait: the one at hand, while the next is decoded.
 const QUEUE: usize = 1;
@@ -14,7 +14,7 @@ const QUEUE: usize = 1;
 /// What the thread has to say.
 pub(super) enum Message {
     Opened(Opened),
-    Picture(Picture),
+    Picture(LivePicture),
     Ended,
     Failed(LiveError),
 }

@@ -4,7 +4,7 @@ use opencv::core::{Mat, MatTraitConst, Vector};
 use opencv::videoio::{self, VideoCapture, VideoCaptureTrait, VideoCaptureTraitConst};
 
 use super::error::LiveError;
-use super::feed::{Feed, Link, Opened, Opener, Picture};
+use super::feed::{Feed, Link, LivePicture, Opened, Opener};
 use crate::capture::pixels;
 
 /// How long an address may take to answer, and a stream to go on.
@@ -77,7 +77,7 @@ impl Feed for StreamFeed {
         }
     }
 
-    fn next_picture(&mut self) -> Result<Option<Picture>, LiveError> {
+    fn next_picture(&mut self) -> Result<Option<LivePicture>, LiveError> {
         let stopped = || LiveError::StreamStopped {
             address: self.address.clone(),
         };
@@ -92,7 +92,7 @@ impl Feed for StreamFeed {
             }
         };
         let rgba = pixels::rgba_from_bgr(&self.bgr).map_err(|_| stopped())?;
-        Ok(Some(Picture {
+        Ok(Some(LivePicture {
             index: None,
             time_secs,
             size_px: pixels::size_of(&self.bgr),

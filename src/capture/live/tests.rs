@@ -8,7 +8,7 @@ use super::*;
 use feed::Feed;
 
 /// What a scripted feed does next.
-enum Step {
+enum ScriptStep {
     /// A picture of this size.
     Picture([u32; 2]),
     /// The driver blocks until the gate is opened.
@@ -22,13 +22,13 @@ enum Step {
 /// Each opening takes the next script; an empty list of them refuses.
 #[derive(Default)]
 struct Scripted {
-    openings: Mutex<VecDeque<Option<Vec<Step>>>>,
+    openings: Mutex<VecDeque<Option<Vec<ScriptStep>>>>,
     asked_for: Mutex<Vec<Option<String>>>,
     gate: Arc<(Mutex<bool>, std::sync::Condvar)>,
 }
 
 struct ScriptedFeed {
-    steps: VecDeque<Step>,
+    steps: VecDeque<ScriptStep>,
     gate: Arc<(Mutex<bool>, std::sync::Condvar)>,
     link: Link,
 }
@@ -72,22 +72,22 @@ impl Feed for ScriptedFeed {
         }
     }
 
-    fn next_picture(&mut self) -> Result<Option<Picture>, LiveError> {
+    fn next_picture(&mut self) -> Result<Option<LivePicture>, LiveError> {
         match self.steps.pop_front() {
-            Some(Step::Picture(size_px)) => Ok(Some(Picture {
+            Some(ScriptStep::Picture(size_px)) => Ok(Some(LivePicture {
                 index: None,
                 time_secs: self.link.now_secs(),
                 size_px,
                 rgba: vec![0; (size_px[0] * size_px[1] * 4) as usize],
             })),
-            Some(Step::Block) => {
+            Some(ScriptStep::Block) => {
                 let (open, turned) = &*self.gate;
                 let held = turned.wait_while(open.lock().unwrap(), |open| !*open);
                 drop(held.unwrap());
                 self.next_picture()
             }
-            Some(Step::Unplug) => Err(unplugged()),
-            Some(Step::Panic) => panic!("a library's own"),
+            Some(ScriptStep::Unplug) => Err(unplugged()),
+            Some(ScriptStep::Panic) => panic!("a library's own"),
             None => Ok(None),
         }
     }
@@ -108,7 +108,7 @@ impl HandClock {
     }
 }
 
-fn source(scripts: Vec<Option<Vec<Step>>>) -> (LiveSource, Arc<Scripted>, HandClock) {
+fn source(scripts: Vec<Option<Vec<ScriptStep>>>) -> (LiveSource, Arc<Scripted>, HandClock) {
     let scripted = Arc::new(Scripted {
         openings: Mutex::new(scripts.into()),
         ..Scripted::default()
@@ -157,10 +157,14 @@ fn a_source_that_cannot_be_opened_says_why_once() {
 #[test]
 fn an_unplugged_camera_is_taken_up_again_by_its_name() {
     let (mut source, scripted, clock) = source(vec![
-        Some(vec![Step::Picture(VGA), Step::Picture(VGA), Step::Unplug]),
+        Some(vec![
+            ScriptStep::Picture(VGA),
+            ScriptStep::Picture(VGA),
+            ScriptStep::Unplug,
+        ]),
         None,
         None,
-        Some(vec![Step::Picture(VGA)]),
+        Some(vec![ScriptStep::Picture(VGA)]),
     ]);
     assert_eq!(letters(&mut source, &clock, 7), "OFFLBFE");
     let same = Some("Camera X".to_owned());
@@ -171,8 +175,11 @@ fn an_unplugged_camera_is_taken_up_again_by_its_name() {
 #[test]
 fn frames_are_counted_on_after_a_loss() {
     let (mut source, _, clock) = source(vec![
-        Some(vec![Step::Picture(VGA), Step::Unplug]),
-        Some(vec![Step::Picture([8, 6]), Step::Picture([8, 6])]),
+        Some(vec![ScriptStep::Picture(VGA), ScriptStep::Unplug]),
+        Some(vec![
+            ScriptStep::Picture([8, 6]),
+            ScriptStep::Picture([8, 6]),
+        ]),
     ]);
     let mut frames = Vec::new();
     while frames.len() < 3 {
@@ -192,10 +199,10 @@ fn frames_are_counted_on_after_a_loss() {
 #[test]
 fn a_camera_that_falls_silent_is_lost_once_and_back_with_its_next_picture() {
     let (mut source, scripted, clock) = source(vec![Some(vec![
-        Step::Picture(VGA),
-        Step::Block,
-        Step::Picture(VGA),
-        Step::Picture(VGA),
+        ScriptStep::Picture(VGA),
+        ScriptStep::Block,
+        ScriptStep::Picture(VGA),
+        ScriptStep::Picture(VGA),
     ])]);
     assert_eq!(letters(&mut source, &clock, 3), "OFL");
     assert!(clock.0.load(Ordering::SeqCst) >= 3000, "patience first");
@@ -212,7 +219,10 @@ fn a_camera_that_falls_silent_is_lost_once_and_back_with_its_next_picture() {
 
 #[test]
 fn a_source_whose_driver_blocks_can_be_dropped() {
-    let (mut source, _, clock) = source(vec![Some(vec![Step::Picture(VGA), Step::Block])]);
+    let (mut source, _, clock) = source(vec![Some(vec![
+        ScriptStep::Picture(VGA),
+        ScriptStep::Block,
+    ])]);
     assert_eq!(letters(&mut source, &clock, 2), "OF");
     // Would hang here.
     drop(source);
@@ -221,8 +231,8 @@ fn a_source_whose_driver_blocks_can_be_dropped() {
 #[test]
 fn a_panic_in_a_library_is_a_loss() {
     let (mut source, _, clock) = source(vec![
-        Some(vec![Step::Picture(VGA), Step::Panic]),
-        Some(vec![Step::Picture(VGA)]),
+        Some(vec![ScriptStep::Picture(VGA), ScriptStep::Panic]),
+        Some(vec![ScriptStep::Picture(VGA)]),
     ]);
     assert_eq!(letters(&mut source, &clock, 6), "OFLBFE");
 }

@@ -9,7 +9,7 @@ use nokhwa::utils::{
 
 use super::decode::{Tolerance, rgba_of};
 use super::error::LiveError;
-use super::feed::{Feed, Link, Opened, Opener, Picture};
+use super::feed::{Feed, Link, LivePicture, Opened, Opener};
 use super::format::{self, Offer};
 use crate::scene::{PixelFormat, WantedFormat};
 
@@ -23,9 +23,9 @@ const PATIENCE_SECS: f64 = 3.0;
 pub struct ListedCamera {
     /// What `webcam:N` calls it.
     pub number: u32,
-    /// Its own name.
+    /// The camera's own name.
     pub name: String,
-    /// Its formats, or why they cannot be told.
+    /// The camera's formats, or why they cannot be told.
     pub offers: Result<Vec<Offer>, LiveError>,
 }
 
@@ -36,7 +36,7 @@ pub struct ListedCamera {
 pub fn list_cameras() -> Result<Vec<ListedCamera>, LiveError> {
     Ok(known("cameras")?
         .into_iter()
-        .map(|Known { number, name }| {
+        .map(|KnownDevice { number, name }| {
             let label = label_of(number, &name);
             let offers =
                 open_any(number, &label).and_then(|mut camera| offers_of(&mut camera, &label));
@@ -69,7 +69,7 @@ impl Opener for WebcamOpener {
 
     fn open(&self, again: Option<&str>, link: &Link) -> Result<Box<dyn Feed>, LiveError> {
         let mut refusal = None;
-        for Known { number, name } in self.candidates(again)? {
+        for KnownDevice { number, name } in self.candidates(again)? {
             match WebcamFeed::open(number, &name, &self.wanted, link) {
                 Ok(feed) => return Ok(Box::new(feed)),
                 // Many cameras have a second device, of the same name, that gives no pictures.
@@ -84,12 +84,12 @@ impl Opener for WebcamOpener {
 
 impl WebcamOpener {
     /// The cameras that are meant, the likeliest first; at least one.
-    fn candidates(&self, again: Option<&str>) -> Result<Vec<Known>, LiveError> {
+    fn candidates(&self, again: Option<&str>) -> Result<Vec<KnownDevice>, LiveError> {
         let known = known(&self.source_name)?;
         pick(&known, &self.wanted_camera, again)
             .map(|picked| picked.into_iter().cloned().collect())
             .map_err(|ambiguous| {
-                let found = |known: &Known| label_of(known.number, &known.name);
+                let found = |known: &KnownDevice| label_of(known.number, &known.name);
                 let wanted = self.source_name.clone();
                 if ambiguous.is_empty() {
                     let found = known.iter().map(found).collect();
@@ -103,7 +103,7 @@ impl WebcamOpener {
 }
 
 #[derive(Debug, Clone, PartialEq)]
-struct Known {
+struct KnownDevice {
     number: u32,
     name: String,
 }
@@ -114,25 +114,25 @@ struct Known {
 /// # Errors
 /// None, or those of several names.
 fn pick<'a>(
-    known: &'a [Known],
+    known: &'a [KnownDevice],
     wanted: &str,
     again: Option<&str>,
-) -> Result<Vec<&'a Known>, Vec<&'a Known>> {
+) -> Result<Vec<&'a KnownDevice>, Vec<&'a KnownDevice>> {
     let number: Option<u32> = wanted.parse().ok();
     if let Some(name) = again {
-        let mut same: Vec<&Known> = known.iter().filter(|known| known.name == name).collect();
+        let mut same: Vec<&KnownDevice> = known.iter().filter(|known| known.name == name).collect();
         same.sort_by_key(|known| (Some(known.number) != number, known.number));
         return if same.is_empty() { Err(same) } else { Ok(same) };
     }
     if number.is_some() {
-        let one: Vec<&Known> = known
+        let one: Vec<&KnownDevice> = known
             .iter()
             .filter(|known| Some(known.number) == number)
             .collect();
         return if one.is_empty() { Err(one) } else { Ok(one) };
     }
     let part = wanted.trim().to_lowercase();
-    let mut named: Vec<&Known> = known
+    let mut named: Vec<&KnownDevice> = known
         .iter()
         .filter(|known| known.name.to_lowercase().contains(&part))
         .collect();
@@ -153,7 +153,7 @@ fn label_of(number: u32, name: &str) -> String {
 }
 
 /// What the system lists; `wanted` is for the message.
-fn known(wanted: &str) -> Result<Vec<Known>, LiveError> {
+fn known(wanted: &str) -> Result<Vec<KnownDevice>, LiveError> {
     let listed = nokhwa::query(ApiBackend::Auto).map_err(|error| LiveError::Camera {
         camera: wanted.to_owned(),
         message: error.to_string(),
@@ -161,9 +161,9 @@ fn known(wanted: &str) -> Result<Vec<Known>, LiveError> {
     let known = |info: &CameraInfo| {
         let number = info.index().as_index().ok()?;
         let name = info.human_name();
-        Some(Known { number, name })
+        Some(KnownDevice { number, name })
     };
-    let mut known: Vec<Known> = listed.iter().filter_map(known).collect();
+    let mut known: Vec<KnownDevice> = listed.iter().filter_map(known).collect();
     known.sort_by_key(|known| known.number);
     if known.is_empty() {
         let reason = if cfg!(target_os = "linux") {
@@ -259,7 +259,7 @@ impl Feed for WebcamFeed {
         }
     }
 
-    fn next_picture(&mut self) -> Result<Option<Picture>, LiveError> {
+    fn next_picture(&mut self) -> Result<Option<LivePicture>, LiveError> {
         loop {
             let Offer {
                 size_px, pixels, ..
@@ -272,7 +272,7 @@ impl Feed for WebcamFeed {
             if let Some((size_px, rgba)) = rgba_of(&bytes, pixels, size_px, self.tolerance) {
                 drop(bytes);
                 self.broken_in_a_row = 0;
-                return Ok(Some(Picture {
+                return Ok(Some(LivePicture {
                     index: None,
                     time_secs,
                     size_px,
@@ -387,17 +387,17 @@ fn frame_format_of(pixels: PixelFormat) -> FrameFormat {
 mod tests {
     use super::*;
 
-    fn cameras(names: &[(u32, &str)]) -> Vec<Known> {
+    fn cameras(names: &[(u32, &str)]) -> Vec<KnownDevice> {
         names
             .iter()
-            .map(|&(number, name)| Known {
+            .map(|&(number, name)| KnownDevice {
                 number,
                 name: name.to_owned(),
             })
             .collect()
     }
 
-    fn numbers(picked: Vec<&Known>) -> Vec<u32> {
+    fn numbers(picked: Vec<&KnownDevice>) -> Vec<u32> {
         picked.into_iter().map(|known| known.number).collect()
     }
 

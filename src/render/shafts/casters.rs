@@ -3,10 +3,10 @@
 use std::f32::consts::FRAC_1_PI;
 
 use glam::{DAffine3, Vec3};
+use rayon::prelude::*;
 
 use crate::geometry::levels::levels;
 use crate::geometry::ray_caster::RayCaster;
-use crate::light::cores::on_all_cores;
 use crate::scene::{Object, Scene};
 use crate::shafts::prepared::Prepared;
 use crate::shafts::selection::Representative;
@@ -186,18 +186,15 @@ impl PlacedCasters {
     ) -> GroupedSurfels {
         let caster = &self.caster;
         let hides = |start, direction| caster.is_hidden(start, direction, f32::INFINITY);
-        let shares = on_all_cores(self.surfels.len(), |range| {
-            let lit = |surfel: &Surfel| {
-                let irradiance = room.light_on_surfel(surfel, RAYS, caster, sources, left);
-                LitSurfel {
-                    surfel: *surfel,
-                    open: open_directions(surfel, hides),
-                    radiance: surfel.albedo * irradiance * FRAC_1_PI,
-                }
-            };
-            self.surfels[range].iter().map(lit).collect::<Vec<_>>()
-        });
-        GroupedSurfels::new(shares.concat())
+        let lit = |surfel: &Surfel| {
+            let irradiance = room.light_on_surfel(surfel, RAYS, caster, sources, left);
+            LitSurfel {
+                surfel: *surfel,
+                open: open_directions(surfel, hides),
+                radiance: surfel.albedo * irradiance * FRAC_1_PI,
+            }
+        };
+        GroupedSurfels::new(self.surfels.par_iter().map(lit).collect())
     }
 
     /// Into how many parts a patch's edges are to be cut, so that what the casters throw on it is smooth within each part.

@@ -3,8 +3,8 @@
 use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
+use rayon::prelude::*;
 
-use crate::light::cores::on_all_cores;
 use crate::scene::Difference;
 use crate::shafts::intensity_transfers::encoded;
 use crate::shafts::prepared::Prepared;
@@ -44,15 +44,17 @@ pub(super) struct Noticing {
 impl Notice<'_> {
     /// The corners of some patches, those left out that neither a shadow reaches nor light that shows.
     pub fn noticing(&self, patches: &[usize]) -> Noticing {
-        let shares = on_all_cores(patches.len(), |range| {
+        /// Patches that are looked at in one go.
+        const CHUNK: usize = 64;
+        let shares = patches.par_chunks(CHUNK).map(|patches| {
             let mut share = Noticing::default();
-            for &patch in &patches[range] {
+            for &patch in patches {
                 self.add(patch, &mut share);
             }
             share
         });
         let mut all = Noticing::default();
-        for share in shares {
+        for share in shares.collect::<Vec<_>>() {
             let first = all.lists.len() as u32;
             all.lists.extend(share.lists);
             all.thrown.extend(share.thrown);

@@ -15,12 +15,12 @@ pub mod room;
 
 use bytemuck::Zeroable;
 use glam::{DAffine3, Vec3, Vec4};
+use rayon::prelude::*;
 use wgpu::util::DeviceExt as _;
 
 use crate::geometry::bounds::Bounds;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::{self, PixelRect};
-use crate::light::cores::on_all_cores;
 use crate::scene::{ProbeScene, Scene, ShaftSettings};
 use crate::shafts::patches::PatchVertex;
 use crate::shafts::prepared::Prepared;
@@ -482,15 +482,12 @@ fn lost_nearby(
     surfels: &GroupedSurfels,
     left: &[Option<f32>],
 ) -> Vec<Vec3> {
-    let shares = on_all_cores(vertices.len(), |range| {
-        let hidden = |&vertex: &u32| {
-            let PatchVertex { position, normal } = room.patches.vertices[vertex as usize];
-            let seen = surfels.seen_from(BoxM::around([position]));
-            room.hidden_among(position, normal, seen, left) + room.lost_at(vertex, left)
-        };
-        vertices[range].iter().map(hidden).collect::<Vec<_>>()
-    });
-    shares.concat()
+    let hidden = |&vertex: &u32| {
+        let PatchVertex { position, normal } = room.patches.vertices[vertex as usize];
+        let seen = surfels.seen_from(BoxM::around([position]));
+        room.hidden_among(position, normal, seen, left) + room.lost_at(vertex, left)
+    };
+    vertices.par_iter().map(hidden).collect()
 }
 
 /// For each vertex and each representative the irradiance that hidden sources would take.
@@ -509,19 +506,15 @@ fn given(
             false => Vec3::ZERO,
         })
         .collect();
-    let shares = on_all_cores(vertices.len(), |range| {
-        let mut rows: Vec<Vec3> = Vec::with_capacity(range.len() * chosen.len());
-        for &vertex in &vertices[range] {
-            let row = room.transfers.row(vertex as usize);
-            rows.extend(chosen.iter().map(|one| {
-                let sources = one.first as usize..one.last as usize;
-                let arriving = row[sources.clone()].iter().zip(&radiance[sources]);
-                arriving
-                    .map(|(&part, &radiance)| radiance * part)
-                    .sum::<Vec3>()
-            }));
-        }
-        rows
+    let given = vertices.par_iter().flat_map_iter(|&vertex| {
+        let row = room.transfers.row(vertex as usize);
+        chosen.iter().map(|one| {
+            let sources = one.first as usize..one.last as usize;
+            let arriving = row[sources.clone()].iter().zip(&radiance[sources]);
+            arriving
+                .map(|(&part, &radiance)| radiance * part)
+                .sum::<Vec3>()
+        })
     });
-    shares.concat()
+    given.collect()
 }

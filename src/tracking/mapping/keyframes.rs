@@ -1,6 +1,6 @@
 //! Which pictures of a long video to learn a layout from: those that show most that the others do not.
 
-use super::bundle::Seen;
+use super::bundle::MarkerObservation;
 
 /// More pictures make a layout hardly better, and its equations slow.
 const MOST_PICTURES: usize = 250;
@@ -10,7 +10,7 @@ const MOVED: f64 = 0.015;
 const MOST_CANDIDATES: usize = 2000;
 
 /// Indices of the pictures to use, in order. Pictures with fewer than two markers tell nothing of a layout.
-pub(super) fn choose(pictures: &[Vec<Seen>], width_px: f64) -> Vec<usize> {
+pub(super) fn choose(pictures: &[Vec<MarkerObservation>], width_px: f64) -> Vec<usize> {
     let mut candidates: Vec<usize> = Vec::new();
     for (index, picture) in pictures.iter().enumerate() {
         let differs = |&last: &usize| differs(&pictures[last], picture, MOVED * width_px);
@@ -55,7 +55,7 @@ pub(super) fn choose(pictures: &[Vec<Seen>], width_px: f64) -> Vec<usize> {
     chosen
 }
 
-fn pairs(picture: &[Seen]) -> impl Iterator<Item = (usize, usize)> {
+fn pairs(picture: &[MarkerObservation]) -> impl Iterator<Item = (usize, usize)> {
     picture.iter().enumerate().flat_map(move |(at, a)| {
         picture[at + 1..]
             .iter()
@@ -64,7 +64,7 @@ fn pairs(picture: &[Seen]) -> impl Iterator<Item = (usize, usize)> {
 }
 
 /// Whether a picture shows other markers than another, or the same ones elsewhere.
-fn differs(last: &[Seen], picture: &[Seen], moved_px: f64) -> bool {
+fn differs(last: &[MarkerObservation], picture: &[MarkerObservation], moved_px: f64) -> bool {
     last.len() != picture.len()
         || last.iter().zip(picture).any(|(a, b)| {
             let moved =
@@ -79,8 +79,8 @@ mod tests {
 
     use super::*;
 
-    fn seen(marker: usize, x_px: f64) -> Seen {
-        Seen {
+    fn seen(marker: usize, x_px: f64) -> MarkerObservation {
+        MarkerObservation {
             marker,
             corners_px: [DVec2::new(x_px, 0.0); 4],
         }
@@ -94,7 +94,7 @@ mod tests {
 
     #[test]
     fn a_rare_pair_is_never_left_out_of_a_long_video() {
-        let mut video: Vec<Vec<Seen>> = (0..1900)
+        let mut video: Vec<Vec<MarkerObservation>> = (0..1900)
             .map(|k| vec![seen(0, f64::from(k) * 20.0), seen(1, f64::from(k) * 20.0)])
             .collect();
         video[777] = vec![seen(1, 5.0), seen(2, 5.0)];

@@ -6,10 +6,11 @@ use std::collections::BTreeMap;
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::Detection;
-use super::undistort::undistorted_pixel;
 use crate::geometry::camera::Intrinsics;
 use crate::scene::{Family, Marker};
-use bundle::{Bundle, Certainty, Freedom, MARKER_UNKNOWNS, Placed, Seen, View};
+use bundle::{
+    BoardView, Bundle, Certainty, MARKER_UNKNOWNS, MarkerFreedom, MarkerObservation, PlacedMarker,
+};
 
 mod bundle;
 mod keyframes;
@@ -18,9 +19,9 @@ mod plane;
 
 /// A marker in one picture alone is not believed.
 const LEAST_PICTURES: usize = 2;
-/// A marker whose corners are so many standard deviations off in a picture (root mean square) is dropped there,
+/// How many standard deviations off (root mean square) a marker's corners are in a picture where it is dropped.
 const OUTLIER: f64 = 5.0;
-/// but never for less than this, pixels.
+/// The least distance (root mean square) of corners for which a marker is dropped, pixels.
 const LEAST_OUTLIER_PX: f64 = 0.5;
 /// Rounds of dropping.
 const ROUNDS: usize = 4;
@@ -63,7 +64,7 @@ pub struct LearntMarker {
     /// Standard deviation of its size, metres; 0 where it was given.
     pub size_deviation_m: f64,
     /// Pictures that it was learnt from.
-    pub sightings: usize,
+    pub observations: usize,
     /// Pictures in which it did not fit and was dropped.
     pub dropped: usize,
     /// Root mean square distance of its corners from where the layout puts them, pixels.
@@ -143,8 +144,8 @@ pub fn learn_board(
     pictures: &[Vec<Detection>],
     settings: &MapSettings,
 ) -> Result<LearntBoard, MapError> {
-    let seen = Sightings::of(intrinsics, family, pictures);
-    let Sightings {
+    let seen = BoardObservations::of(intrinsics, family, pictures);
+    let BoardObservations {
         ids,
         pictures,
         left_out,
@@ -161,7 +162,7 @@ pub fn learn_board(
     };
     connected(&ids, &pictures, gauge)?;
     let width_px = f64::from(intrinsics.size_px[0]);
-    let pictures: Vec<Vec<Seen>> = keyframes::choose(&pictures, width_px)
+    let pictures: Vec<Vec<MarkerObservation>> = keyframes::choose(&pictures, width_px)
         .into_iter()
         .map(|index| pictures[index].clone())
         .collect();
@@ -185,39 +186,21 @@ pub fn learn_board(
         markers: placed.into_iter().flatten().collect(),
         views: views.into_iter().flatten().collect(),
         gauge,
-        freedom: Freedom::Space,
+        freedom: MarkerFreedom::Space,
         sizes_are_free: settings.learns_sizes,
     };
     let mut dropped = vec![0; ids.len()];
     let in_space = adjust_without_outliers(&mut bundle, &mut dropped, &ids)?;
     let off_plane_m = into_plane(&mut bundle, &in_space, settings.plane_tolerance_m, &ids)?;
-    bundle.freedom = Freedom::Plane;
+    bundle.freedom = MarkerFreedom::Plane;
     let certainty = adjust_without_outliers(&mut bundle, &mut dropped, &ids)?;
-    let markers = (0..ids.len())
-        .map(|marker| {
-            let [_, _, turn, x, y, _, size] = certainty.deviations[marker];
-            let placed = &bundle.markers[marker];
-            let rms = bundle.rms_px(marker);
-            LearntMarker {
-                marker: Marker {
-                    family,
-                    id: ids[marker],
-                    size_m: placed.size_m,
-                    center_m: placed.world_from_marker.translation.truncate(),
-                    rotation_rad: rotation_rad(&placed.world_from_marker),
-                },
-                center_deviation_m: DVec2::new(x, y),
-                rotation_deviation_rad: turn,
-                size_deviation_m: size * placed.size_m,
-                sightings: rms.1,
-                dropped: dropped[marker],
-                rms_px: rms.0,
-                off_plane_m: off_plane_m[marker],
-            }
-        })
-        .collect();
+    let markers = (0..ids.len()).map(|marker| LearntMarker {
+        dropped: dropped[marker],
+        off_plane_m: off_plane_m[marker],
+        ..bundle.learnt(marker, family, ids[marker], &certainty)
+    });
     Ok(LearntBoard {
-        markers,
+        markers: markers.collect(),
         pictures: bundle.views.len(),
         noise_px: certainty.noise_px,
         left_out,
@@ -225,7 +208,7 @@ pub fn learn_board(
 }
 
 impl LearntBoard {
-    /// The same layout, larger by a factor: for a scale that is known better than from a marker's size.
+    /// This layout, larger by a factor: for a scale that is known better than from a marker's size.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
         let mut scaled = self.clone();
@@ -241,15 +224,15 @@ impl LearntBoard {
 }
 
 /// What the detections come to.
-struct Sightings {
+struct BoardObservations {
     /// Sorted.
     ids: Vec<u32>,
     /// Markers by their index in `ids`, sorted.
-    pictures: Vec<Vec<Seen>>,
+    pictures: Vec<Vec<MarkerObservation>>,
     left_out: Vec<u32>,
 }
 
-impl Sightings {
+impl BoardObservations {
     fn of(intrinsics: &Intrinsics, family: Family, pictures: &[Vec<Detection>]) -> Self {
         let mut by_picture: Vec<BTreeMap<u32, [DVec2; 4]>> = pictures
             .iter()
@@ -274,7 +257,7 @@ impl Sightings {
             .iter_mut()
             .map(|picture| {
                 let seen = picture.iter().filter_map(|(id, corners_px)| {
-                    Some(Seen {
+                    Some(MarkerObservation {
                         marker: ids.binary_search(id).ok()?,
                         corners_px: *corners_px,
                     })
@@ -306,7 +289,7 @@ fn once_seen(
         .filter_map(|detection| {
             let corners = detection
                 .corners_px
-                .map(|corner| undistorted_pixel(intrinsics, corner));
+                .map(|corner| intrinsics.undistorted_pixel(corner));
             let [Some(a), Some(b), Some(c), Some(d)] = corners else {
                 return None;
             };
@@ -316,7 +299,11 @@ fn once_seen(
 }
 
 /// Refuses groups of markers that no picture joins.
-fn connected(ids: &[u32], pictures: &[Vec<Seen>], gauge: usize) -> Result<(), MapError> {
+fn connected(
+    ids: &[u32],
+    pictures: &[Vec<MarkerObservation>],
+    gauge: usize,
+) -> Result<(), MapError> {
     // Each marker's group, by the lowest index in it.
     let mut group: Vec<usize> = (0..ids.len()).collect();
     for picture in pictures {
@@ -373,7 +360,8 @@ fn adjust_without_outliers(
         if !lost.is_empty() {
             return Err(MapError::NoPlace { ids: lost });
         }
-        let pictures: Vec<Vec<Seen>> = bundle.views.iter().map(|view| view.seen.clone()).collect();
+        let pictures: Vec<Vec<MarkerObservation>> =
+            bundle.views.iter().map(|view| view.seen.clone()).collect();
         connected(ids, &pictures, bundle.gauge)?;
     }
     bundle.adjust().ok_or(MapError::NotDetermined)
@@ -417,8 +405,8 @@ fn into_plane(
     Ok(off_m)
 }
 
-/// Of a corner: of the centre's height, and of the tilt over half a side.
-fn height_deviation_m(deviations: &[f64; MARKER_UNKNOWNS], placed: &Placed) -> f64 {
+/// The standard deviation of a corner's height: that of the centre's, and of the tilt over half a side.
+fn height_deviation_m(deviations: &[f64; MARKER_UNKNOWNS], placed: &PlacedMarker) -> f64 {
     let [rx, ry, _, _, _, z_m, _] = *deviations;
     let half_m = 0.5 * placed.size_m;
     (z_m * z_m + (rx * half_m).powi(2) + (ry * half_m).powi(2)).sqrt()
@@ -439,9 +427,39 @@ fn rms(distances_px: &[f64]) -> f64 {
 }
 
 impl Bundle {
-    /// Of a marker's corners, pixels, and the views that see it.
+    /// What an adjustment in the plane tells of a marker.
+    fn learnt(
+        &self,
+        marker: usize,
+        family: Family,
+        id: u32,
+        certainty: &Certainty,
+    ) -> LearntMarker {
+        let [_, _, turn, x, y, _, size] = certainty.deviations[marker];
+        let placed = &self.markers[marker];
+        let (rms_px, observations) = self.rms_px(marker);
+        LearntMarker {
+            marker: Marker {
+                family,
+                id,
+                size_m: placed.size_m,
+                center_m: placed.world_from_marker.translation.truncate(),
+                rotation_rad: rotation_rad(&placed.world_from_marker),
+            },
+            center_deviation_m: DVec2::new(x, y),
+            rotation_deviation_rad: turn,
+            size_deviation_m: size * placed.size_m,
+            observations,
+            dropped: 0,
+            rms_px,
+            off_plane_m: 0.0,
+        }
+    }
+
+    /// The root mean square distance of a marker's corners, pixels, and the number of views that see it.
     fn rms_px(&self, marker: usize) -> (f64, usize) {
-        let seeing = |view: &View| view.seen.iter().find(|seen| seen.marker == marker).copied();
+        let seeing =
+            |view: &BoardView| view.seen.iter().find(|seen| seen.marker == marker).copied();
         let distances_px: Vec<f64> = self
             .views
             .iter()

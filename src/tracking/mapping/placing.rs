@@ -3,27 +3,27 @@
 //! A lone square has two poses that explain its picture about equally well; the wrong one of them differs from picture
 //! to picture, the right one does not. So each new marker is put where one picture says, and the other pictures vote.
 
-use glam::{DAffine3, DVec2, DVec3};
+use glam::DAffine3;
 
-use super::super::least_squares::{accumulate, solve_positive_definite};
-use super::super::pose::{self, Sighting};
-use super::bundle::{Placed, Seen, UNIT_CORNERS, View, project, turned};
+use super::super::pose::{self, CornerObservation};
+use super::bundle::{BoardView, MarkerObservation, PlacedMarker, UNIT_CORNERS};
 use crate::geometry::camera::Intrinsics;
 
-/// Pictures that say where a new marker may be, and those that vote.
+/// The most pictures that say where a new marker may be.
 const SAYING: usize = 6;
+/// The most pictures that vote on where a new marker is.
 const VOTING: usize = 12;
 /// A picture that does not agree at all has no more to say than this, pixels (root mean square).
 const DISAGREES_PX: f64 = 8.0;
-/// Of so many placed markers in a picture both poses are tried.
+/// The number of placed markers in a picture of which both poses are tried.
 const STARTS: usize = 2;
 /// So many placed markers settle a picture's camera; one more does not move it.
 const SETTLED: usize = 3;
 
 /// A picture with both poses of each lone marker in it.
-struct Picture<'a> {
-    seen: &'a [Seen],
-    /// camera_from_marker of each, the better one first.
+struct BoardPicture<'a> {
+    seen: &'a [MarkerObservation],
+    /// The poses (camera_from_marker) of each marker seen alone, the better one first.
     lone: Vec<Vec<DAffine3>>,
 }
 
@@ -32,15 +32,15 @@ struct Picture<'a> {
 /// its plane.
 pub(super) fn place(
     intrinsics: &Intrinsics,
-    pictures: &[Vec<Seen>],
+    pictures: &[Vec<MarkerObservation>],
     markers: usize,
     gauge: usize,
     size_m: f64,
     sizes_are_free: bool,
-) -> (Vec<Option<Placed>>, Vec<Option<View>>) {
-    let pictures: Vec<Picture> = pictures
+) -> (Vec<Option<PlacedMarker>>, Vec<Option<BoardView>>) {
+    let pictures: Vec<BoardPicture> = pictures
         .iter()
-        .map(|seen| Picture {
+        .map(|seen| BoardPicture {
             seen,
             lone: seen
                 .iter()
@@ -54,7 +54,7 @@ pub(super) fn place(
         size_m,
         placed: vec![None; markers],
     };
-    placing.placed[gauge] = Some(Placed {
+    placing.placed[gauge] = Some(PlacedMarker {
         world_from_marker: DAffine3::IDENTITY,
         size_m,
     });
@@ -68,7 +68,7 @@ pub(super) fn place(
         .iter()
         .map(|picture| {
             let (camera_from_world, _) = placing.camera(picture, None)?;
-            Some(View {
+            Some(BoardView {
                 camera_from_world,
                 seen: picture.seen.to_vec(),
             })
@@ -77,12 +77,12 @@ pub(super) fn place(
     (placing.placed, views)
 }
 
-fn lone_poses(intrinsics: &Intrinsics, seen: &Seen, size_m: f64) -> Vec<DAffine3> {
-    let sightings: [Sighting; 4] = std::array::from_fn(|corner| Sighting {
-        point_m: UNIT_CORNERS[corner].truncate() * size_m,
+fn lone_poses(intrinsics: &Intrinsics, seen: &MarkerObservation, size_m: f64) -> Vec<DAffine3> {
+    let observations: [CornerObservation; 4] = std::array::from_fn(|corner| CornerObservation {
+        point_m: UNIT_CORNERS[corner] * size_m,
         pixel: seen.corners_px[corner],
     });
-    let Some(solutions) = pose::solve(intrinsics, &sightings) else {
+    let Some(solutions) = pose::solve(intrinsics, &observations) else {
         return Vec::new();
     };
     let both = std::iter::once(solutions.best).chain(solutions.alternative);
@@ -91,8 +91,8 @@ fn lone_poses(intrinsics: &Intrinsics, seen: &Seen, size_m: f64) -> Vec<DAffine3
 
 /// A picture that judges where a marker may be.
 struct Voter<'a> {
-    picture: &'a Picture<'a>,
-    /// Of the marker in it.
+    picture: &'a BoardPicture<'a>,
+    /// The index of the marker in the picture.
     at: usize,
     /// Where the markers that are placed settle it.
     camera_from_world: Option<DAffine3>,
@@ -100,10 +100,10 @@ struct Voter<'a> {
 
 struct Placing<'a> {
     intrinsics: &'a Intrinsics,
-    pictures: Vec<Picture<'a>>,
-    /// Of the lone poses.
+    pictures: Vec<BoardPicture<'a>>,
+    /// The size of markers that the lone poses are for, metres.
     size_m: f64,
-    placed: Vec<Option<Placed>>,
+    placed: Vec<Option<PlacedMarker>>,
 }
 
 impl Placing<'_> {
@@ -126,8 +126,8 @@ impl Placing<'_> {
             .max_by_key(|&marker| (together[marker], std::cmp::Reverse(marker)))
     }
 
-    fn place_next(&self, marker: usize, sizes_are_free: bool) -> Option<Placed> {
-        let mut showing: Vec<(&Picture, usize)> = self
+    fn place_next(&self, marker: usize, sizes_are_free: bool) -> Option<PlacedMarker> {
+        let mut showing: Vec<(&BoardPicture, usize)> = self
             .pictures
             .iter()
             .filter(|picture| {
@@ -143,7 +143,7 @@ impl Placing<'_> {
             .collect();
         // Large in the picture, so seen well; equally large ones stay in the pictures' order.
         showing.sort_by(|a, b| area_px(b.0, b.1).total_cmp(&area_px(a.0, a.1)));
-        let voting: Vec<(&Picture, usize)> = showing
+        let voting: Vec<(&BoardPicture, usize)> = showing
             .iter()
             .step_by(1 + showing.len() / VOTING)
             .copied()
@@ -170,7 +170,7 @@ impl Placing<'_> {
                 }
             })
             .collect();
-        let mut best: Option<(f64, Placed)> = None;
+        let mut best: Option<(f64, PlacedMarker)> = None;
         for (picture, at) in showing.iter().take(SAYING) {
             let Some((camera_from_world, _)) = self.camera(picture, None) else {
                 continue;
@@ -184,7 +184,7 @@ impl Placing<'_> {
                     .chain([camera_from_world])
                     .map(|camera_from_world| camera_from_world.inverse() * camera_from_marker);
                 for world_from_marker in candidates {
-                    let hypothesis = Placed {
+                    let hypothesis = PlacedMarker {
                         world_from_marker,
                         size_m,
                     };
@@ -202,16 +202,15 @@ impl Placing<'_> {
     }
 
     /// How far a picture shows a marker from where it is thought to be, pixels (root mean square).
-    fn against(&self, voter: &Voter, marker: usize, hypothesis: &Placed) -> f64 {
+    fn against(&self, voter: &Voter, marker: usize, hypothesis: &PlacedMarker) -> f64 {
         let rms_px = match &voter.camera_from_world {
             Some(camera_from_world) => {
                 let squares = (hypothesis.corners_m().into_iter())
                     .zip(voter.picture.seen[voter.at].corners_px)
                     .map(|(point_m, pixel)| {
-                        Some(
-                            project(self.intrinsics, camera_from_world, point_m)?
-                                .distance_squared(pixel),
-                        )
+                        let in_camera_m = camera_from_world.transform_point3(point_m);
+                        let expected_px = self.intrinsics.undistorted_pixel_of(in_camera_m)?;
+                        Some(expected_px.distance_squared(pixel))
                     });
                 squares
                     .sum::<Option<f64>>()
@@ -225,7 +224,7 @@ impl Placing<'_> {
     }
 
     /// The side that a marker has if it lies in the plane of the gauge: the median over its pictures.
-    fn size_in_plane(&self, showing: &[(&Picture, usize)]) -> Option<f64> {
+    fn size_in_plane(&self, showing: &[(&BoardPicture, usize)]) -> Option<f64> {
         let mut sizes_m: Vec<f64> = showing
             .iter()
             .filter_map(|(picture, at)| {
@@ -248,7 +247,7 @@ impl Placing<'_> {
     }
 
     /// Poses of the camera that the largest placed markers in a picture say.
-    fn starts(&self, picture: &Picture) -> Vec<DAffine3> {
+    fn starts(&self, picture: &BoardPicture) -> Vec<DAffine3> {
         let mut known: Vec<usize> = (0..picture.seen.len())
             .filter(|&at| self.placed[picture.seen[at].marker].is_some())
             .collect();
@@ -270,7 +269,11 @@ impl Placing<'_> {
 
     /// The camera that explains the placed markers in a picture best, with one more marker where it is thought to be,
     /// and the root mean square of what is left, pixels.
-    fn camera(&self, picture: &Picture, more: Option<(usize, &Placed)>) -> Option<(DAffine3, f64)> {
+    fn camera(
+        &self,
+        picture: &BoardPicture,
+        more: Option<(usize, &PlacedMarker)>,
+    ) -> Option<(DAffine3, f64)> {
         let mut points = Vec::new();
         for seen in picture.seen {
             let placed = match more {
@@ -278,79 +281,19 @@ impl Placing<'_> {
                 _ => self.placed[seen.marker].as_ref(),
             };
             if let Some(placed) = placed {
-                points.extend(placed.corners_m().into_iter().zip(seen.corners_px));
+                let corners = placed.corners_m().into_iter().zip(seen.corners_px);
+                points.extend(corners.map(|(point_m, pixel)| CornerObservation { point_m, pixel }));
             }
         }
         self.starts(picture)
             .into_iter()
-            .filter_map(|start| resected(self.intrinsics, &points, start))
-            .min_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(camera_from_world, squares_px)| {
-                (camera_from_world, (squares_px / points.len() as f64).sqrt())
-            })
+            .filter_map(|start| pose::refine_roughly(self.intrinsics, &points, start))
+            .min_by(|a, b| a.squared_error_px.total_cmp(&b.squared_error_px))
+            .map(|found| (found.camera_from_anchor, found.rms_px(points.len())))
     }
 }
 
-fn area_px(picture: &Picture, at: usize) -> f64 {
+fn area_px(picture: &BoardPicture, at: usize) -> f64 {
     let [a, b, c, d] = picture.seen[at].corners_px;
     0.5 * (c - a).perp_dot(d - b).abs()
-}
-
-/// The camera that sees points where they were seen, by Levenberg-Marquardt from a start, and the sum of its squared
-/// errors, pixels; `None` when a point falls behind it.
-fn resected(
-    intrinsics: &Intrinsics,
-    points: &[(DVec3, DVec2)],
-    start: DAffine3,
-) -> Option<(DAffine3, f64)> {
-    const ROUNDS: usize = 15;
-    let squares_px = |camera: &DAffine3| {
-        let squares = points.iter().map(|&(point_m, pixel)| {
-            Some(project(intrinsics, camera, point_m)?.distance_squared(pixel))
-        });
-        squares.sum::<Option<f64>>()
-    };
-    let mut camera = start;
-    let mut error = squares_px(&camera)?;
-    let mut damping = 1e-3;
-    for _ in 0..ROUNDS {
-        let (mut normal, mut right) = ([[0.0; 6]; 6], [0.0; 6]);
-        for &(point_m, pixel) in points {
-            let turned_m = camera.matrix3 * point_m;
-            let in_camera_m = turned_m + camera.translation;
-            let image = in_camera_m.truncate() / in_camera_m.z;
-            let missing_px = pixel - intrinsics.pixel_from_plane(image);
-            let gradients = [
-                DVec3::new(1.0, 0.0, -image.x) * (intrinsics.focal_px.x / in_camera_m.z),
-                DVec3::new(0.0, 1.0, -image.y) * (intrinsics.focal_px.y / in_camera_m.z),
-            ];
-            for (gradient, value) in gradients.into_iter().zip(missing_px.to_array()) {
-                let by_turn = turned_m.cross(gradient);
-                let row = [
-                    by_turn.x, by_turn.y, by_turn.z, gradient.x, gradient.y, gradient.z,
-                ];
-                accumulate(&mut normal, &mut right, &row, value);
-            }
-        }
-        for (k, row) in normal.iter_mut().enumerate() {
-            row[k] *= 1.0 + damping;
-        }
-        let [rx, ry, rz, tx, ty, tz] = solve_positive_definite(&normal, &right)?;
-        let candidate = DAffine3::from_rotation_translation(
-            turned(&camera, DVec3::new(rx, ry, rz)),
-            camera.translation + DVec3::new(tx, ty, tz),
-        );
-        match squares_px(&candidate) {
-            Some(lower) if lower < error => {
-                let settled = error - lower < 1e-6 * error;
-                (camera, error) = (candidate, lower);
-                damping = (damping / 10.0).max(1e-9);
-                if settled {
-                    break;
-                }
-            }
-            _ => damping *= 10.0,
-        }
-    }
-    Some((camera, error))
 }

@@ -2,12 +2,12 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 
-use super::bundle::Placed;
+use super::bundle::PlacedMarker;
 
 /// The frame whose z = 0 is the plane through the markers' corners: origin and x axis are those of the gauge, put into the
 /// plane. A marker farther off than it may be does not count. `None` where the markers leave it open.
 pub(super) fn plane_from_world(
-    markers: &[Placed],
+    markers: &[PlacedMarker],
     gauge: usize,
     may_be_off_m: &[f64],
 ) -> Option<DAffine3> {
@@ -32,15 +32,15 @@ pub(super) fn plane_from_world(
     }
 }
 
-/// Of a marker's farthest corner from the plane, metres.
-pub(super) fn farthest_m(marker: &Placed, plane_from_world: &DAffine3) -> f64 {
+/// The distance of a marker's farthest corner from the plane, metres.
+pub(super) fn farthest_m(marker: &PlacedMarker, plane_from_world: &DAffine3) -> f64 {
     let heights_m = marker
         .corners_m()
         .map(|corner_m| plane_from_world.transform_point3(corner_m).z.abs());
     heights_m.into_iter().fold(0.0, f64::max)
 }
 
-fn through(markers: &[Placed], counting: &[usize], gauge: usize) -> Option<DAffine3> {
+fn through(markers: &[PlacedMarker], counting: &[usize], gauge: usize) -> Option<DAffine3> {
     let corners_m: Vec<DVec3> = counting
         .iter()
         .flat_map(|&marker| markers[marker].corners_m())
@@ -63,7 +63,7 @@ fn through(markers: &[Placed], counting: &[usize], gauge: usize) -> Option<DAffi
     Some(world_from_plane.inverse())
 }
 
-/// The direction in which a symmetric matrix stretches least: the power method on its inverse, which is nearly singular
+/// The eigenvector of a symmetric matrix for the least eigenvalue: the power method on its inverse, which is nearly singular
 /// where it matters and so settles in a few rounds.
 fn least_axis(scatter: DMat3) -> Option<DVec3> {
     let trace = scatter.x_axis.x + scatter.y_axis.y + scatter.z_axis.z;
@@ -92,13 +92,13 @@ mod tests {
             DQuat::from_euler(glam::EulerRot::XYZ, 0.3, -0.2, 0.9),
             DVec3::new(0.1, 0.2, 0.3),
         );
-        let markers: Vec<Placed> = [
+        let markers: Vec<PlacedMarker> = [
             (0.0, 0.0, 0.0),
             (0.2, 0.0, 0.0),
             (0.0, 0.2, 0.0),
             (0.2, 0.2, 0.03),
         ]
-        .map(|(x_m, y_m, z_m)| Placed {
+        .map(|(x_m, y_m, z_m)| PlacedMarker {
             world_from_marker: world_from_plane
                 * DAffine3::from_translation(DVec3::new(x_m, y_m, z_m)),
             size_m: 0.04,

@@ -14,7 +14,7 @@ use crate::app::live::pipeline::Wake;
 use crate::app::live_capture::{Arrived, CaptureEvent, LiveCapture, Tap, Tapped};
 use crate::app::mailbox::{Mailbox, Taken};
 use crate::calibration::{
-    CalibrateError, Coverage, FEWEST_VIEWS, Lack, Moment, Taker, View, solve,
+    CalibrateError, Coverage, FEWEST_VIEWS, Lack, Moment, Taker, TargetView, solve,
 };
 use crate::capture::Frame;
 use crate::capture::live::{LiveOptions, Now};
@@ -247,7 +247,12 @@ impl Stage {
         });
     }
 
-    fn tell(&self, moment: Option<Moment>, view: Option<&View>, passed_over: Option<[u32; 2]>) {
+    fn tell(
+        &self,
+        moment: Option<Moment>,
+        view: Option<&TargetView>,
+        passed_over: Option<[u32; 2]>,
+    ) {
         let views = self.taker.views();
         self.standings.put(Standing {
             moment,

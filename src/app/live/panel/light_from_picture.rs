@@ -3,7 +3,7 @@
 use eframe::egui::{Button, Ui};
 
 use crate::app::live::wish::{Clicks, Wish};
-use crate::geometry::light_placing::Freedom;
+use crate::geometry::light_placing::LightFreedom;
 
 /// Pairs that fix a light at any distance, and one that is infinitely far.
 const POINT_PAIRS: usize = 2;
@@ -29,11 +29,15 @@ pub fn show(ui: &mut Ui, clicks: Option<(usize, bool)>, wishes: &mut Vec<Wish>) 
     ));
     ui.horizontal_wrapped(|ui| {
         for (text, enabled, step) in [
-            ("Lamp", pairs >= POINT_PAIRS, Clicks::Find(Freedom::Point)),
+            (
+                "Lamp",
+                pairs >= POINT_PAIRS,
+                Clicks::Find(LightFreedom::Point),
+            ),
             (
                 "Distant light",
                 pairs >= DIRECTIONAL_PAIRS,
-                Clicks::Find(Freedom::Directional),
+                Clicks::Find(LightFreedom::Directional),
             ),
             ("Take back", pairs > 0 || shadow_is_next, Clicks::TakeBack),
             ("Cancel", true, Clicks::Cancel),

@@ -38,7 +38,7 @@ pub fn show(ui: &mut Ui, facts: &Facts<'_>, editing: &mut Editing, wishes: &mut 
                 let name = ui.label(&anchor.name);
                 let (word, colour) = status(pose);
                 let told = ui.colored_label(colour, word);
-                if let Some(why) = pose.why {
+                if let Some(why) = pose.loss_reason {
                     told.on_hover_text(why.to_string());
                 }
                 ui.label(format!("{} of {}", pose.markers, anchor.markers.len()));

@@ -1,14 +1,14 @@
 //! A marker found again where a prediction puts it, by its code alone and without a detector.
 //!
-//! Every edge of the print says which of two neighbouring cells is the lighter one, whatever light or shadow lies on
+//! Every edge of the template says which of two neighbouring cells is the lighter one, whatever light or shadow lies on
 //! the marker. The shift of the prediction under which they say so most clearly is where the marker is; when hardly one
 //! objects it *is* that marker, since a picture of anything else obeys about half of them.
 
 use glam::{DAffine3, DVec2};
 
 use super::light::Grey;
-use super::pixel_pose::project;
-use super::print::Print;
+use super::marker_template::MarkerTemplate;
+use super::pixel_pose::pixel_of;
 use crate::geometry::camera::Intrinsics;
 
 /// The part of all differences of light that must have the right sign, less those that have the wrong one.
@@ -38,22 +38,22 @@ pub(super) const REACHES: [Reach; 2] = [
     },
 ];
 
-/// How far the print lies from where `pose` puts it, pixels. `None` when it is not within reach.
+/// How far the marker lies from where `pose` puts it, pixels. `None` when it is not within reach.
 pub(super) fn find_shift(
     picture: Grey<'_>,
     intrinsics: &Intrinsics,
-    print: &Print,
+    template: &MarkerTemplate,
     pose: &DAffine3,
     reach: &Reach,
 ) -> Option<DVec2> {
-    let place = |point_m: DVec2| Some(project(intrinsics, pose, point_m)?.pixel);
-    let corners = print.corners_m().map(place);
+    let place = |point_m: DVec2| pixel_of(intrinsics, pose, point_m);
+    let corners = template.corners_m().map(place);
     let [Some(a), Some(b), Some(c), Some(d)] = corners else {
         return None;
     };
     // Half of the cross product of the diagonals, positive where the front is seen.
     let area = 0.5 * (c - a).perp_dot(d - b);
-    let cell_px = area.max(0.0).sqrt() / f64::from(print.side);
+    let cell_px = area.max(0.0).sqrt() / f64::from(template.side);
     if cell_px < SMALLEST_CELL_PX {
         return None;
     }
@@ -73,7 +73,7 @@ pub(super) fn find_shift(
         let inside = pixel.cmpge(low).all() && pixel.cmple(high).all();
         inside.then(|| pixel.y as i32 * row + pixel.x as i32)
     };
-    let pairs: Vec<[i32; 2]> = print
+    let pairs: Vec<[i32; 2]> = template
         .edges
         .iter()
         .filter_map(|edge| {

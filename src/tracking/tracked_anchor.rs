@@ -4,18 +4,18 @@ use glam::{DAffine3, DVec2};
 
 use super::condition::Condition;
 use super::filter::Filter;
-use super::follow::{REACHES, find_shift};
+use super::flipped_pose::{FlippedPose, flipped_pose_of};
 use super::layout::{Layout, Located};
-use super::least_squares::Matrix6;
 use super::light::Grey;
-use super::pixel_pose::{PixelPose, difference, fit_pose, moved, project};
-use super::pose::{Sighting, refine, rotation_between};
-use super::twin::{Twin, twin_of};
-use super::undistort::undistorted_pixel;
-use super::{Alternative, AnchorPose, Status, Why};
+use super::pixel_pose::{PixelPose, fit_pose, pixel_of};
+use super::pose::{CornerObservation, refine};
+use super::template_match::{REACHES, find_shift};
+use super::{Alternative, AnchorPose, LossReason, Status};
 use crate::geometry::camera::Intrinsics;
+use crate::geometry::matrix::Matrix;
+use crate::geometry::pose::{PoseStep, difference, moved, rotation_between};
 
-/// What was seen longer ago than this decides nothing any more, seconds.
+/// The age from which on an observation decides nothing any more, seconds.
 const MEMORY_SECS: f64 = 0.5;
 /// A motion is believed to go on over gaps up to this, seconds.
 const LONGEST_STEP_SECS: f64 = 0.15;
@@ -29,24 +29,24 @@ const COASTING_SECS: f64 = 0.08;
 const SMALL_SHIFT_PX: f64 = 0.75;
 /// A pose that moves no corner by more than this since it was shown is not shown anew, pixels.
 const INVISIBLE_PX: f64 = 0.02;
-/// Logarithm of the odds, 100 : 1, from which on a pose is believed to be the right one of the two,
+/// The logarithm of the odds, 100 : 1, from which on a pose is believed to be the right one of the two.
 const BELIEVED: f64 = 4.6;
-/// and below which it is doubted again: between the two it stays what it was.
+/// The logarithm of the odds, 10 : 1, below which a pose that was believed is doubted again.
 const DOUBTED: f64 = 2.3;
 /// What a hand turns a thing beside what it did before, from one frame to the next, radians (standard deviation).
 const UNFORESEEN_TURN: f64 = 0.02;
 /// The most that earlier frames can say for a pose.
 const MOST_ODDS: f64 = 20.0;
-/// What of the earlier frames' odds counts in the next one,
+/// The part of the earlier frames' odds that counts in the next one.
 const REMEMBERED: f64 = 0.9;
-/// and what of its own: errors of neighbouring frames are not independent.
+/// The part of a frame's own odds that counts: errors of neighbouring frames are not independent.
 const NEW_SHARE: f64 = 0.3;
 
 /// An anchor and what is known of it from earlier frames.
-pub(super) struct Followed {
+pub(super) struct TrackedAnchor {
     pub(super) layout: Layout,
     condition: Condition,
-    last: Option<Sight>,
+    last: Option<Observation>,
     smoothing: Option<Smoothing>,
 }
 
@@ -57,25 +57,25 @@ struct Smoothing {
     shown: DAffine3,
 }
 
-/// An anchor as it was seen.
+/// An anchor as a frame showed it.
 #[derive(Clone)]
-struct Sight {
+struct Observation {
     time_secs: f64,
     camera_from_anchor: DAffine3,
     motion: Motion,
     /// Variance of its turn, rad².
     turn_variance: f64,
     /// The other pose that it might have had.
-    twin: Option<DAffine3>,
-    /// Logarithm of the odds for this pose against its twin, from all frames.
+    flipped: Option<DAffine3>,
+    /// Logarithm of the odds for this pose against the flipped one, from all frames.
     odds: f64,
     believed: bool,
 }
 
 /// A turn (left of the rotation, rad/s) and a shift (m/s).
-type Motion = [f64; 6];
+type Motion = PoseStep;
 
-impl Followed {
+impl TrackedAnchor {
     pub(super) fn new(layout: Layout, smooths: bool) -> Self {
         Self {
             layout,
@@ -95,11 +95,15 @@ impl Followed {
 
     /// Forgets what is too long ago, or lies ahead in a recording that starts again.
     pub(super) fn forget(&mut self, now_secs: f64) {
-        let recent = |sight: &Sight| {
-            let age_secs = now_secs - sight.time_secs;
+        let recent = |observation: &Observation| {
+            let age_secs = now_secs - observation.time_secs;
             (0.0..=MEMORY_SECS).contains(&age_secs)
         };
-        if self.last.as_ref().is_some_and(|sight| !recent(sight)) {
+        if self
+            .last
+            .as_ref()
+            .is_some_and(|observation| !recent(observation))
+        {
             self.last = None;
             if let Some(smoothing) = &mut self.smoothing {
                 smoothing.filter = None;
@@ -113,15 +117,15 @@ impl Followed {
         intrinsics: &Intrinsics,
         now_secs: f64,
         pose: DAffine3,
-        covariance: Matrix6,
-    ) -> (DAffine3, Matrix6) {
+        covariance: Matrix<6>,
+    ) -> (DAffine3, Matrix<6>) {
         let Some(Smoothing { filter, shown }) = &mut self.smoothing else {
             return (pose, covariance);
         };
         let is_new = filter.is_none();
-        let filter = filter.get_or_insert_with(|| Filter::new(now_secs, pose, &covariance));
+        let filter = filter.get_or_insert_with(|| Filter::new(now_secs, pose, covariance));
         if !is_new {
-            filter.add(now_secs, &pose, &covariance);
+            filter.add(now_secs, &pose, covariance);
         }
         // Where nothing moves, not a bit of the picture does.
         if is_new || self.layout.distance_px(intrinsics, shown, filter.pose()) > INVISIBLE_PX {
@@ -131,7 +135,7 @@ impl Followed {
     }
 
     /// The anchor near where its motion puts it, without a detector.
-    pub(super) fn follow(
+    pub(super) fn track(
         &mut self,
         picture: Grey<'_>,
         intrinsics: &Intrinsics,
@@ -141,9 +145,9 @@ impl Followed {
         let near = REACHES.iter().find_map(|reach| {
             let shifts: Vec<Option<DVec2>> = self
                 .layout
-                .prints
+                .templates
                 .iter()
-                .map(|print| find_shift(picture, intrinsics, print, &predicted, reach))
+                .map(|template| find_shift(picture, intrinsics, template, &predicted, reach))
                 .collect();
             shifts.iter().any(Option::is_some).then_some(shifts)
         })?;
@@ -151,13 +155,13 @@ impl Followed {
         fit_pose(
             picture,
             intrinsics,
-            &self.layout.prints,
+            &self.layout.templates,
             start,
             &mut self.condition,
         )
     }
 
-    /// The pose that explains by how much each print lies from where `pose` puts it.
+    /// The pose that explains by how much each marker lies from where `pose` puts it.
     fn shifted(
         &self,
         intrinsics: &Intrinsics,
@@ -172,16 +176,18 @@ impl Followed {
         if largest_px <= SMALL_SHIFT_PX {
             return Some(pose);
         }
-        let mut sightings = Vec::new();
-        for (print, shift) in self.layout.prints.iter().zip(shifts) {
+        let mut observations = Vec::new();
+        for (template, shift) in self.layout.templates.iter().zip(shifts) {
             let Some(shift) = shift else { continue };
-            for point_m in print.corners_m() {
-                let pixel = project(intrinsics, &pose, point_m)?.pixel + *shift;
-                let pixel = undistorted_pixel(intrinsics, pixel)?;
-                sightings.push(Sighting { point_m, pixel });
+            for point_m in template.corners_m() {
+                let distorted_px = pixel_of(intrinsics, &pose, point_m)? + *shift;
+                observations.push(CornerObservation {
+                    point_m: point_m.extend(0.0),
+                    pixel: intrinsics.undistorted_pixel(distorted_px)?,
+                });
             }
         }
-        Some(refine(intrinsics, &sightings, pose)?.camera_from_anchor)
+        Some(refine(intrinsics, &observations, pose)?.camera_from_anchor)
     }
 
     /// The anchor's pose from the pixels around where a detector's corners put it; `None` where the pixels do not bear
@@ -195,13 +201,13 @@ impl Followed {
         fit_pose(
             picture,
             intrinsics,
-            &self.layout.prints,
+            &self.layout.templates,
             start,
             &mut self.condition,
         )
     }
 
-    /// Takes a pose of this frame for the anchor's, or its twin, as this frame and the earlier ones say.
+    /// Takes a pose of this frame for the anchor's, or the flipped one, as this frame and the earlier ones say.
     pub(super) fn take(
         &mut self,
         picture: Grey<'_>,
@@ -209,24 +215,24 @@ impl Followed {
         mut fitted: PixelPose,
         now_secs: f64,
     ) -> AnchorPose {
-        let mut twin = twin_of(&fitted, intrinsics, &self.layout.prints);
-        let mut odds = twin.map_or(MOST_ODDS, |twin| twin.odds);
+        let mut flipped = flipped_pose_of(&fitted, intrinsics, &self.layout.templates);
+        let mut odds = flipped.map_or(MOST_ODDS, |flipped| flipped.odds);
         let turn_variance = turn_variance(&fitted.covariance);
         let (mut believed, mut turns_below) = (false, 0.0);
-        if let (Some(last), Some(twin)) = (&self.last, &twin) {
+        if let (Some(last), Some(flipped)) = (&self.last, &flipped) {
             // The earlier frames speak for the pose that theirs became, and it takes something to turn it over.
-            let (here, there) = (&fitted.camera_from_anchor, &twin.camera_from_anchor);
+            let (here, there) = (&fitted.camera_from_anchor, &flipped.camera_from_anchor);
             odds = NEW_SHARE * odds + last.odds_of(here, there, turn_variance);
             believed = last.believed;
             let off = |pose| rotation_between(pose, &last.camera_from_anchor);
             turns_below = DOUBTED * (off(here) - off(there)).signum();
         }
         let turned = odds < turns_below;
-        if let (true, Some(other)) = (turned, twin)
+        if let (true, Some(other)) = (turned, flipped)
             && let Some(better) = self.fit(picture, intrinsics, other.camera_from_anchor)
         {
             odds = -odds;
-            twin = Some(Twin {
+            flipped = Some(FlippedPose {
                 camera_from_anchor: fitted.camera_from_anchor,
                 odds: -other.odds,
                 rms_px: fitted.rms_px,
@@ -235,16 +241,16 @@ impl Followed {
         }
         let odds = odds.clamp(-DOUBTED, MOST_ODDS);
         let believed = odds > if believed { DOUBTED } else { BELIEVED };
-        let sight = Sight {
+        let observation = Observation {
             time_secs: now_secs,
             camera_from_anchor: fitted.camera_from_anchor,
             motion: self.motion_to(&fitted.camera_from_anchor, now_secs),
             turn_variance,
-            twin: twin.map(|twin| twin.camera_from_anchor),
+            flipped: flipped.map(|flipped| flipped.camera_from_anchor),
             odds,
             believed,
         };
-        self.last = Some(sight);
+        self.last = Some(observation);
         let (camera_from_anchor, covariance) = self.smoothed(
             intrinsics,
             now_secs,
@@ -257,15 +263,15 @@ impl Followed {
             } else {
                 Status::Ambiguous
             },
-            why: (!believed).then_some(Why::TwoPoses),
+            loss_reason: (!believed).then_some(LossReason::TwoPoses),
             markers: fitted.seen.iter().filter(|&&seen| seen).count() as u32,
             camera_from_anchor: Some(camera_from_anchor),
-            covariance: Some(covariance),
+            covariance: Some(covariance.0),
             // An edge tells one coordinate of a corner's two.
             reprojection_px: fitted.rms_px * std::f64::consts::SQRT_2,
-            alternative: twin.map(|twin| Alternative {
-                camera_from_anchor: twin.camera_from_anchor,
-                reprojection_px: twin.rms_px * std::f64::consts::SQRT_2,
+            alternative: flipped.map(|flipped| Alternative {
+                camera_from_anchor: flipped.camera_from_anchor,
+                reprojection_px: flipped.rms_px * std::f64::consts::SQRT_2,
             }),
             visibility: 1.0,
         }
@@ -289,12 +295,12 @@ impl Followed {
             chosen = alternative;
         }
         let corners = 4 * located.markers;
-        self.last = Some(Sight {
+        self.last = Some(Observation {
             time_secs: now_secs,
             camera_from_anchor: chosen.camera_from_anchor,
             motion: self.motion_to(&chosen.camera_from_anchor, now_secs),
             turn_variance: turn_variance(&located.covariance),
-            twin: other.map(|other| other.camera_from_anchor),
+            flipped: other.map(|other| other.camera_from_anchor),
             odds: 0.0,
             believed: !solutions.ambiguous,
         });
@@ -310,10 +316,10 @@ impl Followed {
             } else {
                 Status::Tracked
             },
-            why: solutions.ambiguous.then_some(Why::TwoPoses),
+            loss_reason: solutions.ambiguous.then_some(LossReason::TwoPoses),
             markers: located.markers as u32,
             camera_from_anchor: Some(camera_from_anchor),
-            covariance: Some(covariance),
+            covariance: Some(covariance.0),
             reprojection_px: chosen.rms_px(corners),
             alternative: other.map(|solution| Alternative {
                 camera_from_anchor: solution.camera_from_anchor,
@@ -324,9 +330,9 @@ impl Followed {
     }
 
     /// The anchor in a frame that does not show it: predicted for a moment, fading, then lost.
-    pub(super) fn missed(&self, why: Why, now_secs: f64) -> AnchorPose {
+    pub(super) fn missed(&self, loss_reason: LossReason, now_secs: f64) -> AnchorPose {
         let lost = AnchorPose {
-            why: Some(why),
+            loss_reason: Some(loss_reason),
             ..AnchorPose::LOST
         };
         let Some(last) = &self.last else { return lost };
@@ -343,7 +349,7 @@ impl Followed {
     }
 
     /// Where what was shown goes on to.
-    fn shown_at(&self, last: &Sight, now_secs: f64) -> DAffine3 {
+    fn shown_at(&self, last: &Observation, now_secs: f64) -> DAffine3 {
         match &self.smoothing {
             Some(Smoothing {
                 filter: Some(filter),
@@ -368,9 +374,9 @@ impl Followed {
     }
 }
 
-impl Sight {
+impl Observation {
     /// Logarithm of the odds for one of two poses that the anchor may have by now against the other: either was reached
-    /// from this pose, or, where this one was the wrong one, from its twin. Where the two have come together, as they do
+    /// from this pose, or, where this one was the wrong one, from the flipped one. Where the two have come together, as they do
     /// when the anchor faces the camera, nobody can tell which of those that part again is which.
     fn odds_of(&self, here: &DAffine3, there: &DAffine3, turn_variance: f64) -> f64 {
         let variance = self.turn_variance + turn_variance + UNFORESEEN_TURN * UNFORESEEN_TURN;
@@ -381,8 +387,10 @@ impl Sight {
         let doubt = REMEMBERED * self.odds;
         let likely = |pose| {
             let same = reached(&self.camera_from_anchor, pose);
-            let twin = self.twin.as_ref();
-            twin.map_or(same, |twin| log_of_sum(same, reached(twin, pose) - doubt))
+            let flipped = self.flipped.as_ref();
+            flipped.map_or(same, |flipped| {
+                log_of_sum(same, reached(flipped, pose) - doubt)
+            })
         };
         likely(here) - likely(there)
     }
@@ -397,12 +405,12 @@ impl Sight {
     }
 }
 
-/// Of a turn, whatever its direction, rad².
-fn turn_variance(covariance: &Matrix6) -> f64 {
-    (0..3).map(|k| covariance[k][k]).sum()
+/// The variance of a turn, whatever its direction, rad².
+fn turn_variance(covariance: &Matrix<6>) -> f64 {
+    (0..3).map(|k| covariance.0[k][k]).sum()
 }
 
-/// ln(eᵃ + eᵇ)
+/// The logarithm of a sum, ln(eᵃ + eᵇ).
 fn log_of_sum(a: f64, b: f64) -> f64 {
     let (more, less) = (a.max(b), a.min(b));
     more + (less - more).exp().ln_1p()

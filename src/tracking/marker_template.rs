@@ -1,4 +1,4 @@
-//! What a marker's print looks like: its cells, and the edges between black and white ones, in its anchor's plane.
+//! What a printed marker looks like: its cells, and the edges between black and white ones, in its anchor's plane.
 
 use glam::DVec2;
 
@@ -9,8 +9,8 @@ pub(super) const ROWS: usize = 3;
 /// Columns of cells that an edge knows: two to either side of it.
 pub(super) const COLUMNS: usize = 4;
 
-/// A marker's print, placed in the plane of its anchor.
-pub(super) struct Print {
+/// A marker as printed, placed in the plane of its anchor.
+pub(super) struct MarkerTemplate {
     /// Cells a side of the black square.
     pub side: i32,
     /// White cells of the black square, rows from the top.
@@ -21,12 +21,12 @@ pub(super) struct Print {
     right_m: DVec2,
     /// A step of one cell down, metres.
     down_m: DVec2,
-    pub edges: Vec<Edge>,
+    pub edges: Vec<TemplateEdge>,
 }
 
 /// One cell's length of the boundary between a black and a white cell.
-pub(super) struct Edge {
-    /// Its middle in the anchor's plane, metres.
+pub(super) struct TemplateEdge {
+    /// The edge's middle in the anchor's plane, metres.
     pub point_m: DVec2,
     /// A step of one cell across it, metres.
     pub across_m: DVec2,
@@ -38,14 +38,14 @@ pub(super) struct Edge {
     pub around: [[f32; COLUMNS]; ROWS],
 }
 
-impl Print {
+impl MarkerTemplate {
     /// `white` are the cells of the black square, rows from the top, its border included; their number is a square.
     pub fn new(marker: &Marker, white: Vec<bool>) -> Self {
         let side = white.len().isqrt();
         let turn = DVec2::from_angle(marker.rotation_rad);
         let half_m = marker.size_m / 2.0;
         let cell_m = marker.size_m / side as f64;
-        let mut print = Self {
+        let mut template = Self {
             side: side as i32,
             white,
             corner_m: marker.center_m + turn.rotate(DVec2::new(-half_m, half_m)),
@@ -53,13 +53,13 @@ impl Print {
             down_m: turn.rotate(DVec2::new(0.0, -cell_m)),
             edges: Vec::new(),
         };
-        for line in 0..=print.side {
-            for row in 0..print.side {
-                print.edges.extend(print.edge(line, row, false));
-                print.edges.extend(print.edge(line, row, true));
+        for line in 0..=template.side {
+            for row in 0..template.side {
+                template.edges.extend(template.edge(line, row, false));
+                template.edges.extend(template.edge(line, row, true));
             }
         }
-        print
+        template
     }
 
     /// Whether a cell is white; all around the black square is.
@@ -87,7 +87,7 @@ impl Print {
     }
 
     /// The edge left of the cell (line, row), or, `level`, above the cell (row, line); `None` between like cells.
-    fn edge(&self, line: i32, row: i32, level: bool) -> Option<Edge> {
+    fn edge(&self, line: i32, row: i32, level: bool) -> Option<TemplateEdge> {
         let white = |across: i32, along: i32| match level {
             false => self.is_white(across, along),
             true => self.is_white(along, across),
@@ -97,7 +97,7 @@ impl Print {
             return None;
         }
         let (across, along) = (f64::from(line), f64::from(row) + 0.5);
-        Some(Edge {
+        Some(TemplateEdge {
             point_m: match level {
                 false => self.point_m(across, along),
                 true => self.point_m(along, across),
@@ -121,7 +121,7 @@ mod tests {
     use crate::scene::Family;
 
     /// Three by three cells, the middle one white.
-    fn ring(rotation_rad: f64) -> Print {
+    fn ring(rotation_rad: f64) -> MarkerTemplate {
         let marker = Marker {
             family: Family::TAG16H5,
             id: 0,
@@ -129,19 +129,19 @@ mod tests {
             center_m: DVec2::new(1.0, 2.0),
             rotation_rad,
         };
-        Print::new(&marker, (0..9).map(|k| k == 4).collect())
+        MarkerTemplate::new(&marker, (0..9).map(|k| k == 4).collect())
     }
 
     #[test]
     fn every_boundary_between_unlike_cells_is_an_edge_once() {
-        let print = ring(0.0);
+        let template = ring(0.0);
         // Twelve around the square, four around the white cell.
-        assert_eq!(print.edges.len(), 16);
-        for edge in &print.edges {
+        assert_eq!(template.edges.len(), 16);
+        for edge in &template.edges {
             let step = 0.25 * edge.across_m;
             let white = |point_m: DVec2| {
-                let cell = ((point_m - print.corner_m) * DVec2::new(10.0, -10.0)).floor();
-                print.is_white(cell.x as i32, cell.y as i32)
+                let cell = ((point_m - template.corner_m) * DVec2::new(10.0, -10.0)).floor();
+                template.is_white(cell.x as i32, cell.y as i32)
             };
             assert_eq!(white(edge.point_m + step), edge.brightens);
             assert_eq!(white(edge.point_m - step), !edge.brightens);
