@@ -1,9 +1,9 @@
 // Soft shadows of a room's light (Gibson et al. 2003, section 7): what virtual things hide of the light of real surfaces, what
-// they throw back, and the light on them.
+// they reflect, and the light on them.
 //!include "sampled_surface.wgsl"
-//!include "source.wgsl"
+//!include "mapped_source.wgsl"
 
-struct Frame {
+struct ShaftFrame {
     world_from_camera: mat4x4f,
     source_count: u32,
     padding_1: u32,
@@ -11,8 +11,8 @@ struct Frame {
     padding_3: u32,
 }
 
-@group(2) @binding(0) var<uniform> frame: Frame;
-@group(2) @binding(1) var<storage, read> sources: array<Source>;
+@group(2) @binding(0) var<uniform> frame: ShaftFrame;
+@group(2) @binding(1) var<storage, read> sources: array<MappedSource>;
 // Of each vertex, without virtual things.
 @group(2) @binding(2) var<storage, read> irradiances: array<vec3f>;
 // Irradiance of each vertex from each source: rows of `source_count`, packed into two halves and one.
@@ -40,13 +40,13 @@ struct PatchCorner {
     @location(3) list: vec2u,
 }
 
-struct ThrownCorner {
+struct ReflectedCorner {
     @location(0) position: vec3f,
     // Irradiance from virtual things.
     @location(1) irradiance: vec3f,
 }
 
-struct ThrownSurface {
+struct ReflectedSurface {
     @builtin(position) clip: vec4f,
     @location(0) @interpolate(perspective, centroid) irradiance: vec3f,
     @location(1) @interpolate(perspective, centroid) one: f32,
@@ -87,8 +87,8 @@ fn place_patch(corner: PatchCorner, @builtin(vertex_index) index: u32) -> PatchS
 }
 
 @vertex
-fn place_thrown(corner: ThrownCorner, @builtin(vertex_index) index: u32) -> ThrownSurface {
-    return ThrownSurface(
+fn place_reflected(corner: ReflectedCorner, @builtin(vertex_index) index: u32) -> ReflectedSurface {
+    return ReflectedSurface(
         clip_from_point(view, vec4f(corner.position, 1.0)),
         corner.irradiance,
         one(index),
@@ -141,7 +141,7 @@ fn spread_of(seen: vec3f) -> f32 {
 }
 
 // The map around a place, averaged over what the source's extent sees through a caster at a depth.
-fn map_at(source: Source, in_tile: vec2f, caster: f32, depth: f32) -> vec3f {
+fn map_at(source: MappedSource, in_tile: vec2f, caster: f32, depth: f32) -> vec3f {
     let texels = source.spread_m * (depth - caster) / (depth * caster) * source.focal_texels;
     let level = clamp(log2(2.0 * texels), 0.0, log2(source.tile_px));
     let margin = 0.5 * exp2(level) / source.tile_px;
@@ -179,7 +179,7 @@ fn light_on_patch(surface: PatchSurface) -> Light {
 
 // Added to what sources take.
 @fragment
-fn thrown_back(surface: ThrownSurface) -> @location(1) vec4f {
+fn reflected_on_patch(surface: ReflectedSurface) -> @location(1) vec4f {
     return vec4f(-recovered(surface.irradiance, surface.first_irradiance, surface.one), 0.0);
 }
 

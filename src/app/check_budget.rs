@@ -9,7 +9,7 @@ use super::recording;
 use super::stats::quantile;
 use super::stopwatch::Stopwatch;
 use crate::capture::live::is_live;
-use crate::render::{Gpu, Renderer, Shown};
+use crate::render::{Gpu, Shown};
 use crate::scene::Scene;
 use crate::tracking::Tracker;
 
@@ -54,7 +54,8 @@ fn measured(scene: &Scene) -> Result<String> {
         bail!("the recording's first frames do not show where the world is");
     };
     let gpu = Arc::new(Gpu::open(None)?);
-    let mut renderer = Renderer::new(Arc::clone(&gpu), scene, intrinsics)?;
+    let mut renderer =
+        crate::app::room_transport_cache::renderer(Arc::clone(&gpu), scene, intrinsics)?;
     let watch = Stopwatch::start();
     let mut frames_ms = Vec::new();
     while frames_ms.len() < DRAWS && watch.elapsed_ms() < LONGEST_MS {

@@ -202,7 +202,8 @@ impl Drawing {
     ) -> Result<Self> {
         let gpu = Arc::new(Gpu::open(request.adapter.as_deref())?);
         eprintln!("drawing on {}", gpu.description());
-        let renderer = Renderer::new(Arc::clone(&gpu), scene, intrinsics)?;
+        let renderer =
+            crate::app::room_transport_cache::renderer(Arc::clone(&gpu), scene, intrinsics)?;
         let sink = request
             .out
             .as_ref()

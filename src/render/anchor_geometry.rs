@@ -15,7 +15,6 @@ use crate::geometry::mesh::Mesh;
 use crate::geometry::outline_scale::largest_stretch;
 use crate::geometry::shadow_volume::Caster;
 use crate::geometry::solid::holes;
-use crate::light::bounce::Reflector;
 use crate::scene::{Object, Scene, Shortcut};
 
 /// What kind of thing a surface belongs to.
@@ -201,7 +200,7 @@ fn thing(
         .map(|(mesh, lengths_m)| {
             let [max_error_m, mean_error_m, largest_facet_m] =
                 lengths_m.map(|length_m| length_m * stretch);
-            let positions = positions_in_anchor(object, mesh);
+            let positions = object.positions_in_anchor(mesh);
             let corner = |index: u32| positions[index as usize].as_dvec3();
             receivers = mesh.triangles.iter().map(|t| t.map(corner)).collect();
             let first = shared.triangles.len();
@@ -230,7 +229,7 @@ fn thing(
             }
         })
         .collect();
-    let positions = positions_in_anchor(object, &object.mesh);
+    let positions = object.positions_in_anchor(&object.mesh);
     Some(Thing {
         role,
         tie,
@@ -302,19 +301,9 @@ impl SharedCorners {
     }
 }
 
-fn positions_in_anchor(object: &Object, mesh: &Mesh) -> Vec<Vec3> {
-    let place = |position: &Vec3| {
-        object
-            .anchor_from_object
-            .transform_point3(position.as_dvec3())
-            .as_vec3()
-    };
-    mesh.positions.iter().map(place).collect()
-}
-
 /// Three corners for each triangle.
 fn corners(object: &Object, mesh: &Mesh) -> Vec<Corner> {
-    let positions = positions_in_anchor(object, mesh);
+    let positions = object.positions_in_anchor(mesh);
     let normal_matrix = object.anchor_from_object.matrix3.inverse().transpose();
     mesh.triangles
         .iter()
@@ -345,17 +334,4 @@ fn smooth_normals(corners: &[Corner]) -> Option<Vec<[Vec3; 3]>> {
     normals()
         .any(|[a, b, c]| a != b || b != c)
         .then(|| normals().collect())
-}
-
-/// The triangles of an object as what light meets there, in its anchor's space.
-pub(super) fn reflectors(object: &Object) -> impl Iterator<Item = Reflector> {
-    let mesh = &object.mesh;
-    let positions = positions_in_anchor(object, mesh);
-    mesh.triangles
-        .iter()
-        .zip(&mesh.triangle_materials)
-        .map(move |(triangle, &material)| Reflector {
-            corners: triangle.map(|index| positions[index as usize]),
-            albedo: object.materials[material as usize].albedo,
-        })
 }

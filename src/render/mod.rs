@@ -35,5 +35,3 @@ pub use gpu::{Gpu, RenderError, SharedDevice};
 pub use gpu_clock::GpuTimes;
 pub use layers::{Layers, REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};
 pub use renderer::{Renderer, Shown};
-pub use shafts::kept_rooms;
-pub use shafts::room::Room;

@@ -11,6 +11,8 @@ use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
 use crate::light::Material;
 use crate::scene::{Object, Scene, ShadowSettings, Shortcut, Shortcuts, Technique};
+use crate::shafts::room::Room;
+use crate::shafts::room_transport::RoomTransport;
 
 use super::accumulation::{Accumulation, Targets};
 use super::anchor_geometry::Role;
@@ -102,11 +104,24 @@ impl Shape {
 }
 
 impl Renderer {
-    /// Prepares all that does not change from frame to frame.
+    /// Prepares all that does not change from frame to frame; the light of a room is worked out, which takes seconds.
     ///
     /// # Errors
     /// A picture larger than the adapter can hold, or a device that failed.
     pub fn new(gpu: Arc<Gpu>, scene: &Scene, intrinsics: Intrinsics) -> Result<Self, RenderError> {
+        Self::with_transport(gpu, scene, intrinsics, |room| room.transport())
+    }
+
+    /// The same, where the light of a room comes from somebody who may know it already.
+    ///
+    /// # Errors
+    /// A picture larger than the adapter can hold, or a device that failed.
+    pub fn with_transport(
+        gpu: Arc<Gpu>,
+        scene: &Scene,
+        intrinsics: Intrinsics,
+        transport: impl FnOnce(&Room<'_>) -> RoomTransport,
+    ) -> Result<Self, RenderError> {
         let device = &gpu.device;
         let size_px = intrinsics.size_px;
         let [width, height] = size_px;
@@ -132,10 +147,11 @@ impl Renderer {
             materials.any(|material| material.roughness.is_some())
         });
         let is_shafts = scene.chosen_technique().0 == Technique::Shafts;
-        let shafts = scene.probe.as_ref().filter(|_| is_shafts).map(|probe| {
+        let room = scene.probe.as_ref().filter(|_| is_shafts);
+        let shafts = room.map(|probe| {
             let difference = scene.shadows.shafts.difference;
             let targets = Targets::new(&gpu, &background, samples, difference);
-            (Shafts::new(&gpu, scene, probe, &stage), targets)
+            (Shafts::new(&gpu, scene, probe, &stage, transport), targets)
         });
         let without = scene.shadows.without;
         let is_direct = samples == 1

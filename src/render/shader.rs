@@ -15,8 +15,8 @@ const INCLUDED: [(&str, &str); 7] = [
         include_str!("../../shaders/shading.wgsl"),
     ),
     (
-        "//!include \"source.wgsl\"",
-        include_str!("../../shaders/source.wgsl"),
+        "//!include \"mapped_source.wgsl\"",
+        include_str!("../../shaders/mapped_source.wgsl"),
     ),
     (
         "//!include \"video.wgsl\"",

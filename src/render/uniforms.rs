@@ -195,7 +195,8 @@ pub(super) fn uniform_entry(binding: u32, dynamic: bool) -> wgpu::BindGroupLayou
 mod tests {
     use super::*;
     use crate::render::shader;
-    use crate::render::shafts::data::{Frame, Source};
+    use crate::render::shafts::data::ShaftFrame;
+    use crate::shafts::shadow_atlas::MappedSource;
     use std::mem::offset_of;
 
     /// Members of a WGSL struct as (name, offset), and the struct's size.
@@ -235,10 +236,10 @@ mod tests {
         assert_twins!(common, LightSource, place_in_camera, power);
         let volumes = shader::source(include_str!("../../shaders/volumes.wgsl"));
         assert_twins!(&volumes, CastingLight, place_in_anchor, end_in_anchor);
-        let source = include_str!("../../shaders/source.wgsl");
+        let source = include_str!("../../shaders/mapped_source.wgsl");
         assert_twins!(
             source,
-            Source,
+            MappedSource,
             map_from_world,
             position,
             spread_m,
@@ -254,7 +255,7 @@ mod tests {
         let shafts = shader::source(include_str!("../../shaders/shafts.wgsl"));
         assert_twins!(
             &shafts,
-            Frame,
+            ShaftFrame,
             world_from_camera,
             source_count,
             padding_1,

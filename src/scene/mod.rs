@@ -7,6 +7,7 @@ use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
 use crate::geometry::mesh::{Mesh, MeshReport};
 use crate::light::probe::Probe;
 use crate::light::{Light, Material};
+pub use crate::shafts::difference::Difference;
 
 mod anchors;
 mod dictionary;
@@ -24,6 +25,7 @@ pub mod probe_file;
 mod reader;
 mod settings;
 mod shortcuts;
+mod transport;
 
 pub use dictionary::Dictionary;
 pub use error::{Place, SceneError};
@@ -447,24 +449,6 @@ pub struct ShaftSettings {
     pub map_px: u32,
     /// How what is hidden is taken out of the video.
     pub difference: Difference,
-}
-
-/// How what virtual things hide of a room's light is taken out of the video.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Difference {
-    /// Of the pixel's linear light as large a part as of the modelled light: the video keeps its texture, and the model's
-    /// reflectances do not matter.
-    Ratio,
-    /// The radiance that the model says is missing (Gibson et al. 2003, section 7; Debevec 1998).
-    Subtract,
-    /// Intensity transfers, from the encoded pixel (Gibson et al. 2003, section 7.1): for the record, as it was done where
-    /// pictures could not be added in linear light.
-    Encoded,
-}
-
-impl Difference {
-    /// The two in linear light, by the names that files use for `difference`.
-    pub const BY_NAME: [(&str, Self); 2] = [("ratio", Self::Ratio), ("subtract", Self::Subtract)];
 }
 
 impl Default for ShaftSettings {

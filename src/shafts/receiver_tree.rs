@@ -3,8 +3,8 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use super::bounding::Aabb;
 use super::patches::Patches;
-use super::source_tree::BoxM;
 
 /// A node: the patches `first..last` in the tree's order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -13,7 +13,7 @@ pub struct ReceiverNode {
     pub last: u32,
     /// Empty in a leaf.
     pub children: Vec<u32>,
-    pub bounds: BoxM,
+    pub bounds: Aabb,
     /// Vertices of its patches, each once.
     pub vertices: Vec<u32>,
 }
@@ -42,7 +42,7 @@ impl ReceiverTree {
     fn build(&mut self, patches: &Patches, order: &mut [u32], first: u32, leaf: usize) -> u32 {
         let index = self.nodes.len() as u32;
         let triangles = order.iter().map(|&patch| &patches.patches[patch as usize]);
-        let bounds = BoxM::around(triangles.clone().flat_map(|patch| patches.corners(patch)));
+        let bounds = Aabb::around(triangles.clone().flat_map(|patch| patches.corners(patch)));
         let mut vertices: Vec<u32> = triangles.flat_map(|patch| patch.vertices).collect();
         vertices.sort_unstable();
         vertices.dedup();
@@ -55,7 +55,7 @@ impl ReceiverTree {
         });
         if order.len() > leaf {
             let center = |patch: u32| patches.center(&patches.patches[patch as usize]);
-            let around = BoxM::around(order.iter().map(|&patch| center(patch)));
+            let around = Aabb::around(order.iter().map(|&patch| center(patch)));
             let middle = around.min.midpoint(around.max);
             let octant = |patch: u32| octant(center(patch), middle);
             order.sort_by_key(|&patch| octant(patch));

@@ -7,6 +7,10 @@ use glam::{DMat3, DVec3, Mat3, Vec3};
 
 use super::source_tree::{SourceNode, SourceTree};
 
+/// Nodes of sources that give receivers less than this part of their light on the average are not cut: less than a level
+/// of 255.
+pub const LEAST_WEIGHT: f32 = 1.0 / 2048.0;
+
 /// A source as it weighs in the present frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeighedSource {

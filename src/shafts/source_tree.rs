@@ -3,6 +3,8 @@
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
+use super::bounding::Aabb;
+
 /// A source of light before it has its place in the tree.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Source {
@@ -16,45 +18,6 @@ pub struct Source {
     pub luminance: f32,
 }
 
-/// A box, metres.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct BoxM {
-    /// Smallest coordinates.
-    pub min: Vec3,
-    /// Largest coordinates.
-    pub max: Vec3,
-}
-
-impl BoxM {
-    /// Around points; without any, one that holds nothing.
-    pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
-        let empty = Self {
-            min: Vec3::MAX,
-            max: Vec3::MIN,
-        };
-        points.into_iter().fold(empty, |bounds, point| Self {
-            min: bounds.min.min(point),
-            max: bounds.max.max(point),
-        })
-    }
-
-    /// Whether both have a point in common.
-    pub fn touches(&self, other: &Self) -> bool {
-        self.min.cmple(other.max).all() && self.max.cmpge(other.min).all()
-    }
-
-    /// How far the two are apart; 0 where they touch.
-    pub fn distance(&self, other: &Self) -> f32 {
-        let apart = (self.min - other.max).max(other.min - self.max);
-        apart.max(Vec3::ZERO).length()
-    }
-
-    /// Length of the diagonal.
-    pub fn diagonal(&self) -> f32 {
-        self.min.distance(self.max)
-    }
-}
-
 /// A node: the sources `first..last` in the tree's order.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SourceNode {
@@ -65,7 +28,7 @@ pub struct SourceNode {
     /// Both children; a node of one source has none.
     pub children: Option<[u32; 2]>,
     /// Around its patches.
-    pub bounds: BoxM,
+    pub bounds: Aabb,
 }
 
 /// The tree; the root is node 0.
@@ -95,7 +58,7 @@ impl SourceTree {
             first,
             last: first + sources.len() as u32,
             children: None,
-            bounds: BoxM::around(sources.iter().flat_map(|source| source.corners)),
+            bounds: Aabb::around(sources.iter().flat_map(|source| source.corners)),
         });
         if sources.len() > 1 {
             let cut = cut_by_brightness(sources).unwrap_or_else(|| cut(sources));

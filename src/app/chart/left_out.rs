@@ -16,7 +16,7 @@ use super::shots::{Shots, grey_frame};
 use crate::app::truth::changed_by;
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
-use crate::render::{Renderer, Shown};
+use crate::render::Shown;
 use crate::scene::{Counting, Scene, Technique};
 
 /// By how many pixels silhouettes may move.
@@ -97,7 +97,11 @@ impl Looks {
 }
 
 fn draw(lab: &Lab<'_>, looks: &Looks) -> Result<Vec<Drawn>> {
-    let mut renderer = Renderer::new(Arc::clone(&lab.gpu()?), &looks.scene, looks.intrinsics)?;
+    let mut renderer = crate::app::room_transport_cache::renderer(
+        Arc::clone(&lab.gpu()?),
+        &looks.scene,
+        looks.intrinsics,
+    )?;
     let drawn = looks.frames.iter().map(|(frame, camera_from_anchor)| {
         renderer.upload(frame)?;
         renderer.draw(camera_from_anchor, Shown::Composite);

@@ -52,7 +52,11 @@ impl Canvas {
             let (gpu, orders, made) = (Arc::clone(&gpu), Arc::clone(&orders), Arc::clone(&made));
             thread::spawn(move || {
                 while let Some(order) = orders.take() {
-                    let renderer = Renderer::new(Arc::clone(&gpu), &order.scene, order.intrinsics);
+                    let renderer = crate::app::room_transport_cache::renderer(
+                        Arc::clone(&gpu),
+                        &order.scene,
+                        order.intrinsics,
+                    );
                     if !made.put(Made { order, renderer }) {
                         return;
                     }
@@ -215,7 +219,8 @@ impl Canvas {
             probe: None,
             ..(*self.scene).clone()
         });
-        let renderer = Renderer::new(Arc::clone(&self.gpu), &empty, intrinsics)?;
+        let renderer =
+            crate::app::room_transport_cache::renderer(Arc::clone(&self.gpu), &empty, intrinsics)?;
         let order = Order {
             scene: empty,
             intrinsics,

@@ -4,7 +4,7 @@ use super::super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT};
 use super::super::gpu::Gpu;
 use super::super::shader;
 use super::super::surfaces::Sided;
-use super::data::{PATCH_CORNER_LAYOUT, PLACE_LAYOUT, THROWN_CORNER_LAYOUT};
+use super::data::{PATCH_CORNER_LAYOUT, PLACE_LAYOUT, REFLECTED_CORNER_LAYOUT};
 
 const SUM: wgpu::BlendComponent = wgpu::BlendComponent {
     src_factor: wgpu::BlendFactor::One,
@@ -23,8 +23,8 @@ pub(super) struct Pipelines {
     pub light_on_virtual: Sided,
     /// Patches that sources light, where they are seen.
     pub light_on_patch: wgpu::RenderPipeline,
-    /// Adds what virtual things throw back on patches.
-    pub thrown_back: wgpu::RenderPipeline,
+    /// Adds what virtual things reflect on to patches.
+    pub reflected_on_patch: wgpu::RenderPipeline,
 }
 
 impl Pipelines {
@@ -149,7 +149,7 @@ impl Pipelines {
                 cache: None,
             })
         };
-        // What is thrown back is cut finer than where depth comes from, and lands on it but for rounding.
+        // What is reflected is cut finer than where depth comes from, and lands on it but for rounding.
         let flush = wgpu::DepthBiasState::default();
         let nearer = wgpu::DepthBiasState {
             constant: 16,
@@ -183,10 +183,10 @@ impl Pipelines {
                 false,
                 nearer,
             ),
-            thrown_back: build(
-                "place_thrown",
-                &[Some(THROWN_CORNER_LAYOUT)],
-                Some("thrown_back"),
+            reflected_on_patch: build(
+                "place_reflected",
+                &[Some(REFLECTED_CORNER_LAYOUT)],
+                Some("reflected_on_patch"),
                 false,
                 true,
                 nearer,

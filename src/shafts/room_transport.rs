@@ -9,6 +9,7 @@ use crate::geometry::bounds::Bounds;
 use crate::geometry::ray_caster::RayCaster;
 use crate::light::cores::on_all_cores;
 
+use super::bounding::Aabb;
 use super::hierarchy::{Arriving, Hierarchy, Marks};
 use super::irradiance_volume::IrradianceVolume;
 pub use super::light_of_room::{PatchLight, PlacedProbe};
@@ -18,13 +19,13 @@ use super::patches::{Patches, RoomTriangle};
 use super::points::points_on;
 use super::receiver_tree::ReceiverTree;
 use super::selection::{Representative, WeighedSource, triangle_spread};
-use super::source_tree::{BoxM, Source, SourceTree};
+use super::source_tree::{Source, SourceTree};
 use super::surfels::{LitSurfel, Surfel};
 use super::transfer::{Transfers, irradiance};
 
 /// How finely a room is worked out.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
+pub struct RoomOptions {
     /// Patches, about.
     pub patches: usize,
     /// Part of all power that the sources send out, the brightest first, in (0, 1].
@@ -37,7 +38,7 @@ pub struct Options {
 
 /// What is known of a room.
 #[derive(Serialize, Deserialize)]
-pub struct Prepared {
+pub struct RoomTransport {
     /// The room, the table and the phantoms.
     pub patches: Patches,
     /// Light of each patch.
@@ -72,13 +73,13 @@ const VOLUME_SPACING_M: f32 = 0.06;
 /// How far it reaches beyond where things stand.
 const VOLUME_MARGIN_M: f64 = 0.15;
 
-impl Prepared {
+impl RoomTransport {
     /// Works a room out. `things` is around all phantoms but the table, and all virtual things where they first stand.
     pub fn new(
         triangles: &[RoomTriangle],
         probe: PlacedProbe<'_>,
         things: &[Bounds],
-        options: &Options,
+        options: &RoomOptions,
     ) -> Self {
         let brightness = |place: Vec3| luminance(probe.radiance_of(place));
         let mut focuses = things.to_vec();
@@ -162,8 +163,8 @@ impl Prepared {
         self.volume = volume_around(things, &self.patches, &self.caster, &radiance);
     }
 
-    /// Marks what things in boxes may hide, and who may notice.
-    pub fn mark(&self, boxes: &[BoxM]) -> Marks {
+    /// Marks what things in boxes may hide, and which receivers may get their shadows.
+    pub fn mark(&self, boxes: &[Aabb]) -> Marks {
         let mut marks = Marks::new(&self.sources, &self.receivers);
         for bounds in boxes {
             self.hierarchy.mark(bounds, &mut marks);
@@ -328,7 +329,7 @@ impl Prepared {
     }
 }
 
-impl Prepared {
+impl RoomTransport {
     /// Irradiance of a surfel past what `caster` and the room hide: from representatives of sources, with their radiant
     /// intensities, and by `rays` from the patches of which `left` knows which part of their light the casters' shadows
     /// leave.
@@ -399,13 +400,13 @@ fn volume_around(
     IrradianceVolume::new(bounds, VOLUME_SPACING_M, patches, caster, radiance)
 }
 
-fn around(things: &[Bounds], margin_m: f64) -> BoxM {
+fn around(things: &[Bounds], margin_m: f64) -> Aabb {
     let corners = things.iter().flat_map(|bounds| {
         [bounds.low - margin_m, bounds.high + margin_m].map(|corner| corner.as_vec3())
     });
-    let bounds = BoxM::around(corners);
+    let bounds = Aabb::around(corners);
     match bounds.min.cmple(bounds.max).all() {
         true => bounds,
-        false => BoxM::around([Vec3::splat(-0.5), Vec3::splat(0.5)]),
+        false => Aabb::around([Vec3::splat(-0.5), Vec3::splat(0.5)]),
     }
 }
