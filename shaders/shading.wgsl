@@ -1,8 +1,8 @@
 // Surfaces and how they reflect one light, for all passes that shade.
 //!include "common.wgsl"
 
-@group(0) @binding(0) var<uniform> view: View;
-@group(1) @binding(0) var<uniform> light: LightSource;
+@group(0) @binding(0) var<uniform> view: AnchorView;
+@group(1) @binding(0) var<uniform> light: CameraLight;
 
 // Set when the shader is built: whether any material has a glossy layer.
 override GLOSSY: bool = true;

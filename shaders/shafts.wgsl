@@ -1,6 +1,7 @@
 // Soft shadows of a room's light (Gibson et al. 2003, section 7): what virtual things hide of the light of real surfaces, what
 // they reflect, and the light on them.
 //!include "sampled_surface.wgsl"
+//!include "light_sums.wgsl"
 //!include "mapped_source.wgsl"
 
 struct ShaftFrame {
@@ -25,7 +26,6 @@ struct ShaftFrame {
 // the level.
 @group(2) @binding(7) var environment: texture_2d<f32>;
 @group(2) @binding(8) var environment_sampler: sampler;
-
 
 // Least variance of depths in a map: a surface hides itself by no more than its own slope.
 const LEAST_SPREAD: f32 = 0.0004;
@@ -62,14 +62,6 @@ struct PatchSurface {
     @location(4) @interpolate(perspective, centroid) one: f32,
     @location(5) @interpolate(flat) first_point_in_world: vec3f,
     @location(6) @interpolate(flat) first_weights: vec2f,
-}
-
-struct Light {
-    // Irradiance on a real surface without virtual things; a = 1 where it is known.
-    @location(0) reaching: vec4f,
-    // Irradiance that virtual things take from a real surface, or the radiance of a virtual one; a = 1 where the surface is
-    // virtual.
-    @location(1) change: vec4f,
 }
 
 @vertex
@@ -155,7 +147,7 @@ fn transfer(row: u32, source: u32) -> vec3f {
 }
 
 @fragment
-fn light_on_patch(surface: PatchSurface) -> Light {
+fn light_on_patch(surface: PatchSurface) -> LightSums {
     let point_in_world = recovered(surface.point_in_world, surface.first_point_in_world, surface.one);
     let of_first = vec3f(surface.first_weights, 0.0);
     let first = recovered(vec3f(surface.weights, 0.0), of_first, surface.one).xy;
@@ -174,7 +166,7 @@ fn light_on_patch(surface: PatchSurface) -> Light {
     let reaching = weights.x * irradiances[surface.rows.x]
         + weights.y * irradiances[surface.rows.y]
         + weights.z * irradiances[surface.rows.z];
-    return Light(vec4f(reaching, 1.0), vec4f(taken, 0.0));
+    return LightSums(vec4f(reaching, 1.0), vec4f(taken, 0.0));
 }
 
 // Added to what sources take.
@@ -184,7 +176,7 @@ fn reflected_on_patch(surface: ReflectedSurface) -> @location(1) vec4f {
 }
 
 @fragment
-fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: bool) -> Light {
+fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: bool) -> LightSums {
     let surface = surface(sampled);
     let point_in_world = (frame.world_from_camera * vec4f(surface.point_in_camera, 1.0)).xyz;
     let normal_in_camera = unit(surface.normal_in_camera) * select(-1.0, 1.0, outside);
@@ -203,14 +195,14 @@ fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: boo
     let arriving = max(surface.indirect - taken, vec3f(0.0));
     let diffuse = surface.material.rgb / PI * arriving;
     if !GLOSSY || surface.material.a <= 0.0 {
-        return Light(vec4f(0.0), vec4f(diffuse, 1.0));
+        return LightSums(vec4f(0.0), vec4f(diffuse, 1.0));
     }
     let to_camera = normalize(frame.world_from_camera[3].xyz - point_in_world);
     let cos_camera = max(dot(normal, to_camera), 1e-3);
     // What hides light hides it from the layer as well; more is not known of where it comes from.
     let left = arriving / max(surface.indirect, vec3f(1e-6));
     let mirrored = mirrored(reflect(-to_camera, normal), sqrt(surface.material.a), cos_camera) * left;
-    return Light(vec4f(0.0), vec4f(diffuse * (1.0 - fresnel(cos_camera)) + mirrored, 1.0));
+    return LightSums(vec4f(0.0), vec4f(diffuse * (1.0 - fresnel(cos_camera)) + mirrored, 1.0));
 }
 
 // Radiance that the glossy layer mirrors of the environment (Karis 2013: a mean over the lobe times what the layer reflects

@@ -68,10 +68,13 @@ fn measured(scene: &Scene) -> Result<String> {
         renderer.spent(ms);
         frames_ms.push(ms);
     }
-    let governed = renderer.governed();
-    ensure!(governed.is_some(), "the technique has nothing to leave out");
+    let controller = renderer.quality_controller();
+    ensure!(
+        controller.is_some(),
+        "the technique has nothing to leave out"
+    );
     let last = &frames_ms[frames_ms.len().saturating_sub(LAST)..];
-    let setting = governed.map(|governed| setting_words(governed.setting()));
+    let setting = controller.map(|controller| setting_words(controller.setting()));
     Ok(format!(
         "{} here, at {:.1} ms (19 of 20 within {:.1} ms; {})",
         setting.unwrap_or_default(),

@@ -2,7 +2,7 @@
 
 use crate::app::room_transport_cache;
 use crate::app::stopwatch::Stopwatch;
-use crate::scene::{ProbeScene, Scene, Technique};
+use crate::scene::{ProbeScene, Scene, ShadowTechnique};
 
 /// Labels and what stands behind them. Works the room out where that has not been done yet.
 pub fn room_lines(scene: &Scene, probe: &ProbeScene) -> Vec<(&'static str, String)> {
@@ -29,7 +29,7 @@ pub fn room_lines(scene: &Scene, probe: &ProbeScene) -> Vec<(&'static str, Strin
             ),
         ),
     ];
-    if scene.chosen_technique().0 != Technique::Shafts {
+    if scene.chosen_technique().0 != ShadowTechnique::Shafts {
         return lines;
     }
     let folder = room_transport_cache::folder();
@@ -71,7 +71,7 @@ pub fn room_lines(scene: &Scene, probe: &ProbeScene) -> Vec<(&'static str, Strin
 
 /// What of a scene has no part in a room's light.
 pub fn warnings(scene: &Scene) -> Vec<String> {
-    if scene.chosen_technique().0 != Technique::Shafts {
+    if scene.chosen_technique().0 != ShadowTechnique::Shafts {
         return Vec::new();
     }
     let mut warnings = Vec::new();

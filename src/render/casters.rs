@@ -13,8 +13,8 @@ use crate::scene::{self, ShadowSettings, Shortcut};
 use super::anchor_geometry::{LevelCaster, Role, Thing};
 use super::gpu::Gpu;
 use super::insides::Insides;
-use super::touched::{Touched, light_place};
-use super::uniforms::{CastingLight, NEAR_M, UniformRow};
+use super::screen_bounds::{ScreenBounds, light_place};
+use super::uniforms::{CastingLight, LIGHT_GROUP, NEAR_M, UniformRow};
 use super::volumes::{Counted, IndexBuffer, MadeFor, Volume};
 
 /// The shadows of a scene's things.
@@ -50,7 +50,7 @@ struct Shadow {
 pub(super) struct Lit {
     pub facing: LitSides,
     pub terminator: LitSides,
-    pub averted: LitSides,
+    pub back_facing: LitSides,
 }
 
 /// Triangles that may be seen from outside, then those that are seen from inside.
@@ -73,27 +73,21 @@ impl LitSides {
 }
 
 impl Casters {
-    /// `light_layout` has one uniform with a dynamic offset.
     pub fn new(
-        device: &wgpu::Device,
+        gpu: &Gpu,
         thing_count: usize,
         light_count: usize,
-        light_layout: &wgpu::BindGroupLayout,
         shadows: &ShadowSettings,
     ) -> Self {
-        let lights =
-            UniformRow::new::<CastingLight>(device, "casting lights", light_count * thing_count);
+        let lights = UniformRow::new::<CastingLight>(
+            &gpu.device,
+            "casting lights",
+            light_count * thing_count,
+        );
         let of_light = |_| (0..thing_count).map(|_| Shadow::default()).collect();
         Self {
             shadows: (0..light_count).map(of_light).collect(),
-            light_group: device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("casting light"),
-                layout: light_layout,
-                entries: &[wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: lights.binding(),
-                }],
-            }),
+            light_group: gpu.bind_group(&LIGHT_GROUP, [lights.binding()]),
             lights,
             depth_pass: shadows.counting == scene::Counting::Auto
                 && !shadows.without.has(Shortcut::DepthPass),
@@ -110,17 +104,17 @@ impl Casters {
         lights: &[Light],
         camera_from_anchor: &[Option<DAffine3>],
         intrinsics: &Intrinsics,
-        (touched, within): (&Touched, PixelRect),
+        (bounds, within): (&ScreenBounds, PixelRect),
     ) {
         let Some(camera_from_world) = camera_from_anchor.first().copied().flatten() else {
             return;
         };
-        let placed: Vec<Option<Placed>> = camera_from_anchor
+        let placed: Vec<Option<CasterView>> = camera_from_anchor
             .iter()
             .enumerate()
             .map(|(anchor, camera_from_anchor)| {
                 let anchor_from_camera = (*camera_from_anchor)?.inverse();
-                Some(Placed {
+                Some(CasterView {
                     // The world stands still to its lights: no camera may come between, or rounding would move them.
                     anchor_from_world: match anchor {
                         0 => DAffine3::IDENTITY,
@@ -137,7 +131,7 @@ impl Casters {
             .collect();
         for (index, (light, shadows)) in lights.iter().zip(&mut self.shadows).enumerate() {
             for (number, (thing, shadow)) in things.iter().zip(shadows).enumerate() {
-                let reach = &touched.shadows[index][number];
+                let reach = &bounds.shadows[index][number];
                 shadow.scissor = None;
                 let level = levels[number];
                 let pixels = reach.pixels.intersection(within);
@@ -248,7 +242,7 @@ impl Shadow {
         for (sides, seen) in [
             (&mut self.lit.facing, sorted.facing),
             (&mut self.lit.terminator, sorted.terminator),
-            (&mut self.lit.averted, sorted.averted),
+            (&mut self.lit.back_facing, sorted.averted),
         ] {
             let triangles = seen.outer.iter().chain(&seen.inner);
             let corners = triangles.flat_map(|&triangle| caster.surface_triangles[triangle]);
@@ -261,7 +255,7 @@ impl Shadow {
 }
 
 /// Where an anchor's casters have the light and the camera.
-struct Placed {
+struct CasterView {
     anchor_from_world: DAffine3,
     near: [DVec3; 4],
     eye: DVec3,

@@ -10,7 +10,7 @@ use crate::geometry::shadow_volume::LightPlace;
 use crate::light::Light;
 
 use super::anchor_geometry::{Role, Thing, ThingLevel};
-use super::touched::light_place;
+use super::screen_bounds::light_place;
 use super::uniforms::NEAR_M;
 
 /// So far may the line move at which a real thing turns away from a light.
@@ -43,12 +43,12 @@ pub(super) fn chosen_levels(
         near_m: f64::from(NEAR_M),
     };
     let world_from_camera = camera_from_world.inverse();
-    let placed: Vec<Option<Placed>> = things
+    let placed: Vec<Option<PlacedBounds>> = things
         .iter()
         .map(|thing| {
             let world_from_thing = world_from_camera * camera_from_anchor[thing.anchor]?;
             let place = |point: DVec3| world_from_thing.transform_point3(point);
-            Some(Placed {
+            Some(PlacedBounds {
                 bounds: Bounds::around(thing.bounds.corners().map(place))?,
                 world_from_thing,
             })
@@ -63,7 +63,7 @@ pub(super) fn chosen_levels(
         .zip(&placed)
         .enumerate()
         .map(|(index, (thing, placed_thing))| {
-            let Some(Placed { bounds, .. }) = placed_thing else {
+            let Some(PlacedBounds { bounds, .. }) = placed_thing else {
                 return 0;
             };
             if thing.levels.len() == 1 {
@@ -112,7 +112,7 @@ pub(super) fn chosen_levels(
 }
 
 /// Where a thing is in this frame, in world space.
-struct Placed {
+struct PlacedBounds {
     bounds: Bounds,
     world_from_thing: DAffine3,
 }

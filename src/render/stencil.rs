@@ -24,3 +24,22 @@ pub(super) fn hides(role: Role) -> u32 {
         Role::Virtual => VIRTUAL_HIDES,
     }
 }
+
+/// A stencil test of both sides' bits `read`, and what a drawn sample does to other bits.
+pub(super) fn stencil(
+    compare: wgpu::CompareFunction,
+    read: u32,
+    (pass_op, written): (wgpu::StencilOperation, u32),
+) -> wgpu::StencilState {
+    let face = wgpu::StencilFaceState {
+        compare,
+        pass_op,
+        ..Default::default()
+    };
+    wgpu::StencilState {
+        front: face,
+        back: face,
+        read_mask: read,
+        write_mask: written,
+    }
+}

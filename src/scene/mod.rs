@@ -348,6 +348,25 @@ impl Technique {
     }
 }
 
+/// What makes a scene's shadows: a [`Technique`] that is chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ShadowTechnique {
+    /// Shadow volumes.
+    Volumes,
+    /// Soft shadows of a probe's light in a room.
+    Shafts,
+}
+
+impl ShadowTechnique {
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Volumes => Technique::Volumes.name(),
+            Self::Shafts => Technique::Shafts.name(),
+        }
+    }
+}
+
 /// How shadow volumes are counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Counting {
@@ -481,19 +500,19 @@ impl Default for ShadowSettings {
 }
 
 impl Scene {
-    /// The technique that makes this scene's shadows (never [`Technique::Auto`]), and why.
-    pub fn chosen_technique(&self) -> (Technique, &'static str) {
+    /// The technique that makes this scene's shadows, and why.
+    pub fn chosen_technique(&self) -> (ShadowTechnique, &'static str) {
         match self.shadows.technique {
             Technique::Auto => match &self.probe {
-                None => (Technique::Volumes, "the scene has no probe"),
+                None => (ShadowTechnique::Volumes, "the scene has no probe"),
                 Some(probe) if probe.is_far => {
                     let reason = "the scene has a probe; without a room its light comes from afar";
-                    (Technique::Shafts, reason)
+                    (ShadowTechnique::Shafts, reason)
                 }
-                Some(_) => (Technique::Shafts, "the scene has a probe and a room"),
+                Some(_) => (ShadowTechnique::Shafts, "the scene has a probe and a room"),
             },
-            Technique::Shafts => (Technique::Shafts, "the scene asks for it"),
-            Technique::Volumes => (Technique::Volumes, "the scene asks for it"),
+            Technique::Shafts => (ShadowTechnique::Shafts, "the scene asks for it"),
+            Technique::Volumes => (ShadowTechnique::Volumes, "the scene asks for it"),
         }
     }
 }

@@ -3,12 +3,27 @@
 
 use crate::shafts::shadow_atlas::Tiling;
 
-use super::super::shader;
+use super::super::attachments::cleared;
+use super::super::gpu::Gpu;
+use super::super::passes::Passes;
+use super::super::pipelines::{GroupLayout, PipelineDescription, overwritten, storage, texels};
 use super::data::PLACE_LAYOUT;
 
 /// Whether there is a caster, how far off, and that squared.
 const MAP_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+/// The sources, for those who draw their maps.
+const SOURCES_GROUP: GroupLayout = GroupLayout {
+    label: "shaft maps",
+    entries: &[storage(0, wgpu::ShaderStages::VERTEX)],
+};
+
+/// The next finer level.
+const FINER_GROUP: GroupLayout = GroupLayout {
+    label: "shaft mips",
+    entries: &[texels(0, false)],
+};
+
 /// The atlas, and how it is drawn.
 pub(super) struct Maps {
     tiling: Tiling,
@@ -17,101 +32,39 @@ pub(super) struct Maps {
     pub view: wgpu::TextureView,
     cast: wgpu::RenderPipeline,
     halve: wgpu::RenderPipeline,
-    halve_layout: wgpu::BindGroupLayout,
-    sources_layout: wgpu::BindGroupLayout,
 }
 
 impl Maps {
-    pub fn new(device: &wgpu::Device, tiling: Tiling) -> Self {
-        let sources_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("shaft maps"),
-            entries: &[wgpu::BindGroupLayoutEntry {
-                binding: 0,
-                visibility: wgpu::ShaderStages::VERTEX,
-                ty: wgpu::BindingType::Buffer {
-                    ty: wgpu::BufferBindingType::Storage { read_only: true },
-                    has_dynamic_offset: false,
-                    min_binding_size: None,
-                },
-                count: None,
-            }],
-        });
-        let halve_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("shaft mips"),
-            entries: &[wgpu::BindGroupLayoutEntry {
-                binding: 0,
-                visibility: wgpu::ShaderStages::FRAGMENT,
-                ty: wgpu::BindingType::Texture {
-                    sample_type: wgpu::TextureSampleType::Float { filterable: false },
-                    view_dimension: wgpu::TextureViewDimension::D2,
-                    multisampled: false,
-                },
-                count: None,
-            }],
-        });
-        let layout = |groups: &[Option<&wgpu::BindGroupLayout>]| {
-            device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some("shaft maps"),
-                bind_group_layouts: groups,
-                immediate_size: 0,
-            })
-        };
-        let module = shader::module(
-            device,
-            "shaft maps",
-            include_str!("../../../shaders/shaft_maps.wgsl"),
-        );
-        let cast = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("shaft maps"),
-            layout: Some(&layout(&[Some(&sources_layout)])),
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("see"),
-                compilation_options: Default::default(),
-                buffers: &[Some(PLACE_LAYOUT)],
-            },
-            primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: Some(wgpu::DepthStencilState {
-                format: DEPTH_FORMAT,
-                depth_write_enabled: Some(true),
-                depth_compare: Some(wgpu::CompareFunction::Less),
-                stencil: wgpu::StencilState::default(),
-                bias: wgpu::DepthBiasState::default(),
-            }),
-            multisample: wgpu::MultisampleState::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("seen"),
-                compilation_options: Default::default(),
-                targets: &[Some(MAP_FORMAT.into())],
-            }),
-            multiview_mask: None,
-            cache: None,
-        });
-        let module = shader::module(
-            device,
-            "shaft mips",
-            include_str!("../../../shaders/shaft_mips.wgsl"),
-        );
-        let halve = shader::whole_picture(
-            device,
-            &layout(&[Some(&halve_layout)]),
-            &module,
-            "halve",
-            &[Some(MAP_FORMAT.into())],
-            None,
-            &[],
-        );
-        let (atlas, depth) = textures(device, &tiling);
+    pub fn new(gpu: &Gpu, tiling: Tiling) -> Self {
+        let (atlas, depth) = textures(&gpu.device, &tiling);
         Self {
             tiling,
             view: atlas.create_view(&Default::default()),
             atlas,
             depth,
-            cast,
-            halve,
-            halve_layout,
-            sources_layout,
+            cast: gpu.pipeline(&PipelineDescription {
+                shader: "shaft_maps.wgsl",
+                vertex: "see",
+                fragment: "seen",
+                groups: vec![Some(SOURCES_GROUP)],
+                vertex_buffers: vec![PLACE_LAYOUT],
+                targets: vec![overwritten(MAP_FORMAT)],
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: DEPTH_FORMAT,
+                    depth_write_enabled: Some(true),
+                    depth_compare: Some(wgpu::CompareFunction::Less),
+                    stencil: wgpu::StencilState::default(),
+                    bias: wgpu::DepthBiasState::default(),
+                }),
+                ..Default::default()
+            }),
+            halve: gpu.pipeline(&PipelineDescription {
+                shader: "shaft_mips.wgsl",
+                fragment: "halve",
+                groups: vec![Some(FINER_GROUP)],
+                targets: vec![overwritten(MAP_FORMAT)],
+                ..Default::default()
+            }),
         }
     }
 
@@ -129,8 +82,8 @@ impl Maps {
     /// Draws the casters' triangles as each of `count` sources sees them.
     pub fn draw(
         &self,
-        device: &wgpu::Device,
-        encoder: &mut wgpu::CommandEncoder,
+        gpu: &Gpu,
+        passes: &mut Passes<'_>,
         sources: &wgpu::Buffer,
         count: u32,
         casters: (&wgpu::Buffer, u32),
@@ -142,28 +95,17 @@ impl Maps {
                 ..Default::default()
             })
         };
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("shaft maps"),
-            layout: &self.sources_layout,
-            entries: &[wgpu::BindGroupEntry {
-                binding: 0,
-                resource: sources.as_entire_binding(),
-            }],
-        });
         let finest = level(0);
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("shaft maps"),
-            color_attachments: &[Some(cleared(&finest))],
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &self.depth,
-                depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(1.0),
-                    store: wgpu::StoreOp::Discard,
-                }),
-                stencil_ops: None,
+        let depth = wgpu::RenderPassDepthStencilAttachment {
+            view: &self.depth,
+            depth_ops: Some(wgpu::Operations {
+                load: wgpu::LoadOp::Clear(1.0),
+                store: wgpu::StoreOp::Discard,
             }),
-            ..Default::default()
-        });
+            stencil_ops: None,
+        };
+        let mut pass = passes.begin("shaft maps", None, &[cleared(&finest)], Some(depth));
+        let group = gpu.bind_group(&SOURCES_GROUP, [sources.as_entire_binding()]);
         pass.set_pipeline(&self.cast);
         pass.set_bind_group(0, &group, &[]);
         pass.set_vertex_buffer(0, casters.0.slice(..));
@@ -177,36 +119,14 @@ impl Maps {
         drop(pass);
         for coarser in 1..self.tiling.levels() {
             let finer = level(coarser - 1);
-            let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("shaft mips"),
-                layout: &self.halve_layout,
-                entries: &[wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: wgpu::BindingResource::TextureView(&finer),
-                }],
-            });
+            let finer = wgpu::BindingResource::TextureView(&finer);
+            let group = gpu.bind_group(&FINER_GROUP, [finer]);
             let target = level(coarser);
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("shaft mips"),
-                color_attachments: &[Some(cleared(&target))],
-                ..Default::default()
-            });
+            let mut pass = passes.begin("shaft mips", None, &[cleared(&target)], None);
             pass.set_pipeline(&self.halve);
             pass.set_bind_group(0, &group, &[]);
             pass.draw(0..3, 0..1);
         }
-    }
-}
-
-fn cleared(view: &wgpu::TextureView) -> wgpu::RenderPassColorAttachment<'_> {
-    wgpu::RenderPassColorAttachment {
-        view,
-        depth_slice: None,
-        resolve_target: None,
-        ops: wgpu::Operations {
-            load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-            store: wgpu::StoreOp::Store,
-        },
     }
 }
 

@@ -1,5 +1,5 @@
 //! Soft shadows by shafts: what virtual things hide of a room's light, what they reflect, and the light on them.
-//! Reads the room's transport, and poses. Writes `reaching` and `change` (see shafts.wgsl).
+//! Reads the room's transport, and poses. Writes the sources' maps, light sums, and then the picture.
 //!
 //! What depends on where things are in the world is worked out when they move, not when the camera does.
 
@@ -13,9 +13,8 @@ use glam::{DAffine3, Vec3};
 use wgpu::util::DeviceExt as _;
 
 use crate::geometry::bounds::Bounds;
-use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::{self, PixelRect};
-use crate::scene::{ProbeScene, Scene, ShaftSettings};
+use crate::scene::{Difference, ProbeScene, Scene, ShaftSettings};
 use crate::shafts::bounding::Aabb;
 use crate::shafts::casters::{PlacedCasters, ShaftCasters};
 use crate::shafts::hidden_light::{HiddenLight, ShadowOptions};
@@ -25,12 +24,20 @@ use crate::shafts::shadow_atlas::Tiling;
 use crate::shafts::surfels::{GroupedSurfels, interreflected_irradiance};
 
 use super::anchor_geometry::Role;
+use super::attachments::{cleared, depth_stencil};
+use super::background::Background;
 use super::gpu::Gpu;
+use super::gpu_clock::GpuSpan;
+use super::light_sums::{BY_GAIN, CompositeShader, LightSums};
+use super::passes::Passes;
+use super::screen_bounds::ScreenBounds;
 use super::stage::Stage;
+use super::technique::{DrawnFrame, Shown, TechniquePasses};
+use super::volumes::set_scissor;
 use data::ShaftFrame;
 use environment::Environment;
 use maps::Maps;
-use pipelines::Pipelines;
+use pipelines::{Pipelines, SHAFT_GROUP};
 
 /// What shafts need from frame to frame.
 pub(super) struct Shafts {
@@ -40,6 +47,7 @@ pub(super) struct Shafts {
     settings: ShaftSettings,
     casters: ShaftCasters,
     pipelines: Pipelines,
+    sums: LightSums,
     maps: Maps,
     /// Places of all patches' corners, three each.
     places: wgpu::Buffer,
@@ -78,37 +86,29 @@ impl Shafts {
         gpu: &Gpu,
         scene: &Scene,
         probe: &ProbeScene,
-        stage: &Stage,
+        background: &Background,
+        glossy: bool,
         transport: impl FnOnce(&Room<'_>) -> RoomTransport,
     ) -> Self {
         let parts = scene.room(probe);
         let surfaces_key = parts.surfaces_key();
         let room = transport(&parts);
         let device = &gpu.device;
-        let buffer = |label, contents: &[u8], usage| {
-            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some(label),
-                contents,
-                usage,
-            })
-        };
-        let places: Vec<Vec3> = room
-            .patches
-            .patches
-            .iter()
+        let patches = room.patches.patches.iter();
+        let places: Vec<Vec3> = patches
             .flat_map(|patch| room.patches.corners(patch))
             .collect();
         let settings = scene.shadows.shafts;
+        let samples = scene.shadows.samples;
         let tiling = Tiling::new(1, settings.map_px, device.limits().max_texture_dimension_2d);
-        let glossy = scene.virtuals.iter().any(|object| {
-            let mut materials = object.materials.iter();
-            materials.any(|material| material.roughness.is_some())
-        });
+        let environment = glossy.then_some((&probe.probe, probe.exposure as f32));
         Self {
-            pipelines: Pipelines::new(gpu, &stage.layouts, scene.shadows.samples, glossy),
-            maps: Maps::new(device, tiling),
+            pipelines: Pipelines::new(gpu, samples, glossy),
+            sums: LightSums::new(gpu, background, samples, composite(settings.difference)),
+            maps: Maps::new(gpu, tiling),
             casters: ShaftCasters::new(&scene.occluders()),
             places: buffer(
+                gpu,
                 "patches",
                 bytemuck::cast_slice(&places),
                 wgpu::BufferUsages::VERTEX,
@@ -127,11 +127,7 @@ impl Shafts {
                 mipmap_filter: wgpu::MipmapFilterMode::Linear,
                 ..Default::default()
             }),
-            environment: Environment::new(
-                device,
-                &gpu.queue,
-                glossy.then_some((&probe.probe, probe.exposure as f32)),
-            ),
+            environment: Environment::new(device, &gpu.queue, environment),
             world_from_anchor: Vec::new(),
             hidden: None,
             settings,
@@ -140,39 +136,9 @@ impl Shafts {
         }
     }
 
-    /// Takes the places of virtual things from another state of its scene. False where the room is another one.
-    pub fn follow(&mut self, scene: &Scene) -> bool {
-        let Some(probe) = &scene.probe else {
-            return false;
-        };
-        let parts = scene.room(probe);
-        if parts.surfaces_key() != self.surfaces_key {
-            return false;
-        }
-        let corners = |bounds: Bounds| [bounds.low, bounds.high].map(|corner| corner.as_vec3());
-        let is_held = |bounds| self.room.volume.holds(&Aabb::around(corners(bounds)));
-        if !scene.virtual_bounds().all(is_held) {
-            self.room.gather_volume(&parts.things);
-        }
-        self.casters.follow(&scene.occluders());
-        self.world_from_anchor.clear();
-        true
-    }
-
-    /// So many sources at most get a shadow from now on; `None`: all.
-    pub fn set_sources(&mut self, sources: Option<u32>) {
-        self.settings.sources = sources;
-        self.world_from_anchor.clear();
-    }
-
     /// Works out what is hidden where things are now. Returns the pixels that it can change, `None` if none.
-    pub fn update(
-        &mut self,
-        gpu: &Gpu,
-        stage: &Stage,
-        camera_from_anchor: &[Option<DAffine3>],
-        intrinsics: &Intrinsics,
-    ) -> Option<PixelRect> {
+    fn update(&mut self, gpu: &Gpu, stage: &Stage) -> Option<PixelRect> {
+        let camera_from_anchor = stage.camera_from_anchor();
         let camera_from_world = (*camera_from_anchor.first()?)?;
         let world_from_camera = camera_from_world.inverse();
         let mut world_from_anchor: Vec<Option<DAffine3>> = camera_from_anchor
@@ -203,7 +169,7 @@ impl Shafts {
             .write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
         let covered = |bounds: &Aabb| {
             let corners = bounds.corners().map(|corner| corner.as_dvec3());
-            reach::covered(&corners, &camera_from_world, intrinsics)
+            reach::covered(&corners, &camera_from_world, stage.intrinsics())
         };
         let changed = hidden.changed.iter().map(covered);
         let pixels = changed.fold(PixelRect::NONE, PixelRect::union);
@@ -233,7 +199,7 @@ impl Shafts {
         ];
         let seen = placed.seen.iter().copied();
         Hidden {
-            group: self.group(&gpu.device, buffers),
+            group: self.group(gpu, buffers),
             source_count: hidden.sources.len() as u32,
             sources,
             casters: vertices("shaft casters", bytemuck::cast_slice(&placed.triangles)),
@@ -249,7 +215,7 @@ impl Shafts {
     }
 
     /// Group 2 of shafts.wgsl; the buffers are those of the first bindings.
-    fn group(&self, device: &wgpu::Device, buffers: [&wgpu::Buffer; 5]) -> wgpu::BindGroup {
+    fn group(&self, gpu: &Gpu, buffers: [&wgpu::Buffer; 5]) -> wgpu::BindGroup {
         let buffers = buffers.map(|buffer| buffer.as_entire_binding());
         let textures = [
             wgpu::BindingResource::TextureView(&self.maps.view),
@@ -257,25 +223,17 @@ impl Shafts {
             wgpu::BindingResource::TextureView(&self.environment.view),
             wgpu::BindingResource::Sampler(&self.environment.sampler),
         ];
-        let entries: Vec<wgpu::BindGroupEntry<'_>> = (0..)
-            .zip(buffers.into_iter().chain(textures))
-            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
-            .collect();
-        device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("shafts"),
-            layout: &self.pipelines.layout,
-            entries: &entries,
-        })
+        gpu.bind_group(&SHAFT_GROUP, buffers.into_iter().chain(textures))
     }
 
     /// Draws the sources' maps where they are not drawn yet.
-    pub fn draw_maps(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder) {
+    fn draw_maps(&mut self, gpu: &Gpu, passes: &mut Passes<'_>) {
         let Some(hidden) = self.hidden.as_mut().filter(|hidden| !hidden.is_drawn) else {
             return;
         };
         self.maps.draw(
-            &gpu.device,
-            encoder,
+            gpu,
+            passes,
             &hidden.sources,
             hidden.source_count,
             (&hidden.casters, hidden.caster_vertices),
@@ -284,7 +242,7 @@ impl Shafts {
     }
 
     /// Draws what is real into depth, what is virtual over it, and the light on both.
-    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, stage: &Stage, within: PixelRect) {
+    fn draw_light(&self, pass: &mut wgpu::RenderPass<'_>, stage: &Stage, within: PixelRect) {
         let Some(hidden) = &self.hidden else {
             return;
         };
@@ -308,6 +266,76 @@ impl Shafts {
         pass.set_pipeline(&self.pipelines.reflected_on_patch);
         pass.set_vertex_buffer(0, hidden.reflected.slice(..));
         pass.draw(0..hidden.reflected_count, 0..1);
+    }
+}
+
+impl TechniquePasses for Shafts {
+    /// Takes the places of virtual things. False where the room is another one.
+    fn follow(&mut self, scene: &Scene) -> bool {
+        let Some(probe) = &scene.probe else {
+            return false;
+        };
+        let parts = scene.room(probe);
+        if parts.surfaces_key() != self.surfaces_key {
+            return false;
+        }
+        let corners = |bounds: Bounds| [bounds.low, bounds.high].map(|corner| corner.as_vec3());
+        let is_held = |bounds| self.room.volume.holds(&Aabb::around(corners(bounds)));
+        if !scene.virtual_bounds().all(is_held) {
+            self.room.gather_volume(&parts.things);
+        }
+        self.casters.follow(&scene.occluders());
+        self.world_from_anchor.clear();
+        true
+    }
+
+    fn set_sources(&mut self, sources: Option<u32>) {
+        self.settings.sources = sources;
+        self.world_from_anchor.clear();
+    }
+
+    fn prepare(&mut self, gpu: &Gpu, stage: &mut Stage, shown: Shown) -> Option<ScreenBounds> {
+        match shown {
+            Shown::Bare => None,
+            Shown::Composite => self.update(gpu, stage).map(ScreenBounds::pixels_alone),
+        }
+    }
+
+    /// Gibson et al. 2003, section 7, in as few passes over the pixels as there are: one.
+    fn draw(&mut self, passes: &mut Passes<'_>, frame: &DrawnFrame<'_>) {
+        self.draw_maps(frame.gpu, passes);
+        let mut pass = passes.begin(
+            "shafts",
+            Some(GpuSpan::Light.whole()),
+            &[cleared(&self.sums.reaching), cleared(&self.sums.change)],
+            Some(depth_stencil(&self.sums.depth_stencil, true, true)),
+        );
+        set_scissor(&mut pass, frame.bounds.pixels);
+        self.draw_light(&mut pass, frame.stage, frame.bounds.pixels);
+        drop(pass);
+        self.sums.composite(passes, frame);
+    }
+
+    fn draw_gain(
+        &self,
+        passes: &mut Passes<'_>,
+        frame: &DrawnFrame<'_>,
+        gain: wgpu::RenderPassColorAttachment<'_>,
+    ) {
+        self.sums.draw_gain(passes, frame, gain);
+    }
+}
+
+/// How light is taken out of the video.
+fn composite(difference: Difference) -> CompositeShader {
+    let shader = "difference.wgsl";
+    match difference {
+        Difference::Ratio => BY_GAIN,
+        Difference::Subtract => CompositeShader { shader, flag: None },
+        Difference::Encoded => CompositeShader {
+            shader,
+            flag: Some("ENCODED"),
+        },
     }
 }
 

@@ -1,4 +1,4 @@
-//! Where in the picture virtual things and shadows can be: the passes leave the rest alone.
+//! Bounds on screen: where in the picture virtual things and shadows can be. The passes leave the rest alone.
 
 use glam::{DAffine3, DVec3};
 
@@ -16,9 +16,9 @@ const UNSEEN: ShadowReach = ShadowReach {
     end: None,
 };
 
-/// Where the things of a frame can change its picture.
+/// Where in the picture the things of a frame can change it.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Touched {
+pub(super) struct ScreenBounds {
     /// All of it.
     pub pixels: PixelRect,
     /// Where virtual things can be.
@@ -36,7 +36,7 @@ pub(super) struct ShadowReach {
     pub end: Option<HalfSpace>,
 }
 
-impl Touched {
+impl ScreenBounds {
     /// Where the passes make no difference between things and shadows.
     pub fn pixels_alone(pixels: PixelRect) -> Self {
         Self {
@@ -48,13 +48,13 @@ impl Touched {
 }
 
 /// What virtual things and their shadows can change, and how far all shadows reach; `None` where nothing is placed.
-pub(super) fn touched_by_virtual(
+pub(super) fn screen_bounds(
     things: &[Thing],
     lights: &[Light],
     camera_from_anchor: &[Option<DAffine3>],
     intrinsics: &Intrinsics,
     without: Shortcuts,
-) -> Option<Touched> {
+) -> Option<ScreenBounds> {
     let whole = PixelRect::whole(intrinsics.size_px);
     let scissored = |pixels: PixelRect| match without.has(Shortcut::Scissors) {
         true => whole,
@@ -102,7 +102,7 @@ pub(super) fn touched_by_virtual(
             shadows[*index] = shadow;
         }
     }
-    Some(Touched {
+    Some(ScreenBounds {
         pixels: pixels.union(virtuals),
         virtuals,
         shadows,

@@ -1,0 +1,79 @@
+//! The technique that draws a renderer's shadows, with all that it alone needs.
+
+use super::super::accumulated::Accumulated;
+use super::super::background::Background;
+use super::super::direct::Direct;
+use super::super::gpu::Gpu;
+use super::super::shafts::Shafts;
+use super::super::stage::{LitBy, Stage};
+use super::super::technique::TechniquePasses;
+use crate::geometry::camera::Intrinsics;
+use crate::scene::{ProbeScene, Scene, ShadowTechnique, Shortcut};
+use crate::shafts::room::Room;
+use crate::shafts::room_transport::RoomTransport;
+
+/// A renderer's technique.
+pub(super) enum ChosenTechnique {
+    /// One light and one sample, shaded straight into the picture.
+    Direct(Direct),
+    /// Several lights or samples, added up.
+    Accumulated(Accumulated),
+    /// A room's light.
+    Shafts(Box<Shafts>),
+}
+
+impl ChosenTechnique {
+    /// The technique of a scene, and the stage that it draws; `transport` gives the light of a room.
+    pub fn new(
+        gpu: &Gpu,
+        scene: &Scene,
+        intrinsics: Intrinsics,
+        background: &Background,
+        transport: impl FnOnce(&Room<'_>) -> RoomTransport,
+    ) -> (Self, Stage) {
+        match room_probe(scene) {
+            Some(probe) => {
+                let stage = Stage::new(gpu, scene, intrinsics, LitBy::Room);
+                let glossy = stage.glossy;
+                let shafts = Shafts::new(gpu, scene, probe, background, glossy, transport);
+                (Self::Shafts(Box::new(shafts)), stage)
+            }
+            None => {
+                let stage = Stage::new(gpu, scene, intrinsics, LitBy::Lights);
+                let (samples, glossy) = (scene.shadows.samples, stage.glossy);
+                let is_single = samples == 1 && scene.lights.len() == 1;
+                let technique = match is_single && !scene.shadows.without.has(Shortcut::Direct) {
+                    true => Self::Direct(Direct::new(gpu, background, glossy)),
+                    false => Self::Accumulated(Accumulated::new(gpu, background, samples, glossy)),
+                };
+                (technique, stage)
+            }
+        }
+    }
+
+    /// Its steps.
+    pub fn passes(&self) -> &dyn TechniquePasses {
+        match self {
+            Self::Direct(direct) => direct,
+            Self::Accumulated(accumulated) => accumulated,
+            Self::Shafts(shafts) => shafts.as_ref(),
+        }
+    }
+
+    /// Its steps that change it.
+    pub fn passes_mut(&mut self) -> &mut dyn TechniquePasses {
+        match self {
+            Self::Direct(direct) => direct,
+            Self::Accumulated(accumulated) => accumulated,
+            Self::Shafts(shafts) => shafts.as_mut(),
+        }
+    }
+}
+
+/// The probe whose room lights the scene; `None` where its lights do.
+fn room_probe(scene: &Scene) -> Option<&ProbeScene> {
+    match scene.chosen_technique().0 {
+        ShadowTechnique::Shafts => scene.probe.as_ref(),
+        ShadowTechnique::Volumes => None,
+    }
+}
