@@ -7,7 +7,7 @@
 // Set when the shader is built: whether any material has a glossy layer.
 override GLOSSY: bool = true;
 
-struct Corner {
+struct SurfaceCorner {
     @location(0) position: vec3f,
     @location(1) normal: vec3f,
     // Albedo, and the roughness of a glossy layer or 0.
@@ -25,11 +25,11 @@ struct Surface {
 }
 
 @vertex
-fn place(corner: Corner) -> Surface {
+fn place(corner: SurfaceCorner) -> Surface {
     return placed(corner);
 }
 
-fn placed(corner: Corner) -> Surface {
+fn placed(corner: SurfaceCorner) -> Surface {
     let point = vec4f(corner.position, 1.0);
     return Surface(
         clip_from_point(view, point),

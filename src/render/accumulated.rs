@@ -7,16 +7,16 @@ use super::attachments::{depth_stencil, loaded};
 use super::background::Background;
 use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
+use super::gpu_scene::{GEOMETRY_GROUPS, GpuScene};
 use super::light_sums::{BY_GAIN, LightSums};
 use super::passes::Passes;
 use super::screen_bounds::ScreenBounds;
-use super::stage::{GEOMETRY_GROUPS, Stage};
 use super::surfaces::Surfaces;
-use super::technique::{DrawnFrame, Shown, TechniquePasses};
+use super::technique::{FrameContext, Shown, TechniquePasses};
 use super::volumes::{Among, Volumes, set_scissor};
 use crate::scene::Scene;
 
-/// Where several lights or samples of shadow volumes are added up.
+/// The technique that adds several lights or samples of shadow volumes up.
 pub(super) struct Accumulated {
     surfaces: Surfaces,
     volumes: Volumes,
@@ -36,11 +36,11 @@ impl Accumulated {
     fn draw_light(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        frame: &DrawnFrame<'_>,
+        frame: &FrameContext<'_>,
         light: usize,
         is_first: bool,
     ) {
-        let (stage, pixels) = (frame.stage, frame.bounds.pixels);
+        let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
         let (surfaces, volumes) = (&self.surfaces, &self.volumes);
         set_scissor(pass, pixels);
         if is_first {
@@ -49,16 +49,16 @@ impl Accumulated {
                 (&surfaces.ambient_on_virtual, Role::Virtual),
             ];
             for (pipelines, role) in ambient {
-                stage.draw_surfaces(pass, pipelines, role, light, pixels);
+                gpu_scene.draw_surfaces(pass, pipelines, role, light, pixels);
             }
         }
-        if stage.light_count() == 0 {
+        if gpu_scene.light_count() == 0 {
             return;
         }
-        if stage.count_volumes(pass, volumes, Among::All, Role::Real, light, pixels) {
+        if gpu_scene.count_volumes(pass, volumes, Among::All, Role::Real, light, pixels) {
             volumes.keep(pass, Role::Real, pixels);
         }
-        stage.draw_surfaces(
+        gpu_scene.draw_surfaces(
             pass,
             &surfaces.light_reaching_real,
             Role::Real,
@@ -66,8 +66,8 @@ impl Accumulated {
             pixels,
         );
         let lit = Among::LitByReal;
-        if stage.count_volumes(pass, volumes, lit, Role::Virtual, light, pixels) {
-            stage.draw_surfaces(
+        if gpu_scene.count_volumes(pass, volumes, lit, Role::Virtual, light, pixels) {
+            gpu_scene.draw_surfaces(
                 pass,
                 &surfaces.light_hidden_from_real,
                 Role::Real,
@@ -75,7 +75,7 @@ impl Accumulated {
                 pixels,
             );
         }
-        stage.draw_virtuals_facing(pass, &surfaces.light_on_virtual, light, pixels);
+        gpu_scene.draw_virtuals_facing(pass, &surfaces.light_on_virtual, light, pixels);
     }
 }
 
@@ -86,13 +86,18 @@ impl TechniquePasses for Accumulated {
 
     fn set_sources(&mut self, _: Option<u32>) {}
 
-    fn prepare(&mut self, gpu: &Gpu, stage: &mut Stage, shown: Shown) -> Option<ScreenBounds> {
-        stage.cast_shadows(gpu, shown)
+    fn prepare(
+        &mut self,
+        gpu: &Gpu,
+        gpu_scene: &mut GpuScene,
+        shown: Shown,
+    ) -> Option<ScreenBounds> {
+        gpu_scene.cast_shadows(gpu, shown)
     }
 
-    fn draw(&mut self, passes: &mut Passes<'_>, frame: &DrawnFrame<'_>) {
+    fn draw(&mut self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) {
         let sums = &self.sums;
-        let count = frame.stage.light_count().max(1);
+        let count = frame.gpu_scene.light_count().max(1);
         for light in 0..count {
             let (first, last) = (light == 0, light + 1 == count);
             let load = match first {
@@ -113,7 +118,7 @@ impl TechniquePasses for Accumulated {
     fn draw_gain(
         &self,
         passes: &mut Passes<'_>,
-        frame: &DrawnFrame<'_>,
+        frame: &FrameContext<'_>,
         gain: wgpu::RenderPassColorAttachment<'_>,
     ) {
         self.sums.draw_gain(passes, frame, gain);

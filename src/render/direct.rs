@@ -8,14 +8,14 @@ use super::attachments::{kept, loaded, target};
 use super::background::{Background, PICTURE_FORMAT, VIDEO_GROUP};
 use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
+use super::gpu_scene::{GEOMETRY_GROUPS, GpuScene};
 use super::light_sums::GAIN_FORMAT;
 use super::passes::Passes;
 use super::pipelines::{GroupLayout, PipelineDescription, overwritten, texels, untouched};
 use super::screen_bounds::ScreenBounds;
-use super::stage::{GEOMETRY_GROUPS, Stage};
 use super::stencil::{SHADOW, VIRTUAL_SHADOW, stencil};
 use super::surfaces::{Sided, surface_description};
-use super::technique::{DrawnFrame, Shown, TechniquePasses};
+use super::technique::{FrameContext, Shown, TechniquePasses};
 use super::volumes::{Among, Volumes, set_scissor};
 use crate::scene::Scene;
 
@@ -26,7 +26,7 @@ const AT_TERMINATOR: f64 = 0.5;
 /// Groups 0 to 2 where geometry is drawn over the video.
 const OVER_VIDEO_GROUPS: [GroupLayout; 3] = [GEOMETRY_GROUPS[0], GEOMETRY_GROUPS[1], VIDEO_GROUP];
 
-/// What a shadow leaves of virtual surfaces, in group 3.
+/// Group 3: what a shadow leaves of virtual surfaces.
 const AMBIENT_GROUP: GroupLayout = GroupLayout {
     label: "ambient light",
     entries: &[texels(0, false)],
@@ -66,7 +66,7 @@ impl Direct {
             |label, format, usage| target(&gpu.device, label, background.size_px, format, 1, usage);
         let read = wgpu::TextureUsages::TEXTURE_BINDING;
         let ambient = target("ambient light", PICTURE_FORMAT, read);
-        let surface = Surface {
+        let surface = SurfacesOverVideo {
             gpu,
             // What a scene does not have costs nothing.
             constants: vec![
@@ -116,8 +116,8 @@ impl Direct {
     }
 
     /// Draws phantoms' depth and lit virtual things.
-    fn draw_surfaces(&self, passes: &mut Passes<'_>, frame: &DrawnFrame<'_>) {
-        let (stage, pixels) = (frame.stage, frame.bounds.pixels);
+    fn draw_surfaces(&self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) {
+        let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
         let keep = wgpu::LoadOp::Load;
         let mut pass = passes.begin(
             "surfaces",
@@ -129,18 +129,18 @@ impl Direct {
         pass.set_pipeline(&self.nothing);
         pass.draw(0..3, 0..1);
         pass.set_bind_group(2, &frame.background.group, &[]);
-        stage.draw_surfaces(&mut pass, &self.depth_of_real, Role::Real, 0, pixels);
+        gpu_scene.draw_surfaces(&mut pass, &self.depth_of_real, Role::Real, 0, pixels);
         let shading = [
             &self.light_on_virtual,
             &self.light_at_terminator,
             &self.ambient_on_virtual,
         ];
-        stage.draw_virtuals(&mut pass, shading, 0, pixels);
+        gpu_scene.draw_virtuals(&mut pass, shading, 0, pixels);
     }
 
     /// Draws the shadows on them.
-    fn draw_shadows(&self, passes: &mut Passes<'_>, frame: &DrawnFrame<'_>) {
-        let (stage, bounds) = (frame.stage, frame.bounds);
+    fn draw_shadows(&self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) {
+        let (gpu_scene, bounds) = (frame.gpu_scene, frame.bounds);
         let pixels = bounds.pixels;
         let mut pass = passes.begin(
             "shadows",
@@ -152,14 +152,14 @@ impl Direct {
         set_scissor(pass, pixels);
         pass.set_bind_group(2, &frame.background.group, &[]);
         let volumes = &self.volumes;
-        let by_real = stage.count_volumes(pass, volumes, Among::All, Role::Real, 0, pixels);
+        let by_real = gpu_scene.count_volumes(pass, volumes, Among::All, Role::Real, 0, pixels);
         if by_real {
             volumes.keep(pass, Role::Real, pixels);
         }
         let lit = Among::LitByReal;
-        let by_virtual = stage.count_volumes(pass, volumes, lit, Role::Virtual, 0, pixels);
+        let by_virtual = gpu_scene.count_volumes(pass, volumes, lit, Role::Virtual, 0, pixels);
         if by_virtual {
-            stage.draw_surfaces(pass, &self.hidden_on_real, Role::Real, 0, pixels);
+            gpu_scene.draw_surfaces(pass, &self.hidden_on_real, Role::Real, 0, pixels);
         }
         if (by_real || by_virtual) && !bounds.virtuals.is_empty() {
             set_scissor(pass, bounds.virtuals);
@@ -180,14 +180,19 @@ impl TechniquePasses for Direct {
 
     fn set_sources(&mut self, _: Option<u32>) {}
 
-    fn prepare(&mut self, gpu: &Gpu, stage: &mut Stage, shown: Shown) -> Option<ScreenBounds> {
-        stage.cast_shadows(gpu, shown)
+    fn prepare(
+        &mut self,
+        gpu: &Gpu,
+        gpu_scene: &mut GpuScene,
+        shown: Shown,
+    ) -> Option<ScreenBounds> {
+        gpu_scene.cast_shadows(gpu, shown)
     }
 
     /// Haller et al. 2003, section 3.2, for one light and one sample: phantoms and lit virtual things into depth; *real
     /// onto real* is counted; *virtual onto real* is counted where the light arrives, and what is counted loses it;
     /// *all onto virtual* is what both have counted there, and leaves what was set aside.
-    fn draw(&mut self, passes: &mut Passes<'_>, frame: &DrawnFrame<'_>) {
+    fn draw(&mut self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) {
         self.draw_surfaces(passes, frame);
         self.draw_shadows(passes, frame);
     }
@@ -195,24 +200,24 @@ impl TechniquePasses for Direct {
     fn draw_gain(
         &self,
         passes: &mut Passes<'_>,
-        frame: &DrawnFrame<'_>,
+        frame: &FrameContext<'_>,
         gain: wgpu::RenderPassColorAttachment<'_>,
     ) {
-        let (stage, pixels) = (frame.stage, frame.bounds.pixels);
+        let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
         let mut pass = passes.begin("gain", None, &[gain], Some(kept(&self.depth_stencil)));
         set_scissor(&mut pass, pixels);
         pass.set_bind_group(2, &frame.background.group, &[]);
-        stage.draw_surfaces(&mut pass, &self.gain_on_real, Role::Real, 0, pixels);
+        gpu_scene.draw_surfaces(&mut pass, &self.gain_on_real, Role::Real, 0, pixels);
     }
 }
 
-/// What pipelines have in common that draw surfaces.
-struct Surface<'a> {
+/// The common part of all pipelines that draw surfaces over the video.
+struct SurfacesOverVideo<'a> {
     gpu: &'a Gpu,
     constants: Vec<(&'static str, f64)>,
 }
 
-impl Surface<'_> {
+impl SurfacesOverVideo<'_> {
     /// Pipelines that draw into depth, and into the picture and `ambient` as `written` says.
     fn first(
         &self,

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 
 use super::pipelines::{GroupLayout, PipelineCache, PipelineDescription};
 
-/// What can go wrong on the way to a drawn frame.
+/// A failure on the way to a drawn frame.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
     /// There is no adapter at all.

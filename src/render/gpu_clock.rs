@@ -3,7 +3,7 @@
 use super::gpu::{Gpu, RenderError};
 use super::readback::map_for_reading;
 
-/// What the last frame cost on the GPU, milliseconds; `None` where nothing was drawn or the adapter has no timestamps.
+/// The last frame's time on the GPU, milliseconds; `None` where nothing was drawn or the adapter has no timestamps.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct GpuTimes {
     /// Surfaces, shadow volumes and light.

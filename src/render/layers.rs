@@ -4,10 +4,10 @@
 use super::anchor_geometry::{CORNER_LAYOUT, Role};
 use super::attachments::{cleared, loaded, target, texture};
 use super::gpu::{Gpu, RenderError};
+use super::gpu_scene::GEOMETRY_GROUPS;
 use super::passes::Passes;
 use super::pipelines::{PipelineDescription, added, overwritten};
 use super::readback::Readback;
-use super::stage::GEOMETRY_GROUPS;
 use super::stencil::{COUNT, MOST_LAYERS, SHADOW, stencil};
 use super::surfaces::{Sided, surface_description};
 use super::volumes::Volumes;
@@ -25,7 +25,7 @@ pub const REAL_HIDES: u8 = 1;
 /// Bit of a shadow layer: a virtual thing hides the light.
 pub const VIRTUAL_HIDES: u8 = 2;
 
-/// What is seen at each pixel's centre, rows from the top.
+/// A picture's layers: what is seen at each pixel's centre, rows from the top.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Layers {
     /// 0 none, [`REAL`] or [`VIRTUAL`].

@@ -7,7 +7,7 @@ use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
 use super::passes::Passes;
 use super::pipelines::{GroupLayout, PipelineDescription, overwritten, texels};
-use super::technique::DrawnFrame;
+use super::technique::FrameContext;
 use super::volumes::set_scissor;
 
 /// Format of the gain layer.
@@ -105,7 +105,7 @@ impl LightSums {
     }
 
     /// Draws video and virtual light together, where virtual things reach.
-    pub fn composite(&self, passes: &mut Passes<'_>, frame: &DrawnFrame<'_>) {
+    pub fn composite(&self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) {
         let colors = [loaded(frame.picture, wgpu::LoadOp::Load)];
         let part = GpuSpan::Composite.whole();
         let mut pass = passes.begin("composite", Some(part), &colors, None);
@@ -116,7 +116,7 @@ impl LightSums {
     pub fn draw_gain(
         &self,
         passes: &mut Passes<'_>,
-        frame: &DrawnFrame<'_>,
+        frame: &FrameContext<'_>,
         gain: wgpu::RenderPassColorAttachment<'_>,
     ) {
         let mut pass = passes.begin("gain", None, &[gain], None);
@@ -127,7 +127,7 @@ impl LightSums {
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         pipeline: &wgpu::RenderPipeline,
-        frame: &DrawnFrame<'_>,
+        frame: &FrameContext<'_>,
     ) {
         set_scissor(pass, frame.bounds.pixels);
         pass.set_pipeline(pipeline);

@@ -145,7 +145,7 @@ pub(super) fn added(
     }
 }
 
-/// What pipelines have in common that are built for one device.
+/// All pipelines that were built for one device, and the modules and layouts that they share.
 #[derive(Default)]
 pub(super) struct PipelineCache(Mutex<Built>);
 

@@ -20,13 +20,13 @@ use super::background::{Background, PICTURE_FORMAT};
 use super::fade::{self, Fade};
 use super::gpu::{Gpu, RenderError};
 use super::gpu_clock::{GpuClock, GpuTimes};
+use super::gpu_scene::GpuScene;
 use super::layers::LayerPasses;
 use super::passes::{Passes, RecordedPasses};
 use super::quality_controller::{QualityController, Setting};
 use super::readback::Readback;
 use super::screen_bounds::ScreenBounds;
-use super::stage::Stage;
-use super::technique::{DrawnFrame, Shown};
+use super::technique::{FrameContext, Shown};
 use chosen_technique::ChosenTechnique;
 
 /// Draws the frames of one scene through one camera.
@@ -34,7 +34,7 @@ pub struct Renderer {
     gpu: Arc<Gpu>,
     size_px: [u32; 2],
     without: Shortcuts,
-    stage: Stage,
+    gpu_scene: GpuScene,
     background: Background,
     technique: ChosenTechnique,
     /// Keeps to the scene's frame budget, if it has one.
@@ -56,7 +56,7 @@ pub struct Renderer {
     made_for: Shape,
 }
 
-/// What of a scene a renderer cannot change.
+/// The part of a scene that a renderer cannot change.
 #[derive(PartialEq)]
 struct Shape {
     technique: ShadowTechnique,
@@ -119,7 +119,7 @@ impl Renderer {
             });
         }
         let background = Background::new(&gpu, &intrinsics);
-        let (technique, stage) =
+        let (technique, gpu_scene) =
             ChosenTechnique::new(&gpu, scene, intrinsics, &background, transport);
         let made_for = Shape::of(scene);
         Ok(Self {
@@ -149,7 +149,7 @@ impl Renderer {
             made_for,
             size_px,
             without: scene.shadows.without,
-            stage,
+            gpu_scene,
             background,
             gpu,
         })
@@ -162,7 +162,7 @@ impl Renderer {
         let follows =
             self.made_for == Shape::of(scene) && self.technique.passes_mut().follow(scene);
         if follows {
-            self.stage.follow(&self.gpu, scene);
+            self.gpu_scene.follow(&self.gpu, scene);
             self.stale = PixelRect::whole(self.size_px);
         }
         follows
@@ -177,7 +177,7 @@ impl Renderer {
         if controller.spent(frame_ms) {
             match controller.setting() {
                 Setting::Sources(sources) => self.technique.passes_mut().set_sources(sources),
-                Setting::SilhouettesPx(error_px) => self.stage.set_detail(error_px),
+                Setting::SilhouettesPx(error_px) => self.gpu_scene.set_detail(error_px),
             }
         }
     }
@@ -247,9 +247,9 @@ impl Renderer {
     /// the world's pose nobody knows where the light comes from, and the video is shown alone.
     pub fn draw(&mut self, camera_from_anchor: &[Option<DAffine3>], shown: Shown) {
         self.shown = shown;
-        self.stage.place(&self.gpu, camera_from_anchor);
+        self.gpu_scene.place(&self.gpu, camera_from_anchor);
         let technique = self.technique.passes_mut();
-        self.bounds = technique.prepare(&self.gpu, &mut self.stage, shown);
+        self.bounds = technique.prepare(&self.gpu, &mut self.gpu_scene, shown);
         if self.without.has(Shortcut::Kept) {
             self.stale = PixelRect::whole(self.size_px);
         }
@@ -260,9 +260,9 @@ impl Renderer {
         let bounds = self.bounds.as_ref().filter(|_| shown == Shown::Composite);
         if let Some(bounds) = bounds.filter(|bounds| !bounds.pixels.is_empty()) {
             self.stale = bounds.pixels;
-            let frame = DrawnFrame {
+            let frame = FrameContext {
                 gpu: &self.gpu,
-                stage: &self.stage,
+                gpu_scene: &self.gpu_scene,
                 background: &self.background,
                 picture: &picture,
                 bounds,
@@ -288,7 +288,7 @@ impl Renderer {
 
     /// Takes note of a frame that is not drawn, so that the next one is what it would be after it.
     pub fn pass_over(&mut self, camera_from_anchor: &[Option<DAffine3>]) {
-        self.stage.choose_levels(camera_from_anchor);
+        self.gpu_scene.choose_levels(camera_from_anchor);
     }
 
     /// The picture that is drawn: sRGB-encoded bytes, whatever the format says. It stays the same texture.
@@ -298,7 +298,7 @@ impl Renderer {
 
     /// Triangles of the things that were drawn last, in the levels of detail that were chosen for them.
     pub fn triangles(&self) -> usize {
-        self.stage.triangles()
+        self.gpu_scene.triangles()
     }
 
     /// Waits until the picture is drawn, so that drawing and reading back can be timed apart.

@@ -9,14 +9,14 @@ use crate::geometry::shadow_volume::LightPlace;
 use crate::light::Light;
 use crate::scene::{Shortcut, Shortcuts};
 
-use super::anchor_geometry::{Role, Thing};
+use super::anchor_geometry::{AnchoredModel, Role};
 
 const UNSEEN: ShadowReach = ShadowReach {
     pixels: PixelRect::NONE,
     end: None,
 };
 
-/// Where in the picture the things of a frame can change it.
+/// The pixels that a frame's things can change.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ScreenBounds {
     /// All of it.
@@ -27,7 +27,7 @@ pub(super) struct ScreenBounds {
     pub shadows: Vec<Vec<ShadowReach>>,
 }
 
-/// How far a caster's shadow reaches.
+/// The reach of a caster's shadow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ShadowReach {
     /// Where in the picture it can fall on anything; empty where there is none.
@@ -49,7 +49,7 @@ impl ScreenBounds {
 
 /// What virtual things and their shadows can change, and how far all shadows reach; `None` where nothing is placed.
 pub(super) fn screen_bounds(
-    things: &[Thing],
+    things: &[AnchoredModel],
     lights: &[Light],
     camera_from_anchor: &[Option<DAffine3>],
     intrinsics: &Intrinsics,
@@ -62,7 +62,7 @@ pub(super) fn screen_bounds(
     };
     let camera_from_world = (*camera_from_anchor.first()?)?;
     let world_from_camera = camera_from_world.inverse();
-    let corners_in_world = |thing: &Thing| {
+    let corners_in_world = |thing: &AnchoredModel| {
         let world_from_anchor = world_from_camera * camera_from_anchor[thing.anchor]?;
         Some(
             thing
@@ -71,7 +71,7 @@ pub(super) fn screen_bounds(
                 .map(|corner| world_from_anchor.transform_point3(corner)),
         )
     };
-    let placed: Vec<(usize, &Thing, [DVec3; 8])> = things
+    let placed: Vec<(usize, &AnchoredModel, [DVec3; 8])> = things
         .iter()
         .enumerate()
         .filter_map(|(index, thing)| Some((index, thing, corners_in_world(thing)?)))

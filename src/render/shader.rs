@@ -34,7 +34,7 @@ const FILES: [(&str, &str); 20] = files![
     "volumes.wgsl",
 ];
 
-/// What keeps a shader from being put together.
+/// A mistake that keeps a shader from being put together.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub(super) enum ShaderError {
     /// A file that is not there.

@@ -2,7 +2,7 @@
 
 use super::anchor_geometry::Role;
 
-/// How many volumes of the present batch the surface lies in.
+/// The number of volumes of the present batch that the surface lies in.
 pub(super) const COUNT: u32 = 0x1f;
 /// The largest number that the count can hold: a batch never has more volumes one in another.
 pub(super) const MOST_LAYERS: u32 = COUNT;

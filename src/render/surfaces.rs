@@ -3,8 +3,8 @@
 
 use super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT};
 use super::gpu::Gpu;
+use super::gpu_scene::GEOMETRY_GROUPS;
 use super::pipelines::{PipelineDescription, added, overwritten, untouched};
-use super::stage::GEOMETRY_GROUPS;
 use super::stencil::{ADDED, REAL_HIDES, SHADOW, VIRTUAL_SHADOW, stencil};
 
 /// Pipelines of the pass where several samples or lights are added up.

@@ -2,12 +2,12 @@
 
 use super::background::Background;
 use super::gpu::Gpu;
+use super::gpu_scene::GpuScene;
 use super::passes::Passes;
 use super::screen_bounds::ScreenBounds;
-use super::stage::Stage;
 use crate::scene::Scene;
 
-/// What a frame shows.
+/// The content of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shown {
     /// The video with the virtual things.
@@ -17,9 +17,9 @@ pub enum Shown {
 }
 
 /// A frame that is being drawn.
-pub(super) struct DrawnFrame<'a> {
+pub(super) struct FrameContext<'a> {
     pub gpu: &'a Gpu,
-    pub stage: &'a Stage,
+    pub gpu_scene: &'a GpuScene,
     pub background: &'a Background,
     /// The picture that is shown, with the video in it.
     pub picture: &'a wgpu::TextureView,
@@ -35,17 +35,22 @@ pub(super) trait TechniquePasses {
     /// So many sources of broad light at most get a shadow from now on; `None`: all.
     fn set_sources(&mut self, sources: Option<u32>);
 
-    /// Works out what the frame needs, whose poses `stage` has. Returns what of the picture can change; `None` if nothing.
-    fn prepare(&mut self, gpu: &Gpu, stage: &mut Stage, shown: Shown) -> Option<ScreenBounds>;
+    /// Works out what the frame needs, whose poses `gpu_scene` has. Returns what of the picture can change; `None` if nothing.
+    fn prepare(
+        &mut self,
+        gpu: &Gpu,
+        gpu_scene: &mut GpuScene,
+        shown: Shown,
+    ) -> Option<ScreenBounds>;
 
     /// Draws virtual things and shadows over the video.
-    fn draw(&mut self, passes: &mut Passes<'_>, frame: &DrawnFrame<'_>);
+    fn draw(&mut self, passes: &mut Passes<'_>, frame: &FrameContext<'_>);
 
     /// Draws the factor that the frame, which was drawn last, has put on the video; `gain` is white at first.
     fn draw_gain(
         &self,
         passes: &mut Passes<'_>,
-        frame: &DrawnFrame<'_>,
+        frame: &FrameContext<'_>,
         gain: wgpu::RenderPassColorAttachment<'_>,
     );
 }

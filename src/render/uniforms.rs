@@ -13,7 +13,7 @@ use super::pipelines::{GroupLayout, uniform};
 /// Nearest depth that is drawn, metres. Reversed floating depth keeps its precision however near this is.
 pub(super) const NEAR_M: f32 = 1e-3;
 
-/// Twin of `AnchorView` in common.wgsl.
+/// The camera as what stands on an anchor meets it: the twin of `AnchorView` in common.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(super) struct AnchorView {
@@ -45,12 +45,12 @@ impl AnchorView {
     }
 }
 
-/// By what part a virtual thing's depths are nearer.
+/// The part by which a virtual thing's depths are nearer.
 const TIE: f32 = 1.0 / 65_536.0;
 /// Numbers beyond this win no ties among themselves.
 const MOST_TIES: usize = 63;
 
-/// Twin of `CameraLight` in common.wgsl.
+/// A light in the camera's space: the twin of `CameraLight` in common.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(super) struct CameraLight {
@@ -85,7 +85,7 @@ impl CameraLight {
     }
 }
 
-/// Twin of `CastingLight` in volumes.wgsl.
+/// A light in a caster's space: the twin of `CastingLight` in volumes.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(super) struct CastingLight {
@@ -105,7 +105,7 @@ impl CastingLight {
     }
 }
 
-/// Twin of `Lens` in video.wgsl.
+/// The camera's lens: the twin of `Lens` in video.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(super) struct Lens {

@@ -16,7 +16,7 @@ use super::insides::Insides;
 use super::pipelines::{GroupLayout, PipelineDescription, untouched};
 use super::stencil::{self, COUNT, MOST_LAYERS, REAL_HIDES};
 
-/// Where volumes are counted.
+/// The surfaces on which volumes are counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Among {
     /// On all surfaces.
@@ -109,7 +109,7 @@ impl Counters {
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         groups: [&wgpu::BindGroup; 2],
-        counted: &Counted<'_>,
+        counted: &CountedVolume<'_>,
         part: &DrawnPart,
     ) {
         pass.set_stencil_reference(0);
@@ -140,7 +140,7 @@ impl Caps {
     fn draw(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        counted: &Counted<'_>,
+        counted: &CountedVolume<'_>,
         indices: &IndexBuffer,
         range: Range<u32>,
     ) {
@@ -203,7 +203,7 @@ fn count(among: Among, counting: Counting, turned: bool) -> wgpu::StencilState {
 }
 
 /// One volume of a batch, as it is to be drawn.
-pub(super) struct Counted<'a> {
+pub(super) struct CountedVolume<'a> {
     pub volume: &'a Volume,
     pub counting: Counting,
     /// Where the camera may see the caster's inside.
@@ -268,13 +268,13 @@ impl Volumes {
         role: Role,
         groups: [&wgpu::BindGroup; 2],
         within: PixelRect,
-        counted: impl Iterator<Item = Counted<'a>>,
+        counted: impl Iterator<Item = CountedVolume<'a>>,
     ) -> bool {
         let counters = match among {
             Among::All => &self.among_all,
             Among::LitByReal => &self.among_lit,
         };
-        let counted: Vec<Counted<'_>> = counted.collect();
+        let counted: Vec<CountedVolume<'_>> = counted.collect();
         let mut layers = 0;
         let mut any = false;
         // What is counted apart comes first, so that the rest is left as a number.
@@ -325,7 +325,7 @@ pub(super) struct Volume {
     parts: Vec<DrawnPart>,
 }
 
-/// What a volume depends on.
+/// All that a volume depends on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct MadeFor {
     /// The caster's level of detail.

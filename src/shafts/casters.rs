@@ -15,7 +15,7 @@ use super::room_transport::RoomTransport;
 use super::selection::Representative;
 use super::surfels::{GroupedSurfels, LitSurfel, Surfel, open_directions, surfels};
 
-/// How far outlines may move for fewer triangles, in parts of a thing's size.
+/// The limit to how far outlines may move for fewer triangles, in parts of a thing's size.
 const COARSE_PART: f64 = 0.004;
 /// Surfels of all things together.
 const SURFELS: usize = 512;

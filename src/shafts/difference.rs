@@ -9,7 +9,7 @@ use super::intensity_transfers::{SETS, intensity_transfers, set_of};
 use super::luminance;
 use super::room_transport::RoomTransport;
 
-/// How what virtual things hide of a room's light is taken out of the video.
+/// A way to take what virtual things hide of a room's light out of the video.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Difference {
     /// Of the pixel's linear light as large a part as of the modelled light: the video keeps its texture, and the model's

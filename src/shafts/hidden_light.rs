@@ -22,7 +22,7 @@ const SOURCES_OF_BOUNCE: usize = 96;
 /// Sources nearer to the casters' middle than so many of their radii are among them.
 const NEAREST_SOURCE: f32 = 3.0;
 
-/// How many shadows there may be, and how they are taken out of the video.
+/// The number of shadows that there may be, and the way to take them out of the video.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShadowOptions {
     /// Sources that get a shadow, at most; `None`: all.
@@ -35,7 +35,7 @@ pub struct ShadowOptions {
     pub difference: Difference,
 }
 
-/// What the casters hide of a room's light where they are, and what they reflect.
+/// The part of a room's light that the casters hide where they are, and what they reflect.
 pub struct HiddenLight {
     /// Where the sources have their maps.
     pub tiling: Tiling,
@@ -92,7 +92,7 @@ impl HiddenLight {
     }
 }
 
-/// What the casters may change.
+/// Sources, patches and vertices that the casters may change.
 struct Affected {
     /// For each source whether they may hide it.
     may_be_hidden: Vec<bool>,

@@ -9,7 +9,7 @@ use super::source_tree::SourceTree;
 
 /// All shafts, each followed by those that it is cut into.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Hierarchy {
+pub struct ShaftHierarchy {
     shafts: Vec<Shaft>,
     planes: Vec<ShaftPlane>,
 }
@@ -25,7 +25,7 @@ struct Shaft {
     end: u32,
 }
 
-/// What traversals found, by node.
+/// The findings of traversals, by node.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marks {
     source_nodes: Vec<bool>,
@@ -68,7 +68,7 @@ impl Arriving {
     }
 }
 
-impl Hierarchy {
+impl ShaftHierarchy {
     /// Joins sources and receivers. A shaft that brings no vertex any light is left out; one that brings each less than
     /// `least_part` of all its light is not cut any further.
     pub fn new(

@@ -11,7 +11,7 @@ use crate::light::cores::on_all_cores;
 
 use super::bounding::Aabb;
 use super::harmonics::{Radiance9, sphere};
-use super::patches::Patches;
+use super::patches::RoomPatches;
 
 /// Rays from each point of the grid.
 const RAYS: usize = 1024;
@@ -35,7 +35,7 @@ impl IrradianceVolume {
     pub fn new(
         bounds: Aabb,
         spacing_m: f32,
-        patches: &Patches,
+        patches: &RoomPatches,
         caster: &RayCaster,
         radiance: &[Vec3],
     ) -> Self {
@@ -107,7 +107,7 @@ impl IrradianceVolume {
 
 fn gathered(
     point: Vec3,
-    patches: &Patches,
+    patches: &RoomPatches,
     caster: &RayCaster,
     radiance: &[Vec3],
 ) -> Option<Radiance9> {

@@ -41,7 +41,7 @@ pub struct ReflectedCorner {
     pub irradiance: Vec3,
 }
 
-/// What decides which patches receive a shadow.
+/// All that decides which patches receive a shadow.
 pub struct ReceiverInputs<'a> {
     /// The room.
     pub room: &'a RoomTransport,

@@ -4,7 +4,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::bounding::Aabb;
-use super::patches::Patches;
+use super::patches::RoomPatches;
 
 /// A node: the patches `first..last` in the tree's order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -29,7 +29,7 @@ pub struct ReceiverTree {
 
 impl ReceiverTree {
     /// Sorts patches into octants until at most `leaf` of them are together.
-    pub fn new(patches: &Patches, leaf: usize) -> Self {
+    pub fn new(patches: &RoomPatches, leaf: usize) -> Self {
         let mut order: Vec<u32> = (0..patches.patches.len() as u32).collect();
         let mut tree = Self::default();
         if !order.is_empty() {
@@ -39,7 +39,7 @@ impl ReceiverTree {
         tree
     }
 
-    fn build(&mut self, patches: &Patches, order: &mut [u32], first: u32, leaf: usize) -> u32 {
+    fn build(&mut self, patches: &RoomPatches, order: &mut [u32], first: u32, leaf: usize) -> u32 {
         let index = self.nodes.len() as u32;
         let triangles = order.iter().map(|&patch| &patches.patches[patch as usize]);
         let bounds = Aabb::around(triangles.clone().flat_map(|patch| patches.corners(patch)));

@@ -4,8 +4,8 @@ use super::super::accumulated::Accumulated;
 use super::super::background::Background;
 use super::super::direct::Direct;
 use super::super::gpu::Gpu;
+use super::super::gpu_scene::{GpuScene, LitBy};
 use super::super::shafts::Shafts;
-use super::super::stage::{LitBy, Stage};
 use super::super::technique::TechniquePasses;
 use crate::geometry::camera::Intrinsics;
 use crate::scene::{ProbeScene, Scene, ShadowTechnique, Shortcut};
@@ -30,23 +30,23 @@ impl ChosenTechnique {
         intrinsics: Intrinsics,
         background: &Background,
         transport: impl FnOnce(&Room<'_>) -> RoomTransport,
-    ) -> (Self, Stage) {
+    ) -> (Self, GpuScene) {
         match room_probe(scene) {
             Some(probe) => {
-                let stage = Stage::new(gpu, scene, intrinsics, LitBy::Room);
-                let glossy = stage.glossy;
+                let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Room);
+                let glossy = gpu_scene.glossy;
                 let shafts = Shafts::new(gpu, scene, probe, background, glossy, transport);
-                (Self::Shafts(Box::new(shafts)), stage)
+                (Self::Shafts(Box::new(shafts)), gpu_scene)
             }
             None => {
-                let stage = Stage::new(gpu, scene, intrinsics, LitBy::Lights);
-                let (samples, glossy) = (scene.shadows.samples, stage.glossy);
+                let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Lights);
+                let (samples, glossy) = (scene.shadows.samples, gpu_scene.glossy);
                 let is_single = samples == 1 && scene.lights.len() == 1;
                 let technique = match is_single && !scene.shadows.without.has(Shortcut::Direct) {
                     true => Self::Direct(Direct::new(gpu, background, glossy)),
                     false => Self::Accumulated(Accumulated::new(gpu, background, samples, glossy)),
                 };
-                (technique, stage)
+                (technique, gpu_scene)
             }
         }
     }

@@ -9,7 +9,7 @@ use super::super::layers::{LayerPasses, Layers};
 use super::super::light_sums::GAIN_FORMAT;
 use super::super::passes::Passes;
 use super::super::readback::Readback;
-use super::super::technique::{DrawnFrame, Shown};
+use super::super::technique::{FrameContext, Shown};
 use super::super::volumes::Among;
 use super::Renderer;
 use crate::geometry::reach::PixelRect;
@@ -22,7 +22,7 @@ impl Renderer {
     pub fn layers(&mut self) -> Result<Layers, RenderError> {
         let gain = self.read_gain()?;
         self.cast_on_all_pixels();
-        let (gpu, stage, size_px) = (&self.gpu, &self.stage, self.size_px);
+        let (gpu, gpu_scene, size_px) = (&self.gpu, &self.gpu_scene, self.size_px);
         let passes = self
             .layer_passes
             .get_or_insert_with(|| LayerPasses::new(gpu, size_px));
@@ -30,14 +30,14 @@ impl Renderer {
         let shown = |role: Role| role == Role::Real || self.shown == Shown::Composite;
         let (role, depth_m) = passes.role_and_depth(gpu, &|pass, pipeline, role| {
             if shown(role) {
-                stage.draw_surfaces(pass, pipeline, role, 0, whole);
+                gpu_scene.draw_surfaces(pass, pipeline, role, 0, whole);
             }
         })?;
         let mut shadow = Vec::new();
-        for light in 0..stage.light_count() {
+        for light in 0..gpu_scene.light_count() {
             let mut bits = passes.shadow(gpu, &|pass, volumes, role| {
                 if shown(role) {
-                    stage.count_volumes(pass, volumes, Among::All, role, light, whole);
+                    gpu_scene.count_volumes(pass, volumes, Among::All, role, light, whole);
                 }
             })?;
             // Where nothing is modelled nothing can be shadowed.
@@ -61,18 +61,18 @@ impl Renderer {
     /// The device failed since it was opened.
     pub fn stencil_counts(&mut self) -> Result<Vec<u8>, RenderError> {
         self.cast_on_all_pixels();
-        let (gpu, stage, size_px) = (&self.gpu, &self.stage, self.size_px);
+        let (gpu, gpu_scene, size_px) = (&self.gpu, &self.gpu_scene, self.size_px);
         let passes = self
             .layer_passes
             .get_or_insert_with(|| LayerPasses::new(gpu, size_px));
         let whole = PixelRect::whole(size_px);
         let (roles, _) = passes.role_and_depth(gpu, &|pass, pipeline, role| {
-            stage.draw_surfaces(pass, pipeline, role, 0, whole);
+            gpu_scene.draw_surfaces(pass, pipeline, role, 0, whole);
         })?;
         let mut sums = vec![0_u8; roles.len()];
-        for light in 0..stage.light_count() {
+        for light in 0..gpu_scene.light_count() {
             let counts = passes.counts(gpu, &|pass, volumes, role| {
-                stage.count_volumes(pass, volumes, Among::All, role, light, whole);
+                gpu_scene.count_volumes(pass, volumes, Among::All, role, light, whole);
             })?;
             // Where nothing is modelled nothing lies in a shadow.
             for ((sum, count), &role) in sums.iter_mut().zip(counts).zip(&roles) {
@@ -86,7 +86,7 @@ impl Renderer {
     fn cast_on_all_pixels(&mut self) {
         if let Some(bounds) = &self.bounds {
             let whole = PixelRect::whole(self.size_px);
-            self.stage.cast(&self.gpu, bounds, whole);
+            self.gpu_scene.cast(&self.gpu, bounds, whole);
         }
     }
 
@@ -111,9 +111,9 @@ impl Renderer {
         );
         let gain = texture.create_view(&Default::default());
         let picture = self.picture.create_view(&Default::default());
-        let frame = DrawnFrame {
+        let frame = FrameContext {
             gpu,
-            stage: &self.stage,
+            gpu_scene: &self.gpu_scene,
             background: &self.background,
             picture: &picture,
             bounds,

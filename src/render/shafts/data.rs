@@ -5,7 +5,7 @@ use glam::{Mat4, Vec3};
 
 use crate::shafts::receiver_patches::{PatchCorner, ReflectedCorner};
 
-/// Twin of `ShaftFrame` in shafts.wgsl.
+/// A frame's part of group 2: the twin of `ShaftFrame` in shafts.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub struct ShaftFrame {

@@ -9,7 +9,7 @@ use super::super::passes::Passes;
 use super::super::pipelines::{GroupLayout, PipelineDescription, overwritten, storage, texels};
 use super::data::PLACE_LAYOUT;
 
-/// Whether there is a caster, how far off, and that squared.
+/// Format of the maps: whether there is a caster, how far off, and that squared.
 const MAP_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// The sources, for those who draw their maps.

@@ -28,18 +28,18 @@ use super::attachments::{cleared, depth_stencil};
 use super::background::Background;
 use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
+use super::gpu_scene::GpuScene;
 use super::light_sums::{BY_GAIN, CompositeShader, LightSums};
 use super::passes::Passes;
 use super::screen_bounds::ScreenBounds;
-use super::stage::Stage;
-use super::technique::{DrawnFrame, Shown, TechniquePasses};
+use super::technique::{FrameContext, Shown, TechniquePasses};
 use super::volumes::set_scissor;
 use data::ShaftFrame;
 use environment::Environment;
 use maps::Maps;
 use pipelines::{Pipelines, SHAFT_GROUP};
 
-/// What shafts need from frame to frame.
+/// The technique that shades a room's light by shafts.
 pub(super) struct Shafts {
     room: RoomTransport,
     /// Of the room that `room` is the transport of.
@@ -60,7 +60,7 @@ pub(super) struct Shafts {
     hidden: Option<Hidden>,
 }
 
-/// What the casters hide where they are.
+/// The light that the casters hide where they are, on the GPU.
 struct Hidden {
     sources: wgpu::Buffer,
     source_count: u32,
@@ -137,8 +137,8 @@ impl Shafts {
     }
 
     /// Works out what is hidden where things are now. Returns the pixels that it can change, `None` if none.
-    fn update(&mut self, gpu: &Gpu, stage: &Stage) -> Option<PixelRect> {
-        let camera_from_anchor = stage.camera_from_anchor();
+    fn update(&mut self, gpu: &Gpu, gpu_scene: &GpuScene) -> Option<PixelRect> {
+        let camera_from_anchor = gpu_scene.camera_from_anchor();
         let camera_from_world = (*camera_from_anchor.first()?)?;
         let world_from_camera = camera_from_world.inverse();
         let mut world_from_anchor: Vec<Option<DAffine3>> = camera_from_anchor
@@ -152,7 +152,7 @@ impl Shafts {
                 .place(&world_from_anchor)
                 .map(|placed| self.hide(gpu, &placed));
             let volume = &self.room.volume;
-            stage.set_indirect(&gpu.queue, &world_from_anchor, |place, normal| {
+            gpu_scene.set_indirect(&gpu.queue, &world_from_anchor, |place, normal| {
                 let surfels = self.hidden.iter().flat_map(|hidden| hidden.surfels.all());
                 volume.radiance(place).irradiance(normal)
                     + interreflected_irradiance(place, normal, surfels)
@@ -169,7 +169,7 @@ impl Shafts {
             .write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
         let covered = |bounds: &Aabb| {
             let corners = bounds.corners().map(|corner| corner.as_dvec3());
-            reach::covered(&corners, &camera_from_world, stage.intrinsics())
+            reach::covered(&corners, &camera_from_world, gpu_scene.intrinsics())
         };
         let changed = hidden.changed.iter().map(covered);
         let pixels = changed.fold(PixelRect::NONE, PixelRect::union);
@@ -242,24 +242,24 @@ impl Shafts {
     }
 
     /// Draws what is real into depth, what is virtual over it, and the light on both.
-    fn draw_light(&self, pass: &mut wgpu::RenderPass<'_>, stage: &Stage, within: PixelRect) {
+    fn draw_light(&self, pass: &mut wgpu::RenderPass<'_>, gpu_scene: &GpuScene, within: PixelRect) {
         let Some(hidden) = &self.hidden else {
             return;
         };
         pass.set_bind_group(2, &hidden.group, &[]);
-        stage.set_world(pass);
+        gpu_scene.set_world(pass);
         pass.set_pipeline(&self.pipelines.depth_of_room);
         pass.set_vertex_buffer(0, self.places.slice(..));
         pass.draw(0..self.place_count, 0..1);
-        stage.draw_moving_real(pass, &self.pipelines.depth_of_real, within);
-        stage.draw_surfaces(
+        gpu_scene.draw_moving_real(pass, &self.pipelines.depth_of_real, within);
+        gpu_scene.draw_surfaces(
             pass,
             &self.pipelines.light_on_virtual,
             Role::Virtual,
             0,
             within,
         );
-        stage.set_world(pass);
+        gpu_scene.set_world(pass);
         pass.set_pipeline(&self.pipelines.light_on_patch);
         pass.set_vertex_buffer(0, hidden.corners.slice(..));
         pass.draw(0..hidden.corner_count, 0..1);
@@ -294,15 +294,20 @@ impl TechniquePasses for Shafts {
         self.world_from_anchor.clear();
     }
 
-    fn prepare(&mut self, gpu: &Gpu, stage: &mut Stage, shown: Shown) -> Option<ScreenBounds> {
+    fn prepare(
+        &mut self,
+        gpu: &Gpu,
+        gpu_scene: &mut GpuScene,
+        shown: Shown,
+    ) -> Option<ScreenBounds> {
         match shown {
             Shown::Bare => None,
-            Shown::Composite => self.update(gpu, stage).map(ScreenBounds::pixels_alone),
+            Shown::Composite => self.update(gpu, gpu_scene).map(ScreenBounds::pixels_alone),
         }
     }
 
     /// Gibson et al. 2003, section 7, in as few passes over the pixels as there are: one.
-    fn draw(&mut self, passes: &mut Passes<'_>, frame: &DrawnFrame<'_>) {
+    fn draw(&mut self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) {
         self.draw_maps(frame.gpu, passes);
         let mut pass = passes.begin(
             "shafts",
@@ -311,7 +316,7 @@ impl TechniquePasses for Shafts {
             Some(depth_stencil(&self.sums.depth_stencil, true, true)),
         );
         set_scissor(&mut pass, frame.bounds.pixels);
-        self.draw_light(&mut pass, frame.stage, frame.bounds.pixels);
+        self.draw_light(&mut pass, frame.gpu_scene, frame.bounds.pixels);
         drop(pass);
         self.sums.composite(passes, frame);
     }
@@ -319,14 +324,14 @@ impl TechniquePasses for Shafts {
     fn draw_gain(
         &self,
         passes: &mut Passes<'_>,
-        frame: &DrawnFrame<'_>,
+        frame: &FrameContext<'_>,
         gain: wgpu::RenderPassColorAttachment<'_>,
     ) {
         self.sums.draw_gain(passes, frame, gain);
     }
 }
 
-/// How light is taken out of the video.
+/// The shader that takes light out of the video.
 fn composite(difference: Difference) -> CompositeShader {
     let shader = "difference.wgsl";
     match difference {

@@ -2,11 +2,11 @@
 
 use super::super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT};
 use super::super::gpu::Gpu;
+use super::super::gpu_scene::GEOMETRY_GROUPS;
 use super::super::pipelines::{
     GroupLayout, PipelineDescription, added, filtered, overwritten, sampler, storage, uniform,
     untouched,
 };
-use super::super::stage::GEOMETRY_GROUPS;
 use super::super::surfaces::Sided;
 use super::data::{PATCH_CORNER_LAYOUT, PLACE_LAYOUT, REFLECTED_CORNER_LAYOUT};
 
@@ -26,8 +26,8 @@ pub(super) const SHAFT_GROUP: GroupLayout = GroupLayout {
     ],
 };
 
-/// What lets a patch's corners, and the parts that it is cut into, be drawn on the depth of the whole patch. A part lies in
-/// its patch but for rounding: of its corners' depths (some of the 24 bits of a number, for which 16 units are enough), and
+/// The depth bias of patches, and of the parts that they are cut into, over the depth of the whole patch. A part lies in its
+/// patch but for rounding: of its corners' depths (some of the 24 bits of a number, for which 16 units are enough), and
 /// of their places to a 256th of a pixel, which moves either plane by up to a 512th of its slope each way, both by less than
 /// a hundredth. No surface in front is that near, and no volume is ever drawn with it.
 const ON_THE_PATCH: wgpu::DepthBiasState = wgpu::DepthBiasState {

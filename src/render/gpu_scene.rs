@@ -9,7 +9,7 @@ use crate::light::cores::on_all_cores;
 use crate::scene::{Scene, ShadowSettings, Shortcut};
 
 use super::anchor_geometry::{
-    AnchorGeometry, KnownLevels, Role, SurfaceBatch, Thing, VirtualCorners,
+    AnchorGeometry, AnchoredModel, KnownLevels, Role, SurfaceBatch, VirtualCorners,
 };
 use super::casters::{Casters, LitSides};
 use super::detail::chosen_levels;
@@ -26,17 +26,17 @@ use super::volumes::{Among, Volumes, set_scissor};
 /// Groups 0 and 1 of every shader that draws geometry: the anchor's view, and a light.
 pub(super) const GEOMETRY_GROUPS: [GroupLayout; 2] = [VIEW_GROUP, LIGHT_GROUP];
 
-/// Where the light comes from.
+/// The origin of a scene's light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum LitBy {
     /// The scene's lights, and what reflects them.
     Lights,
-    /// A room, whose light a technique brings ([`Stage::set_indirect`]).
+    /// A room, whose light a technique brings ([`GpuScene::set_indirect`]).
     Room,
 }
 
 /// The scene as the present frame has it.
-pub(super) struct Stage {
+pub(super) struct GpuScene {
     lit_by: LitBy,
     intrinsics: Intrinsics,
     /// Those that cast shadow volumes.
@@ -44,7 +44,7 @@ pub(super) struct Stage {
     /// Whether any virtual thing has a glossy layer.
     pub glossy: bool,
     batches: Vec<SurfaceBatch>,
-    things: Vec<Thing>,
+    things: Vec<AnchoredModel>,
     /// For each thing the level that is drawn.
     levels: Vec<usize>,
     max_silhouette_error_px: f64,
@@ -66,7 +66,7 @@ pub(super) struct Stage {
     known_levels: KnownLevels,
 }
 
-impl Stage {
+impl GpuScene {
     pub fn new(gpu: &Gpu, scene: &Scene, intrinsics: Intrinsics, lit_by: LitBy) -> Self {
         let device = &gpu.device;
         let view_count = scene.anchors.len() + scene.virtuals.len();
@@ -384,7 +384,7 @@ impl Stage {
         pass: &mut wgpu::RenderPass<'_>,
         pipelines: &Sided,
         number: usize,
-        thing: &Thing,
+        thing: &AnchoredModel,
         within: PixelRect,
     ) {
         let range = || thing.levels[self.levels[number]].range.clone();
@@ -453,7 +453,7 @@ impl Stage {
     }
 
     /// The things of a batch, with their numbers.
-    fn of_batch(&self, batch: &SurfaceBatch) -> impl Iterator<Item = (usize, &Thing)> {
+    fn of_batch(&self, batch: &SurfaceBatch) -> impl Iterator<Item = (usize, &AnchoredModel)> {
         let kind = (batch.role, batch.anchor);
         let things = self.things.iter().enumerate();
         things.filter(move |(_, thing)| (thing.role, thing.anchor) == kind)
@@ -465,14 +465,19 @@ impl Stage {
     }
 
     /// Where in `views` a thing's is.
-    fn view_of(&self, thing: &Thing) -> usize {
+    fn view_of(&self, thing: &AnchoredModel) -> usize {
         match thing.tie {
             None => thing.anchor,
             Some(tie) => self.camera_from_anchor.len() + tie,
         }
     }
 
-    fn set_thing(&self, pass: &mut wgpu::RenderPass<'_>, batch: &SurfaceBatch, thing: &Thing) {
+    fn set_thing(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        batch: &SurfaceBatch,
+        thing: &AnchoredModel,
+    ) {
         let view = self.views.offset(self.view_of(thing));
         pass.set_bind_group(0, &self.view_group, &[view]);
         pass.set_vertex_buffer(0, batch.corners.slice(..));
