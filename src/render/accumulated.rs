@@ -7,14 +7,15 @@ use super::attachments::{depth_stencil, loaded};
 use super::background::Background;
 use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
-use super::gpu_scene::{GEOMETRY_GROUPS, GpuScene};
+use super::gpu_scene::GpuScene;
 use super::light_sums::{BY_GAIN, LightSums};
 use super::passes::Passes;
 use super::screen_bounds::ScreenBounds;
+use super::shown::Shown;
 use super::surfaces::Surfaces;
-use super::technique::{FrameContext, Shown, TechniquePasses};
+use super::technique::{FrameContext, TechniquePasses};
+use super::uniforms::GEOMETRY_GROUPS;
 use super::volumes::{Among, Volumes, set_scissor};
-use crate::scene::Scene;
 
 /// The technique that adds several lights or samples of shadow volumes up.
 pub(super) struct Accumulated {
@@ -80,12 +81,6 @@ impl Accumulated {
 }
 
 impl TechniquePasses for Accumulated {
-    fn follow(&mut self, _: &Scene) -> bool {
-        true
-    }
-
-    fn set_sources(&mut self, _: Option<u32>) {}
-
     fn prepare(
         &mut self,
         gpu: &Gpu,

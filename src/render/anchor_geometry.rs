@@ -186,7 +186,7 @@ fn thing(
     coarser: &[Level],
     shared: &mut SharedCorners,
 ) -> Option<AnchoredModel> {
-    let stretch = largest_stretch(&object.anchor_from_object);
+    let scale = largest_stretch(&object.anchor_from_object);
     let itself = (&object.mesh, [0.0; 3]);
     let coarser = coarser.iter().map(|level| {
         let lengths_m = [level.max_error_m, level.mean_error_m, level.largest_facet_m];
@@ -199,7 +199,7 @@ fn thing(
         .chain(coarser)
         .map(|(mesh, lengths_m)| {
             let [max_error_m, mean_error_m, largest_facet_m] =
-                lengths_m.map(|length_m| length_m * stretch);
+                lengths_m.map(|length_m| length_m * scale);
             let positions = object.positions_in_anchor(mesh);
             let corner = |index: u32| positions[index as usize].as_dvec3();
             receivers = mesh.triangles.iter().map(|t| t.map(corner)).collect();

@@ -8,16 +8,17 @@ use super::attachments::{kept, loaded, target};
 use super::background::{Background, PICTURE_FORMAT, VIDEO_GROUP};
 use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
-use super::gpu_scene::{GEOMETRY_GROUPS, GpuScene};
+use super::gpu_scene::GpuScene;
 use super::light_sums::GAIN_FORMAT;
 use super::passes::Passes;
 use super::pipelines::{GroupLayout, PipelineDescription, overwritten, texels, untouched};
 use super::screen_bounds::ScreenBounds;
-use super::stencil::{SHADOW, VIRTUAL_SHADOW, stencil};
+use super::shown::Shown;
+use super::stencil::{SHADOW, VIRTUAL_SHADOW, depth_stencil_state, stencil};
 use super::surfaces::{Sided, surface_description};
-use super::technique::{FrameContext, Shown, TechniquePasses};
+use super::technique::{FrameContext, TechniquePasses};
+use super::uniforms::GEOMETRY_GROUPS;
 use super::volumes::{Among, Volumes, set_scissor};
-use crate::scene::Scene;
 
 /// Values of `SEEN` in direct.wgsl.
 const IN_OPEN_LIGHT: f64 = 1.0;
@@ -174,12 +175,6 @@ impl Direct {
 }
 
 impl TechniquePasses for Direct {
-    fn follow(&mut self, _: &Scene) -> bool {
-        true
-    }
-
-    fn set_sources(&mut self, _: Option<u32>) {}
-
     fn prepare(
         &mut self,
         gpu: &Gpu,
@@ -270,26 +265,12 @@ impl SurfacesOverVideo<'_> {
 fn emptied(format: wgpu::TextureFormat) -> wgpu::DepthStencilState {
     let always = wgpu::CompareFunction::Always;
     let zero = (wgpu::StencilOperation::Zero, u32::MAX);
-    over_all(format, true, stencil(always, SHADOW, zero))
+    depth_stencil_state(format, true, always, stencil(always, SHADOW, zero))
 }
 
 /// Depth and stencil where such a triangle is drawn in the shadow alone.
 fn in_shadow(format: wgpu::TextureFormat) -> wgpu::DepthStencilState {
     let nothing = (wgpu::StencilOperation::Keep, 0);
     let counted = stencil(wgpu::CompareFunction::Less, SHADOW, nothing);
-    over_all(format, false, counted)
-}
-
-fn over_all(
-    format: wgpu::TextureFormat,
-    writes_depth: bool,
-    stencil: wgpu::StencilState,
-) -> wgpu::DepthStencilState {
-    wgpu::DepthStencilState {
-        format,
-        depth_write_enabled: Some(writes_depth),
-        depth_compare: Some(wgpu::CompareFunction::Always),
-        stencil,
-        bias: wgpu::DepthBiasState::default(),
-    }
+    depth_stencil_state(format, false, wgpu::CompareFunction::Always, counted)
 }

@@ -16,15 +16,11 @@ use super::detail::chosen_levels;
 use super::gpu::Gpu;
 use super::indirect::Indirect;
 use super::insides::{Insides, insides};
-use super::pipelines::GroupLayout;
 use super::screen_bounds::{ScreenBounds, screen_bounds};
+use super::shown::Shown;
 use super::surfaces::Sided;
-use super::technique::Shown;
 use super::uniforms::{AnchorView, CameraLight, LIGHT_GROUP, UniformRow, VIEW_GROUP};
 use super::volumes::{Among, Volumes, set_scissor};
-
-/// Groups 0 and 1 of every shader that draws geometry: the anchor's view, and a light.
-pub(super) const GEOMETRY_GROUPS: [GroupLayout; 2] = [VIEW_GROUP, LIGHT_GROUP];
 
 /// The origin of a scene's light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

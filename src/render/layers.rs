@@ -4,12 +4,12 @@
 use super::anchor_geometry::{CORNER_LAYOUT, Role};
 use super::attachments::{cleared, loaded, target, texture};
 use super::gpu::{Gpu, RenderError};
-use super::gpu_scene::GEOMETRY_GROUPS;
 use super::passes::Passes;
 use super::pipelines::{PipelineDescription, added, overwritten};
 use super::readback::Readback;
-use super::stencil::{COUNT, MOST_LAYERS, SHADOW, stencil};
+use super::stencil::{COUNT, MOST_LAYERS, SHADOW, depth_stencil_state, stencil};
 use super::surfaces::{Sided, surface_description};
+use super::uniforms::GEOMETRY_GROUPS;
 use super::volumes::Volumes;
 
 const ROLE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
@@ -249,13 +249,12 @@ fn mark(
         shader: "layers.wgsl",
         fragment,
         targets: vec![added(BITS_FORMAT, factor)],
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: gpu.depth_format,
-            depth_write_enabled: Some(false),
-            depth_compare: Some(wgpu::CompareFunction::Always),
-            stencil: stencil(compare, read, (wgpu::StencilOperation::Keep, 0)),
-            bias: wgpu::DepthBiasState::default(),
-        }),
+        depth_stencil: Some(depth_stencil_state(
+            gpu.depth_format,
+            false,
+            wgpu::CompareFunction::Always,
+            stencil(compare, read, (wgpu::StencilOperation::Keep, 0)),
+        )),
         ..Default::default()
     }
 }

@@ -26,7 +26,8 @@ use super::passes::{Passes, RecordedPasses};
 use super::quality_controller::{QualityController, Setting};
 use super::readback::Readback;
 use super::screen_bounds::ScreenBounds;
-use super::technique::{FrameContext, Shown};
+use super::shown::Shown;
+use super::technique::FrameContext;
 use chosen_technique::ChosenTechnique;
 
 /// Draws the frames of one scene through one camera.

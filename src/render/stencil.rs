@@ -1,4 +1,4 @@
-//! What the stencil's bits mean while one light is worked on.
+//! What the stencil's bits mean while one light is worked on, and how pipelines test depth and stencil.
 
 use super::anchor_geometry::Role;
 
@@ -41,5 +41,21 @@ pub(super) fn stencil(
         back: face,
         read_mask: read,
         write_mask: written,
+    }
+}
+
+/// Depth and stencil without any bias.
+pub(super) fn depth_stencil_state(
+    format: wgpu::TextureFormat,
+    writes_depth: bool,
+    depth_compare: wgpu::CompareFunction,
+    stencil: wgpu::StencilState,
+) -> wgpu::DepthStencilState {
+    wgpu::DepthStencilState {
+        format,
+        depth_write_enabled: Some(writes_depth),
+        depth_compare: Some(depth_compare),
+        stencil,
+        bias: wgpu::DepthBiasState::default(),
     }
 }

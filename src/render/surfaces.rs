@@ -3,9 +3,9 @@
 
 use super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT};
 use super::gpu::Gpu;
-use super::gpu_scene::GEOMETRY_GROUPS;
 use super::pipelines::{PipelineDescription, added, overwritten, untouched};
-use super::stencil::{ADDED, REAL_HIDES, SHADOW, VIRTUAL_SHADOW, stencil};
+use super::stencil::{ADDED, REAL_HIDES, SHADOW, VIRTUAL_SHADOW, depth_stencil_state, stencil};
+use super::uniforms::GEOMETRY_GROUPS;
 
 /// Pipelines of the pass where several samples or lights are added up.
 pub(super) struct Surfaces {
@@ -64,16 +64,15 @@ pub(super) fn surface_description(
     let is_first = stencil.is_none();
     PipelineDescription {
         vertex_buffers: vec![CORNER_LAYOUT, INDIRECT_LAYOUT],
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: gpu.depth_format,
-            depth_write_enabled: Some(is_first),
-            depth_compare: Some(match is_first {
+        depth_stencil: Some(depth_stencil_state(
+            gpu.depth_format,
+            is_first,
+            match is_first {
                 true => wgpu::CompareFunction::Greater,
                 false => wgpu::CompareFunction::Equal,
-            }),
-            stencil: stencil.unwrap_or_default(),
-            bias: wgpu::DepthBiasState::default(),
-        }),
+            },
+            stencil.unwrap_or_default(),
+        )),
         ..Default::default()
     }
 }

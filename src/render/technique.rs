@@ -5,16 +5,8 @@ use super::gpu::Gpu;
 use super::gpu_scene::GpuScene;
 use super::passes::Passes;
 use super::screen_bounds::ScreenBounds;
+use super::shown::Shown;
 use crate::scene::Scene;
-
-/// The content of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Shown {
-    /// The video with the virtual things.
-    Composite,
-    /// The undistorted video alone.
-    Bare,
-}
 
 /// A frame that is being drawn.
 pub(super) struct FrameContext<'a> {
@@ -30,10 +22,12 @@ pub(super) struct FrameContext<'a> {
 /// A technique's steps through a frame, in their order.
 pub(super) trait TechniquePasses {
     /// Draws another state of its scene from now on. False where that takes a new renderer.
-    fn follow(&mut self, scene: &Scene) -> bool;
+    fn follow(&mut self, _scene: &Scene) -> bool {
+        true
+    }
 
     /// So many sources of broad light at most get a shadow from now on; `None`: all.
-    fn set_sources(&mut self, sources: Option<u32>);
+    fn set_sources(&mut self, _sources: Option<u32>) {}
 
     /// Works out what the frame needs, whose poses `gpu_scene` has. Returns what of the picture can change; `None` if nothing.
     fn prepare(

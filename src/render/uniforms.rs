@@ -143,6 +143,9 @@ pub(super) const LIGHT_GROUP: GroupLayout = GroupLayout {
     entries: &[uniform(0, wgpu::ShaderStages::VERTEX_FRAGMENT, true)],
 };
 
+/// Groups 0 and 1 of every shader that draws geometry: the anchor's view, and a light.
+pub(super) const GEOMETRY_GROUPS: [GroupLayout; 2] = [VIEW_GROUP, LIGHT_GROUP];
+
 /// Several uniforms of one kind in one buffer, picked by a dynamic offset.
 pub(super) struct UniformRow {
     pub buffer: wgpu::Buffer,

@@ -14,7 +14,7 @@ use super::anchor_geometry::Role;
 use super::gpu::Gpu;
 use super::insides::Insides;
 use super::pipelines::{GroupLayout, PipelineDescription, untouched};
-use super::stencil::{self, COUNT, MOST_LAYERS, REAL_HIDES};
+use super::stencil::{self, COUNT, MOST_LAYERS, REAL_HIDES, depth_stencil_state};
 
 /// The surfaces on which volumes are counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,13 +70,12 @@ impl Counters {
     fn new(gpu: &Gpu, counting: &PipelineDescription, among: Among) -> Self {
         let counter = |depth_compare, cull_mode, stencil| {
             gpu.pipeline(&PipelineDescription {
-                depth_stencil: Some(wgpu::DepthStencilState {
-                    format: gpu.depth_format,
-                    depth_write_enabled: Some(false),
-                    depth_compare: Some(depth_compare),
+                depth_stencil: Some(depth_stencil_state(
+                    gpu.depth_format,
+                    false,
+                    depth_compare,
                     stencil,
-                    bias: wgpu::DepthBiasState::default(),
-                }),
+                )),
                 cull_mode,
                 ..counting.clone()
             })
@@ -242,13 +241,12 @@ impl Volumes {
                 COUNT | stencil::hides(role),
             );
             gpu.pipeline(&PipelineDescription {
-                depth_stencil: Some(wgpu::DepthStencilState {
-                    format: gpu.depth_format,
-                    depth_write_enabled: Some(false),
-                    depth_compare: Some(wgpu::CompareFunction::Always),
-                    stencil: stencil::stencil(wgpu::CompareFunction::NotEqual, COUNT, counted),
-                    bias: wgpu::DepthBiasState::default(),
-                }),
+                depth_stencil: Some(depth_stencil_state(
+                    gpu.depth_format,
+                    false,
+                    wgpu::CompareFunction::Always,
+                    stencil::stencil(wgpu::CompareFunction::NotEqual, COUNT, counted),
+                )),
                 ..common.clone()
             })
         };

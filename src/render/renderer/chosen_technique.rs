@@ -8,7 +8,7 @@ use super::super::gpu_scene::{GpuScene, LitBy};
 use super::super::shafts::Shafts;
 use super::super::technique::TechniquePasses;
 use crate::geometry::camera::Intrinsics;
-use crate::scene::{ProbeScene, Scene, ShadowTechnique, Shortcut};
+use crate::scene::{Scene, ShadowTechnique, Shortcut};
 use crate::shafts::room::Room;
 use crate::shafts::room_transport::RoomTransport;
 
@@ -23,7 +23,7 @@ pub(super) enum ChosenTechnique {
 }
 
 impl ChosenTechnique {
-    /// The technique of a scene, and the stage that it draws; `transport` gives the light of a room.
+    /// The technique of a scene, and the scene as it draws it; `transport` gives the light of a room.
     pub fn new(
         gpu: &Gpu,
         scene: &Scene,
@@ -31,14 +31,15 @@ impl ChosenTechnique {
         background: &Background,
         transport: impl FnOnce(&Room<'_>) -> RoomTransport,
     ) -> (Self, GpuScene) {
-        match room_probe(scene) {
-            Some(probe) => {
+        match (scene.chosen_technique().0, &scene.probe) {
+            (ShadowTechnique::Shafts, Some(probe)) => {
                 let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Room);
                 let glossy = gpu_scene.glossy;
                 let shafts = Shafts::new(gpu, scene, probe, background, glossy, transport);
                 (Self::Shafts(Box::new(shafts)), gpu_scene)
             }
-            None => {
+            // (No scene that was read has shafts without a probe.)
+            (ShadowTechnique::Volumes | ShadowTechnique::Shafts, _) => {
                 let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Lights);
                 let (samples, glossy) = (scene.shadows.samples, gpu_scene.glossy);
                 let is_single = samples == 1 && scene.lights.len() == 1;
@@ -67,13 +68,5 @@ impl ChosenTechnique {
             Self::Accumulated(accumulated) => accumulated,
             Self::Shafts(shafts) => shafts.as_mut(),
         }
-    }
-}
-
-/// The probe whose room lights the scene; `None` where its lights do.
-fn room_probe(scene: &Scene) -> Option<&ProbeScene> {
-    match scene.chosen_technique().0 {
-        ShadowTechnique::Shafts => scene.probe.as_ref(),
-        ShadowTechnique::Volumes => None,
     }
 }

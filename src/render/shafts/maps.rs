@@ -7,6 +7,7 @@ use super::super::attachments::cleared;
 use super::super::gpu::Gpu;
 use super::super::passes::Passes;
 use super::super::pipelines::{GroupLayout, PipelineDescription, overwritten, storage, texels};
+use super::super::stencil::depth_stencil_state;
 use super::data::PLACE_LAYOUT;
 
 /// Format of the maps: whether there is a caster, how far off, and that squared.
@@ -49,13 +50,12 @@ impl Maps {
                 groups: vec![Some(SOURCES_GROUP)],
                 vertex_buffers: vec![PLACE_LAYOUT],
                 targets: vec![overwritten(MAP_FORMAT)],
-                depth_stencil: Some(wgpu::DepthStencilState {
-                    format: DEPTH_FORMAT,
-                    depth_write_enabled: Some(true),
-                    depth_compare: Some(wgpu::CompareFunction::Less),
-                    stencil: wgpu::StencilState::default(),
-                    bias: wgpu::DepthBiasState::default(),
-                }),
+                depth_stencil: Some(depth_stencil_state(
+                    DEPTH_FORMAT,
+                    true,
+                    wgpu::CompareFunction::Less,
+                    wgpu::StencilState::default(),
+                )),
                 ..Default::default()
             }),
             halve: gpu.pipeline(&PipelineDescription {

@@ -2,12 +2,13 @@
 
 use super::super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT};
 use super::super::gpu::Gpu;
-use super::super::gpu_scene::GEOMETRY_GROUPS;
 use super::super::pipelines::{
     GroupLayout, PipelineDescription, added, filtered, overwritten, sampler, storage, uniform,
     untouched,
 };
+use super::super::stencil::depth_stencil_state;
 use super::super::surfaces::Sided;
+use super::super::uniforms::GEOMETRY_GROUPS;
 use super::data::{PATCH_CORNER_LAYOUT, PLACE_LAYOUT, REFLECTED_CORNER_LAYOUT};
 
 /// Group 2: the frame, the sources, what they give to the vertices, their maps and the environment.
@@ -64,13 +65,12 @@ impl Pipelines {
                 .chain([SHAFT_GROUP])
                 .map(Some)
                 .collect(),
-            depth_stencil: Some(wgpu::DepthStencilState {
-                format: gpu.depth_format,
-                depth_write_enabled: Some(true),
-                depth_compare: Some(wgpu::CompareFunction::Greater),
-                stencil: wgpu::StencilState::default(),
-                bias: wgpu::DepthBiasState::default(),
-            }),
+            depth_stencil: Some(depth_stencil_state(
+                gpu.depth_format,
+                true,
+                wgpu::CompareFunction::Greater,
+                wgpu::StencilState::default(),
+            )),
             samples,
             ..Default::default()
         };
@@ -80,13 +80,16 @@ impl Pipelines {
             ..into_depth.clone()
         };
         let corners = vec![CORNER_LAYOUT, INDIRECT_LAYOUT];
+        let depth_of_patch = depth_stencil_state(
+            gpu.depth_format,
+            false,
+            wgpu::CompareFunction::GreaterEqual,
+            wgpu::StencilState::default(),
+        );
         let on_patch = PipelineDescription {
             depth_stencil: Some(wgpu::DepthStencilState {
-                format: gpu.depth_format,
-                depth_write_enabled: Some(false),
-                depth_compare: Some(wgpu::CompareFunction::GreaterEqual),
-                stencil: wgpu::StencilState::default(),
                 bias: ON_THE_PATCH,
+                ..depth_of_patch
             }),
             ..into_depth.clone()
         };
