@@ -27,10 +27,16 @@ pub(super) const SHAFT_GROUP: GroupLayout = GroupLayout {
     ],
 };
 
+/// All groups of the pass.
+const SHAFT_GROUPS: [GroupLayout; 3] = [GEOMETRY_GROUPS[0], GEOMETRY_GROUPS[1], SHAFT_GROUP];
+
 /// The depth bias of patches, and of the parts that they are cut into, over the depth of the whole patch. A part lies in its
-/// patch but for rounding: of its corners' depths (some of the 24 bits of a number, for which 16 units are enough), and
-/// of their places to a 256th of a pixel, which moves either plane by up to a 512th of its slope each way, both by less than
-/// a hundredth. No surface in front is that near, and no volume is ever drawn with it.
+/// patch but for rounding: of its corners' depths, by some units in the last place, and of their places on screen to a 256th
+/// of a pixel, which moves either plane by up to a 512th of its slope along both axes, both planes by less than a hundredth.
+/// At one metre 16 units are 2 µm, less than the 15 µm by which a virtual thing that touches a patch is nearer
+/// ([`AnchorView::winning_ties`]), so it stays in front. No volume is ever drawn with it.
+///
+/// [`AnchorView::winning_ties`]: super::super::uniforms::AnchorView::winning_ties
 const ON_THE_PATCH: wgpu::DepthBiasState = wgpu::DepthBiasState {
     constant: 16,
     slope_scale: 0.01,
@@ -60,11 +66,7 @@ impl Pipelines {
                 ("GLOSSY", f64::from(glossy)),
                 ("MULTISAMPLED", f64::from(samples > 1)),
             ],
-            groups: GEOMETRY_GROUPS
-                .into_iter()
-                .chain([SHAFT_GROUP])
-                .map(Some)
-                .collect(),
+            groups: SHAFT_GROUPS.map(Some).to_vec(),
             depth_stencil: Some(depth_stencil_state(
                 gpu.depth_format,
                 true,
