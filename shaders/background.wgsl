@@ -1,6 +1,6 @@
 // The video alone, as an ideal lens would have seen it.
 //!include "video.wgsl"
-//!include "whole_picture.wgsl"
+//!include "fullscreen.wgsl"
 
 @fragment
 fn background(@builtin(position) position: vec4f) -> @location(0) vec4f {

@@ -1,7 +1,7 @@
 // Real and virtual surfaces drawn straight over the video, where one light and one sample leave nothing to add up.
 //!include "shading.wgsl"
 //!include "video.wgsl"
-//!include "whole_picture.wgsl"
+//!include "fullscreen.wgsl"
 
 struct Place {
     @invariant @builtin(position) clip: vec4f,
@@ -42,7 +42,7 @@ fn gain_on_real(surface: Surface, @builtin(front_facing) outside: bool) -> @loca
 
 // Of a virtual surface the picture gets all its light, as if nothing hid any, and `ambient` what is left of it where
 // something does.
-struct Light {
+struct Shaded {
     @location(0) picture: vec4f,
     // a: which surface is seen, one of the three below.
     @location(1) ambient: vec4f,
@@ -56,15 +56,15 @@ const IN_OPEN_LIGHT: f32 = 1.0;
 const AT_TERMINATOR: f32 = 0.5;
 
 @fragment
-fn nothing() -> Light {
-    return Light(vec4f(0.0), vec4f(NOT_VIRTUAL));
+fn nothing() -> Shaded {
+    return Shaded(vec4f(0.0), vec4f(NOT_VIRTUAL));
 }
 
 // No light reaches it that could be taken again.
 @fragment
-fn ambient_on_virtual(surface: AmbientSurface) -> Light {
+fn ambient_on_virtual(surface: AmbientSurface) -> Shaded {
     let ambient = surface.material.rgb / PI * surface.indirect;
-    return Light(vec4f(srgb_from_linear(ambient), 1.0), vec4f(NOT_VIRTUAL));
+    return Shaded(vec4f(srgb_from_linear(ambient), 1.0), vec4f(NOT_VIRTUAL));
 }
 
 struct AmbientSurface {
@@ -82,9 +82,9 @@ fn place_in_ambient_light(@location(0) position: vec3f, @location(2) material: v
 override SEEN: f32 = IN_OPEN_LIGHT;
 
 @fragment
-fn light_on_virtual(surface: Surface, @builtin(front_facing) outside: bool) -> Light {
+fn light_on_virtual(surface: Surface, @builtin(front_facing) outside: bool) -> Shaded {
     let ambient = surface.material.rgb / PI * surface.indirect;
-    return Light(
+    return Shaded(
         vec4f(srgb_from_linear(ambient + max(radiance(surface, outside), vec3f(0.0))), 1.0),
         vec4f(srgb_from_linear(ambient), SEEN),
     );

@@ -1,5 +1,5 @@
 // What comes or goes: the picture with it over the picture without it. Both are display values.
-//!include "whole_picture.wgsl"
+//!include "fullscreen.wgsl"
 
 @group(0) @binding(0) var without: texture_2d<f32>;
 @group(0) @binding(1) var with_it: texture_2d<f32>;

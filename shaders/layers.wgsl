@@ -1,8 +1,8 @@
 // Layers for tests and tools, at the pixels' centres: role and depth of the visible surface, and shadow bits.
 //!include "common.wgsl"
-//!include "whole_picture.wgsl"
+//!include "fullscreen.wgsl"
 
-@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(0) var<uniform> view: AnchorView;
 
 struct Surface {
     @invariant @builtin(position) clip: vec4f,

@@ -16,7 +16,7 @@ struct SampledSurface {
 }
 
 @vertex
-fn place_sampled(corner: Corner, @builtin(vertex_index) index: u32) -> SampledSurface {
+fn place_sampled(corner: SurfaceCorner, @builtin(vertex_index) index: u32) -> SampledSurface {
     let placed = placed(corner);
     return SampledSurface(
         placed.clip,

@@ -1,13 +1,13 @@
 // Surfaces and how they reflect one light, for all passes that shade.
 //!include "common.wgsl"
 
-@group(0) @binding(0) var<uniform> view: View;
-@group(1) @binding(0) var<uniform> light: LightSource;
+@group(0) @binding(0) var<uniform> view: AnchorView;
+@group(1) @binding(0) var<uniform> light: CameraLight;
 
 // Set when the shader is built: whether any material has a glossy layer.
 override GLOSSY: bool = true;
 
-struct Corner {
+struct SurfaceCorner {
     @location(0) position: vec3f,
     @location(1) normal: vec3f,
     // Albedo, and the roughness of a glossy layer or 0.
@@ -25,11 +25,11 @@ struct Surface {
 }
 
 @vertex
-fn place(corner: Corner) -> Surface {
+fn place(corner: SurfaceCorner) -> Surface {
     return placed(corner);
 }
 
-fn placed(corner: Corner) -> Surface {
+fn placed(corner: SurfaceCorner) -> Surface {
     let point = vec4f(corner.position, 1.0);
     return Surface(
         clip_from_point(view, point),

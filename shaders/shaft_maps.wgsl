@@ -1,8 +1,8 @@
 // What each source sees of the casters: a tile of the atlas for each. Red: 1 where a caster is; green: how far, from the
 // nearest to the farthest that casters can be; blue: its square; all averaged in the coarser levels.
-//!include "source.wgsl"
+//!include "mapped_source.wgsl"
 
-@group(0) @binding(0) var<storage, read> sources: array<Source>;
+@group(0) @binding(0) var<storage, read> sources: array<MappedSource>;
 
 struct Seen {
     @builtin(position) clip: vec4f,

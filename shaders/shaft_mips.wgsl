@@ -1,5 +1,5 @@
 // Halves the atlas of the sources' maps: each texel is the mean of four.
-//!include "whole_picture.wgsl"
+//!include "fullscreen.wgsl"
 
 @group(0) @binding(0) var finer: texture_2d<f32>;
 

@@ -1,9 +1,10 @@
 // Soft shadows of a room's light (Gibson et al. 2003, section 7): what virtual things hide of the light of real surfaces, what
-// they throw back, and the light on them.
+// they reflect, and the light on them.
 //!include "sampled_surface.wgsl"
-//!include "source.wgsl"
+//!include "light_sums.wgsl"
+//!include "mapped_source.wgsl"
 
-struct Frame {
+struct ShaftFrame {
     world_from_camera: mat4x4f,
     source_count: u32,
     padding_1: u32,
@@ -11,8 +12,8 @@ struct Frame {
     padding_3: u32,
 }
 
-@group(2) @binding(0) var<uniform> frame: Frame;
-@group(2) @binding(1) var<storage, read> sources: array<Source>;
+@group(2) @binding(0) var<uniform> frame: ShaftFrame;
+@group(2) @binding(1) var<storage, read> sources: array<MappedSource>;
 // Of each vertex, without virtual things.
 @group(2) @binding(2) var<storage, read> irradiances: array<vec3f>;
 // Irradiance of each vertex from each source: rows of `source_count`, packed into two halves and one.
@@ -25,7 +26,6 @@ struct Frame {
 // the level.
 @group(2) @binding(7) var environment: texture_2d<f32>;
 @group(2) @binding(8) var environment_sampler: sampler;
-
 
 // Least variance of depths in a map: a surface hides itself by no more than its own slope.
 const LEAST_SPREAD: f32 = 0.0004;
@@ -40,13 +40,13 @@ struct PatchCorner {
     @location(3) list: vec2u,
 }
 
-struct ThrownCorner {
+struct ReflectedCorner {
     @location(0) position: vec3f,
     // Irradiance from virtual things.
     @location(1) irradiance: vec3f,
 }
 
-struct ThrownSurface {
+struct ReflectedSurface {
     @builtin(position) clip: vec4f,
     @location(0) @interpolate(perspective, centroid) irradiance: vec3f,
     @location(1) @interpolate(perspective, centroid) one: f32,
@@ -64,14 +64,6 @@ struct PatchSurface {
     @location(6) @interpolate(flat) first_weights: vec2f,
 }
 
-struct Light {
-    // Irradiance on a real surface without virtual things; a = 1 where it is known.
-    @location(0) reaching: vec4f,
-    // Irradiance that virtual things take from a real surface, or the radiance of a virtual one; a = 1 where the surface is
-    // virtual.
-    @location(1) change: vec4f,
-}
-
 @vertex
 fn place_patch(corner: PatchCorner, @builtin(vertex_index) index: u32) -> PatchSurface {
     return PatchSurface(
@@ -87,8 +79,8 @@ fn place_patch(corner: PatchCorner, @builtin(vertex_index) index: u32) -> PatchS
 }
 
 @vertex
-fn place_thrown(corner: ThrownCorner, @builtin(vertex_index) index: u32) -> ThrownSurface {
-    return ThrownSurface(
+fn place_reflected(corner: ReflectedCorner, @builtin(vertex_index) index: u32) -> ReflectedSurface {
+    return ReflectedSurface(
         clip_from_point(view, vec4f(corner.position, 1.0)),
         corner.irradiance,
         one(index),
@@ -141,7 +133,7 @@ fn spread_of(seen: vec3f) -> f32 {
 }
 
 // The map around a place, averaged over what the source's extent sees through a caster at a depth.
-fn map_at(source: Source, in_tile: vec2f, caster: f32, depth: f32) -> vec3f {
+fn map_at(source: MappedSource, in_tile: vec2f, caster: f32, depth: f32) -> vec3f {
     let texels = source.spread_m * (depth - caster) / (depth * caster) * source.focal_texels;
     let level = clamp(log2(2.0 * texels), 0.0, log2(source.tile_px));
     let margin = 0.5 * exp2(level) / source.tile_px;
@@ -155,7 +147,7 @@ fn transfer(row: u32, source: u32) -> vec3f {
 }
 
 @fragment
-fn light_on_patch(surface: PatchSurface) -> Light {
+fn light_on_patch(surface: PatchSurface) -> LightSums {
     let point_in_world = recovered(surface.point_in_world, surface.first_point_in_world, surface.one);
     let of_first = vec3f(surface.first_weights, 0.0);
     let first = recovered(vec3f(surface.weights, 0.0), of_first, surface.one).xy;
@@ -174,17 +166,17 @@ fn light_on_patch(surface: PatchSurface) -> Light {
     let reaching = weights.x * irradiances[surface.rows.x]
         + weights.y * irradiances[surface.rows.y]
         + weights.z * irradiances[surface.rows.z];
-    return Light(vec4f(reaching, 1.0), vec4f(taken, 0.0));
+    return LightSums(vec4f(reaching, 1.0), vec4f(taken, 0.0));
 }
 
 // Added to what sources take.
 @fragment
-fn thrown_back(surface: ThrownSurface) -> @location(1) vec4f {
+fn reflected_on_patch(surface: ReflectedSurface) -> @location(1) vec4f {
     return vec4f(-recovered(surface.irradiance, surface.first_irradiance, surface.one), 0.0);
 }
 
 @fragment
-fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: bool) -> Light {
+fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: bool) -> LightSums {
     let surface = surface(sampled);
     let point_in_world = (frame.world_from_camera * vec4f(surface.point_in_camera, 1.0)).xyz;
     let normal_in_camera = unit(surface.normal_in_camera) * select(-1.0, 1.0, outside);
@@ -203,14 +195,14 @@ fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: boo
     let arriving = max(surface.indirect - taken, vec3f(0.0));
     let diffuse = surface.material.rgb / PI * arriving;
     if !GLOSSY || surface.material.a <= 0.0 {
-        return Light(vec4f(0.0), vec4f(diffuse, 1.0));
+        return LightSums(vec4f(0.0), vec4f(diffuse, 1.0));
     }
     let to_camera = normalize(frame.world_from_camera[3].xyz - point_in_world);
     let cos_camera = max(dot(normal, to_camera), 1e-3);
     // What hides light hides it from the layer as well; more is not known of where it comes from.
     let left = arriving / max(surface.indirect, vec3f(1e-6));
     let mirrored = mirrored(reflect(-to_camera, normal), sqrt(surface.material.a), cos_camera) * left;
-    return Light(vec4f(0.0), vec4f(diffuse * (1.0 - fresnel(cos_camera)) + mirrored, 1.0));
+    return LightSums(vec4f(0.0), vec4f(diffuse * (1.0 - fresnel(cos_camera)) + mirrored, 1.0));
 }
 
 // Radiance that the glossy layer mirrors of the environment (Karis 2013: a mean over the lobe times what the layer reflects

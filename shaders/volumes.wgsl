@@ -1,6 +1,6 @@
 // Shadow volumes into the stencil; no colour.
 //!include "common.wgsl"
-//!include "whole_picture.wgsl"
+//!include "fullscreen.wgsl"
 
 struct CastingLight {
     // In the caster's anchor: a point (w = 1), or the direction towards distant light (w = 0).
@@ -10,7 +10,7 @@ struct CastingLight {
     end_in_anchor: vec4f,
 }
 
-@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(0) var<uniform> view: AnchorView;
 @group(1) @binding(0) var<uniform> light: CastingLight;
 
 struct Corner {

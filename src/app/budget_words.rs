@@ -1,21 +1,21 @@
 //! What became of a frame budget, in words.
 
-use crate::render::{Governed, Setting};
+use crate::render::{QualityController, Setting};
 
 /// How much longer than the budget frames may take, now and then, and still be said to keep to it.
 const HELD: f64 = 1.1;
 
 /// A sentence for people. `p95_ms` is what 95 % of the frames kept.
-pub fn budget_words(governed: &Governed, p95_ms: f64) -> String {
-    let budget_ms = governed.budget_ms();
-    let lowest = setting_words(governed.lowest());
+pub fn budget_words(controller: &QualityController, p95_ms: f64) -> String {
+    let budget_ms = controller.budget_ms();
+    let lowest = setting_words(controller.lowest());
     if p95_ms <= HELD * budget_ms {
         return format!(
             "the frame budget of {budget_ms} ms was held: 95 % of the frames took at most {p95_ms:.1} ms, with {lowest} at \
              the least"
         );
     }
-    let why = match governed.is_at_the_end() {
+    let why = match controller.is_at_the_end() {
         true => "there is nothing more to leave out",
         false => "frames take too different times",
     };

@@ -9,7 +9,7 @@ use super::recording;
 use super::stats::quantile;
 use super::stopwatch::Stopwatch;
 use crate::capture::live::is_live;
-use crate::render::{Gpu, Renderer, Shown};
+use crate::render::{Gpu, Shown};
 use crate::scene::Scene;
 use crate::tracking::Tracker;
 
@@ -54,7 +54,8 @@ fn measured(scene: &Scene) -> Result<String> {
         bail!("the recording's first frames do not show where the world is");
     };
     let gpu = Arc::new(Gpu::open(None)?);
-    let mut renderer = Renderer::new(Arc::clone(&gpu), scene, intrinsics)?;
+    let mut renderer =
+        crate::app::room_transport_cache::renderer(Arc::clone(&gpu), scene, intrinsics)?;
     let watch = Stopwatch::start();
     let mut frames_ms = Vec::new();
     while frames_ms.len() < DRAWS && watch.elapsed_ms() < LONGEST_MS {
@@ -67,10 +68,13 @@ fn measured(scene: &Scene) -> Result<String> {
         renderer.spent(ms);
         frames_ms.push(ms);
     }
-    let governed = renderer.governed();
-    ensure!(governed.is_some(), "the technique has nothing to leave out");
+    let controller = renderer.quality_controller();
+    ensure!(
+        controller.is_some(),
+        "the technique has nothing to leave out"
+    );
     let last = &frames_ms[frames_ms.len().saturating_sub(LAST)..];
-    let setting = governed.map(|governed| setting_words(governed.setting()));
+    let setting = controller.map(|controller| setting_words(controller.setting()));
     Ok(format!(
         "{} here, at {:.1} ms (19 of 20 within {:.1} ms; {})",
         setting.unwrap_or_default(),

@@ -1,13 +1,13 @@
 //! What `gnomon check` says of a room that shafts take their light from.
 
+use crate::app::room_transport_cache;
 use crate::app::stopwatch::Stopwatch;
-use crate::render::{Room, kept_rooms};
-use crate::scene::{ProbeScene, Scene, Technique};
+use crate::scene::{ProbeScene, Scene, ShadowTechnique};
 
 /// Labels and what stands behind them. Works the room out where that has not been done yet.
 pub fn room_lines(scene: &Scene, probe: &ProbeScene) -> Vec<(&'static str, String)> {
     let [width, height] = probe.probe.size_px();
-    let room = Room::of(scene, probe);
+    let room = scene.room(probe);
     let mut lines = vec![
         (
             "probe",
@@ -29,27 +29,28 @@ pub fn room_lines(scene: &Scene, probe: &ProbeScene) -> Vec<(&'static str, Strin
             ),
         ),
     ];
-    if scene.chosen_technique().0 != Technique::Shafts {
+    if scene.chosen_technique().0 != ShadowTechnique::Shafts {
         return lines;
     }
-    let folder = kept_rooms::folder();
-    let (ready, took_ms) = Stopwatch::time(|| kept_rooms::ready(&room, folder.as_deref()));
-    let prepared = &ready.prepared;
+    let folder = room_transport_cache::folder();
+    let (ready, took_ms) =
+        Stopwatch::time(|| room_transport_cache::ready(&room, folder.as_deref()));
+    let transport = &ready.transport;
     lines.push((
         "patches",
         format!(
             "{}  {} corners, {} of them send light",
-            prepared.patches.patches.len(),
-            prepared.patches.vertices.len(),
-            prepared.sources.patches.len()
+            transport.patches.patches.len(),
+            transport.patches.vertices.len(),
+            transport.sources.patches.len()
         ),
     ));
     lines.push((
         "shafts",
         format!(
             "{} leaves  {:.1} MB, {}",
-            prepared.hierarchy.leaf_count(),
-            prepared.hierarchy.bytes() as f64 / 1e6,
+            transport.hierarchy.leaf_count(),
+            transport.hierarchy.bytes() as f64 / 1e6,
             match ready.read_from {
                 Some(path) => format!("kept in {}", path.display()),
                 None => format!("worked out in {:.1} s", took_ms / 1e3),
@@ -70,7 +71,7 @@ pub fn room_lines(scene: &Scene, probe: &ProbeScene) -> Vec<(&'static str, Strin
 
 /// What of a scene has no part in a room's light.
 pub fn warnings(scene: &Scene) -> Vec<String> {
-    if scene.chosen_technique().0 != Technique::Shafts {
+    if scene.chosen_technique().0 != ShadowTechnique::Shafts {
         return Vec::new();
     }
     let mut warnings = Vec::new();

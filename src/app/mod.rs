@@ -40,6 +40,7 @@ mod recording;
 pub mod replay;
 pub mod report;
 pub mod result_kind;
+pub mod room_transport_cache;
 mod scene_copy;
 mod session_folder;
 pub mod session_recorder;

@@ -12,7 +12,7 @@ use anyhow::{Context as _, Result, bail};
 
 use crate::capture::{Frame, FrameSource};
 use crate::geometry::camera::Intrinsics;
-use crate::render::{Governed, Gpu, Layers, Renderer, Shown};
+use crate::render::{Gpu, Layers, QualityController, Renderer, Shown};
 use crate::scene::{Scene, Shortcuts};
 use crate::tracking::{AnchorPose, Tracker};
 
@@ -107,7 +107,7 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
         poses: PosesText::new(),
         tally: Tally::new(scene.anchors.len()),
         drawn: 0,
-        governed: None,
+        controller: None,
     };
     let adapter = drawing
         .as_ref()
@@ -138,8 +138,8 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
     }
     let mut remarks = Vec::new();
     let render = run.tally.log.summary().remove("render");
-    if let (Some(governed), Some(times)) = (&run.governed, render) {
-        remarks.push(budget_words(governed, times.p95_ms));
+    if let (Some(controller), Some(times)) = (&run.controller, render) {
+        remarks.push(budget_words(controller, times.p95_ms));
     }
     if run.tally.lost[0] > 0 {
         remarks.push(format!(
@@ -202,7 +202,8 @@ impl Drawing {
     ) -> Result<Self> {
         let gpu = Arc::new(Gpu::open(request.adapter.as_deref())?);
         eprintln!("drawing on {}", gpu.description());
-        let renderer = Renderer::new(Arc::clone(&gpu), scene, intrinsics)?;
+        let renderer =
+            crate::app::room_transport_cache::renderer(Arc::clone(&gpu), scene, intrinsics)?;
         let sink = request
             .out
             .as_ref()
@@ -229,7 +230,7 @@ struct Run<'a> {
     tally: Tally,
     drawn: u32,
     /// What the frame budget has led to so far.
-    governed: Option<Governed>,
+    controller: Option<QualityController>,
 }
 
 impl Run<'_> {
@@ -339,7 +340,7 @@ impl Run<'_> {
         self.tally.log.add("readback", readback_ms);
         self.tally.log.add("render", render_ms);
         renderer.spent(render_ms);
-        self.governed = renderer.governed().cloned();
+        self.controller = renderer.quality_controller().cloned();
         let gpu = renderer.gpu_times()?;
         if let Some(ms) = gpu.shadows_ms {
             self.tally.log.add("shadows", ms);

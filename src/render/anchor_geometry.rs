@@ -15,20 +15,19 @@ use crate::geometry::mesh::Mesh;
 use crate::geometry::outline_scale::largest_scale;
 use crate::geometry::shadow_volume::Caster;
 use crate::geometry::solid::holes;
-use crate::light::bounce::Reflector;
 use crate::scene::{Object, Scene, Shortcut};
 
-/// What kind of thing a surface belongs to.
+/// The kind of model that a surface belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Role {
     Real,
     Virtual,
 }
 
-/// A corner of a triangle, as `Corner` in shading.wgsl reads it.
+/// A corner of a triangle, as `SurfaceCorner` in shading.wgsl reads it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Corner {
+struct SurfaceCorner {
     position: Vec3,
     normal: Vec3,
     albedo: Vec3,
@@ -36,9 +35,9 @@ struct Corner {
     roughness: f32,
 }
 
-/// Vertex layout of [`Corner`].
+/// Vertex layout of [`SurfaceCorner`].
 pub(super) const CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
-    array_stride: size_of::<Corner>() as u64,
+    array_stride: size_of::<SurfaceCorner>() as u64,
     step_mode: wgpu::VertexStepMode::Vertex,
     attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x4],
 };
@@ -62,7 +61,7 @@ pub(super) struct SurfaceBatch {
 }
 
 /// One thing, in its anchor's space.
-pub(super) struct Thing {
+pub(super) struct AnchoredModel {
     pub role: Role,
     pub anchor: usize,
     /// Where two surfaces are in one place, one is to be seen: a virtual thing before a real one, and of virtual ones that
@@ -71,14 +70,14 @@ pub(super) struct Thing {
     /// Around the mesh itself; its coarser levels lie within.
     pub bounds: Bounds,
     /// The mesh itself, then ever coarser ones.
-    pub levels: Vec<ThingLevel>,
+    pub levels: Vec<ModelLevel>,
     pub casts: bool,
     /// Triangles that stand for it where others' shadows fall on it.
     pub receivers: Vec<[DVec3; 3]>,
 }
 
 /// A thing in one level of detail.
-pub(super) struct ThingLevel {
+pub(super) struct ModelLevel {
     /// Its triangles among the batch's indices.
     pub range: Range<u32>,
     /// How far outlines are off at most and on the average, metres in the anchor's space.
@@ -92,7 +91,7 @@ pub(super) struct ThingLevel {
     pub caster: Option<LevelCaster>,
 }
 
-/// What takes light away.
+/// A caster of shadows: a model in one level of detail.
 pub(super) struct LevelCaster {
     pub caster: Caster,
     /// See [`Caster::volume_vertices`].
@@ -110,7 +109,7 @@ pub(super) type VirtualCorners = (Vec<(Vec3, Vec3)>, Vec<[u32; 3]>);
 pub(super) struct AnchorGeometry {
     pub batches: Vec<SurfaceBatch>,
     /// The real ones first.
-    pub things: Vec<Thing>,
+    pub things: Vec<AnchoredModel>,
     /// For each virtual batch its anchor and corners.
     pub virtual_corners: Vec<(usize, VirtualCorners)>,
 }
@@ -186,8 +185,8 @@ fn thing(
     object: &Object,
     coarser: &[Level],
     shared: &mut SharedCorners,
-) -> Option<Thing> {
-    let stretch = largest_scale(&object.anchor_from_object);
+) -> Option<AnchoredModel> {
+    let scale = largest_scale(&object.anchor_from_object);
     let itself = (&object.mesh, [0.0; 3]);
     let coarser = coarser.iter().map(|level| {
         let lengths_m = [level.max_error_m, level.mean_error_m, level.largest_facet_m];
@@ -200,8 +199,8 @@ fn thing(
         .chain(coarser)
         .map(|(mesh, lengths_m)| {
             let [max_error_m, mean_error_m, largest_facet_m] =
-                lengths_m.map(|length_m| length_m * stretch);
-            let positions = positions_in_anchor(object, mesh);
+                lengths_m.map(|length_m| length_m * scale);
+            let positions = object.positions_in_anchor(mesh);
             let corner = |index: u32| positions[index as usize].as_dvec3();
             receivers = mesh.triangles.iter().map(|t| t.map(corner)).collect();
             let first = shared.triangles.len();
@@ -220,7 +219,7 @@ fn thing(
                     smooth_normals: smooth_normals(&corners),
                 }
             };
-            ThingLevel {
+            ModelLevel {
                 holes: holes(mesh).map(|holes| holes.into_iter().map(in_anchor).collect()),
                 caster: object.casts.then(of_casting),
                 range: 3 * first as u32..3 * shared.triangles.len() as u32,
@@ -230,8 +229,8 @@ fn thing(
             }
         })
         .collect();
-    let positions = positions_in_anchor(object, &object.mesh);
-    Some(Thing {
+    let positions = object.positions_in_anchor(&object.mesh);
+    Some(AnchoredModel {
         role,
         tie,
         anchor: object.anchor,
@@ -245,19 +244,19 @@ fn thing(
 /// Corners that triangles share, and the triangles.
 #[derive(Default)]
 struct SharedCorners {
-    corners: Vec<Corner>,
+    corners: Vec<SurfaceCorner>,
     triangles: Vec<[u32; 3]>,
     index_of: HashMap<[u32; 10], u32>,
 }
 
 impl SharedCorners {
     /// Adds triangles, three corners each.
-    fn add(&mut self, corners: &[Corner]) {
+    fn add(&mut self, corners: &[SurfaceCorner]) {
         let indices: Vec<u32> = corners.iter().map(|corner| self.index(*corner)).collect();
         self.triangles.extend(indices.as_chunks::<3>().0);
     }
 
-    fn index(&mut self, corner: Corner) -> u32 {
+    fn index(&mut self, corner: SurfaceCorner) -> u32 {
         let next = self.corners.len() as u32;
         let index = *self.index_of.entry(bytemuck::cast(corner)).or_insert(next);
         if index == next {
@@ -302,19 +301,9 @@ impl SharedCorners {
     }
 }
 
-fn positions_in_anchor(object: &Object, mesh: &Mesh) -> Vec<Vec3> {
-    let place = |position: &Vec3| {
-        object
-            .anchor_from_object
-            .transform_point3(position.as_dvec3())
-            .as_vec3()
-    };
-    mesh.positions.iter().map(place).collect()
-}
-
 /// Three corners for each triangle.
-fn corners(object: &Object, mesh: &Mesh) -> Vec<Corner> {
-    let positions = positions_in_anchor(object, mesh);
+fn corners(object: &Object, mesh: &Mesh) -> Vec<SurfaceCorner> {
+    let positions = object.positions_in_anchor(mesh);
     let normal_matrix = object.anchor_from_object.matrix3.inverse().transpose();
     mesh.triangles
         .iter()
@@ -322,7 +311,7 @@ fn corners(object: &Object, mesh: &Mesh) -> Vec<Corner> {
         .zip(&mesh.triangle_materials)
         .flat_map(|((triangle, normals), &material)| {
             let material = object.materials[material as usize];
-            [0, 1, 2].map(|corner| Corner {
+            [0, 1, 2].map(|corner| SurfaceCorner {
                 position: positions[triangle[corner] as usize],
                 normal: (normal_matrix * normals[corner].as_dvec3())
                     .normalize_or_zero()
@@ -335,7 +324,7 @@ fn corners(object: &Object, mesh: &Mesh) -> Vec<Corner> {
 }
 
 /// The normals of triangles' corners unless each triangle has but one.
-fn smooth_normals(corners: &[Corner]) -> Option<Vec<[Vec3; 3]>> {
+fn smooth_normals(corners: &[SurfaceCorner]) -> Option<Vec<[Vec3; 3]>> {
     let (triangles, _) = corners.as_chunks::<3>();
     let normals = || {
         triangles
@@ -345,17 +334,4 @@ fn smooth_normals(corners: &[Corner]) -> Option<Vec<[Vec3; 3]>> {
     normals()
         .any(|[a, b, c]| a != b || b != c)
         .then(|| normals().collect())
-}
-
-/// The triangles of an object as what light meets there, in its anchor's space.
-pub(super) fn reflectors(object: &Object) -> impl Iterator<Item = Reflector> {
-    let mesh = &object.mesh;
-    let positions = positions_in_anchor(object, mesh);
-    mesh.triangles
-        .iter()
-        .zip(&mesh.triangle_materials)
-        .map(move |(triangle, &material)| Reflector {
-            corners: triangle.map(|index| positions[index as usize]),
-            albedo: object.materials[material as usize].albedo,
-        })
 }

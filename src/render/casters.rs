@@ -10,12 +10,12 @@ use crate::geometry::shadow_volume::{Casting, LightPlace};
 use crate::light::Light;
 use crate::scene::{self, ShadowSettings, Shortcut};
 
-use super::anchor_geometry::{LevelCaster, Role, Thing};
+use super::anchor_geometry::{AnchoredModel, LevelCaster, Role};
 use super::gpu::Gpu;
 use super::insides::Insides;
-use super::touched::{Touched, light_place};
-use super::uniforms::{CastingLight, NEAR_M, UniformRow};
-use super::volumes::{Counted, IndexBuffer, MadeFor, Volume};
+use super::screen_bounds::{ScreenBounds, light_place};
+use super::uniforms::{CastingLight, LIGHT_GROUP, NEAR_M, UniformRow};
+use super::volumes::{CountedVolume, IndexBuffer, MadeFor, Volume};
 
 /// The shadows of a scene's things.
 pub(super) struct Casters {
@@ -30,7 +30,7 @@ pub(super) struct Casters {
     forgets: bool,
 }
 
-/// What one caster does to one light.
+/// The shadow of one caster in one light.
 #[derive(Default)]
 struct Shadow {
     volume: Volume,
@@ -50,7 +50,7 @@ struct Shadow {
 pub(super) struct Lit {
     pub facing: LitSides,
     pub terminator: LitSides,
-    pub averted: LitSides,
+    pub back_facing: LitSides,
 }
 
 /// Triangles that may be seen from outside, then those that are seen from inside.
@@ -73,27 +73,21 @@ impl LitSides {
 }
 
 impl Casters {
-    /// `light_layout` has one uniform with a dynamic offset.
     pub fn new(
-        device: &wgpu::Device,
+        gpu: &Gpu,
         thing_count: usize,
         light_count: usize,
-        light_layout: &wgpu::BindGroupLayout,
         shadows: &ShadowSettings,
     ) -> Self {
-        let lights =
-            UniformRow::new::<CastingLight>(device, "casting lights", light_count * thing_count);
+        let lights = UniformRow::new::<CastingLight>(
+            &gpu.device,
+            "casting lights",
+            light_count * thing_count,
+        );
         let of_light = |_| (0..thing_count).map(|_| Shadow::default()).collect();
         Self {
             shadows: (0..light_count).map(of_light).collect(),
-            light_group: device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("casting light"),
-                layout: light_layout,
-                entries: &[wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: lights.binding(),
-                }],
-            }),
+            light_group: gpu.bind_group(&LIGHT_GROUP, [lights.binding()]),
             lights,
             depth_pass: shadows.counting == scene::Counting::Auto
                 && !shadows.without.has(Shortcut::DepthPass),
@@ -106,38 +100,31 @@ impl Casters {
     pub fn update(
         &mut self,
         gpu: &Gpu,
-        (things, levels): (&[Thing], &[usize]),
+        (things, levels): (&[AnchoredModel], &[usize]),
         lights: &[Light],
         camera_from_anchor: &[Option<DAffine3>],
         intrinsics: &Intrinsics,
-        (touched, within): (&Touched, PixelRect),
+        (bounds, within): (&ScreenBounds, PixelRect),
     ) {
         let Some(camera_from_world) = camera_from_anchor.first().copied().flatten() else {
             return;
         };
-        let placed: Vec<Option<Placed>> = camera_from_anchor
+        let placed: Vec<Option<CasterView>> = camera_from_anchor
             .iter()
             .enumerate()
-            .map(|(anchor, camera_from_anchor)| {
-                let anchor_from_camera = (*camera_from_anchor)?.inverse();
-                Some(Placed {
-                    // The world stands still to its lights: no camera may come between, or rounding would move them.
-                    anchor_from_world: match anchor {
-                        0 => DAffine3::IDENTITY,
-                        _ => anchor_from_camera * camera_from_world,
-                    },
-                    near: counting::near_corners(
-                        intrinsics,
-                        f64::from(NEAR_M),
-                        &anchor_from_camera,
-                    ),
-                    eye: anchor_from_camera.translation,
-                })
+            .map(|(anchor, pose)| {
+                let pose = (*pose)?;
+                Some(CasterView::new(
+                    anchor,
+                    &pose,
+                    &camera_from_world,
+                    intrinsics,
+                ))
             })
             .collect();
         for (index, (light, shadows)) in lights.iter().zip(&mut self.shadows).enumerate() {
             for (number, (thing, shadow)) in things.iter().zip(shadows).enumerate() {
-                let reach = &touched.shadows[index][number];
+                let reach = &bounds.shadows[index][number];
                 shadow.scissor = None;
                 let level = levels[number];
                 let pixels = reach.pixels.intersection(within);
@@ -157,14 +144,7 @@ impl Casters {
                 let slot = index * things.len() + number;
                 self.lights
                     .write(&gpu.queue, slot, &CastingLight::new(light, end));
-                // Beyond its end a volume is open: no ray may come from there.
-                let sees_past_end = |end: HalfSpace| {
-                    placed
-                        .near
-                        .iter()
-                        .any(|corner| end.depth_of(*corner) <= 0.0)
-                };
-                let counting = match self.depth_pass && !end.is_some_and(sees_past_end) {
+                let counting = match self.depth_pass && !placed.sees_past(end) {
                     true => counting::counting(&thing.bounds, light, &placed.near),
                     false => Counting::DepthFail,
                 };
@@ -197,18 +177,18 @@ impl Casters {
     /// The volumes of a role and light, for [`super::volumes::Volumes::count`].
     pub fn counted<'a>(
         &'a self,
-        things: &'a [Thing],
+        things: &'a [AnchoredModel],
         role: Role,
         light: usize,
         insides: &'a [Insides],
-        view_offset: impl Fn(&Thing) -> u32 + 'a,
-    ) -> impl Iterator<Item = Counted<'a>> {
+        view_offset: impl Fn(&AnchoredModel) -> u32 + 'a,
+    ) -> impl Iterator<Item = CountedVolume<'a>> {
         let shadows = things.iter().zip(&self.shadows[light]).enumerate();
         shadows
             .filter(move |(_, (thing, _))| thing.role == role)
             .filter_map(move |(number, (thing, shadow))| {
                 let slot = light * things.len() + number;
-                Some(Counted {
+                Some(CountedVolume {
                     volume: &shadow.volume,
                     counting: shadow.counting?,
                     insides: insides[number],
@@ -248,7 +228,7 @@ impl Shadow {
         for (sides, seen) in [
             (&mut self.lit.facing, sorted.facing),
             (&mut self.lit.terminator, sorted.terminator),
-            (&mut self.lit.averted, sorted.back_facing),
+            (&mut self.lit.back_facing, sorted.back_facing),
         ] {
             let triangles = seen.outer.iter().chain(&seen.inner);
             let corners = triangles.flat_map(|&triangle| caster.surface_triangles[triangle]);
@@ -260,9 +240,38 @@ impl Shadow {
     }
 }
 
-/// Where an anchor's casters have the light and the camera.
-struct Placed {
+/// The light and the camera as an anchor's casters have them.
+struct CasterView {
     anchor_from_world: DAffine3,
     near: [DVec3; 4],
     eye: DVec3,
+}
+
+impl CasterView {
+    fn new(
+        anchor: usize,
+        camera_from_anchor: &DAffine3,
+        camera_from_world: &DAffine3,
+        intrinsics: &Intrinsics,
+    ) -> Self {
+        let anchor_from_camera = camera_from_anchor.inverse();
+        Self {
+            // The world stands still to its lights: no camera may come between, or rounding would move them.
+            anchor_from_world: match anchor {
+                0 => DAffine3::IDENTITY,
+                _ => anchor_from_camera * camera_from_world,
+            },
+            near: counting::near_corners(intrinsics, f64::from(NEAR_M), &anchor_from_camera),
+            eye: anchor_from_camera.translation,
+        }
+    }
+
+    /// Whether the near plane reaches beyond the end of a volume, where it is open: no ray may come from there.
+    fn sees_past(&self, end: Option<HalfSpace>) -> bool {
+        let is_past = |end: HalfSpace| {
+            let mut near = self.near.iter();
+            near.any(|corner| end.depth_of(*corner) <= 0.0)
+        };
+        end.is_some_and(is_past)
+    }
 }

@@ -9,25 +9,25 @@ use crate::geometry::outline_scale::{OutlineView, outline_px_per_m, shadow_px_pe
 use crate::geometry::shadow_volume::LightPlace;
 use crate::light::Light;
 
-use super::anchor_geometry::{Role, Thing, ThingLevel};
-use super::touched::light_place;
+use super::anchor_geometry::{AnchoredModel, ModelLevel, Role};
+use super::screen_bounds::light_place;
 use super::uniforms::NEAR_M;
 
-/// So far may the line move at which a real thing turns away from a light.
+/// The limit to how far the line may move at which a real thing turns away from a light, pixels.
 const LARGEST_REAL_FACET_PX: f64 = 1.0;
 
 /// A coarser level than the last frame's is taken where it is off by no more than this part of what is allowed: a camera
 /// that trembles about the limit does not make things flip between two levels.
 const COARSER_AT: f64 = 0.75;
 
-/// How much farther than an outline the edge of a thing's shadow on itself may move where light falls straight: by the error
-/// of what casts it and by that of what it falls on. Where light grazes at a sine it moves by as much more as there is less
+/// The factor by which the edge of a thing's shadow on itself may move farther than an outline where light falls straight: by
+/// the error of what casts it and by that of what it falls on. Where light grazes at a sine it moves by as much more as there is less
 /// light to lose, so that what is lost or won in light stays the same.
 const OWN_SHADOW: f64 = 2.0;
 
 /// For each thing the index of its level, for the camera and all lights; `before` are those of the last frame.
 pub(super) fn chosen_levels(
-    things: &[Thing],
+    things: &[AnchoredModel],
     lights: &[Light],
     camera_from_anchor: &[Option<DAffine3>],
     intrinsics: &Intrinsics,
@@ -37,82 +37,104 @@ pub(super) fn chosen_levels(
     let Some(camera_from_world) = camera_from_anchor.first().copied().flatten() else {
         return vec![0; things.len()];
     };
-    let view = OutlineView {
-        intrinsics: *intrinsics,
-        camera_from_world,
-        near_m: f64::from(NEAR_M),
-    };
     let world_from_camera = camera_from_world.inverse();
-    let placed: Vec<Option<Placed>> = things
+    let placed = things
         .iter()
         .map(|thing| {
             let world_from_thing = world_from_camera * camera_from_anchor[thing.anchor]?;
             let place = |point: DVec3| world_from_thing.transform_point3(point);
-            Some(Placed {
+            Some(PlacedBounds {
                 bounds: Bounds::around(thing.bounds.corners().map(place))?,
                 world_from_thing,
             })
         })
         .collect();
-    let lights: Vec<LightPlace> = lights
-        .iter()
-        .map(|light| light_place(light, &DAffine3::IDENTITY))
-        .collect();
-    things
-        .iter()
-        .zip(&placed)
-        .enumerate()
-        .map(|(index, (thing, placed_thing))| {
-            let Some(Placed { bounds, .. }) = placed_thing else {
-                return 0;
-            };
-            if thing.levels.len() == 1 {
-                return 0;
-            }
-            let outline_px_per_m = outline_px_per_m(bounds, &view);
-            let mut px_per_m = outline_px_per_m;
-            if thing.casts && !lights.is_empty() {
-                px_per_m *= OWN_SHADOW;
-            }
-            for &light in lights.iter().filter(|_| thing.casts) {
-                let others = things.iter().zip(&placed).enumerate();
-                for (_, (other, placed)) in others.filter(|(other, _)| *other != index) {
-                    let Some(placed) = placed
-                        .as_ref()
-                        .filter(|placed| may_shade(light, bounds, &placed.bounds))
-                    else {
-                        continue;
-                    };
-                    let place = |point: DVec3| placed.world_from_thing.transform_point3(point);
-                    let receivers = other.receivers.iter().map(|corners| corners.map(place));
-                    px_per_m = px_per_m.max(shadow_px_per_m(bounds, light, receivers, &view));
-                }
-            }
-            // Where `part` of all that is allowed is.
-            let close_enough = |level: &ThingLevel, part: f64| {
-                let (max_px, mean_px) =
-                    (level.max_error_m * px_per_m, level.mean_error_m * px_per_m);
-                // The video shows a real thing's own shading, and where that ends its own shadow has to.
-                let facets_show = thing.role == Role::Real
-                    && level.largest_facet_m * outline_px_per_m > part * LARGEST_REAL_FACET_PX;
-                is_close_enough(max_px, mean_px, part * max_silhouette_error_px) && !facets_show
-            };
-            let mut levels = thing.levels.iter();
-            let surely = levels
-                .rposition(|level| close_enough(level, COARSER_AT))
-                .unwrap_or(0);
-            let kept = before.get(index).copied().unwrap_or(0);
-            let may_stay = |level: &ThingLevel| kept > surely && close_enough(level, 1.0);
-            match thing.levels.get(kept).is_some_and(may_stay) {
-                true => kept,
-                false => surely,
-            }
-        })
+    let place = |light| light_place(light, &DAffine3::IDENTITY);
+    let choice = LevelChoice {
+        view: OutlineView {
+            intrinsics: *intrinsics,
+            camera_from_world,
+            near_m: f64::from(NEAR_M),
+        },
+        things,
+        placed,
+        lights: lights.iter().map(place).collect(),
+        max_silhouette_error_px,
+    };
+    let before = |index: usize| before.get(index).copied().unwrap_or(0);
+    let indices = 0..things.len();
+    indices
+        .map(|index| choice.level(index, before(index)))
         .collect()
 }
 
-/// Where a thing is in this frame, in world space.
-struct Placed {
+/// All that the choice of levels depends on.
+struct LevelChoice<'a> {
+    view: OutlineView,
+    things: &'a [AnchoredModel],
+    placed: Vec<Option<PlacedBounds>>,
+    lights: Vec<LightPlace>,
+    max_silhouette_error_px: f64,
+}
+
+impl LevelChoice<'_> {
+    /// The level of a thing that was drawn in another one before.
+    fn level(&self, index: usize, before: usize) -> usize {
+        let thing = &self.things[index];
+        let Some(PlacedBounds { bounds, .. }) = &self.placed[index] else {
+            return 0;
+        };
+        if thing.levels.len() == 1 {
+            return 0;
+        }
+        let outline_px_per_m = outline_px_per_m(bounds, &self.view);
+        let px_per_m = self.px_per_m(index, bounds, outline_px_per_m);
+        // Where `part` of all that is allowed is.
+        let close_enough = |level: &ModelLevel, part: f64| {
+            let (max_px, mean_px) = (level.max_error_m * px_per_m, level.mean_error_m * px_per_m);
+            // The video shows a real thing's own shading, and where that ends its own shadow has to.
+            let facets_show = thing.role == Role::Real
+                && level.largest_facet_m * outline_px_per_m > part * LARGEST_REAL_FACET_PX;
+            is_close_enough(max_px, mean_px, part * self.max_silhouette_error_px) && !facets_show
+        };
+        let mut levels = thing.levels.iter();
+        let surely = levels
+            .rposition(|level| close_enough(level, COARSER_AT))
+            .unwrap_or(0);
+        let may_stay = |level: &ModelLevel| before > surely && close_enough(level, 1.0);
+        match thing.levels.get(before).is_some_and(may_stay) {
+            true => before,
+            false => surely,
+        }
+    }
+
+    /// By how many pixels a metre of a thing's error shows at most: in its outline, or in the edge of a shadow.
+    fn px_per_m(&self, index: usize, bounds: &Bounds, outline_px_per_m: f64) -> f64 {
+        let thing = &self.things[index];
+        let mut px_per_m = outline_px_per_m;
+        if thing.casts && !self.lights.is_empty() {
+            px_per_m *= OWN_SHADOW;
+        }
+        for &light in self.lights.iter().filter(|_| thing.casts) {
+            let others = self.things.iter().zip(&self.placed).enumerate();
+            for (_, (other, placed)) in others.filter(|(other, _)| *other != index) {
+                let Some(placed) = placed
+                    .as_ref()
+                    .filter(|placed| may_shade(light, bounds, &placed.bounds))
+                else {
+                    continue;
+                };
+                let place = |point: DVec3| placed.world_from_thing.transform_point3(point);
+                let receivers = other.receivers.iter().map(|corners| corners.map(place));
+                px_per_m = px_per_m.max(shadow_px_per_m(bounds, light, receivers, &self.view));
+            }
+        }
+        px_per_m
+    }
+}
+
+/// The place of a thing in this frame, in world space.
+struct PlacedBounds {
     bounds: Bounds,
     world_from_thing: DAffine3,
 }

@@ -3,232 +3,274 @@
 //! Reads the recorded picture and the stencil (stencil.rs). Writes depth, stencil and the picture; beside it, for virtual
 //! surfaces, what a shadow leaves of them, which is copied into the picture where one falls.
 
-use super::background::{Background, PICTURE_FORMAT, extent};
-use super::composite::GAIN_FORMAT;
+use super::anchor_geometry::Role;
+use super::attachments::{kept, loaded, target};
+use super::background::{Background, PICTURE_FORMAT, VIDEO_GROUP};
 use super::gpu::Gpu;
-use super::shader;
-use super::stencil::{SHADOW, VIRTUAL_SHADOW};
-use super::surfaces::{Sided, Use};
-use super::volumes::Volumes;
+use super::gpu_clock::GpuSpan;
+use super::gpu_scene::GpuScene;
+use super::light_sums::GAIN_FORMAT;
+use super::passes::Passes;
+use super::pipelines::{GroupLayout, PipelineDescription, overwritten, texels, untouched};
+use super::screen_bounds::ScreenBounds;
+use super::shown::Shown;
+use super::stencil::{SHADOW, VIRTUAL_SHADOW, depth_stencil_state, stencil};
+use super::surfaces::{Sided, surface_description};
+use super::technique::{FrameContext, TechniquePasses};
+use super::uniforms::GEOMETRY_GROUPS;
+use super::volumes::{Among, Volumes, set_scissor};
 
 /// Values of `SEEN` in direct.wgsl.
 const IN_OPEN_LIGHT: f64 = 1.0;
 const AT_TERMINATOR: f64 = 0.5;
 
+/// Groups 0 to 2 where geometry is drawn over the video.
+const OVER_VIDEO_GROUPS: [GroupLayout; 3] = [GEOMETRY_GROUPS[0], GEOMETRY_GROUPS[1], VIDEO_GROUP];
+
+/// Group 3: what a shadow leaves of virtual surfaces.
+const AMBIENT_GROUP: GroupLayout = GroupLayout {
+    label: "ambient light",
+    entries: &[texels(0, false)],
+};
+
 /// Pipelines and textures of the two passes.
 pub(super) struct Direct {
     /// Empties depth, stencil and `ambient` as far as the scissor reaches: to clear the whole of them took longer than to
     /// draw most things.
-    pub nothing: wgpu::RenderPipeline,
+    nothing: wgpu::RenderPipeline,
     /// Depth of real surfaces.
-    pub depth_of_real: Sided,
+    depth_of_real: Sided,
     /// Depth and all light of virtual surfaces, as if nothing hid it.
-    pub light_on_virtual: Sided,
+    light_on_virtual: Sided,
     /// The same where they are turned away from the light, and smooth shading lights them all the same.
-    pub light_at_terminator: Sided,
+    light_at_terminator: Sided,
     /// Depth and the ambient light alone.
-    pub ambient_on_virtual: Sided,
-    pub volumes: Volumes,
+    ambient_on_virtual: Sided,
+    volumes: Volumes,
     /// Real surfaces where virtual things hide the light.
-    pub hidden_on_real: Sided,
+    hidden_on_real: Sided,
     /// The factor that they then have on the video, for the `gain` layer.
-    pub gain_on_real: Sided,
+    gain_on_real: Sided,
     /// The ambient light alone where virtual surfaces lie in more volumes than the stencil's reference says: those in the
     /// open (0), and those at the terminator (1), which lie in their own.
-    pub shadow_on_virtual: [wgpu::RenderPipeline; 2],
-    /// What they read, in group 3.
-    pub ambient_group: wgpu::BindGroup,
+    shadow_on_virtual: [wgpu::RenderPipeline; 2],
+    /// What they read.
+    ambient_group: wgpu::BindGroup,
     /// What a shadow leaves of virtual surfaces, encoded as the picture is.
-    pub ambient: wgpu::TextureView,
-    pub depth_stencil: wgpu::TextureView,
+    ambient: wgpu::TextureView,
+    depth_stencil: wgpu::TextureView,
 }
 
 impl Direct {
-    /// `layouts` are those of groups 0 and 1 where geometry is drawn.
-    pub fn new(
-        gpu: &Gpu,
-        [view, light]: &[wgpu::BindGroupLayout; 2],
-        background: &Background,
-        glossy: bool,
-    ) -> Self {
-        let device = &gpu.device;
-        let texture = |label, format, usage| {
-            device
-                .create_texture(&wgpu::TextureDescriptor {
-                    label: Some(label),
-                    size: extent(background.size_px),
-                    mip_level_count: 1,
-                    sample_count: 1,
-                    dimension: wgpu::TextureDimension::D2,
-                    format,
-                    usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
-                    view_formats: &[],
-                })
-                .create_view(&Default::default())
+    pub fn new(gpu: &Gpu, background: &Background, glossy: bool) -> Self {
+        let target =
+            |label, format, usage| target(&gpu.device, label, background.size_px, format, 1, usage);
+        let read = wgpu::TextureUsages::TEXTURE_BINDING;
+        let ambient = target("ambient light", PICTURE_FORMAT, read);
+        let surface = SurfacesOverVideo {
+            gpu,
+            // What a scene does not have costs nothing.
+            constants: vec![
+                ("GLOSSY", f64::from(glossy)),
+                ("DISTORTS", f64::from(background.distorts)),
+            ],
         };
-        let ambient = texture(
-            "ambient light",
-            PICTURE_FORMAT,
-            wgpu::TextureUsages::TEXTURE_BINDING,
-        );
-        let ambient_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("ambient light"),
-            entries: &[wgpu::BindGroupLayoutEntry {
-                binding: 0,
-                visibility: wgpu::ShaderStages::FRAGMENT,
-                ty: wgpu::BindingType::Texture {
-                    sample_type: wgpu::TextureSampleType::Float { filterable: false },
-                    view_dimension: wgpu::TextureViewDimension::D2,
-                    multisampled: false,
-                },
-                count: None,
-            }],
-        });
-        let layout = |label, groups: &[Option<&wgpu::BindGroupLayout>]| {
-            device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some(label),
-                bind_group_layouts: groups,
-                immediate_size: 0,
-            })
-        };
-        let geometry = layout(
-            "geometry over video",
-            &[Some(view), Some(light), Some(&background.layout)],
-        );
-        let module = shader::module(device, "direct", include_str!("../../shaders/direct.wgsl"));
-        // What a scene does not have costs nothing.
-        let constants = [
-            ("GLOSSY", f64::from(glossy)),
-            ("DISTORTS", f64::from(background.distorts)),
-        ];
-        let target = |format, write_mask| {
-            Some(wgpu::ColorTargetState {
-                format,
-                blend: None,
-                write_mask,
-            })
-        };
-        let targets =
-            |written| [PICTURE_FORMAT, PICTURE_FORMAT].map(|format| target(format, written));
-        let (all, none) = (wgpu::ColorWrites::ALL, wgpu::ColorWrites::empty());
-
-        let surface = |vertex, fragment, constants: &[_], written| {
-            let usage = Use {
-                vertex,
-                fragment,
-                writes_depth: true,
-                stencil: wgpu::CompareFunction::Always,
-                stencil_bits: 0,
-                marks: (wgpu::StencilOperation::Keep, 0),
-                targets: &targets(written),
-                constants,
-            };
-            usage.pipelines(device, &geometry, &module, gpu.depth_format, 1)
-        };
-        let lit = |seen| {
-            let constants = [constants[0], ("SEEN", seen)];
-            surface("place", "light_on_virtual", &constants, all)
-        };
-        let hidden = |fragment, format| {
-            let usage = Use {
-                vertex: "place",
-                fragment,
-                writes_depth: false,
-                stencil: wgpu::CompareFunction::Less,
-                stencil_bits: VIRTUAL_SHADOW,
-                marks: (wgpu::StencilOperation::Keep, 0),
-                targets: &[target(format, all)],
-                constants: &constants,
-            };
-            usage.pipelines(device, &geometry, &module, gpu.depth_format, 1)
-        };
-        let over_all = |layout, fragment, constants: &[_], targets: &[_], depth_stencil| {
-            shader::whole_picture(
-                device,
-                layout,
-                &module,
-                fragment,
-                targets,
-                Some(depth_stencil),
-                constants,
-            )
-        };
-        let depth_format = gpu.depth_format;
-        let shadow_layout = layout("ambient light", &[None, None, None, Some(&ambient_layout)]);
-        let shadow = |seen| {
-            over_all(
-                &shadow_layout,
-                "shadow_on_virtual",
-                &[("SEEN", seen)],
-                &[target(PICTURE_FORMAT, all)],
-                whole(depth_format, wgpu::CompareFunction::Less, None),
-            )
-        };
+        let format = gpu.depth_format;
         Self {
-            nothing: over_all(
-                &shader::no_bindings(device),
-                "nothing",
-                &[],
-                &[target(PICTURE_FORMAT, none), target(PICTURE_FORMAT, all)],
-                whole(
-                    depth_format,
-                    wgpu::CompareFunction::Always,
-                    Some(wgpu::StencilOperation::Zero),
-                ),
-            ),
-            depth_of_real: surface("place_alone", "depth_alone", &constants, none),
-            light_on_virtual: lit(IN_OPEN_LIGHT),
-            light_at_terminator: lit(AT_TERMINATOR),
-            ambient_on_virtual: surface(
+            nothing: gpu.pipeline(&PipelineDescription {
+                shader: "direct.wgsl",
+                fragment: "nothing",
+                targets: vec![untouched(PICTURE_FORMAT), overwritten(PICTURE_FORMAT)],
+                depth_stencil: Some(emptied(format)),
+                ..Default::default()
+            }),
+            depth_of_real: surface.first("place_alone", "depth_alone", None, untouched),
+            light_on_virtual: surface.lit(IN_OPEN_LIGHT),
+            light_at_terminator: surface.lit(AT_TERMINATOR),
+            ambient_on_virtual: surface.first(
                 "place_in_ambient_light",
                 "ambient_on_virtual",
-                &constants,
-                all,
+                None,
+                overwritten,
             ),
-            volumes: Volumes::new(device, &geometry, depth_format, 1, &[PICTURE_FORMAT]),
-            hidden_on_real: hidden("hidden_on_real", PICTURE_FORMAT),
-            gain_on_real: hidden("gain_on_real", GAIN_FORMAT),
-            shadow_on_virtual: [shadow(IN_OPEN_LIGHT), shadow(AT_TERMINATOR)],
-            ambient_group: device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("ambient light"),
-                layout: &ambient_layout,
-                entries: &[wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: wgpu::BindingResource::TextureView(&ambient),
-                }],
+            volumes: Volumes::new(gpu, &OVER_VIDEO_GROUPS, 1, &[PICTURE_FORMAT]),
+            hidden_on_real: surface.hidden("hidden_on_real", PICTURE_FORMAT),
+            gain_on_real: surface.hidden("gain_on_real", GAIN_FORMAT),
+            shadow_on_virtual: [IN_OPEN_LIGHT, AT_TERMINATOR].map(|seen| {
+                gpu.pipeline(&PipelineDescription {
+                    shader: "direct.wgsl",
+                    fragment: "shadow_on_virtual",
+                    constants: vec![("SEEN", seen)],
+                    groups: vec![None, None, None, Some(AMBIENT_GROUP)],
+                    targets: vec![overwritten(PICTURE_FORMAT)],
+                    depth_stencil: Some(in_shadow(format)),
+                    ..Default::default()
+                })
             }),
-            ambient,
-            depth_stencil: texture(
-                "depth and stencil",
-                depth_format,
-                wgpu::TextureUsages::empty(),
+            ambient_group: gpu.bind_group(
+                &AMBIENT_GROUP,
+                [wgpu::BindingResource::TextureView(&ambient)],
             ),
+            ambient,
+            depth_stencil: target("depth and stencil", format, wgpu::TextureUsages::empty()),
+        }
+    }
+
+    /// Draws phantoms' depth and lit virtual things.
+    fn draw_surfaces(&self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) {
+        let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
+        let keep = wgpu::LoadOp::Load;
+        let mut pass = passes.begin(
+            "surfaces",
+            Some(GpuSpan::Light.part(true, false)),
+            &[loaded(frame.picture, keep), loaded(&self.ambient, keep)],
+            Some(kept(&self.depth_stencil)),
+        );
+        set_scissor(&mut pass, pixels);
+        pass.set_pipeline(&self.nothing);
+        pass.draw(0..3, 0..1);
+        pass.set_bind_group(2, &frame.background.group, &[]);
+        gpu_scene.draw_surfaces(&mut pass, &self.depth_of_real, Role::Real, 0, pixels);
+        let shading = [
+            &self.light_on_virtual,
+            &self.light_at_terminator,
+            &self.ambient_on_virtual,
+        ];
+        gpu_scene.draw_virtuals(&mut pass, shading, 0, pixels);
+    }
+
+    /// Draws the shadows on them.
+    fn draw_shadows(&self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) {
+        let (gpu_scene, bounds) = (frame.gpu_scene, frame.bounds);
+        let pixels = bounds.pixels;
+        let mut pass = passes.begin(
+            "shadows",
+            Some(GpuSpan::Light.part(false, true)),
+            &[loaded(frame.picture, wgpu::LoadOp::Load)],
+            Some(kept(&self.depth_stencil)),
+        );
+        let pass = &mut pass;
+        set_scissor(pass, pixels);
+        pass.set_bind_group(2, &frame.background.group, &[]);
+        let volumes = &self.volumes;
+        let by_real = gpu_scene.count_volumes(pass, volumes, Among::All, Role::Real, 0, pixels);
+        if by_real {
+            volumes.keep(pass, Role::Real, pixels);
+        }
+        let lit = Among::LitByReal;
+        let by_virtual = gpu_scene.count_volumes(pass, volumes, lit, Role::Virtual, 0, pixels);
+        if by_virtual {
+            gpu_scene.draw_surfaces(pass, &self.hidden_on_real, Role::Real, 0, pixels);
+        }
+        if (by_real || by_virtual) && !bounds.virtuals.is_empty() {
+            set_scissor(pass, bounds.virtuals);
+            pass.set_bind_group(3, &self.ambient_group, &[]);
+            for (own, pipeline) in (0..).zip(&self.shadow_on_virtual) {
+                pass.set_pipeline(pipeline);
+                pass.set_stencil_reference(own);
+                pass.draw(0..3, 0..1);
+            }
         }
     }
 }
 
-/// What a triangle over the whole picture does with depth and stencil: draw where the stencil says so, or empty both by an
-/// operation.
-fn whole(
-    format: wgpu::TextureFormat,
-    stencil: wgpu::CompareFunction,
-    empties: Option<wgpu::StencilOperation>,
-) -> wgpu::DepthStencilState {
-    let face = wgpu::StencilFaceState {
-        compare: stencil,
-        pass_op: empties.unwrap_or(wgpu::StencilOperation::Keep),
-        ..Default::default()
-    };
-    wgpu::DepthStencilState {
-        format,
-        depth_write_enabled: Some(empties.is_some()),
-        depth_compare: Some(wgpu::CompareFunction::Always),
-        stencil: wgpu::StencilState {
-            front: face,
-            back: face,
-            read_mask: SHADOW,
-            write_mask: if empties.is_some() { u32::MAX } else { 0 },
-        },
-        bias: wgpu::DepthBiasState::default(),
+impl TechniquePasses for Direct {
+    fn prepare(
+        &mut self,
+        gpu: &Gpu,
+        gpu_scene: &mut GpuScene,
+        shown: Shown,
+    ) -> Option<ScreenBounds> {
+        gpu_scene.cast_shadows(gpu, shown)
     }
+
+    /// Haller et al. 2003, section 3.2, for one light and one sample: phantoms and lit virtual things into depth; *real
+    /// onto real* is counted; *virtual onto real* is counted where the light arrives, and what is counted loses it;
+    /// *all onto virtual* is what both have counted there, and leaves what was set aside.
+    fn draw(&mut self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) {
+        self.draw_surfaces(passes, frame);
+        self.draw_shadows(passes, frame);
+    }
+
+    fn draw_gain(
+        &self,
+        passes: &mut Passes<'_>,
+        frame: &FrameContext<'_>,
+        gain: wgpu::RenderPassColorAttachment<'_>,
+    ) {
+        let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
+        let mut pass = passes.begin("gain", None, &[gain], Some(kept(&self.depth_stencil)));
+        set_scissor(&mut pass, pixels);
+        pass.set_bind_group(2, &frame.background.group, &[]);
+        gpu_scene.draw_surfaces(&mut pass, &self.gain_on_real, Role::Real, 0, pixels);
+    }
+}
+
+/// The common part of all pipelines that draw surfaces over the video.
+struct SurfacesOverVideo<'a> {
+    gpu: &'a Gpu,
+    constants: Vec<(&'static str, f64)>,
+}
+
+impl SurfacesOverVideo<'_> {
+    /// Pipelines that draw into depth, and into the picture and `ambient` as `written` says.
+    fn first(
+        &self,
+        vertex: &'static str,
+        fragment: &'static str,
+        seen: Option<f64>,
+        written: fn(wgpu::TextureFormat) -> wgpu::ColorTargetState,
+    ) -> Sided {
+        let mut constants = self.constants.clone();
+        constants.extend(seen.map(|seen| ("SEEN", seen)));
+        let description = PipelineDescription {
+            vertex,
+            fragment,
+            constants,
+            targets: vec![written(PICTURE_FORMAT), written(PICTURE_FORMAT)],
+            ..self.over_video(None)
+        };
+        Sided::new(self.gpu, &description)
+    }
+
+    /// Pipelines of virtual surfaces that the light reaches.
+    fn lit(&self, seen: f64) -> Sided {
+        self.first("place", "light_on_virtual", Some(seen), overwritten)
+    }
+
+    /// Pipelines of real surfaces where virtual things hide the light.
+    fn hidden(&self, fragment: &'static str, format: wgpu::TextureFormat) -> Sided {
+        let nothing = (wgpu::StencilOperation::Keep, 0);
+        let counted = stencil(wgpu::CompareFunction::Less, VIRTUAL_SHADOW, nothing);
+        let description = PipelineDescription {
+            vertex: "place",
+            fragment,
+            constants: self.constants.clone(),
+            targets: vec![overwritten(format)],
+            ..self.over_video(Some(counted))
+        };
+        Sided::new(self.gpu, &description)
+    }
+
+    fn over_video(&self, stencil: Option<wgpu::StencilState>) -> PipelineDescription {
+        PipelineDescription {
+            shader: "direct.wgsl",
+            groups: OVER_VIDEO_GROUPS.map(Some).to_vec(),
+            ..surface_description(self.gpu, stencil)
+        }
+    }
+}
+
+/// Depth and stencil where a triangle over the whole picture empties both.
+fn emptied(format: wgpu::TextureFormat) -> wgpu::DepthStencilState {
+    let always = wgpu::CompareFunction::Always;
+    let zero = (wgpu::StencilOperation::Zero, u32::MAX);
+    depth_stencil_state(format, true, always, stencil(always, SHADOW, zero))
+}
+
+/// Depth and stencil where such a triangle is drawn in the shadow alone.
+fn in_shadow(format: wgpu::TextureFormat) -> wgpu::DepthStencilState {
+    let nothing = (wgpu::StencilOperation::Keep, 0);
+    let counted = stencil(wgpu::CompareFunction::Less, SHADOW, nothing);
+    depth_stencil_state(format, false, wgpu::CompareFunction::Always, counted)
 }

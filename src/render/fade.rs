@@ -1,9 +1,21 @@
 //! Cross-fades two pictures: what stands on an anchor that is no longer seen goes gently.
 //! Reads and writes the picture that is shown.
 
+use super::attachments::{cleared, texture};
 use super::background::PICTURE_FORMAT;
 use super::gpu::Gpu;
-use super::shader;
+use super::passes::Passes;
+use super::pipelines::{GroupLayout, PipelineDescription, overwritten, texels, uniform};
+
+/// The two pictures and how much is seen of the second.
+const FADE_GROUP: GroupLayout = GroupLayout {
+    label: "fade",
+    entries: &[
+        texels(0, false),
+        texels(1, false),
+        uniform(2, wgpu::ShaderStages::FRAGMENT, false),
+    ],
+};
 
 /// Pipeline and pictures of the pass.
 pub(super) struct Fade {
@@ -17,19 +29,11 @@ pub(super) struct Fade {
 
 impl Fade {
     /// For the picture that is shown.
-    pub fn new(device: &wgpu::Device, picture: &wgpu::Texture) -> Self {
-        let module = shader::module(device, "fade", include_str!("../../shaders/fade.wgsl"));
+    pub fn new(gpu: &Gpu, picture: &wgpu::Texture) -> Self {
+        let size_px = [picture.width(), picture.height()];
         let texture = |label, usage| {
-            device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: picture.size(),
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format: PICTURE_FORMAT,
-                usage,
-                view_formats: &[],
-            })
+            let device = &gpu.device;
+            texture(device, label, size_px, PICTURE_FORMAT, 1, usage)
         };
         let without = texture(
             "without what fades",
@@ -39,67 +43,23 @@ impl Fade {
             "faded",
             wgpu::TextureUsages::COPY_SRC | wgpu::TextureUsages::RENDER_ATTACHMENT,
         );
-        let visibility = device.create_buffer(&wgpu::BufferDescriptor {
+        let visibility = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("visibility"),
             size: 16,
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::FRAGMENT,
-            ty,
-            count: None,
-        };
-        let read = wgpu::BindingType::Texture {
-            sample_type: wgpu::TextureSampleType::Float { filterable: false },
-            view_dimension: wgpu::TextureViewDimension::D2,
-            multisampled: false,
-        };
-        let uniform = wgpu::BindingType::Buffer {
-            ty: wgpu::BufferBindingType::Uniform,
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        };
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("fade"),
-            entries: &[entry(0, read), entry(1, read), entry(2, uniform)],
-        });
         let views = [&without, picture].map(|texture| texture.create_view(&Default::default()));
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("fade"),
-            layout: &layout,
-            entries: &[
-                wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: wgpu::BindingResource::TextureView(&views[0]),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 1,
-                    resource: wgpu::BindingResource::TextureView(&views[1]),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 2,
-                    resource: visibility.as_entire_binding(),
-                },
-            ],
-        });
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("fade"),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
+        let [before, after] = [0, 1].map(|index| wgpu::BindingResource::TextureView(&views[index]));
         Self {
-            pipeline: shader::whole_picture(
-                device,
-                &pipeline_layout,
-                &module,
-                "fade",
-                &[Some(PICTURE_FORMAT.into())],
-                None,
-                &[],
-            ),
-            group,
+            pipeline: gpu.pipeline(&PipelineDescription {
+                shader: "fade.wgsl",
+                fragment: "fade",
+                groups: vec![Some(FADE_GROUP)],
+                targets: vec![overwritten(PICTURE_FORMAT)],
+                ..Default::default()
+            }),
+            group: gpu.bind_group(&FADE_GROUP, [before, after, visibility.as_entire_binding()]),
             visibility,
             without,
             mixed,
@@ -118,24 +78,15 @@ impl Fade {
         let uniform = [visibility as f32, 0.0, 0.0, 0.0];
         gpu.queue
             .write_buffer(&self.visibility, 0, bytemuck::cast_slice(&uniform));
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let mut passes = Passes::new(gpu, None);
         let target = self.mixed.create_view(&Default::default());
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("fade"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &target,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations::default(),
-            })],
-            ..Default::default()
-        });
+        let mut pass = passes.begin("fade", None, &[cleared(&target)], None);
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &self.group, &[]);
         pass.draw(0..3, 0..1);
         drop(pass);
-        copy(&mut encoder, &self.mixed, picture);
-        gpu.queue.submit([encoder.finish()]);
+        copy(&mut passes.encoder, &self.mixed, picture);
+        gpu.queue.submit([passes.encoder.finish()]);
     }
 }
 

@@ -2,7 +2,9 @@
 
 use std::sync::{Arc, Mutex};
 
-/// What can go wrong on the way to a drawn frame.
+use super::pipelines::{GroupLayout, PipelineCache, PipelineDescription};
+
+/// A failure on the way to a drawn frame.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
     /// There is no adapter at all.
@@ -58,6 +60,7 @@ pub struct Gpu {
     pub(super) light_format: wgpu::TextureFormat,
     /// Nanoseconds per tick of a timestamp; `None` where the adapter has no timestamps.
     pub(super) timestamp_period_ns: Option<f32>,
+    pipelines: PipelineCache,
     description: String,
     failure: Arc<Mutex<Option<String>>>,
 }
@@ -165,6 +168,7 @@ impl Gpu {
                 .contains(wgpu::Features::TIMESTAMP_QUERY)
                 .then(|| queue.get_timestamp_period()),
             description: format!("{} ({:?}, {})", info.name, info.backend, info.driver_info),
+            pipelines: PipelineCache::default(),
             instance: instance.clone(),
             adapter: adapter.clone(),
             device,
@@ -178,6 +182,33 @@ impl Gpu {
         &self.description
     }
 
+    /// The pipeline of a description.
+    pub(super) fn pipeline(&self, description: &PipelineDescription) -> wgpu::RenderPipeline {
+        self.pipelines.pipeline(&self.device, description)
+    }
+
+    /// A bind group of a layout; the resources come in the order of its entries.
+    pub(super) fn bind_group<'a>(
+        &self,
+        layout: &GroupLayout,
+        resources: impl IntoIterator<Item = wgpu::BindingResource<'a>>,
+    ) -> wgpu::BindGroup {
+        let entries: Vec<wgpu::BindGroupEntry<'_>> = layout
+            .entries
+            .iter()
+            .zip(resources)
+            .map(|(entry, resource)| wgpu::BindGroupEntry {
+                binding: entry.binding,
+                resource,
+            })
+            .collect();
+        self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(layout.label),
+            layout: &self.pipelines.group_layout(&self.device, layout),
+            entries: &entries,
+        })
+    }
+
     /// What a window needs to show pictures of this device without a detour.
     pub fn shared(&self) -> SharedDevice {
         SharedDevice {
@@ -188,13 +219,13 @@ impl Gpu {
         }
     }
 
-    /// The first failure that the device reported, if any.
     /// Memory that the driver has given out so far, bytes; `None` where it does not tell.
     pub fn allocated_bytes(&self) -> Option<u64> {
         let report = self.device.generate_allocator_report()?;
         Some(report.total_allocated_bytes)
     }
 
+    /// The first failure that the device reported, if any.
     pub(super) fn check(&self) -> Result<(), RenderError> {
         let failure = self
             .failure

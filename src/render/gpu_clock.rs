@@ -3,7 +3,7 @@
 use super::gpu::{Gpu, RenderError};
 use super::readback::map_for_reading;
 
-/// What the last frame cost on the GPU, milliseconds; `None` where nothing was drawn or the adapter has no timestamps.
+/// The last frame's time on the GPU, milliseconds; `None` where nothing was drawn or the adapter has no timestamps.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct GpuTimes {
     /// Surfaces, shadow volumes and light.
@@ -12,23 +12,49 @@ pub struct GpuTimes {
     pub composite_ms: Option<f64>,
 }
 
-/// A part of the frame between two timestamps.
+/// A span of the frame between two timestamps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Stretch {
+pub(super) enum GpuSpan {
     Background,
     Light,
     Composite,
 }
 
-const STRETCHES: [Stretch; 3] = [Stretch::Background, Stretch::Light, Stretch::Composite];
+const SPANS: [GpuSpan; 3] = [GpuSpan::Background, GpuSpan::Light, GpuSpan::Composite];
 
-/// Two timestamps for each stretch of the frame.
+/// A pass's part of a span.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct SpanPart {
+    pub span: GpuSpan,
+    /// Whether the span begins with it.
+    pub begins: bool,
+    /// Whether the span ends with it.
+    pub ends: bool,
+}
+
+impl GpuSpan {
+    /// The part of a pass that is the span's only one.
+    pub fn whole(self) -> SpanPart {
+        self.part(true, true)
+    }
+
+    /// The part of one of the span's passes.
+    pub fn part(self, begins: bool, ends: bool) -> SpanPart {
+        SpanPart {
+            span: self,
+            begins,
+            ends,
+        }
+    }
+}
+
+/// Two timestamps for each span of the frame.
 pub(super) struct GpuClock {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
     readable: wgpu::Buffer,
     period_ns: f32,
-    drawn: Vec<Stretch>,
+    drawn: Vec<GpuSpan>,
 }
 
 impl GpuClock {
@@ -38,7 +64,7 @@ impl GpuClock {
         let buffer = |usage| {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("timestamps"),
-                size: Self::STRIDE * STRETCHES.len() as u64,
+                size: Self::STRIDE * SPANS.len() as u64,
                 usage,
                 mapped_at_creation: false,
             })
@@ -47,7 +73,7 @@ impl GpuClock {
             queries: device.create_query_set(&wgpu::QuerySetDescriptor {
                 label: Some("timestamps"),
                 ty: wgpu::QueryType::Timestamp,
-                count: 2 * STRETCHES.len() as u32,
+                count: 2 * SPANS.len() as u32,
             }),
             resolved: buffer(wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC),
             readable: buffer(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
@@ -56,26 +82,22 @@ impl GpuClock {
         }
     }
 
-    /// For a pass of a stretch; `None` if it is neither its first nor its last.
-    pub fn pass(
-        &self,
-        stretch: Stretch,
-        first: bool,
-        last: bool,
-    ) -> Option<wgpu::RenderPassTimestampWrites<'_>> {
-        let begin = 2 * stretch as u32;
-        (first || last).then(|| wgpu::RenderPassTimestampWrites {
+    /// The timestamps that a pass writes; `None` if its span neither begins nor ends with it.
+    pub fn writes(&self, part: SpanPart) -> Option<wgpu::RenderPassTimestampWrites<'_>> {
+        let SpanPart { span, begins, ends } = part;
+        let begin = 2 * span as u32;
+        (begins || ends).then(|| wgpu::RenderPassTimestampWrites {
             query_set: &self.queries,
-            beginning_of_pass_write_index: first.then_some(begin),
-            end_of_pass_write_index: last.then_some(begin + 1),
+            beginning_of_pass_write_index: begins.then_some(begin),
+            end_of_pass_write_index: ends.then_some(begin + 1),
         })
     }
 
-    pub fn resolve(&mut self, encoder: &mut wgpu::CommandEncoder, drawn: &[Stretch]) {
+    pub fn resolve(&mut self, encoder: &mut wgpu::CommandEncoder, drawn: &[GpuSpan]) {
         self.drawn = drawn.to_vec();
-        for &stretch in drawn {
-            let begin = 2 * stretch as u32;
-            let offset = Self::STRIDE * stretch as u64;
+        for &span in drawn {
+            let begin = 2 * span as u32;
+            let offset = Self::STRIDE * span as u64;
             encoder.resolve_query_set(&self.queries, begin..begin + 2, &self.resolved, offset);
         }
         encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.readable, 0, self.readable.size());
@@ -91,19 +113,16 @@ impl GpuClock {
         let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&mapped);
         drop(mapped);
         self.readable.unmap();
-        let stretch_ms = |stretch: Stretch| {
-            let begin = stretch as usize * (Self::STRIDE / 8) as usize;
+        let span_ms = |span: GpuSpan| {
+            let begin = span as usize * (Self::STRIDE / 8) as usize;
             let ticks = ticks[begin + 1].saturating_sub(ticks[begin]);
-            let drawn = self.drawn.contains(&stretch);
+            let drawn = self.drawn.contains(&span);
             drawn.then(|| ticks as f64 * f64::from(self.period_ns) * 1e-6)
         };
-        let picture = [Stretch::Background, Stretch::Composite];
+        let picture = [GpuSpan::Background, GpuSpan::Composite];
         Ok(GpuTimes {
-            shadows_ms: stretch_ms(Stretch::Light),
-            composite_ms: picture
-                .into_iter()
-                .filter_map(stretch_ms)
-                .reduce(|a, b| a + b),
+            shadows_ms: span_ms(GpuSpan::Light),
+            composite_ms: picture.into_iter().filter_map(span_ms).reduce(|a, b| a + b),
         })
     }
 }

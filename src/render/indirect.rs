@@ -8,9 +8,9 @@ use std::collections::HashMap;
 use glam::{DAffine3, DVec3, Vec3};
 
 use crate::light::bounce::{Gathering, Mover, Surroundings};
-use crate::scene::Scene;
+use crate::scene::{Object, Scene};
 
-use super::anchor_geometry::{VirtualCorners, reflectors};
+use super::anchor_geometry::VirtualCorners;
 
 /// Rays for a scene in which nothing moves: gathered once, in a second or so.
 const STANDING_BUDGET: usize = 1_000_000;
@@ -40,7 +40,7 @@ impl Indirect {
         let on_anchor = |anchor: usize| {
             let all = scene.phantoms.iter().chain(&scene.virtuals);
             all.filter(move |object| object.visible && object.anchor == anchor)
-                .flat_map(reflectors)
+                .flat_map(Object::reflectors)
                 .collect::<Vec<_>>()
         };
         let movers: Vec<(usize, Mover)> = (1..scene.anchors.len())

@@ -7,10 +7,10 @@ use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::{PixelRect, covered};
 use crate::geometry::shadow_volume::EDGE_ON_TO_EYE;
 
-use super::anchor_geometry::Thing;
+use super::anchor_geometry::AnchoredModel;
 use super::uniforms::NEAR_M;
 
-/// Where the inside of a thing can be seen.
+/// The pixels in which the inside of a thing can be seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Insides {
     Unseen,
@@ -21,7 +21,7 @@ pub(super) enum Insides {
 
 /// Where the camera can see the inside of a thing at a level of detail.
 pub(super) fn insides(
-    thing: &Thing,
+    thing: &AnchoredModel,
     level: usize,
     camera_from_anchor: &DAffine3,
     intrinsics: &Intrinsics,

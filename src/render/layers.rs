@@ -2,11 +2,14 @@
 //! Same vertices, same volumes and same counting as the picture. Reads nothing. Writes textures of its own.
 
 use super::anchor_geometry::{CORNER_LAYOUT, Role};
+use super::attachments::{cleared, loaded, target, texture};
 use super::gpu::{Gpu, RenderError};
+use super::passes::Passes;
+use super::pipelines::{PipelineDescription, added, overwritten};
 use super::readback::Readback;
-use super::shader;
-use super::stencil::{COUNT, MOST_LAYERS, SHADOW};
-use super::surfaces::Sided;
+use super::stencil::{COUNT, MOST_LAYERS, SHADOW, depth_stencil_state, stencil};
+use super::surfaces::{Sided, surface_description};
+use super::uniforms::GEOMETRY_GROUPS;
 use super::volumes::Volumes;
 
 const ROLE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
@@ -22,7 +25,7 @@ pub const REAL_HIDES: u8 = 1;
 /// Bit of a shadow layer: a virtual thing hides the light.
 pub const VIRTUAL_HIDES: u8 = 2;
 
-/// What is seen at each pixel's centre, rows from the top.
+/// A picture's layers: what is seen at each pixel's centre, rows from the top.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Layers {
     /// 0 none, [`REAL`] or [`VIRTUAL`].
@@ -59,130 +62,40 @@ pub(super) type DrawSurfaces<'a> = &'a dyn Fn(&mut wgpu::RenderPass<'_>, &Sided,
 pub(super) type CountVolumes<'a> = &'a dyn Fn(&mut wgpu::RenderPass<'_>, &Volumes, Role);
 
 impl LayerPasses {
-    pub fn new(gpu: &Gpu, layout: &wgpu::PipelineLayout, size_px: [u32; 2]) -> Self {
+    pub fn new(gpu: &Gpu, size_px: [u32; 2]) -> Self {
         let device = &gpu.device;
-        let module = shader::module(device, "layers", include_str!("../../shaders/layers.wgsl"));
-        let texture = |label, format, usage| {
-            device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: wgpu::Extent3d {
-                    width: size_px[0],
-                    height: size_px[1],
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
-                view_formats: &[],
-            })
+        let copied = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC;
+        let texture = |label, format| texture(device, label, size_px, format, 1, copied);
+        let surface = |fragment| Sided::both(gpu, &surface(gpu, fragment));
+        let mark = |fragment, compare, read, factor| {
+            gpu.pipeline(&mark(gpu, fragment, compare, read, factor))
         };
-        let copied = wgpu::TextureUsages::COPY_SRC;
-        let surface = |entry_point: &str| {
-            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some(entry_point),
-                layout: Some(layout),
-                vertex: wgpu::VertexState {
-                    module: &module,
-                    entry_point: Some("place"),
-                    compilation_options: Default::default(),
-                    buffers: &[Some(CORNER_LAYOUT)],
-                },
-                primitive: wgpu::PrimitiveState::default(),
-                depth_stencil: Some(wgpu::DepthStencilState {
-                    format: gpu.depth_format,
-                    depth_write_enabled: Some(true),
-                    depth_compare: Some(wgpu::CompareFunction::Greater),
-                    stencil: wgpu::StencilState::default(),
-                    bias: wgpu::DepthBiasState::default(),
-                }),
-                multisample: wgpu::MultisampleState::default(),
-                fragment: Some(wgpu::FragmentState {
-                    module: &module,
-                    entry_point: Some(entry_point),
-                    compilation_options: Default::default(),
-                    targets: &[Some(ROLE_FORMAT.into()), Some(DEPTH_FORMAT.into())],
-                }),
-                multiview_mask: None,
-                cache: None,
-            })
-        };
-        let no_bindings = shader::no_bindings(device);
-        let mark = |entry_point: &str, compare, read_mask, src_factor| {
-            let shadowed = wgpu::StencilFaceState {
-                compare,
-                ..Default::default()
-            };
-            let add = wgpu::BlendComponent {
-                src_factor,
-                dst_factor: wgpu::BlendFactor::One,
-                operation: wgpu::BlendOperation::Add,
-            };
-            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some(entry_point),
-                layout: Some(&no_bindings),
-                vertex: wgpu::VertexState {
-                    module: &module,
-                    entry_point: Some("whole_picture"),
-                    compilation_options: Default::default(),
-                    buffers: &[],
-                },
-                primitive: wgpu::PrimitiveState::default(),
-                depth_stencil: Some(wgpu::DepthStencilState {
-                    format: gpu.depth_format,
-                    depth_write_enabled: Some(false),
-                    depth_compare: Some(wgpu::CompareFunction::Always),
-                    stencil: wgpu::StencilState {
-                        front: shadowed,
-                        back: shadowed,
-                        read_mask,
-                        write_mask: 0,
-                    },
-                    bias: wgpu::DepthBiasState::default(),
-                }),
-                multisample: wgpu::MultisampleState::default(),
-                fragment: Some(wgpu::FragmentState {
-                    module: &module,
-                    entry_point: Some(entry_point),
-                    compilation_options: Default::default(),
-                    targets: &[Some(wgpu::ColorTargetState {
-                        format: BITS_FORMAT,
-                        blend: Some(wgpu::BlendState {
-                            color: add,
-                            alpha: add,
-                        }),
-                        write_mask: wgpu::ColorWrites::ALL,
-                    })],
-                }),
-                multiview_mask: None,
-                cache: None,
-            })
-        };
-        let in_shadow = |entry_point| {
+        let in_shadow = |fragment| {
             let (differs, one) = (wgpu::CompareFunction::NotEqual, wgpu::BlendFactor::One);
-            mark(entry_point, differs, SHADOW, one)
+            mark(fragment, differs, SHADOW, one)
         };
         Self {
-            real: Sided::both(surface("real")),
-            seeming: Sided::both(surface("virtual_thing")),
-            volumes: Volumes::new(device, layout, gpu.depth_format, 1, &[BITS_FORMAT]),
+            real: surface("real"),
+            seeming: surface("virtual_thing"),
+            volumes: Volumes::new(gpu, &GEOMETRY_GROUPS, 1, &[BITS_FORMAT]),
             mark_real: in_shadow("in_real_shadow"),
             mark_virtual: in_shadow("in_virtual_shadow"),
             mark_counted: [
                 (wgpu::CompareFunction::Equal, COUNT),
                 (wgpu::CompareFunction::NotEqual, SHADOW & !COUNT),
             ]
-            .map(|(compare, mask)| mark("counted", compare, mask, wgpu::BlendFactor::Constant)),
-            depth_stencil: texture(
+            .map(|(compare, read)| mark("counted", compare, read, wgpu::BlendFactor::Constant)),
+            depth_stencil: target(
+                device,
                 "layer depth and stencil",
+                size_px,
                 gpu.depth_format,
+                1,
                 wgpu::TextureUsages::empty(),
-            )
-            .create_view(&Default::default()),
-            role: texture("role layer", ROLE_FORMAT, copied),
-            depth_m: texture("depth layer", DEPTH_FORMAT, copied),
-            bits: texture("shadow layer", BITS_FORMAT, copied),
+            ),
+            role: texture("role layer", ROLE_FORMAT),
+            depth_m: texture("depth layer", DEPTH_FORMAT),
+            bits: texture("shadow layer", BITS_FORMAT),
             role_readback: Readback::new(device, size_px, 1),
             depth_readback: Readback::new(device, size_px, 4),
             bits_readback: Readback::new(device, size_px, 1),
@@ -195,24 +108,26 @@ impl LayerPasses {
         gpu: &Gpu,
         draw_surfaces: DrawSurfaces<'_>,
     ) -> Result<(Vec<u8>, Vec<f32>), RenderError> {
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let mut passes = Passes::new(gpu, None);
         let (role, depth_m) = (
             self.role.create_view(&Default::default()),
             self.depth_m.create_view(&Default::default()),
         );
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("role and depth layers"),
-            color_attachments: &[Some(cleared(&role)), Some(cleared(&depth_m))],
-            depth_stencil_attachment: Some(self.depth_stencil(wgpu::LoadOp::Clear(0.0))),
-            ..Default::default()
-        });
+        let mut pass = passes.begin(
+            "role and depth layers",
+            None,
+            &[cleared(&role), cleared(&depth_m)],
+            Some(self.depth_stencil(wgpu::LoadOp::Clear(0.0))),
+        );
         for (role, pipeline) in [(Role::Real, &self.real), (Role::Virtual, &self.seeming)] {
             draw_surfaces(&mut pass, pipeline, role);
         }
         drop(pass);
-        self.role_readback.copy_from(&mut encoder, &self.role);
-        self.depth_readback.copy_from(&mut encoder, &self.depth_m);
-        gpu.queue.submit([encoder.finish()]);
+        self.role_readback
+            .copy_from(&mut passes.encoder, &self.role);
+        self.depth_readback
+            .copy_from(&mut passes.encoder, &self.depth_m);
+        gpu.queue.submit([passes.encoder.finish()]);
         let depth_m = self.depth_readback.read(gpu)?;
         Ok((
             self.role_readback.read(gpu)?,
@@ -226,30 +141,14 @@ impl LayerPasses {
         gpu: &Gpu,
         count_volumes: CountVolumes<'_>,
     ) -> Result<Vec<u8>, RenderError> {
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        let bits = self.bits.create_view(&Default::default());
-        for (role, mark) in [
-            (Role::Real, &self.mark_real),
-            (Role::Virtual, &self.mark_virtual),
-        ] {
-            let mut color = cleared(&bits);
-            if role == Role::Virtual {
-                color.ops.load = wgpu::LoadOp::Load;
-            }
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("shadow layer"),
-                color_attachments: &[Some(color)],
-                depth_stencil_attachment: Some(self.depth_stencil(wgpu::LoadOp::Load)),
-                ..Default::default()
+        self.bits(gpu, "shadow layer", count_volumes, &|pass, role| {
+            pass.set_pipeline(match role {
+                Role::Real => &self.mark_real,
+                Role::Virtual => &self.mark_virtual,
             });
-            count_volumes(&mut pass, &self.volumes, role);
-            pass.set_pipeline(mark);
             pass.set_stencil_reference(0);
             pass.draw(0..3, 0..1);
-        }
-        self.bits_readback.copy_from(&mut encoder, &self.bits);
-        gpu.queue.submit([encoder.finish()]);
-        self.bits_readback.read(gpu)
+        })
     }
 
     /// How many of the volumes that `count_volumes` counts the visible surfaces lie in; those that it counts apart from
@@ -259,21 +158,8 @@ impl LayerPasses {
         gpu: &Gpu,
         count_volumes: CountVolumes<'_>,
     ) -> Result<Vec<u8>, RenderError> {
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        let counts = self.bits.create_view(&Default::default());
-        for role in [Role::Real, Role::Virtual] {
-            let mut color = cleared(&counts);
-            if role == Role::Virtual {
-                color.ops.load = wgpu::LoadOp::Load;
-            }
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("stencil counts"),
-                color_attachments: &[Some(color)],
-                depth_stencil_attachment: Some(self.depth_stencil(wgpu::LoadOp::Load)),
-                ..Default::default()
-            });
-            count_volumes(&mut pass, &self.volumes, role);
-            let [counted, kept] = &self.mark_counted;
+        let [counted, kept] = &self.mark_counted;
+        self.bits(gpu, "stencil counts", count_volumes, &|pass, _| {
             let mut mark = |pipeline, reference: u32, number: u32| {
                 let number = f64::from(number) / 255.0;
                 pass.set_pipeline(pipeline);
@@ -290,9 +176,32 @@ impl LayerPasses {
                 mark(counted, number, number);
             }
             mark(kept, 0, 1);
+        })
+    }
+
+    /// What `mark` draws after each role's volumes are counted.
+    fn bits(
+        &self,
+        gpu: &Gpu,
+        name: &'static str,
+        count_volumes: CountVolumes<'_>,
+        mark: &dyn Fn(&mut wgpu::RenderPass<'_>, Role),
+    ) -> Result<Vec<u8>, RenderError> {
+        let mut passes = Passes::new(gpu, None);
+        let bits = self.bits.create_view(&Default::default());
+        for role in [Role::Real, Role::Virtual] {
+            let color = match role {
+                Role::Real => cleared(&bits),
+                Role::Virtual => loaded(&bits, wgpu::LoadOp::Load),
+            };
+            let depth_stencil = self.depth_stencil(wgpu::LoadOp::Load);
+            let mut pass = passes.begin(name, None, &[color], Some(depth_stencil));
+            count_volumes(&mut pass, &self.volumes, role);
+            mark(&mut pass, role);
         }
-        self.bits_readback.copy_from(&mut encoder, &self.bits);
-        gpu.queue.submit([encoder.finish()]);
+        self.bits_readback
+            .copy_from(&mut passes.encoder, &self.bits);
+        gpu.queue.submit([passes.encoder.finish()]);
         self.bits_readback.read(gpu)
     }
 
@@ -315,14 +224,37 @@ impl LayerPasses {
     }
 }
 
-fn cleared(view: &wgpu::TextureView) -> wgpu::RenderPassColorAttachment<'_> {
-    wgpu::RenderPassColorAttachment {
-        view,
-        depth_slice: None,
-        resolve_target: None,
-        ops: wgpu::Operations {
-            load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-            store: wgpu::StoreOp::Store,
-        },
+/// Role and depth of surfaces.
+fn surface(gpu: &Gpu, fragment: &'static str) -> PipelineDescription {
+    PipelineDescription {
+        shader: "layers.wgsl",
+        vertex: "place",
+        fragment,
+        groups: GEOMETRY_GROUPS.map(Some).to_vec(),
+        vertex_buffers: vec![CORNER_LAYOUT],
+        targets: vec![overwritten(ROLE_FORMAT), overwritten(DEPTH_FORMAT)],
+        ..surface_description(gpu, None)
+    }
+}
+
+/// What is added to the bits where the stencil says so.
+fn mark(
+    gpu: &Gpu,
+    fragment: &'static str,
+    compare: wgpu::CompareFunction,
+    read: u32,
+    factor: wgpu::BlendFactor,
+) -> PipelineDescription {
+    PipelineDescription {
+        shader: "layers.wgsl",
+        fragment,
+        targets: vec![added(BITS_FORMAT, factor)],
+        depth_stencil: Some(depth_stencil_state(
+            gpu.depth_format,
+            false,
+            wgpu::CompareFunction::Always,
+            stencil(compare, read, (wgpu::StencilOperation::Keep, 0)),
+        )),
+        ..Default::default()
     }
 }

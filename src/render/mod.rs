@@ -3,37 +3,40 @@
 //! Each pass is one file here and one WGSL file of the same name under `shaders/`; [`Renderer::draw`] tells the frame
 //! from top to bottom.
 
-mod accumulation;
+mod accumulated;
 mod anchor_geometry;
 mod attachments;
 mod background;
 mod casters;
-mod composite;
 mod detail;
 mod direct;
 mod fade;
-mod governed;
-mod governor;
 mod gpu;
 mod gpu_clock;
+mod gpu_scene;
 mod indirect;
 mod insides;
 mod layers;
+mod light_sums;
+mod passes;
+mod pipelines;
+mod quality_controller;
 mod readback;
 mod renderer;
+mod rung_chooser;
+mod screen_bounds;
 mod shader;
 mod shafts;
-mod stage;
+mod shown;
 mod stencil;
 mod surfaces;
-mod touched;
+mod technique;
 mod uniforms;
 mod volumes;
 
-pub use governed::{Governed, Setting};
 pub use gpu::{Gpu, RenderError, SharedDevice};
 pub use gpu_clock::GpuTimes;
 pub use layers::{Layers, REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};
-pub use renderer::{Renderer, Shown};
-pub use shafts::kept_rooms;
-pub use shafts::room::Room;
+pub use quality_controller::{QualityController, Setting};
+pub use renderer::Renderer;
+pub use shown::Shown;

@@ -1,8 +1,8 @@
-//! What the stencil's bits mean while one light is worked on.
+//! What the stencil's bits mean while one light is worked on, and how pipelines test depth and stencil.
 
 use super::anchor_geometry::Role;
 
-/// How many volumes of the present batch the surface lies in.
+/// The number of volumes of the present batch that the surface lies in.
 pub(super) const COUNT: u32 = 0x1f;
 /// The largest number that the count can hold: a batch never has more volumes one in another.
 pub(super) const MOST_LAYERS: u32 = COUNT;
@@ -22,5 +22,40 @@ pub(super) fn hides(role: Role) -> u32 {
     match role {
         Role::Real => REAL_HIDES,
         Role::Virtual => VIRTUAL_HIDES,
+    }
+}
+
+/// A stencil test of both sides' bits `read`, and what a drawn sample does to other bits.
+pub(super) fn stencil(
+    compare: wgpu::CompareFunction,
+    read: u32,
+    (pass_op, written): (wgpu::StencilOperation, u32),
+) -> wgpu::StencilState {
+    let face = wgpu::StencilFaceState {
+        compare,
+        pass_op,
+        ..Default::default()
+    };
+    wgpu::StencilState {
+        front: face,
+        back: face,
+        read_mask: read,
+        write_mask: written,
+    }
+}
+
+/// Depth and stencil without any bias.
+pub(super) fn depth_stencil_state(
+    format: wgpu::TextureFormat,
+    writes_depth: bool,
+    depth_compare: wgpu::CompareFunction,
+    stencil: wgpu::StencilState,
+) -> wgpu::DepthStencilState {
+    wgpu::DepthStencilState {
+        format,
+        depth_write_enabled: Some(writes_depth),
+        depth_compare: Some(depth_compare),
+        stencil,
+        bias: wgpu::DepthBiasState::default(),
     }
 }

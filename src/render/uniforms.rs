@@ -8,18 +8,20 @@ use crate::geometry::camera::Intrinsics;
 use crate::geometry::shadow_volume::LightPlace;
 use crate::light::Light;
 
+use super::pipelines::{GroupLayout, uniform};
+
 /// Nearest depth that is drawn, metres. Reversed floating depth keeps its precision however near this is.
 pub(super) const NEAR_M: f32 = 1e-3;
 
-/// Twin of `View` in common.wgsl.
+/// The camera as what stands on an anchor meets it: the twin of `AnchorView` in common.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(super) struct View {
+pub(super) struct AnchorView {
     pub clip_from_anchor: Mat4,
     pub camera_from_anchor: Mat4,
 }
 
-impl View {
+impl AnchorView {
     pub fn new(intrinsics: &Intrinsics, camera_from_anchor: &DAffine3) -> Self {
         let camera_from_anchor = glam::DMat4::from(*camera_from_anchor).as_mat4();
         let clip_from_camera = intrinsics.clip_from_camera(NEAR_M);
@@ -43,20 +45,20 @@ impl View {
     }
 }
 
-/// By what part a virtual thing's depths are nearer.
+/// The part by which a virtual thing's depths are nearer.
 const TIE: f32 = 1.0 / 65_536.0;
 /// Numbers beyond this win no ties among themselves.
 const MOST_TIES: usize = 63;
 
-/// Twin of `LightSource` in common.wgsl.
+/// A light in the camera's space: the twin of `CameraLight` in common.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(super) struct LightSource {
+pub(super) struct CameraLight {
     pub place_in_camera: Vec4,
     pub power: Vec4,
 }
 
-impl LightSource {
+impl CameraLight {
     pub fn new(light: &Light, camera_from_world: &DAffine3) -> Self {
         let (place, weight, power) = match *light {
             Light::Point {
@@ -83,7 +85,7 @@ impl LightSource {
     }
 }
 
-/// Twin of `CastingLight` in volumes.wgsl.
+/// A light in a caster's space: the twin of `CastingLight` in volumes.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(super) struct CastingLight {
@@ -103,7 +105,7 @@ impl CastingLight {
     }
 }
 
-/// Twin of `Lens` in video.wgsl.
+/// The camera's lens: the twin of `Lens` in video.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(super) struct Lens {
@@ -128,6 +130,21 @@ impl Lens {
         }
     }
 }
+
+/// Group 0 where geometry is drawn: an [`AnchorView`].
+pub(super) const VIEW_GROUP: GroupLayout = GroupLayout {
+    label: "view",
+    entries: &[uniform(0, wgpu::ShaderStages::VERTEX_FRAGMENT, true)],
+};
+
+/// Group 1 where geometry is drawn: a [`CameraLight`], or a [`CastingLight`] for volumes.
+pub(super) const LIGHT_GROUP: GroupLayout = GroupLayout {
+    label: "light",
+    entries: &[uniform(0, wgpu::ShaderStages::VERTEX_FRAGMENT, true)],
+};
+
+/// Groups 0 and 1 of every shader that draws geometry: the anchor's view, and a light.
+pub(super) const GEOMETRY_GROUPS: [GroupLayout; 2] = [VIEW_GROUP, LIGHT_GROUP];
 
 /// Several uniforms of one kind in one buffer, picked by a dynamic offset.
 pub(super) struct UniformRow {
@@ -177,25 +194,12 @@ impl UniformRow {
     }
 }
 
-/// A uniform's entry in a bind group layout.
-pub(super) fn uniform_entry(binding: u32, dynamic: bool) -> wgpu::BindGroupLayoutEntry {
-    wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
-        ty: wgpu::BindingType::Buffer {
-            ty: wgpu::BufferBindingType::Uniform,
-            has_dynamic_offset: dynamic,
-            min_binding_size: None,
-        },
-        count: None,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::render::shader;
-    use crate::render::shafts::data::{Frame, Source};
+    use crate::render::shafts::data::ShaftFrame;
+    use crate::shafts::shadow_atlas::MappedSource;
     use std::mem::offset_of;
 
     /// Members of a WGSL struct as (name, offset), and the struct's size.
@@ -230,15 +234,15 @@ mod tests {
 
     #[test]
     fn every_uniform_has_the_layout_of_its_wgsl_twin() {
-        let common = include_str!("../../shaders/common.wgsl");
-        assert_twins!(common, View, clip_from_anchor, camera_from_anchor);
-        assert_twins!(common, LightSource, place_in_camera, power);
-        let volumes = shader::source(include_str!("../../shaders/volumes.wgsl"));
+        let common = shader::source("common.wgsl", &[]).unwrap();
+        assert_twins!(&common, AnchorView, clip_from_anchor, camera_from_anchor);
+        assert_twins!(&common, CameraLight, place_in_camera, power);
+        let volumes = shader::source("volumes.wgsl", &[]).unwrap();
         assert_twins!(&volumes, CastingLight, place_in_anchor, end_in_anchor);
-        let source = include_str!("../../shaders/source.wgsl");
+        let source = shader::source("mapped_source.wgsl", &[]).unwrap();
         assert_twins!(
-            source,
-            Source,
+            &source,
+            MappedSource,
             map_from_world,
             position,
             spread_m,
@@ -251,19 +255,19 @@ mod tests {
             tile_px,
             padding
         );
-        let shafts = shader::source(include_str!("../../shaders/shafts.wgsl"));
+        let shafts = shader::source("shafts.wgsl", &[]).unwrap();
         assert_twins!(
             &shafts,
-            Frame,
+            ShaftFrame,
             world_from_camera,
             source_count,
             padding_1,
             padding_2,
             padding_3
         );
-        let video = include_str!("../../shaders/video.wgsl");
+        let video = shader::source("video.wgsl", &[]).unwrap();
         assert_twins!(
-            video, Lens, focal_px, center_px, distortion, size_px, k3, padding
+            &video, Lens, focal_px, center_px, distortion, size_px, k3, padding
         );
     }
 }

@@ -13,10 +13,10 @@ use crate::geometry::shadow_volume::{Caster, Casting, LightPlace, Silhouette};
 use super::anchor_geometry::Role;
 use super::gpu::Gpu;
 use super::insides::Insides;
-use super::shader;
-use super::stencil::{self, COUNT, MOST_LAYERS, REAL_HIDES};
+use super::pipelines::{GroupLayout, PipelineDescription, untouched};
+use super::stencil::{self, COUNT, MOST_LAYERS, REAL_HIDES, depth_stencil_state};
 
-/// Where volumes are counted.
+/// The surfaces on which volumes are counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Among {
     /// On all surfaces.
@@ -49,17 +49,66 @@ struct Caps {
     facing: wgpu::RenderPipeline,
     /// and those that do not. They lie behind what is seen, whatever rounding makes of their depth along the rim, where
     /// the surface draws its outside alone.
-    averted: wgpu::RenderPipeline,
+    back_facing: wgpu::RenderPipeline,
     /// These where holes may show them.
-    averted_seen: wgpu::RenderPipeline,
+    back_facing_seen: wgpu::RenderPipeline,
 }
 
+/// Vertex layout of volumes' corners.
+const VOLUME_CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
+    array_stride: size_of::<Vec4>() as u64,
+    step_mode: wgpu::VertexStepMode::Vertex,
+    attributes: &wgpu::vertex_attr_array![0 => Float32x4],
+};
+
+/// Strict: a lit surface lies at the very depth of its own cap, which then counts as not in front. No bias is needed, and
+/// none is right.
+const IN_FRONT: wgpu::CompareFunction = wgpu::CompareFunction::Greater;
+
 impl Counters {
+    /// `counting` is all that they have in common.
+    fn new(gpu: &Gpu, counting: &PipelineDescription, among: Among) -> Self {
+        let counter = |depth_compare, cull_mode, stencil| {
+            gpu.pipeline(&PipelineDescription {
+                depth_stencil: Some(depth_stencil_state(
+                    gpu.depth_format,
+                    false,
+                    depth_compare,
+                    stencil,
+                )),
+                cull_mode,
+                ..counting.clone()
+            })
+        };
+        let caps = |turned| {
+            let cap = |compare, cull_mode| {
+                counter(
+                    compare,
+                    cull_mode,
+                    count(among, Counting::DepthFail, turned),
+                )
+            };
+            let (back, front) = (Some(wgpu::Face::Back), Some(wgpu::Face::Front));
+            Caps {
+                seen: cap(IN_FRONT, None),
+                facing: cap(IN_FRONT, back),
+                back_facing: cap(wgpu::CompareFunction::Never, front),
+                back_facing_seen: cap(IN_FRONT, front),
+            }
+        };
+        let sides = |counting| counter(IN_FRONT, None, count(among, counting, false));
+        Self {
+            depth_pass: sides(Counting::DepthPass),
+            depth_fail: sides(Counting::DepthFail),
+            caps: [false, true].map(caps),
+        }
+    }
+
     fn draw(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         groups: [&wgpu::BindGroup; 2],
-        counted: &Counted<'_>,
+        counted: &CountedVolume<'_>,
         part: &DrawnPart,
     ) {
         pass.set_stencil_reference(0);
@@ -90,7 +139,7 @@ impl Caps {
     fn draw(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        counted: &Counted<'_>,
+        counted: &CountedVolume<'_>,
         indices: &IndexBuffer,
         range: Range<u32>,
     ) {
@@ -106,13 +155,13 @@ impl Caps {
             Insides::Anywhere => draw(&self.seen, all),
             Insides::Unseen => {
                 draw(&self.facing, all);
-                draw(&self.averted, all);
+                draw(&self.back_facing, all);
             }
             Insides::Within(pixels) => {
                 draw(&self.facing, all);
-                draw(&self.averted_seen, all.intersection(pixels));
+                draw(&self.back_facing_seen, all.intersection(pixels));
                 for beside in all.without(pixels) {
-                    draw(&self.averted, beside);
+                    draw(&self.back_facing, beside);
                 }
                 set_scissor(pass, all);
             }
@@ -120,8 +169,40 @@ impl Caps {
     }
 }
 
+/// What sides of volumes do to the stencil, those in front of the surface or those that are not; `turned` ones are wound the
+/// other way.
+fn count(among: Among, counting: Counting, turned: bool) -> wgpu::StencilState {
+    // Counts what lies in front or what does not: entering and leaving change sides.
+    let face = |in_front, otherwise| wgpu::StencilFaceState {
+        compare: match among {
+            Among::All => wgpu::CompareFunction::Always,
+            Among::LitByReal => wgpu::CompareFunction::Equal,
+        },
+        fail_op: wgpu::StencilOperation::Keep,
+        pass_op: match counting {
+            Counting::DepthPass => in_front,
+            Counting::DepthFail => wgpu::StencilOperation::Keep,
+        },
+        depth_fail_op: match counting {
+            Counting::DepthPass => wgpu::StencilOperation::Keep,
+            Counting::DepthFail => otherwise,
+        },
+    };
+    let mut more = wgpu::StencilOperation::IncrementWrap;
+    let mut less = wgpu::StencilOperation::DecrementWrap;
+    if turned {
+        std::mem::swap(&mut more, &mut less);
+    }
+    wgpu::StencilState {
+        front: face(more, less),
+        back: face(less, more),
+        read_mask: REAL_HIDES,
+        write_mask: COUNT,
+    }
+}
+
 /// One volume of a batch, as it is to be drawn.
-pub(super) struct Counted<'a> {
+pub(super) struct CountedVolume<'a> {
     pub volume: &'a Volume,
     pub counting: Counting,
     /// Where the camera may see the caster's inside.
@@ -134,147 +215,44 @@ pub(super) struct Counted<'a> {
 }
 
 impl Volumes {
+    /// `groups` are those of the passes that volumes are drawn in; the first two are theirs.
     pub fn new(
-        device: &wgpu::Device,
-        layout: &wgpu::PipelineLayout,
-        depth_format: wgpu::TextureFormat,
+        gpu: &Gpu,
+        groups: &[GroupLayout],
         samples: u32,
         color_formats: &[wgpu::TextureFormat],
     ) -> Self {
-        let module = shader::module(
-            device,
-            "volumes",
-            include_str!("../../shaders/volumes.wgsl"),
-        );
-        let untouched: Vec<_> = color_formats
-            .iter()
-            .map(|&format| {
-                Some(wgpu::ColorTargetState {
-                    format,
-                    blend: None,
-                    write_mask: wgpu::ColorWrites::empty(),
-                })
-            })
-            .collect();
-        let build = |layout, entry_point, buffers: &[_], depth_compare, cull_mode, stencil| {
-            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some("shadow volumes"),
-                layout: Some(layout),
-                vertex: wgpu::VertexState {
-                    module: &module,
-                    entry_point: Some(entry_point),
-                    compilation_options: Default::default(),
-                    buffers,
-                },
-                primitive: wgpu::PrimitiveState {
-                    cull_mode,
-                    ..Default::default()
-                },
-                depth_stencil: Some(wgpu::DepthStencilState {
-                    format: depth_format,
-                    depth_write_enabled: Some(false),
-                    depth_compare: Some(depth_compare),
-                    stencil,
-                    bias: wgpu::DepthBiasState::default(),
-                }),
-                multisample: wgpu::MultisampleState {
-                    count: samples,
-                    ..Default::default()
-                },
-                fragment: Some(wgpu::FragmentState {
-                    module: &module,
-                    entry_point: Some("count"),
-                    compilation_options: Default::default(),
-                    targets: &untouched,
-                }),
-                multiview_mask: None,
-                cache: None,
-            })
+        let common = PipelineDescription {
+            shader: "volumes.wgsl",
+            fragment: "count",
+            targets: color_formats.iter().copied().map(untouched).collect(),
+            samples,
+            ..Default::default()
         };
-        let corners = Some(wgpu::VertexBufferLayout {
-            array_stride: size_of::<Vec4>() as u64,
-            step_mode: wgpu::VertexStepMode::Vertex,
-            attributes: &wgpu::vertex_attr_array![0 => Float32x4],
-        });
-        // Strict: a lit surface lies at the very depth of its own cap, which then counts as not in front. No bias is
-        // needed, and none is right.
-        let in_front = wgpu::CompareFunction::Greater;
-        let counter = |among: Among, counting, turned: bool, compare, cull_mode| {
-            // Counts what lies in front or what does not: entering and leaving change sides.
-            let face = |in_front, otherwise| wgpu::StencilFaceState {
-                compare: match among {
-                    Among::All => wgpu::CompareFunction::Always,
-                    Among::LitByReal => wgpu::CompareFunction::Equal,
-                },
-                fail_op: wgpu::StencilOperation::Keep,
-                pass_op: match counting {
-                    Counting::DepthPass => in_front,
-                    Counting::DepthFail => wgpu::StencilOperation::Keep,
-                },
-                depth_fail_op: match counting {
-                    Counting::DepthPass => wgpu::StencilOperation::Keep,
-                    Counting::DepthFail => otherwise,
-                },
-            };
-            let mut more = wgpu::StencilOperation::IncrementWrap;
-            let mut less = wgpu::StencilOperation::DecrementWrap;
-            if turned {
-                std::mem::swap(&mut more, &mut less);
-            }
-            build(
-                layout,
-                "place",
-                std::slice::from_ref(&corners),
-                compare,
-                cull_mode,
-                wgpu::StencilState {
-                    front: face(more, less),
-                    back: face(less, more),
-                    read_mask: REAL_HIDES,
-                    write_mask: COUNT,
-                },
-            )
+        let counting = PipelineDescription {
+            vertex: "place",
+            groups: groups.iter().copied().map(Some).collect(),
+            vertex_buffers: vec![VOLUME_CORNER_LAYOUT],
+            ..common.clone()
         };
-        let counters = |among| {
-            let caps = |turned, compare, cull_mode| {
-                counter(among, Counting::DepthFail, turned, compare, cull_mode)
-            };
-            let (back, front) = (Some(wgpu::Face::Back), Some(wgpu::Face::Front));
-            Counters {
-                depth_pass: counter(among, Counting::DepthPass, false, in_front, None),
-                depth_fail: counter(among, Counting::DepthFail, false, in_front, None),
-                caps: [false, true].map(|turned| Caps {
-                    seen: caps(turned, in_front, None),
-                    facing: caps(turned, in_front, back),
-                    averted: caps(turned, wgpu::CompareFunction::Never, front),
-                    averted_seen: caps(turned, in_front, front),
-                }),
-            }
-        };
-        let no_bindings = shader::no_bindings(device);
         let keep = |role| {
-            let counted = wgpu::StencilFaceState {
-                compare: wgpu::CompareFunction::NotEqual,
-                pass_op: wgpu::StencilOperation::Replace,
-                ..Default::default()
-            };
-            build(
-                &no_bindings,
-                "whole_picture",
-                &[],
-                wgpu::CompareFunction::Always,
-                None,
-                wgpu::StencilState {
-                    front: counted,
-                    back: counted,
-                    read_mask: COUNT,
-                    write_mask: COUNT | stencil::hides(role),
-                },
-            )
+            let counted = (
+                wgpu::StencilOperation::Replace,
+                COUNT | stencil::hides(role),
+            );
+            gpu.pipeline(&PipelineDescription {
+                depth_stencil: Some(depth_stencil_state(
+                    gpu.depth_format,
+                    false,
+                    wgpu::CompareFunction::Always,
+                    stencil::stencil(wgpu::CompareFunction::NotEqual, COUNT, counted),
+                )),
+                ..common.clone()
+            })
         };
         Self {
-            among_all: counters(Among::All),
-            among_lit: counters(Among::LitByReal),
+            among_all: Counters::new(gpu, &counting, Among::All),
+            among_lit: Counters::new(gpu, &counting, Among::LitByReal),
             keep_real: keep(Role::Real),
             keep_virtual: keep(Role::Virtual),
         }
@@ -288,13 +266,13 @@ impl Volumes {
         role: Role,
         groups: [&wgpu::BindGroup; 2],
         within: PixelRect,
-        counted: impl Iterator<Item = Counted<'a>>,
+        counted: impl Iterator<Item = CountedVolume<'a>>,
     ) -> bool {
         let counters = match among {
             Among::All => &self.among_all,
             Among::LitByReal => &self.among_lit,
         };
-        let counted: Vec<Counted<'_>> = counted.collect();
+        let counted: Vec<CountedVolume<'_>> = counted.collect();
         let mut layers = 0;
         let mut any = false;
         // What is counted apart comes first, so that the rest is left as a number.
@@ -345,7 +323,7 @@ pub(super) struct Volume {
     parts: Vec<DrawnPart>,
 }
 
-/// What a volume depends on.
+/// All that a volume depends on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct MadeFor {
     /// The caster's level of detail.

@@ -7,6 +7,7 @@ use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
 use crate::geometry::mesh::{Mesh, MeshReport};
 use crate::light::probe::Probe;
 use crate::light::{Light, Material};
+pub use crate::shafts::difference::Difference;
 
 mod anchors;
 mod dictionary;
@@ -25,6 +26,7 @@ pub mod radiance_file;
 mod reader;
 mod settings;
 mod shortcuts;
+mod transport;
 
 pub use dictionary::Dictionary;
 pub use error::{Place, SceneError};
@@ -349,6 +351,25 @@ impl Technique {
     }
 }
 
+/// What makes a scene's shadows: a [`Technique`] that is chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ShadowTechnique {
+    /// Shadow volumes.
+    Volumes,
+    /// Soft shadows of a probe's light in a room.
+    Shafts,
+}
+
+impl ShadowTechnique {
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Volumes => Technique::Volumes.name(),
+            Self::Shafts => Technique::Shafts.name(),
+        }
+    }
+}
+
 /// How shadow volumes are counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Counting {
@@ -452,24 +473,6 @@ pub struct ShaftSettings {
     pub difference: Difference,
 }
 
-/// How what virtual things hide of a room's light is taken out of the video.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Difference {
-    /// Of the pixel's linear light as large a part as of the modelled light: the video keeps its texture, and the model's
-    /// reflectances do not matter.
-    Ratio,
-    /// The radiance that the model says is missing (Gibson et al. 2003, section 7; Debevec 1998).
-    Subtract,
-    /// Intensity transfers, from the encoded pixel (Gibson et al. 2003, section 7.1): for the record, as it was done where
-    /// pictures could not be added in linear light.
-    Encoded,
-}
-
-impl Difference {
-    /// The two in linear light, by the names that files use for `difference`.
-    pub const BY_NAME: [(&str, Self); 2] = [("ratio", Self::Ratio), ("subtract", Self::Subtract)];
-}
-
 impl Default for ShaftSettings {
     fn default() -> Self {
         Self {
@@ -500,19 +503,19 @@ impl Default for ShadowSettings {
 }
 
 impl Scene {
-    /// The technique that makes this scene's shadows (never [`Technique::Auto`]), and why.
-    pub fn chosen_technique(&self) -> (Technique, &'static str) {
+    /// The technique that makes this scene's shadows, and why.
+    pub fn chosen_technique(&self) -> (ShadowTechnique, &'static str) {
         match self.shadows.technique {
             Technique::Auto => match &self.probe {
-                None => (Technique::Volumes, "the scene has no probe"),
+                None => (ShadowTechnique::Volumes, "the scene has no probe"),
                 Some(probe) if probe.is_far => {
                     let reason = "the scene has a probe; without a room its light comes from afar";
-                    (Technique::Shafts, reason)
+                    (ShadowTechnique::Shafts, reason)
                 }
-                Some(_) => (Technique::Shafts, "the scene has a probe and a room"),
+                Some(_) => (ShadowTechnique::Shafts, "the scene has a probe and a room"),
             },
-            Technique::Shafts => (Technique::Shafts, "the scene asks for it"),
-            Technique::Volumes => (Technique::Volumes, "the scene asks for it"),
+            Technique::Shafts => (ShadowTechnique::Shafts, "the scene asks for it"),
+            Technique::Volumes => (ShadowTechnique::Volumes, "the scene asks for it"),
         }
     }
 }

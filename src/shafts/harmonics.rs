@@ -26,7 +26,7 @@ pub fn basis(direction: Vec3) -> [f32; 9] {
     ]
 }
 
-/// What the cosine lobe leaves of each degree.
+/// The part that the cosine lobe leaves of each degree.
 const COSINE: [f32; 3] = [PI, 2.0 * PI / 3.0, PI / 4.0];
 
 impl Radiance9 {

@@ -2,13 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::bounding::Aabb;
 use super::receiver_tree::ReceiverTree;
 use super::shaft::{ShaftPlane, planes};
-use super::source_tree::{BoxM, SourceTree};
+use super::source_tree::SourceTree;
 
 /// All shafts, each followed by those that it is cut into.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Hierarchy {
+pub struct ShaftHierarchy {
     shafts: Vec<Shaft>,
     planes: Vec<ShaftPlane>,
 }
@@ -17,14 +18,14 @@ pub struct Hierarchy {
 struct Shaft {
     source: u32,
     receiver: u32,
-    bounds: BoxM,
+    bounds: Aabb,
     /// Planes from here to the next shaft's.
     first_plane: u32,
     /// Index past all shafts that this one is cut into.
     end: u32,
 }
 
-/// What traversals found, by node.
+/// The findings of traversals, by node.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marks {
     source_nodes: Vec<bool>,
@@ -67,7 +68,7 @@ impl Arriving {
     }
 }
 
-impl Hierarchy {
+impl ShaftHierarchy {
     /// Joins sources and receivers. A shaft that brings no vertex any light is left out; one that brings each less than
     /// `least_part` of all its light is not cut any further.
     pub fn new(
@@ -105,7 +106,7 @@ impl Hierarchy {
         self.shafts.push(Shaft {
             source,
             receiver,
-            bounds: BoxM::around([a.min, a.max, b.min, b.max]),
+            bounds: Aabb::around([a.min, a.max, b.min, b.max]),
             first_plane: self.planes.len() as u32,
             end: 0,
         });
@@ -137,8 +138,8 @@ impl Hierarchy {
         size_of_val(&self.shafts[..]) + size_of_val(&self.planes[..])
     }
 
-    /// Marks the sources that things in a box may hide, and the receivers that may notice.
-    pub fn mark(&self, bounds: &BoxM, marks: &mut Marks) {
+    /// Marks the sources that things in a box may hide, and the receivers that may get their shadows.
+    pub fn mark(&self, bounds: &Aabb, marks: &mut Marks) {
         let mut index = 0;
         while let Some(shaft) = self.shafts.get(index) {
             let next = self.shafts.get(index + 1);

@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::ray_caster::RayCaster;
 
+use super::bounding::Aabb;
 use super::harmonics::{Radiance9, sphere};
-use super::patches::Patches;
-use super::source_tree::BoxM;
+use super::patches::RoomPatches;
 
 /// Rays from each point of the grid.
 const RAYS: usize = 1024;
@@ -23,7 +23,7 @@ const MOST_BACKS: f32 = 0.25;
 /// The grid.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct IrradianceVolume {
-    bounds: BoxM,
+    bounds: Aabb,
     points: UVec3,
     /// x fastest; `None` within things.
     radiance: Vec<Option<Radiance9>>,
@@ -33,9 +33,9 @@ impl IrradianceVolume {
     /// Gathers light in a box at points about `spacing_m` apart; `caster` holds the patches' triangles, which send out
     /// `radiance`.
     pub fn new(
-        bounds: BoxM,
+        bounds: Aabb,
         spacing_m: f32,
-        patches: &Patches,
+        patches: &RoomPatches,
         caster: &RayCaster,
         radiance: &[Vec3],
     ) -> Self {
@@ -64,7 +64,7 @@ impl IrradianceVolume {
     }
 
     /// Whether all of a box lies within.
-    pub fn holds(&self, bounds: &BoxM) -> bool {
+    pub fn holds(&self, bounds: &Aabb) -> bool {
         let holds = |corner: Vec3| {
             self.bounds.min.cmple(corner).all() && self.bounds.max.cmpge(corner).all()
         };
@@ -105,7 +105,7 @@ impl IrradianceVolume {
 
 fn gathered(
     point: Vec3,
-    patches: &Patches,
+    patches: &RoomPatches,
     caster: &RayCaster,
     radiance: &[Vec3],
 ) -> Option<Radiance9> {

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::ray_caster::RayCaster;
 use crate::light::probe::Probe;
 
-use super::patches::{Patch, Patches};
+use super::patches::{RoomPatch, RoomPatches};
 use super::points::points_on;
 
 /// Points of a patch that are looked for from the probe.
@@ -27,7 +27,7 @@ const USUAL_ALBEDO: f32 = 0.5;
 /// Most that paint reflects; what sends out more shines by itself.
 const MOST_ALBEDO: f32 = 0.95;
 
-/// What the probe is, and where it was taken.
+/// A probe, and where it was taken.
 #[derive(Clone, Copy)]
 pub struct PlacedProbe<'a> {
     /// Radiance by direction.
@@ -61,7 +61,7 @@ pub struct PatchLight {
 
 /// Light of every patch; `caster` holds the patches' triangles in their order.
 pub fn light_of_room(
-    patches: &Patches,
+    patches: &RoomPatches,
     caster: &RayCaster,
     placed: PlacedProbe<'_>,
 ) -> Vec<PatchLight> {
@@ -93,7 +93,7 @@ pub fn light_of_room(
     }
     let all: Vec<usize> = (0..radiance.len()).collect();
     let irradiances = irradiances(patches, caster, &all, &radiance);
-    let light = |((patch, radiance), irradiance): ((&Patch, &Option<Vec3>), Vec3)| {
+    let light = |((patch, radiance), irradiance): ((&RoomPatch, &Option<Vec3>), Vec3)| {
         let radiance = radiance.unwrap_or(Vec3::ZERO);
         let reflected = radiance * PI / irradiance.max(Vec3::splat(1e-9));
         let shines = reflected.max_element() > MOST_ALBEDO;
@@ -109,8 +109,8 @@ pub fn light_of_room(
 
 /// Mean of what the probe sees of a patch; `None` where it sees less than a quarter of it, or its back.
 fn seen_radiance(
-    patches: &Patches,
-    patch: &Patch,
+    patches: &RoomPatches,
+    patch: &RoomPatch,
     caster: &RayCaster,
     placed: PlacedProbe<'_>,
 ) -> Option<Vec3> {
@@ -126,7 +126,7 @@ fn seen_radiance(
 }
 
 /// Mean of the nearest seen patches of the same thing that face the same way, the nearer ones weighing more.
-fn of_neighbours(patches: &Patches, patch: &Patch, seen: &[Option<Vec3>]) -> Option<Vec3> {
+fn of_neighbours(patches: &RoomPatches, patch: &RoomPatch, seen: &[Option<Vec3>]) -> Option<Vec3> {
     let (center, normal) = (patches.center(patch), patches.normal(patch));
     let mut near: Vec<(f32, Vec3)> = patches
         .patches
@@ -146,7 +146,7 @@ fn of_neighbours(patches: &Patches, patch: &Patch, seen: &[Option<Vec3>]) -> Opt
 
 /// Irradiance at the centres of some patches, by rays to what is known.
 fn irradiances(
-    patches: &Patches,
+    patches: &RoomPatches,
     caster: &RayCaster,
     chosen: &[usize],
     radiance: &[Option<Vec3>],
@@ -166,7 +166,7 @@ fn irradiances(
     chosen.par_iter().map(irradiance).collect()
 }
 
-/// How far off a surface rays start, metres.
+/// The distance off a surface at which rays start, metres.
 pub const START_OFFSET_M: f32 = 2e-5;
 
 /// Directions over a unit normal, spread by the cosine (Malley's method on a golden-angle spiral): the same each time.

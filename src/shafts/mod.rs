@@ -1,17 +1,24 @@
 //! Soft shadows by shafts (Gibson, Cook, Howard & Hubbold 2003), as plain values: the room in patches, the light that
 //! each sends to each place, and which of it a moving thing may hide. World space, metres, linear radiance.
 
+pub mod bounding;
+pub mod casters;
+pub mod difference;
 mod form_factor;
 mod harmonics;
+pub mod hidden_light;
 pub mod hierarchy;
 pub mod intensity_transfers;
 pub mod irradiance_volume;
 mod light_of_room;
 pub mod patches;
 mod points;
-pub mod prepared;
+pub mod receiver_patches;
 mod receiver_tree;
+pub mod room;
+pub mod room_transport;
 pub mod selection;
+pub mod shadow_atlas;
 mod shaft;
 pub mod source_tree;
 pub mod surfels;

@@ -30,7 +30,7 @@ pub struct PatchVertex {
 
 /// A triangle that sends and receives light as one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Patch {
+pub struct RoomPatch {
     /// Indices of its corners among the vertices, counter-clockwise.
     pub vertices: [u32; 3],
     /// Which thing it belongs to.
@@ -41,11 +41,11 @@ pub struct Patch {
 
 /// The room in patches. Neighbours meet in whole edges: there is no gap between them.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Patches {
+pub struct RoomPatches {
     /// Shared corners.
     pub vertices: Vec<PatchVertex>,
     /// The triangles.
-    pub patches: Vec<Patch>,
+    pub patches: Vec<RoomPatch>,
 }
 
 /// Things nearer than this to where patches matter make them no finer, metres.
@@ -73,7 +73,7 @@ fn mean_seen(
     sum / whole.max(f32::MIN_POSITIVE)
 }
 
-impl Patches {
+impl RoomPatches {
     /// Cuts triangles until there are about `budget` patches, never more unless there are more triangles. Edges are
     /// judged by how large they look from the nearest of `focuses`, and by `brightness` there (in any unit).
     pub fn new(
@@ -133,7 +133,7 @@ impl Patches {
             let vertices = triangle
                 .corners
                 .map(|corner| result.vertex(&mut welded, corner, normal, triangle.piece));
-            result.patches.push(Patch {
+            result.patches.push(RoomPatch {
                 vertices,
                 piece: triangle.piece,
                 albedo: triangle.albedo,
@@ -203,7 +203,7 @@ impl Patches {
         }
     }
 
-    fn edges(&self, patch: &Patch) -> [[Vec3; 2]; 3] {
+    fn edges(&self, patch: &RoomPatch) -> [[Vec3; 2]; 3] {
         let [a, b, c] = self.corners(patch);
         [[a, b], [b, c], [c, a]]
     }
@@ -219,7 +219,7 @@ impl Patches {
                     ring.push((middle, false));
                 }
             }
-            let mut push = |vertices| self.patches.push(Patch { vertices, ..patch });
+            let mut push = |vertices| self.patches.push(RoomPatch { vertices, ..patch });
             let place = |index: usize| ring[index % ring.len()].0;
             match ring.len() {
                 3 => push(patch.vertices),
@@ -249,25 +249,25 @@ impl Patches {
     }
 
     /// Places of a patch's corners.
-    pub fn corners(&self, patch: &Patch) -> [Vec3; 3] {
+    pub fn corners(&self, patch: &RoomPatch) -> [Vec3; 3] {
         patch
             .vertices
             .map(|vertex| self.vertices[vertex as usize].position)
     }
 
     /// Centre of a patch.
-    pub fn center(&self, patch: &Patch) -> Vec3 {
+    pub fn center(&self, patch: &RoomPatch) -> Vec3 {
         self.corners(patch).iter().sum::<Vec3>() / 3.0
     }
 
     /// Area, square metres.
-    pub fn area(&self, patch: &Patch) -> f32 {
+    pub fn area(&self, patch: &RoomPatch) -> f32 {
         let [a, b, c] = self.corners(patch);
         0.5 * (b - a).cross(c - a).length()
     }
 
     /// Unit normal.
-    pub fn normal(&self, patch: &Patch) -> Vec3 {
+    pub fn normal(&self, patch: &RoomPatch) -> Vec3 {
         self.vertices[patch.vertices[0] as usize].normal
     }
 }
@@ -313,7 +313,7 @@ mod tests {
                 true => 100.0,
                 false => 1.0,
             };
-            let patches = Patches::new(&square(2.0, 0.0, 0), 600, &[focus], brightness);
+            let patches = RoomPatches::new(&square(2.0, 0.0, 0), 600, &[focus], brightness);
             let all = patches.patches.iter();
             let inside = all.filter(|patch| patches.center(patch).distance(spot) < 0.3);
             inside.count()
@@ -326,7 +326,7 @@ mod tests {
     fn patches_keep_the_area_have_no_gaps_and_are_finer_near_the_focus() {
         let focus =
             Bounds::around([DVec3::new(0.5, 0.5, 0.0), DVec3::new(0.6, 0.6, 0.1)]).expect("points");
-        let patches = Patches::new(&square(1.0, 0.0, 0), 500, &[focus], |_| 1.0);
+        let patches = RoomPatches::new(&square(1.0, 0.0, 0), 500, &[focus], |_| 1.0);
         assert!(
             (250..=500).contains(&patches.patches.len()),
             "{}",
@@ -365,7 +365,7 @@ mod tests {
     fn bright_places_are_cut_finer() {
         let focus = Bounds::around([DVec3::new(0.0, 0.0, 1.0)]).expect("a point");
         let brightness = |place: Vec3| if place.x > 0.0 { 30.0 } else { 0.1 };
-        let patches = Patches::new(&square(1.0, 0.0, 0), 400, &[focus], brightness);
+        let patches = RoomPatches::new(&square(1.0, 0.0, 0), 400, &[focus], brightness);
         let bright = patches
             .patches
             .iter()
@@ -375,7 +375,7 @@ mod tests {
 
     #[test]
     fn a_budget_below_the_triangles_keeps_them() {
-        let patches = Patches::new(&square(1.0, 0.0, 0), 1, &[], |_| 1.0);
+        let patches = RoomPatches::new(&square(1.0, 0.0, 0), 1, &[], |_| 1.0);
         assert_eq!(patches.patches.len(), 2);
     }
 }

@@ -3,8 +3,8 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::patches::Patches;
-use super::source_tree::BoxM;
+use super::bounding::Aabb;
+use super::patches::RoomPatches;
 
 /// A node: the patches `first..last` in the tree's order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -13,7 +13,7 @@ pub struct ReceiverNode {
     pub last: u32,
     /// Empty in a leaf.
     pub children: Vec<u32>,
-    pub bounds: BoxM,
+    pub bounds: Aabb,
     /// Vertices of its patches, each once.
     pub vertices: Vec<u32>,
 }
@@ -29,7 +29,7 @@ pub struct ReceiverTree {
 
 impl ReceiverTree {
     /// Sorts patches into octants until at most `leaf` of them are together.
-    pub fn new(patches: &Patches, leaf: usize) -> Self {
+    pub fn new(patches: &RoomPatches, leaf: usize) -> Self {
         let mut order: Vec<u32> = (0..patches.patches.len() as u32).collect();
         let mut tree = Self::default();
         if !order.is_empty() {
@@ -39,10 +39,10 @@ impl ReceiverTree {
         tree
     }
 
-    fn build(&mut self, patches: &Patches, order: &mut [u32], first: u32, leaf: usize) -> u32 {
+    fn build(&mut self, patches: &RoomPatches, order: &mut [u32], first: u32, leaf: usize) -> u32 {
         let index = self.nodes.len() as u32;
         let triangles = order.iter().map(|&patch| &patches.patches[patch as usize]);
-        let bounds = BoxM::around(triangles.clone().flat_map(|patch| patches.corners(patch)));
+        let bounds = Aabb::around(triangles.clone().flat_map(|patch| patches.corners(patch)));
         let mut vertices: Vec<u32> = triangles.flat_map(|patch| patch.vertices).collect();
         vertices.sort_unstable();
         vertices.dedup();
@@ -55,7 +55,7 @@ impl ReceiverTree {
         });
         if order.len() > leaf {
             let center = |patch: u32| patches.center(&patches.patches[patch as usize]);
-            let around = BoxM::around(order.iter().map(|&patch| center(patch)));
+            let around = Aabb::around(order.iter().map(|&patch| center(patch)));
             let middle = around.min.midpoint(around.max);
             let octant = |patch: u32| octant(center(patch), middle);
             order.sort_by_key(|&patch| octant(patch));

@@ -7,6 +7,9 @@ use glam::{DMat3, DVec3, Mat3, Vec3};
 
 use super::source_tree::{SourceNode, SourceTree};
 
+/// The part of receivers' light, on the average, below which nodes of sources are not cut: less than a level of 255.
+pub const LEAST_WEIGHT: f32 = 1.0 / 2048.0;
+
 /// A source as it weighs in the present frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeighedSource {
@@ -55,7 +58,7 @@ impl PartialOrd for Candidate {
 }
 
 /// Sums over the first sources of the tree, none to all: any node's moments are a difference.
-struct Sums(Vec<Moments>);
+struct MomentSums(Vec<Moments>);
 
 #[derive(Clone, Copy)]
 struct Moments {
@@ -64,7 +67,7 @@ struct Moments {
     second: DMat3,
 }
 
-impl Sums {
+impl MomentSums {
     fn new(sources: &[WeighedSource]) -> Self {
         let mut sum = Moments {
             weight: 0.0,
@@ -112,7 +115,7 @@ pub fn representatives(
     least: f32,
     casters: Vec3,
 ) -> Vec<Representative> {
-    let sums = Sums::new(sources);
+    let sums = MomentSums::new(sources);
     let all = sums.0[sources.len()].weight;
     if count == 0 || tree.nodes.is_empty() || all <= 0.0 {
         return Vec::new();
@@ -173,7 +176,7 @@ pub fn triangle_spread(corners: [Vec3; 3]) -> Mat3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shafts::source_tree::Source;
+    use crate::shafts::source_tree::PatchSource;
 
     const CASTERS: Vec3 = Vec3::new(5.0, 6.0, -1.0);
 
@@ -182,7 +185,7 @@ mod tests {
             let place = Vec3::new((index * 7 % 11) as f32, (index * 5 % 13) as f32, 2.0);
             [place, place + Vec3::X * 0.1, place + Vec3::Y * 0.1]
         };
-        let sources = (0..60).map(|patch| Source {
+        let sources = (0..60).map(|patch| PatchSource {
             patch,
             corners: corners(patch),
             power: 1.0 + (patch * 3 % 5) as f32,

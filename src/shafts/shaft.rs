@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::source_tree::BoxM;
+use super::bounding::Aabb;
 
 /// A plane along one axis: the points where `normal · (u, v) + offset >= 0` may lie in the shaft.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -18,7 +18,7 @@ pub struct ShaftPlane {
 const ROUNDING: f32 = 4e-6;
 
 /// The planes that bound all lines between two boxes, besides the box around both.
-pub fn planes(from: &BoxM, to: &BoxM) -> Vec<ShaftPlane> {
+pub fn planes(from: &Aabb, to: &Aabb) -> Vec<ShaftPlane> {
     let largest = [from.min, from.max, to.min, to.max].map(|corner| corner.abs().max_element());
     let margin = largest.into_iter().fold(0.0, f32::max) * ROUNDING;
     let mut found: Vec<ShaftPlane> = Vec::new();
@@ -72,7 +72,7 @@ fn is_same(one: &ShaftPlane, other: &ShaftPlane, margin: f32) -> bool {
 }
 
 /// The corners of a box in the two axes after `axis`.
-fn corners(bounds: &BoxM, axis: usize) -> [[f32; 2]; 4] {
+fn corners(bounds: &Aabb, axis: usize) -> [[f32; 2]; 4] {
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
     let (min, max) = (bounds.min, bounds.max);
     [
@@ -85,7 +85,7 @@ fn corners(bounds: &BoxM, axis: usize) -> [[f32; 2]; 4] {
 
 impl ShaftPlane {
     /// Whether a box lies outside altogether.
-    pub fn excludes(&self, bounds: &BoxM) -> bool {
+    pub fn excludes(&self, bounds: &Aabb) -> bool {
         let (u, v) = ((self.axis as usize + 1) % 3, (self.axis as usize + 2) % 3);
         let farthest = |axis: usize, part: f32| match part > 0.0 {
             true => bounds.max[axis] * part,
@@ -112,15 +112,15 @@ mod tests {
         fn point(&mut self, size: f32) -> Vec3 {
             Vec3::new(self.unit(), self.unit(), self.unit()) * size
         }
-        fn bounds(&mut self) -> BoxM {
+        fn bounds(&mut self) -> Aabb {
             let min = self.point(3.0);
             let flat = Vec3::from_array([0; 3].map(|_| f32::from(self.unit() > 0.3)));
-            BoxM {
+            Aabb {
                 min,
                 max: min + self.point(1.5) * flat,
             }
         }
-        fn within(&mut self, bounds: &BoxM) -> Vec3 {
+        fn within(&mut self, bounds: &Aabb) -> Vec3 {
             bounds.min + (bounds.max - bounds.min) * self.point(1.0)
         }
     }
@@ -131,7 +131,7 @@ mod tests {
         let (mut left_out, mut met) = (0, 0);
         for _ in 0..400 {
             let (from, to) = (random.bounds(), random.bounds());
-            let around = BoxM::around([from.min, from.max, to.min, to.max]);
+            let around = Aabb::around([from.min, from.max, to.min, to.max]);
             let planes = planes(&from, &to);
             for _ in 0..20 {
                 let tested = random.bounds();
@@ -149,7 +149,7 @@ mod tests {
         assert!(met > 500 && left_out > 3000, "{met} {left_out}");
     }
 
-    fn crosses(a: Vec3, b: Vec3, bounds: &BoxM) -> bool {
+    fn crosses(a: Vec3, b: Vec3, bounds: &Aabb) -> bool {
         let (mut first, mut last) = (0.0_f32, 1.0_f32);
         for axis in 0..3 {
             let way = b[axis] - a[axis];

@@ -3,9 +3,11 @@
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
+use super::bounding::Aabb;
+
 /// A source of light before it has its place in the tree.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Source {
+pub struct PatchSource {
     /// Index of its patch.
     pub patch: u32,
     /// Corners of its patch, metres.
@@ -14,45 +16,6 @@ pub struct Source {
     pub power: f32,
     /// Luminance, in any unit.
     pub luminance: f32,
-}
-
-/// A box, metres.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct BoxM {
-    /// Smallest coordinates.
-    pub min: Vec3,
-    /// Largest coordinates.
-    pub max: Vec3,
-}
-
-impl BoxM {
-    /// Around points; without any, one that holds nothing.
-    pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
-        let empty = Self {
-            min: Vec3::MAX,
-            max: Vec3::MIN,
-        };
-        points.into_iter().fold(empty, |bounds, point| Self {
-            min: bounds.min.min(point),
-            max: bounds.max.max(point),
-        })
-    }
-
-    /// Whether both have a point in common.
-    pub fn touches(&self, other: &Self) -> bool {
-        self.min.cmple(other.max).all() && self.max.cmpge(other.min).all()
-    }
-
-    /// How far the two are apart; 0 where they touch.
-    pub fn distance(&self, other: &Self) -> f32 {
-        let apart = (self.min - other.max).max(other.min - self.max);
-        apart.max(Vec3::ZERO).length()
-    }
-
-    /// Length of the diagonal.
-    pub fn diagonal(&self) -> f32 {
-        self.min.distance(self.max)
-    }
 }
 
 /// A node: the sources `first..last` in the tree's order.
@@ -65,7 +28,7 @@ pub struct SourceNode {
     /// Both children; a node of one source has none.
     pub children: Option<[u32; 2]>,
     /// Around its patches.
-    pub bounds: BoxM,
+    pub bounds: Aabb,
 }
 
 /// The tree; the root is node 0.
@@ -80,7 +43,7 @@ pub struct SourceTree {
 impl SourceTree {
     /// Sorts sources into a tree: those that differ much in brightness are parted first, so that no lamp is one with the
     /// ceiling that it hangs from; then those that stand apart.
-    pub fn new(mut sources: Vec<Source>) -> Self {
+    pub fn new(mut sources: Vec<PatchSource>) -> Self {
         let mut tree = Self::default();
         if !sources.is_empty() {
             tree.build(&mut sources, 0);
@@ -89,13 +52,13 @@ impl SourceTree {
         tree
     }
 
-    fn build(&mut self, sources: &mut [Source], first: u32) -> u32 {
+    fn build(&mut self, sources: &mut [PatchSource], first: u32) -> u32 {
         let index = self.nodes.len() as u32;
         self.nodes.push(SourceNode {
             first,
             last: first + sources.len() as u32,
             children: None,
-            bounds: BoxM::around(sources.iter().flat_map(|source| source.corners)),
+            bounds: Aabb::around(sources.iter().flat_map(|source| source.corners)),
         });
         if sources.len() > 1 {
             let cut = cut_by_brightness(sources).unwrap_or_else(|| cut(sources));
@@ -112,7 +75,7 @@ impl SourceTree {
 const LARGEST_CONTRAST: f32 = 4.0;
 
 /// Sorts sources by brightness where they differ much, and returns where to cut: at the mean of their magnitudes.
-fn cut_by_brightness(sources: &mut [Source]) -> Option<usize> {
+fn cut_by_brightness(sources: &mut [PatchSource]) -> Option<usize> {
     let luminances = || sources.iter().map(|source| source.luminance.max(1e-12));
     let (darkest, brightest) = (
         luminances().fold(f32::MAX, f32::min),
@@ -128,8 +91,8 @@ fn cut_by_brightness(sources: &mut [Source]) -> Option<usize> {
 
 /// Sorts sources along the axis, and returns where to cut, so that both parts are as narrow as can be: the sum of their
 /// second moments by power is least.
-fn cut(sources: &mut [Source]) -> usize {
-    let middle = |source: &Source| source.corners.iter().sum::<Vec3>() / 3.0;
+fn cut(sources: &mut [PatchSource]) -> usize {
+    let middle = |source: &PatchSource| source.corners.iter().sum::<Vec3>() / 3.0;
     let mut best = (f64::INFINITY, 0, 1);
     for axis in 0..3 {
         sources.sort_by(|one, other| middle(one)[axis].total_cmp(&middle(other)[axis]));
@@ -148,7 +111,7 @@ fn cut(sources: &mut [Source]) -> usize {
 }
 
 /// Second moments by power of the first source, the first two, and so on, each about its own middle.
-fn moments<'a>(sources: impl Iterator<Item = &'a Source>) -> impl Iterator<Item = f64> {
+fn moments<'a>(sources: impl Iterator<Item = &'a PatchSource>) -> impl Iterator<Item = f64> {
     let (mut power, mut first, mut second) = (0.0, DVec3::ZERO, 0.0);
     sources.map(move |source| {
         let middle = (source.corners.iter().sum::<Vec3>() / 3.0).as_dvec3();
@@ -164,11 +127,11 @@ fn moments<'a>(sources: impl Iterator<Item = &'a Source>) -> impl Iterator<Item 
 mod tests {
     use super::*;
 
-    fn sources() -> Vec<Source> {
+    fn sources() -> Vec<PatchSource> {
         (0..37)
             .map(|index| {
                 let place = Vec3::new((index * 7 % 11) as f32, (index * 5 % 13) as f32, 2.0);
-                Source {
+                PatchSource {
                     patch: index,
                     corners: [place, place + Vec3::X, place + Vec3::Y],
                     power: 1.0 + (index * 3 % 5) as f32,

@@ -1,12 +1,12 @@
-//! What a virtual thing throws back on its surroundings: its surface as a few discs, each with the directions in which the
+//! What a virtual thing reflects on to its surroundings: its surface as a few discs, each with the directions in which the
 //! thing itself does not hide it.
 
 use std::f32::consts::PI;
 
 use glam::Vec3;
 
+use super::bounding::Aabb;
 use super::points::points_on;
-use super::source_tree::BoxM;
 
 /// Neighbours in a group.
 const GROUP: usize = 8;
@@ -52,7 +52,7 @@ pub struct LitSurfel {
 }
 
 /// Irradiance at a place with a unit normal from all surfels that see it.
-pub fn thrown_back<'a>(
+pub fn reflected_irradiance<'a>(
     place: Vec3,
     normal: Vec3,
     surfels: impl IntoIterator<Item = &'a LitSurfel>,
@@ -62,7 +62,7 @@ pub fn thrown_back<'a>(
 }
 
 /// The same for a place on the things themselves: the discs that it faces and that face it, as those of a hollow do.
-pub fn thrown_on_caster<'a>(
+pub fn interreflected_irradiance<'a>(
     place: Vec3,
     normal: Vec3,
     surfels: impl IntoIterator<Item = &'a LitSurfel>,
@@ -108,11 +108,11 @@ impl GroupedSurfels {
     }
 
     /// What gives all places in a box about the light that all of them give.
-    pub fn seen_from(&self, bounds: BoxM) -> impl Iterator<Item = &LitSurfel> {
+    pub fn seen_from(&self, bounds: Aabb) -> impl Iterator<Item = &LitSurfel> {
         let chunks = self.surfels.chunks(GROUP).zip(&self.groups);
         chunks.flat_map(move |(surfels, group)| {
             let middle = group.whole.surfel.position;
-            let distance = bounds.distance(&BoxM::around([middle]));
+            let distance = bounds.distance(&Aabb::around([middle]));
             match distance > SEEN_AS_ONE * group.radius {
                 true => std::slice::from_ref(&group.whole),
                 false => surfels,

@@ -10,7 +10,7 @@ use crate::geometry::ray_caster::RayCaster;
 
 use super::form_factor::form_factor;
 use super::light_of_room::START_OFFSET_M;
-use super::patches::{PatchVertex, Patches};
+use super::patches::{PatchVertex, RoomPatches};
 use super::points::points_on;
 
 /// Rays for a patch that covers much of the hemisphere, and for one that hardly shows.
@@ -31,7 +31,7 @@ pub struct Transfers {
 
 impl Transfers {
     /// For each vertex of `patches` and each patch of `senders` (indices of patches, in the order that counts).
-    pub fn new(patches: &Patches, senders: &[u32], caster: &RayCaster) -> Self {
+    pub fn new(patches: &RoomPatches, senders: &[u32], caster: &RayCaster) -> Self {
         let sender_corners: Vec<([Vec3; 3], Vec3)> = senders
             .iter()
             .map(|&sender| {
@@ -62,7 +62,7 @@ impl Transfers {
 }
 
 /// From each vertex a little towards the middle of its patches.
-fn insets(patches: &Patches) -> Vec<Vec3> {
+fn insets(patches: &RoomPatches) -> Vec<Vec3> {
     let mut sums = vec![Vec3::ZERO; patches.vertices.len()];
     for patch in &patches.patches {
         let center = patches.center(patch);

@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use crate::common::{gpu, project_file};
 use gnomon::app::truth::{Errors, Truth, compare, draw, key_frames};
 use gnomon::capture::load_calibration;
-use gnomon::render::Renderer;
 use gnomon::scene::Scene;
 
 fn scene_of(name: &str) -> Scene {
@@ -18,7 +17,8 @@ fn scene_of(name: &str) -> Scene {
 fn errors_of(folder: &Path, scene: &Scene, name: &str) -> Vec<Errors> {
     let calibration = project_file(&format!("recordings/{name}/camera.toml"));
     let intrinsics = load_calibration(&calibration).expect("the calibration");
-    let mut renderer = Renderer::new(gpu(), scene, intrinsics).expect("a renderer");
+    let mut renderer =
+        gnomon::app::room_transport_cache::renderer(gpu(), scene, intrinsics).expect("a renderer");
     let keys = key_frames(folder, &scene.anchors).expect("key frames");
     let errors = keys.iter().map(|(frame, poses)| {
         let drawn = draw(&mut renderer, frame, poses).expect("a drawn frame");

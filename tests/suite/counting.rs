@@ -138,3 +138,29 @@ fn one_light_and_one_sample_need_no_sums() {
         );
     }
 }
+
+/// What a frame is drawn by can be asked for.
+#[test]
+fn the_passes_of_a_frame_are_told() {
+    let table = Thing::file("plane.obj");
+    let crate_ = Thing::made(shapes::cuboid([-0.02; 3], [0.02; 3])).at([0.0, 0.0, 0.02]);
+    let lights = vec![
+        lamp([-0.25, 0.1, 0.5], [0.9; 3]),
+        sun([0.3, 0.2, -1.0], [0.5; 3]),
+    ];
+    let mut stage = Stage::new(&[table], &[crate_], None, lights, DVec3::splat(0.1));
+    let passes = |stage: &Stage| -> Vec<&'static str> {
+        let mut renderer = stage.renderer(CAMERA);
+        let camera = look_at(DVec3::new(0.2, -0.25, 0.3), DVec3::ZERO);
+        stage.shoot(&mut renderer, camera);
+        renderer.passes().to_vec()
+    };
+    stage.scene.shadows.samples = 4;
+    assert_eq!(
+        passes(&stage),
+        ["background", "light", "light", "composite"]
+    );
+    stage.scene.shadows.samples = 1;
+    stage.scene.lights.truncate(1);
+    assert_eq!(passes(&stage), ["background", "surfaces", "shadows"]);
+}

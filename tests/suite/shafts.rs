@@ -13,13 +13,14 @@ use gnomon::capture::{Frame, load_calibration};
 use gnomon::geometry::bounds::Bounds;
 use gnomon::light::probe::Probe;
 use gnomon::light::{Material, reflectance};
-use gnomon::render::{Layers, Renderer, Room, Shown, VIRTUAL};
+use gnomon::render::{Layers, Renderer, Shown, VIRTUAL};
 use gnomon::scene::{Difference, Scene};
+use gnomon::shafts::bounding::Aabb;
 use gnomon::shafts::patches::RoomTriangle;
-use gnomon::shafts::prepared::{Options, PlacedProbe, Prepared};
-use gnomon::shafts::source_tree::BoxM;
+use gnomon::shafts::room::Room;
+use gnomon::shafts::room_transport::{PlacedProbe, RoomOptions, RoomTransport};
 
-const OPTIONS: Options = Options {
+const OPTIONS: RoomOptions = RoomOptions {
     patches: 600,
     source_power: 1.0,
     receivers_per_leaf: 8,
@@ -69,7 +70,7 @@ fn a_room_of_one_brightness_lights_every_place_with_pi_times_it() {
             exposure: 2.0,
         },
     };
-    let prepared = room.prepare();
+    let prepared = room.transport();
     let expected = color * 2.0 * PI;
     for (vertex, irradiance) in prepared.patches.vertices.iter().zip(&prepared.irradiance) {
         let error = (*irradiance / expected - 1.0).abs().max_element();
@@ -93,11 +94,13 @@ fn coarse_scene() -> Scene {
     scene
 }
 
-fn coarse_room() -> &'static Prepared {
-    static ROOM: OnceLock<Prepared> = OnceLock::new();
+fn coarse_room() -> &'static RoomTransport {
+    static ROOM: OnceLock<RoomTransport> = OnceLock::new();
     ROOM.get_or_init(|| {
         let scene = coarse_scene();
-        Room::of(&scene, scene.probe.as_ref().expect("a probe")).prepare()
+        scene
+            .room(scene.probe.as_ref().expect("a probe"))
+            .transport()
     })
 }
 
@@ -111,7 +114,7 @@ fn no_source_that_a_box_hides_and_no_receiver_that_notices_is_missed() {
         let mut part = |low: f64, high: f64| random.between(low, high) as f32;
         let low = Vec3::new(part(-0.4, 0.4), part(-0.4, 0.4), part(0.0, 0.4));
         let high = low + Vec3::new(part(0.01, 0.2), part(0.01, 0.2), part(0.01, 0.2));
-        let tested = BoxM::around([low, high]);
+        let tested = Aabb::around([low, high]);
         let marks = room.mark(&[tested]);
         let sources = marks.sources(&room.sources);
         let receivers = marks.receivers(&room.receivers);
@@ -132,13 +135,13 @@ fn no_source_that_a_box_hides_and_no_receiver_that_notices_is_missed() {
         }
     }
     assert!(hidden > 1000, "{hidden}");
-    let outside = BoxM::around([Vec3::splat(3.0), Vec3::splat(3.5)]);
+    let outside = Aabb::around([Vec3::splat(3.0), Vec3::splat(3.5)]);
     let marks = room.mark(&[outside]);
     assert!(!marks.sources(&room.sources).contains(&true));
     assert!(!marks.receivers(&room.receivers).contains(&true));
 }
 
-fn crosses(a: Vec3, b: Vec3, bounds: &BoxM) -> bool {
+fn crosses(a: Vec3, b: Vec3, bounds: &Aabb) -> bool {
     let (mut first, mut last) = (0.0_f32, 1.0_f32);
     for axis in 0..3 {
         let way = b[axis] - a[axis];
@@ -183,7 +186,8 @@ fn frame() -> &'static (Frame, Vec<Option<DAffine3>>) {
 fn renderer(scene: &Scene) -> Renderer {
     let calibration = project_file("recordings/room/camera.toml");
     let intrinsics = load_calibration(Path::new(&calibration)).expect("the calibration");
-    let mut renderer = Renderer::new(gpu(), scene, intrinsics).expect("a renderer");
+    let mut renderer =
+        gnomon::app::room_transport_cache::renderer(gpu(), scene, intrinsics).expect("a renderer");
     renderer.upload(&frame().0).expect("an uploaded frame");
     renderer
 }
@@ -400,7 +404,9 @@ fn a_probe_without_a_room_lights_from_afar() {
     let ball_m = DVec3::new(0.0, 0.0, 0.05);
     scene.virtuals[0].anchor_from_object.translation = ball_m;
 
-    let room = Room::of(&scene, scene.probe.as_ref().expect("a probe")).prepare();
+    let room = scene
+        .room(scene.probe.as_ref().expect("a probe"))
+        .transport();
     let exposure = scene.probe.as_ref().expect("a probe").exposure;
     // What a table sees of both: the sky, and a disc of a bright one.
     let disc = 39.0 * TAU / 2.0 * 10_f64.to_radians().sin().powi(2) * to_light.z;

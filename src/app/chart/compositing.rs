@@ -13,11 +13,11 @@ use super::figure::{Axis, Figure, Panel, Point, Series};
 use super::lab::Lab;
 use super::measured::rounded;
 use super::shots::{Shots, mean};
-use crate::render::{Room, kept_rooms};
+use crate::app::room_transport_cache;
 use crate::scene::{Difference, Scene};
 use crate::shafts::intensity_transfers::{encoded, intensity_transfers};
 use crate::shafts::luminance;
-use crate::shafts::prepared::Prepared;
+use crate::shafts::room_transport::RoomTransport;
 
 /// The chart.
 pub struct Compositing;
@@ -212,8 +212,9 @@ fn set_name(in_first: usize) -> String {
 /// Gibson et al. 2003, figure 3.
 fn sets(scene: &Scene, trials: usize) -> Result<Vec<Row>> {
     let probe = scene.probe.as_ref().context("the room has a probe")?;
-    let room = Room::of(scene, probe);
-    let room = kept_rooms::ready(&room, kept_rooms::folder().as_deref()).prepared;
+    let room = scene.room(probe);
+    let room =
+        room_transport_cache::ready(&room, room_transport_cache::folder().as_deref()).transport;
     let mut random = fastrand::Rng::with_seed(3);
     let vertices = vertices_near(&room, scene);
     let mut rows = Vec::new();
@@ -241,7 +242,7 @@ fn sets(scene: &Scene, trials: usize) -> Result<Vec<Row>> {
 }
 
 /// The vertices nearest to where the virtual things stand.
-fn vertices_near(room: &Prepared, scene: &Scene) -> Vec<usize> {
+fn vertices_near(room: &RoomTransport, scene: &Scene) -> Vec<usize> {
     let places = scene
         .virtuals
         .iter()
@@ -257,7 +258,7 @@ fn vertices_near(room: &Prepared, scene: &Scene) -> Vec<usize> {
 
 /// A vertex's radiance as a grey surface, at half the camera's range, and that of some of its sources, those that send most
 /// first.
-fn lit(room: &Prepared, vertex: usize, random: &mut fastrand::Rng) -> (Vec3, Vec<Vec3>) {
+fn lit(room: &RoomTransport, vertex: usize, random: &mut fastrand::Rng) -> (Vec3, Vec<Vec3>) {
     let irradiance = room.irradiance[vertex];
     let scale = 0.5 / luminance(irradiance);
     let row = room.transfers.row(vertex);

@@ -16,8 +16,8 @@ use super::shots::{Shots, grey_frame};
 use crate::app::truth::changed_by;
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
-use crate::render::{Renderer, Shown};
-use crate::scene::{Counting, Scene, Technique};
+use crate::render::Shown;
+use crate::scene::{Counting, Scene, ShadowTechnique};
 
 /// By how many pixels silhouettes may move.
 const ERRORS_PX: [f64; 6] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
@@ -97,7 +97,11 @@ impl Looks {
 }
 
 fn draw(lab: &Lab<'_>, looks: &Looks) -> Result<Vec<Drawn>> {
-    let mut renderer = Renderer::new(Arc::clone(&lab.gpu()?), &looks.scene, looks.intrinsics)?;
+    let mut renderer = crate::app::room_transport_cache::renderer(
+        Arc::clone(&lab.gpu()?),
+        &looks.scene,
+        looks.intrinsics,
+    )?;
     let drawn = looks.frames.iter().map(|(frame, camera_from_anchor)| {
         renderer.upload(frame)?;
         renderer.draw(camera_from_anchor, Shown::Composite);
@@ -136,7 +140,7 @@ impl Chart for LeftOut {
         scene.shadows.max_silhouette_error_px = 0.0;
         scene.shadows.counting = Counting::DepthFail;
         scene.shadows.shafts.sources = None;
-        let is_soft = scene.chosen_technique().0 == Technique::Shafts;
+        let is_soft = scene.chosen_technique().0 == ShadowTechnique::Shafts;
         let step = lab.step();
         let all = draw(lab, &looks)?;
         let mut ways = Vec::new();

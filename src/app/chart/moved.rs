@@ -16,7 +16,7 @@ use super::shots::Shots;
 use crate::app::picture_files::{write_rgb_png, write_text};
 use crate::app::progress::Progress;
 use crate::app::truth::{Drawn, Picture, draw};
-use crate::render::{Renderer, VIRTUAL};
+use crate::render::VIRTUAL;
 use crate::scene::Scene;
 
 const NAME: &str = "moved";
@@ -107,7 +107,11 @@ impl AnyChart for Moved {
                 if lab.is_stopped() {
                     return Ok(false);
                 }
-                let mut renderer = Renderer::new(Arc::clone(&lab.gpu()?), scene, shots.intrinsics)?;
+                let mut renderer = crate::app::room_transport_cache::renderer(
+                    Arc::clone(&lab.gpu()?),
+                    scene,
+                    shots.intrinsics,
+                )?;
                 drawn.push(draw(&mut renderer, &shot.frame, &shot.camera_from_anchor)?);
             }
             let changed = |drawn: &Drawn| {

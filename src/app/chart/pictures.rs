@@ -14,7 +14,7 @@ use crate::app::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
 use crate::app::truth::{Drawn, Picture};
 use crate::render::{Renderer, Shown, VIRTUAL};
-use crate::scene::{Quality, Scene, ShadowSettings, Technique};
+use crate::scene::{Quality, Scene, ShadowSettings, ShadowTechnique};
 
 const NAME: &str = "shadow-pictures";
 /// The error is shown so much stronger, about a middle grey.
@@ -55,7 +55,11 @@ impl AnyChart for Pictures {
             for (name, shadows) in ways(&scene, lab.quick) {
                 let mut scene = scene.clone();
                 scene.shadows = shadows;
-                let mut renderer = Renderer::new(lab.gpu()?, &scene, shots.intrinsics)?;
+                let mut renderer = crate::app::room_transport_cache::renderer(
+                    lab.gpu()?,
+                    &scene,
+                    shots.intrinsics,
+                )?;
                 let pictures = shots.draw_with(&mut renderer)?;
                 let took_ms = frame_ms(lab, &shots, &mut renderer)?;
                 let factor = mean(&shots.errors(&pictures)?, |errors| errors.factor);
@@ -86,7 +90,7 @@ impl AnyChart for Pictures {
 /// What the technique of a scene has to offer: the qualities, or so many sources (Gibson et al. 2003, fig. 9).
 fn ways(scene: &Scene, quick: bool) -> Vec<(String, ShadowSettings)> {
     let technique = scene.shadows.technique;
-    if scene.chosen_technique().0 != Technique::Shafts {
+    if scene.chosen_technique().0 != ShadowTechnique::Shafts {
         let qualities = Quality::BY_NAME.into_iter();
         return qualities
             .map(|(name, quality)| {

@@ -15,7 +15,7 @@ use super::shots::{Shots, mean, mean_wrong_pct};
 use crate::app::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
 use crate::app::truth::{Drawn, Picture};
-use crate::render::{Renderer, Shown};
+use crate::render::Shown;
 use crate::scene::{Counting, Quality, Scene, ShadowSettings, ShaftSettings, Technique};
 
 /// The chart.
@@ -159,7 +159,11 @@ impl Chart for Shadows {
             if lab.is_stopped() {
                 return Ok(None);
             }
-            let mut renderer = Renderer::new(Arc::clone(&gpu), &way.scene, shots.intrinsics)?;
+            let mut renderer = crate::app::room_transport_cache::renderer(
+                Arc::clone(&gpu),
+                &way.scene,
+                shots.intrinsics,
+            )?;
             let drawn = shots.draw_with(&mut renderer)?;
             rows.push(row(unit, way.technique, &way.setting, &shots, &drawn)?);
             renderers.push(renderer);

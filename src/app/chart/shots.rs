@@ -83,7 +83,11 @@ impl Shots {
     /// # Errors
     /// A device that failed.
     pub fn draw(&self, gpu: &Arc<Gpu>, scene: &Scene) -> Result<Vec<Drawn>> {
-        self.draw_with(&mut Renderer::new(Arc::clone(gpu), scene, self.intrinsics)?)
+        self.draw_with(&mut crate::app::room_transport_cache::renderer(
+            Arc::clone(gpu),
+            scene,
+            self.intrinsics,
+        )?)
     }
 
     /// Draws all at their true poses with a renderer that is there already.

@@ -13,7 +13,6 @@ use super::lab::Lab;
 use super::measured::rounded;
 use super::shots::{Shot, Shots, mean, mean_wrong_pct};
 use crate::app::truth::{compare, draw, shifts_px};
-use crate::render::Renderer;
 
 /// Pixels by which the pose is off.
 const AMOUNTS_PX: [f64; 6] = [0.0, 0.1, 0.2, 0.5, 1.0, 2.0];
@@ -81,7 +80,11 @@ impl Chart for WrongPose {
         let scene = recording.load_scene()?;
         let shots = Shots::of(lab, &recording, &scene)?;
         let intrinsics = shots.intrinsics;
-        let mut renderer = Renderer::new(Arc::clone(&lab.gpu()?), &scene, intrinsics)?;
+        let mut renderer = crate::app::room_transport_cache::renderer(
+            Arc::clone(&lab.gpu()?),
+            &scene,
+            intrinsics,
+        )?;
         let ways: &[DVec2] = match unit {
             TURNED => &[DVec2::X, DVec2::NEG_X],
             _ => &[DVec2::X, DVec2::Y, DVec2::NEG_X, DVec2::NEG_Y],

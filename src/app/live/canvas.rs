@@ -54,7 +54,13 @@ impl Canvas {
                 // Cores of its own to share: work for the frame at hand must not wait behind that for a renderer to come.
                 let cores = rayon::ThreadPoolBuilder::new().build().ok();
                 while let Some(order) = orders.take() {
-                    let make = || Renderer::new(Arc::clone(&gpu), &order.scene, order.intrinsics);
+                    let make = || {
+                        crate::app::room_transport_cache::renderer(
+                            Arc::clone(&gpu),
+                            &order.scene,
+                            order.intrinsics,
+                        )
+                    };
                     let renderer = match &cores {
                         Some(cores) => cores.install(make),
                         None => make(),
@@ -221,7 +227,8 @@ impl Canvas {
             probe: None,
             ..(*self.scene).clone()
         });
-        let renderer = Renderer::new(Arc::clone(&self.gpu), &empty, intrinsics)?;
+        let renderer =
+            crate::app::room_transport_cache::renderer(Arc::clone(&self.gpu), &empty, intrinsics)?;
         let order = Order {
             scene: empty,
             intrinsics,

@@ -2,17 +2,17 @@
 //! picture's own; the rest comes from the same surfaces and shadow volumes, as far as they reach in the picture, asked once
 //! more at the pixels' centres.
 
-use std::sync::Arc;
-
 use super::super::anchor_geometry::Role;
-use super::super::attachments::{kept, loaded};
-use super::super::composite::GAIN_FORMAT;
+use super::super::attachments::{loaded, texture};
 use super::super::gpu::RenderError;
 use super::super::layers::{LayerPasses, Layers};
+use super::super::light_sums::GAIN_FORMAT;
+use super::super::passes::Passes;
 use super::super::readback::Readback;
-use super::super::volumes::{Among, set_scissor};
+use super::super::shown::Shown;
+use super::super::technique::FrameContext;
+use super::super::volumes::Among;
 use super::Renderer;
-use super::Shown;
 use crate::geometry::reach::PixelRect;
 
 impl Renderer {
@@ -23,22 +23,22 @@ impl Renderer {
     pub fn layers(&mut self) -> Result<Layers, RenderError> {
         let gain = self.read_gain()?;
         self.cast_on_all_pixels();
-        let (gpu, stage, size_px) = (&self.gpu, &self.stage, self.size_px);
+        let (gpu, gpu_scene, size_px) = (&self.gpu, &self.gpu_scene, self.size_px);
         let passes = self
             .layer_passes
-            .get_or_insert_with(|| LayerPasses::new(gpu, &self.geometry_layout, size_px));
+            .get_or_insert_with(|| LayerPasses::new(gpu, size_px));
         let whole = PixelRect::whole(size_px);
         let shown = |role: Role| role == Role::Real || self.shown == Shown::Composite;
         let (role, depth_m) = passes.role_and_depth(gpu, &|pass, pipeline, role| {
             if shown(role) {
-                stage.draw_surfaces(pass, pipeline, role, 0, whole);
+                gpu_scene.draw_surfaces(pass, pipeline, role, 0, whole);
             }
         })?;
         let mut shadow = Vec::new();
-        for light in 0..stage.light_count() {
+        for light in 0..gpu_scene.light_count() {
             let mut bits = passes.shadow(gpu, &|pass, volumes, role| {
                 if shown(role) {
-                    stage.count_volumes(pass, volumes, Among::All, role, light, whole);
+                    gpu_scene.count_volumes(pass, volumes, Among::All, role, light, whole);
                 }
             })?;
             // Where nothing is modelled nothing can be shadowed.
@@ -62,18 +62,18 @@ impl Renderer {
     /// The device failed since it was opened.
     pub fn stencil_counts(&mut self) -> Result<Vec<u8>, RenderError> {
         self.cast_on_all_pixels();
-        let (gpu, stage, size_px) = (&self.gpu, &self.stage, self.size_px);
+        let (gpu, gpu_scene, size_px) = (&self.gpu, &self.gpu_scene, self.size_px);
         let passes = self
             .layer_passes
-            .get_or_insert_with(|| LayerPasses::new(gpu, &self.geometry_layout, size_px));
+            .get_or_insert_with(|| LayerPasses::new(gpu, size_px));
         let whole = PixelRect::whole(size_px);
         let (roles, _) = passes.role_and_depth(gpu, &|pass, pipeline, role| {
-            stage.draw_surfaces(pass, pipeline, role, 0, whole);
+            gpu_scene.draw_surfaces(pass, pipeline, role, 0, whole);
         })?;
         let mut sums = vec![0_u8; roles.len()];
-        for light in 0..stage.light_count() {
+        for light in 0..gpu_scene.light_count() {
             let counts = passes.counts(gpu, &|pass, volumes, role| {
-                stage.count_volumes(pass, volumes, Among::All, role, light, whole);
+                gpu_scene.count_volumes(pass, volumes, Among::All, role, light, whole);
             })?;
             // Where nothing is modelled nothing lies in a shadow.
             for ((sum, count), &role) in sums.iter_mut().zip(counts).zip(&roles) {
@@ -85,60 +85,47 @@ impl Renderer {
 
     /// The picture needs real shadows only where virtual things touch it; the layers tell of all.
     fn cast_on_all_pixels(&mut self) {
-        if let (Some(touched), None) = (&self.touched, &self.shafts) {
+        if let Some(bounds) = &self.bounds {
             let whole = PixelRect::whole(self.size_px);
-            self.stage.cast(&self.gpu, touched, whole);
+            self.gpu_scene.cast(&self.gpu, bounds, whole);
         }
     }
 
-    /// The factor that the picture's own samples put on the video.
+    /// The factor that the picture's own samples put on the video: what the picture was made of lies where it was drawn.
     fn read_gain(&self) -> Result<Vec<[f32; 3]>, RenderError> {
-        let nothing = || vec![[1.0; 3]; (self.size_px[0] * self.size_px[1]) as usize];
-        let within = match (&self.touched, self.shown) {
-            (Some(touched), Shown::Composite) if !touched.pixels.is_empty() => touched.pixels,
-            _ => return Ok(nothing()),
+        let bounds = self
+            .bounds
+            .as_ref()
+            .filter(|_| self.shown == Shown::Composite);
+        let Some(bounds) = bounds.filter(|bounds| !bounds.pixels.is_empty()) else {
+            return Ok(vec![[1.0; 3]; (self.size_px[0] * self.size_px[1]) as usize]);
         };
-        let gpu = Arc::clone(&self.gpu);
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("gain layer"),
-            size: self.picture.size(),
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: GAIN_FORMAT,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
-        let view = texture.create_view(&Default::default());
-        // What the picture was made of lies where it was drawn: sums in the targets, or the stencil.
-        let targets = match (&self.shafts, &self.accumulation) {
-            (Some((_, targets)), _) => Some(targets),
-            (None, Some(accumulation)) => Some(&accumulation.targets),
-            (None, None) => None,
+        let gpu = &self.gpu;
+        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC;
+        let texture = texture(
+            &gpu.device,
+            "gain layer",
+            self.size_px,
+            GAIN_FORMAT,
+            1,
+            usage,
+        );
+        let gain = texture.create_view(&Default::default());
+        let picture = self.picture.create_view(&Default::default());
+        let frame = FrameContext {
+            gpu,
+            gpu_scene: &self.gpu_scene,
+            background: &self.background,
+            picture: &picture,
+            bounds,
         };
-        let stencil = targets.is_none().then_some(self.direct.as_ref()).flatten();
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("gain"),
-            color_attachments: &[Some(loaded(&view, wgpu::LoadOp::Clear(wgpu::Color::WHITE)))],
-            depth_stencil_attachment: stencil.map(|direct| kept(&direct.depth_stencil)),
-            ..Default::default()
-        });
-        set_scissor(&mut pass, within);
-        pass.set_bind_group(2, &self.background.group, &[]);
-        if let Some(targets) = targets {
-            pass.set_pipeline(&targets.composite.gain);
-            pass.set_bind_group(0, &targets.composite.group, &[]);
-            pass.draw(0..3, 0..1);
-        } else if let Some(direct) = stencil {
-            let stage = &self.stage;
-            stage.draw_surfaces(&mut pass, &direct.gain_on_real, Role::Real, 0, within);
-        }
-        drop(pass);
+        let mut passes = Passes::new(gpu, None);
+        let gain = loaded(&gain, wgpu::LoadOp::Clear(wgpu::Color::WHITE));
+        self.technique.passes().draw_gain(&mut passes, &frame, gain);
         let readback = Readback::new(&gpu.device, self.size_px, 16);
-        readback.copy_from(&mut encoder, &texture);
-        gpu.queue.submit([encoder.finish()]);
-        let texels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&readback.read(&gpu)?);
+        readback.copy_from(&mut passes.encoder, &texture);
+        gpu.queue.submit([passes.encoder.finish()]);
+        let texels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&readback.read(gpu)?);
         Ok(texels.into_iter().map(|[r, g, b, _]| [r, g, b]).collect())
     }
 }

@@ -2,19 +2,49 @@
 
 use super::super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT};
 use super::super::gpu::Gpu;
-use super::super::shader;
+use super::super::pipelines::{
+    GroupLayout, PipelineDescription, added, filtered, overwritten, sampler, storage, uniform,
+    untouched,
+};
+use super::super::stencil::depth_stencil_state;
 use super::super::surfaces::Sided;
-use super::data::{PATCH_CORNER_LAYOUT, PLACE_LAYOUT, THROWN_CORNER_LAYOUT};
+use super::super::uniforms::GEOMETRY_GROUPS;
+use super::data::{PATCH_CORNER_LAYOUT, PLACE_LAYOUT, REFLECTED_CORNER_LAYOUT};
 
-const SUM: wgpu::BlendComponent = wgpu::BlendComponent {
-    src_factor: wgpu::BlendFactor::One,
-    dst_factor: wgpu::BlendFactor::One,
-    operation: wgpu::BlendOperation::Add,
+/// Group 2: the frame, the sources, what they give to the vertices, their maps and the environment.
+pub(super) const SHAFT_GROUP: GroupLayout = GroupLayout {
+    label: "shafts",
+    entries: &[
+        uniform(0, wgpu::ShaderStages::FRAGMENT, false),
+        storage(1, wgpu::ShaderStages::FRAGMENT),
+        storage(2, wgpu::ShaderStages::FRAGMENT),
+        storage(3, wgpu::ShaderStages::FRAGMENT),
+        storage(4, wgpu::ShaderStages::FRAGMENT),
+        filtered(5),
+        sampler(6),
+        filtered(7),
+        sampler(8),
+    ],
 };
 
-/// The pipelines, and the layout of their group 2.
+/// All groups of the pass.
+const SHAFT_GROUPS: [GroupLayout; 3] = [GEOMETRY_GROUPS[0], GEOMETRY_GROUPS[1], SHAFT_GROUP];
+
+/// The depth bias of patches, and of the parts that they are cut into, over the depth of the whole patch. A part lies in its
+/// patch but for rounding: of its corners' depths, by some units in the last place, and of their places on screen to a 256th
+/// of a pixel, which moves either plane by up to a 512th of its slope along both axes, both planes by less than a hundredth.
+/// At one metre 16 units are 2 µm, less than the 15 µm by which a virtual thing that touches a patch is nearer
+/// ([`AnchorView::winning_ties`]), so it stays in front. No volume is ever drawn with it.
+///
+/// [`AnchorView::winning_ties`]: super::super::uniforms::AnchorView::winning_ties
+const ON_THE_PATCH: wgpu::DepthBiasState = wgpu::DepthBiasState {
+    constant: 16,
+    slope_scale: 0.01,
+    clamp: 0.0,
+};
+
+/// The pipelines.
 pub(super) struct Pipelines {
-    pub layout: wgpu::BindGroupLayout,
     /// The room, depth alone.
     pub depth_of_room: wgpu::RenderPipeline,
     /// What is real on moving anchors, depth alone.
@@ -23,175 +53,86 @@ pub(super) struct Pipelines {
     pub light_on_virtual: Sided,
     /// Patches that sources light, where they are seen.
     pub light_on_patch: wgpu::RenderPipeline,
-    /// Adds what virtual things throw back on patches.
-    pub thrown_back: wgpu::RenderPipeline,
+    /// Adds what virtual things reflect on to patches.
+    pub reflected_on_patch: wgpu::RenderPipeline,
 }
 
 impl Pipelines {
-    pub fn new(
-        gpu: &Gpu,
-        [view, light]: &[wgpu::BindGroupLayout; 2],
-        samples: u32,
-        glossy: bool,
-    ) -> Self {
-        let device = &gpu.device;
-        let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::FRAGMENT,
-            ty,
-            count: None,
-        };
-        let buffer = |ty| wgpu::BindingType::Buffer {
-            ty,
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        };
-        let storage = || buffer(wgpu::BufferBindingType::Storage { read_only: true });
-        let texture = || wgpu::BindingType::Texture {
-            sample_type: wgpu::TextureSampleType::Float { filterable: true },
-            view_dimension: wgpu::TextureViewDimension::D2,
-            multisampled: false,
-        };
-        let sampler = || wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("shafts"),
-            entries: &[
-                entry(0, buffer(wgpu::BufferBindingType::Uniform)),
-                entry(1, storage()),
-                entry(2, storage()),
-                entry(3, storage()),
-                entry(4, storage()),
-                entry(5, texture()),
-                entry(6, sampler()),
-                entry(7, texture()),
-                entry(8, sampler()),
-            ],
-        });
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("shafts"),
-            bind_group_layouts: &[Some(view), Some(light), Some(&layout)],
-            immediate_size: 0,
-        });
-        let module = shader::module(
-            device,
-            "shafts",
-            include_str!("../../../shaders/shafts.wgsl"),
-        );
-        let build = |vertex: &str,
-                     buffers: &[Option<wgpu::VertexBufferLayout<'static>>],
-                     fragment: Option<&str>,
-                     writes_depth: bool,
-                     adds: bool,
-                     bias: wgpu::DepthBiasState| {
-            let targets = [gpu.light_format; 2].map(|format| {
-                Some(wgpu::ColorTargetState {
-                    format,
-                    blend: adds.then_some(wgpu::BlendState {
-                        color: SUM,
-                        alpha: SUM,
-                    }),
-                    write_mask: match fragment {
-                        Some(_) => wgpu::ColorWrites::ALL,
-                        None => wgpu::ColorWrites::empty(),
-                    },
-                })
-            });
-            let [reaching, change] = targets;
-            // What is added leaves `reaching` as it is.
-            let left_alone = |target| wgpu::ColorTargetState {
-                blend: None,
-                write_mask: wgpu::ColorWrites::empty(),
-                ..target
-            };
-            let reaching = match adds {
-                true => reaching.map(left_alone),
-                false => reaching,
-            };
-            let targets = [reaching, change];
-            let constants = [
+    pub fn new(gpu: &Gpu, samples: u32, glossy: bool) -> Self {
+        let format = gpu.light_format;
+        let into_depth = PipelineDescription {
+            shader: "shafts.wgsl",
+            constants: vec![
                 ("GLOSSY", f64::from(glossy)),
                 ("MULTISAMPLED", f64::from(samples > 1)),
-            ];
-            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some(fragment.unwrap_or(vertex)),
-                layout: Some(&pipeline_layout),
-                vertex: wgpu::VertexState {
-                    module: &module,
-                    entry_point: Some(vertex),
-                    compilation_options: Default::default(),
-                    buffers,
-                },
-                primitive: wgpu::PrimitiveState::default(),
-                depth_stencil: Some(wgpu::DepthStencilState {
-                    format: gpu.depth_format,
-                    depth_write_enabled: Some(writes_depth),
-                    depth_compare: Some(match writes_depth {
-                        true => wgpu::CompareFunction::Greater,
-                        false => wgpu::CompareFunction::GreaterEqual,
-                    }),
-                    stencil: wgpu::StencilState::default(),
-                    bias,
-                }),
-                multisample: wgpu::MultisampleState {
-                    count: samples,
-                    ..Default::default()
-                },
-                fragment: Some(wgpu::FragmentState {
-                    module: &module,
-                    entry_point: Some(fragment.unwrap_or("nothing")),
-                    compilation_options: wgpu::PipelineCompilationOptions {
-                        constants: &constants,
-                        ..Default::default()
-                    },
-                    targets: &targets,
-                }),
-                multiview_mask: None,
-                cache: None,
-            })
-        };
-        // What is thrown back is cut finer than where depth comes from, and lands on it but for rounding.
-        let flush = wgpu::DepthBiasState::default();
-        let nearer = wgpu::DepthBiasState {
-            constant: 16,
-            slope_scale: 0.01,
-            clamp: 0.0,
-        };
-        let corners = [Some(CORNER_LAYOUT), Some(INDIRECT_LAYOUT)];
-        Self {
-            depth_of_room: build(
-                "place_depth",
-                &[Some(PLACE_LAYOUT)],
-                None,
+            ],
+            groups: SHAFT_GROUPS.map(Some).to_vec(),
+            depth_stencil: Some(depth_stencil_state(
+                gpu.depth_format,
                 true,
-                false,
-                flush,
-            ),
-            depth_of_real: Sided::both(build("place", &corners, None, true, false, flush)),
-            light_on_virtual: Sided::both(build(
-                "place_sampled",
-                &corners,
-                Some("light_on_virtual"),
-                true,
-                false,
-                flush,
+                wgpu::CompareFunction::Greater,
+                wgpu::StencilState::default(),
             )),
-            light_on_patch: build(
-                "place_patch",
-                &[Some(PATCH_CORNER_LAYOUT)],
-                Some("light_on_patch"),
-                false,
-                false,
-                nearer,
+            samples,
+            ..Default::default()
+        };
+        let depth_alone = PipelineDescription {
+            fragment: "nothing",
+            targets: vec![untouched(format), untouched(format)],
+            ..into_depth.clone()
+        };
+        let corners = vec![CORNER_LAYOUT, INDIRECT_LAYOUT];
+        let depth_of_patch = depth_stencil_state(
+            gpu.depth_format,
+            false,
+            wgpu::CompareFunction::GreaterEqual,
+            wgpu::StencilState::default(),
+        );
+        let on_patch = PipelineDescription {
+            depth_stencil: Some(wgpu::DepthStencilState {
+                bias: ON_THE_PATCH,
+                ..depth_of_patch
+            }),
+            ..into_depth.clone()
+        };
+        Self {
+            depth_of_room: gpu.pipeline(&PipelineDescription {
+                vertex: "place_depth",
+                vertex_buffers: vec![PLACE_LAYOUT],
+                ..depth_alone.clone()
+            }),
+            depth_of_real: Sided::both(
+                gpu,
+                &PipelineDescription {
+                    vertex: "place",
+                    vertex_buffers: corners.clone(),
+                    ..depth_alone
+                },
             ),
-            thrown_back: build(
-                "place_thrown",
-                &[Some(THROWN_CORNER_LAYOUT)],
-                Some("thrown_back"),
-                false,
-                true,
-                nearer,
+            light_on_virtual: Sided::both(
+                gpu,
+                &PipelineDescription {
+                    vertex: "place_sampled",
+                    fragment: "light_on_virtual",
+                    vertex_buffers: corners,
+                    targets: vec![overwritten(format), overwritten(format)],
+                    ..into_depth
+                },
             ),
-            layout,
+            light_on_patch: gpu.pipeline(&PipelineDescription {
+                vertex: "place_patch",
+                fragment: "light_on_patch",
+                vertex_buffers: vec![PATCH_CORNER_LAYOUT],
+                targets: vec![overwritten(format), overwritten(format)],
+                ..on_patch.clone()
+            }),
+            reflected_on_patch: gpu.pipeline(&PipelineDescription {
+                vertex: "place_reflected",
+                fragment: "reflected_on_patch",
+                vertex_buffers: vec![REFLECTED_CORNER_LAYOUT],
+                targets: vec![untouched(format), added(format, wgpu::BlendFactor::One)],
+                ..on_patch
+            }),
         }
     }
 }

@@ -138,7 +138,10 @@ fn a_small_scene_has_the_defaults() {
             shafts: Default::default(),
         }
     );
-    assert_eq!(scene.chosen_technique().0, Technique::Volumes);
+    assert_eq!(
+        scene.chosen_technique().0,
+        gnomon::scene::ShadowTechnique::Volumes
+    );
     assert_eq!(scene.ambient_radiance, DVec3::ZERO);
     assert_eq!((scene.phantoms.len(), scene.lights.len()), (0, 0));
     assert_eq!(scene.anchors[0].markers[0].family, Family::TAG36H11);

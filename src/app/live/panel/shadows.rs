@@ -7,7 +7,7 @@ use crate::app::authoring::Edit;
 use crate::app::live::wish::Wish;
 use crate::geometry::outline_scale::LARGEST_MOVE_PX;
 use crate::scene::{
-    Counting, Difference, Quality, Scene, ShadowSettings, ShaftSettings, Technique,
+    Counting, Difference, Quality, Scene, ShadowSettings, ShadowTechnique, ShaftSettings, Technique,
 };
 
 /// Samples per pixel that there are.
@@ -38,10 +38,7 @@ pub fn show(ui: &mut Ui, scene: &Scene, editing: &mut Editing, wishes: &mut Vec<
     });
     choice(ui, "technique", &mut shadows.technique, &Technique::BY_NAME);
     let (technique, why) = scene.chosen_technique();
-    let mut names = Technique::BY_NAME.iter();
-    if let Some((name, _)) = names.find(|(_, named)| *named == technique) {
-        ui.weak(format!("{name}: {why}"));
-    }
+    ui.weak(format!("{}: {why}", technique.name()));
     ui.horizontal(|ui| {
         for samples in SAMPLES {
             ui.selectable_value(&mut shadows.samples, samples, samples.to_string());
@@ -61,7 +58,7 @@ pub fn show(ui: &mut Ui, scene: &Scene, editing: &mut Editing, wishes: &mut Vec<
         }
         shadows.frame_budget_ms = limited.then_some(budget_ms.clamp(0.1, 1e6));
     });
-    if technique == Technique::Shafts {
+    if technique == ShadowTechnique::Shafts {
         shaft_knobs(ui, &mut shadows.shafts);
     }
     if shadows != scene.shadows {

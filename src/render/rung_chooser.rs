@@ -13,7 +13,7 @@ const FIRST_HOLD: u32 = 64;
 
 /// The rung that fits.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Governor {
+pub(super) struct RungChooser {
     budget_ms: f64,
     /// What each rung costs in any unit, rising.
     costs: Vec<f64>,
@@ -27,7 +27,7 @@ pub(super) struct Governor {
     hold: u32,
 }
 
-impl Governor {
+impl RungChooser {
     /// Starts on the dearest rung.
     pub fn new(budget_ms: f64, costs: Vec<f64>) -> Self {
         Self {
@@ -96,15 +96,15 @@ mod tests {
     use super::*;
 
     /// Frames that take a part that is always the same, and one for each unit of cost; with noise of ±6 %.
-    fn run(governor: &mut Governor, fixed_ms: f64, frames: u32) -> Vec<(usize, f64)> {
+    fn run(chooser: &mut RungChooser, fixed_ms: f64, frames: u32) -> Vec<(usize, f64)> {
         let mut noise = 12_345_u32;
         (0..frames)
             .map(|_| {
                 noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
                 let factor = 0.94 + 0.12 * f64::from(noise >> 8) / f64::from(1 << 24);
-                let rung = governor.rung();
-                let frame_ms = (fixed_ms + governor.costs[rung]) * factor;
-                governor.spent(frame_ms);
+                let rung = chooser.rung();
+                let frame_ms = (fixed_ms + chooser.costs[rung]) * factor;
+                chooser.spent(frame_ms);
                 (rung, frame_ms)
             })
             .collect()
@@ -116,8 +116,8 @@ mod tests {
     fn budgets_are_held_and_a_still_scene_stays_still() {
         for part in [2.0, 1.2, 0.5, 0.3] {
             let budget_ms = part * 52.0;
-            let mut governor = Governor::new(budget_ms, COSTS.to_vec());
-            let frames = run(&mut governor, 2.0, 400);
+            let mut chooser = RungChooser::new(budget_ms, COSTS.to_vec());
+            let frames = run(&mut chooser, 2.0, 400);
             let mut times: Vec<f64> = frames.iter().map(|(_, frame_ms)| *frame_ms).collect();
             times.sort_by(f64::total_cmp);
             assert!(times[380] <= 1.1 * budget_ms, "{part}: {}", times[380]);
@@ -140,17 +140,17 @@ mod tests {
 
     #[test]
     fn what_cannot_be_held_ends_on_the_cheapest_rung() {
-        let mut governor = Governor::new(1.0, COSTS.to_vec());
-        run(&mut governor, 2.0, 50);
-        assert_eq!(governor.rung(), 0);
+        let mut chooser = RungChooser::new(1.0, COSTS.to_vec());
+        run(&mut chooser, 2.0, 50);
+        assert_eq!(chooser.rung(), 0);
     }
 
     #[test]
     fn when_frames_become_cheap_again_it_rises() {
-        let mut governor = Governor::new(30.0, COSTS.to_vec());
-        run(&mut governor, 25.0, 60);
-        let low = governor.rung();
-        run(&mut governor, 0.0, 400);
-        assert!(governor.rung() > low);
+        let mut chooser = RungChooser::new(30.0, COSTS.to_vec());
+        run(&mut chooser, 25.0, 60);
+        let low = chooser.rung();
+        run(&mut chooser, 0.0, 400);
+        assert!(chooser.rung() > low);
     }
 }

@@ -6,16 +6,16 @@ use glam::{DAffine3, Vec3};
 use rayon::prelude::*;
 
 use crate::geometry::levels::levels;
+use crate::geometry::mesh::Mesh;
 use crate::geometry::ray_caster::RayCaster;
-use crate::scene::{Object, Scene};
-use crate::shafts::prepared::Prepared;
-use crate::shafts::selection::Representative;
-use crate::shafts::source_tree::BoxM;
-use crate::shafts::surfels::{GroupedSurfels, LitSurfel, Surfel, open_directions, surfels};
+use crate::light::Material;
 
-use super::maps::Ball;
+use super::bounding::{Aabb, Ball};
+use super::room_transport::RoomTransport;
+use super::selection::Representative;
+use super::surfels::{GroupedSurfels, LitSurfel, Surfel, open_directions, surfels};
 
-/// How far outlines may move for fewer triangles, in parts of a thing's size.
+/// The limit to how far outlines may move for fewer triangles, in parts of a thing's size.
 const COARSE_PART: f64 = 0.004;
 /// Surfels of all things together.
 const SURFELS: usize = 512;
@@ -29,8 +29,25 @@ const SMALLEST_PART_M: f32 = 0.004;
 const PART_OF_DISTANCE: f32 = 0.3;
 const MOST_PARTS: u32 = 10;
 
-/// A virtual thing, which hides light if it casts.
-struct Caster {
+/// A virtual thing as a scene has it.
+#[derive(Debug, Clone, Copy)]
+pub struct Occluder<'a> {
+    /// Its triangles, in its own space.
+    pub mesh: &'a Mesh,
+    /// What `mesh.triangle_materials` names.
+    pub materials: &'a [Material],
+    /// Number of its anchor.
+    pub anchor: usize,
+    /// Where it stands there.
+    pub anchor_from_object: DAffine3,
+    /// Whether it takes light away from others.
+    pub casts: bool,
+    /// Whether it is there at all.
+    pub visible: bool,
+}
+
+/// A virtual thing, simplified, which hides light if it casts.
+struct SimplifiedCaster {
     casts: bool,
     /// Simplified, in its own space, with albedos.
     coarse: Vec<([Vec3; 3], Vec3)>,
@@ -41,38 +58,42 @@ struct Caster {
 }
 
 /// All virtual things.
-pub(super) struct ShaftCasters {
-    casters: Vec<Caster>,
+pub struct ShaftCasters {
+    casters: Vec<SimplifiedCaster>,
 }
 
 /// The casters where they are in a frame, world space.
-pub(super) struct PlacedCasters {
+pub struct PlacedCasters {
+    /// Of all casters.
     pub triangles: Vec<[Vec3; 3]>,
     /// Around each caster.
-    pub boxes: Vec<BoxM>,
+    pub boxes: Vec<Aabb>,
     /// Around each thing that is seen, casters or not.
-    pub seen: Vec<BoxM>,
+    pub seen: Vec<Aabb>,
+    /// Around all casters.
     pub ball: Ball,
+    /// Rays against all casters.
     pub caster: RayCaster,
     surfels: Vec<Surfel>,
 }
 
 impl ShaftCasters {
-    pub fn new(scene: &Scene) -> Self {
+    /// Of a scene's virtual things.
+    pub fn new(things: &[Occluder<'_>]) -> Self {
         let mut casters = Self {
-            casters: scene.virtuals.iter().map(Caster::new).collect(),
+            casters: things.iter().map(SimplifiedCaster::new).collect(),
         };
-        casters.follow(scene);
+        casters.follow(things);
         casters
     }
 
     /// Takes the places of the same things anew.
-    pub fn follow(&mut self, scene: &Scene) {
-        let casts = |object: &&Object| object.visible && object.casts;
-        let shown = scene.virtuals.iter().filter(casts).count();
+    pub fn follow(&mut self, things: &[Occluder<'_>]) {
+        let casts = |thing: &&Occluder<'_>| thing.visible && thing.casts;
+        let shown = things.iter().filter(casts).count();
         let surfel_count = (SURFELS / shown.max(1)).max(LEAST_SURFELS);
-        for (caster, object) in self.casters.iter_mut().zip(&scene.virtuals) {
-            caster.place(object, surfel_count);
+        for (caster, thing) in self.casters.iter_mut().zip(things) {
+            caster.place(thing, surfel_count);
         }
     }
 
@@ -97,7 +118,7 @@ impl ShaftCasters {
             let point = |point: Vec3| pose.transform_point3(point.as_dvec3()).as_vec3();
             let triangles = caster.triangles.iter().map(|corners| corners.map(point));
             let triangles: Vec<[Vec3; 3]> = triangles.collect();
-            let bounds = BoxM::around(triangles.iter().flatten().copied());
+            let bounds = Aabb::around(triangles.iter().flatten().copied());
             placed.seen.push(bounds);
             if !caster.casts {
                 continue;
@@ -113,7 +134,7 @@ impl ShaftCasters {
                 }));
         }
         placed.caster = RayCaster::new(&placed.triangles);
-        let all = BoxM::around(
+        let all = Aabb::around(
             placed
                 .seen
                 .iter()
@@ -128,14 +149,14 @@ impl ShaftCasters {
     }
 }
 
-impl Caster {
-    fn new(object: &Object) -> Self {
-        let size = BoxM::around(object.mesh.positions.iter().copied()).diagonal();
-        let coarser = levels(&object.mesh);
+impl SimplifiedCaster {
+    fn new(thing: &Occluder<'_>) -> Self {
+        let size = Aabb::around(thing.mesh.positions.iter().copied()).diagonal();
+        let coarser = levels(thing.mesh);
         let coarse_enough = coarser
             .into_iter()
             .rfind(|level| level.max_error_m <= COARSE_PART * f64::from(size));
-        let mesh = coarse_enough.map_or_else(|| object.mesh.clone(), |level| level.mesh);
+        let mesh = coarse_enough.map_or_else(|| thing.mesh.clone(), |level| level.mesh);
         let corners = mesh
             .triangles
             .iter()
@@ -143,26 +164,24 @@ impl Caster {
         let albedos = mesh
             .triangle_materials
             .iter()
-            .map(|&material| object.materials[material as usize].albedo.as_vec3());
+            .map(|&material| thing.materials[material as usize].albedo.as_vec3());
         Self {
-            casts: object.casts,
+            casts: thing.casts,
             coarse: corners.zip(albedos).collect(),
-            anchor: object.anchor,
+            anchor: thing.anchor,
             triangles: Vec::new(),
             surfels: Vec::new(),
         }
     }
 
-    fn place(&mut self, object: &Object, surfel_count: usize) {
-        if !object.visible {
+    fn place(&mut self, thing: &Occluder<'_>, surfel_count: usize) {
+        if !thing.visible {
             self.triangles.clear();
             self.surfels.clear();
             return;
         }
         let place = |corner: Vec3| {
-            let placed = object
-                .anchor_from_object
-                .transform_point3(corner.as_dvec3());
+            let placed = thing.anchor_from_object.transform_point3(corner.as_dvec3());
             placed.as_vec3()
         };
         let placed = |(corners, albedo): &([Vec3; 3], Vec3)| (corners.map(place), *albedo);
@@ -176,11 +195,11 @@ impl Caster {
 }
 
 impl PlacedCasters {
-    /// The light that the casters throw back (one bounce): for each surfel what arrives past all casters, from the room as
+    /// The light that the casters reflect (one bounce): for each surfel what arrives past all casters, from the room as
     /// their shadows leave it.
     pub fn lit_surfels(
         &self,
-        room: &Prepared,
+        room: &RoomTransport,
         sources: &[(Representative, Vec3)],
         left: &[Option<f32>],
     ) -> GroupedSurfels {
@@ -197,9 +216,9 @@ impl PlacedCasters {
         GroupedSurfels::new(self.surfels.par_iter().map(lit).collect())
     }
 
-    /// Into how many parts a patch's edges are to be cut, so that what the casters throw on it is smooth within each part.
+    /// Into how many parts a patch's edges are to be cut, so that what the casters reflect on to it is smooth within each part.
     pub fn parts(&self, corners: [Vec3; 3]) -> u32 {
-        let patch = BoxM::around(corners);
+        let patch = Aabb::around(corners);
         let distances = self.boxes.iter().map(|bounds| bounds.distance(&patch));
         let nearest = distances.fold(f32::INFINITY, f32::min);
         let part = (PART_OF_DISTANCE * nearest).max(SMALLEST_PART_M);

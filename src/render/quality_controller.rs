@@ -1,8 +1,8 @@
-//! What a frame budget may change: how many sources get a shadow, or how coarse things may be.
+//! The quality controller: it keeps to a frame budget by fewer shadows, or by coarser things.
 
-use crate::scene::{Scene, Technique};
+use crate::scene::{Scene, ShadowTechnique};
 
-use super::governor::Governor;
+use super::rung_chooser::RungChooser;
 
 /// Sources of the cheapest rung.
 const FEWEST_SOURCES: u32 = 4;
@@ -24,35 +24,33 @@ pub enum Setting {
 
 /// The settings of a scene with a frame budget, and which of them is used.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Governed {
+pub struct QualityController {
     budget_ms: f64,
     settings: Vec<Setting>,
-    governor: Governor,
+    chooser: RungChooser,
     lowest: usize,
 }
 
-impl Governed {
+impl QualityController {
     /// Of a scene; `None` where it has no frame budget.
-    pub(super) fn new(scene: &Scene) -> Option<Self> {
+    pub(super) fn new(scene: &Scene, technique: ShadowTechnique) -> Option<Self> {
         let budget_ms = scene.shadows.frame_budget_ms?;
-        let (settings, costs): (Vec<Setting>, Vec<f64>) = match scene.chosen_technique().0 {
-            Technique::Shafts => sources(scene.shadows.shafts.sources).unzip(),
-            Technique::Volumes | Technique::Auto => {
-                outlines(scene.shadows.max_silhouette_error_px).unzip()
-            }
+        let (settings, costs): (Vec<Setting>, Vec<f64>) = match technique {
+            ShadowTechnique::Shafts => sources(scene.shadows.shafts.sources).unzip(),
+            ShadowTechnique::Volumes => outlines(scene.shadows.max_silhouette_error_px).unzip(),
         };
         Some(Self {
             budget_ms,
             lowest: settings.len() - 1,
-            governor: Governor::new(budget_ms, costs),
+            chooser: RungChooser::new(budget_ms, costs),
             settings,
         })
     }
 
     /// Takes note of what a frame took. Returns whether the setting is another one from now on.
     pub(super) fn spent(&mut self, frame_ms: f64) -> bool {
-        let changes = self.governor.spent(frame_ms);
-        self.lowest = self.lowest.min(self.governor.rung());
+        let changes = self.chooser.spent(frame_ms);
+        self.lowest = self.lowest.min(self.chooser.rung());
         changes
     }
 
@@ -63,7 +61,7 @@ impl Governed {
 
     /// The present setting.
     pub fn setting(&self) -> Setting {
-        self.settings[self.governor.rung()]
+        self.settings[self.chooser.rung()]
     }
 
     /// The cheapest setting that was used.
@@ -73,7 +71,7 @@ impl Governed {
 
     /// Whether there is nothing cheaper than the present setting.
     pub fn is_at_the_end(&self) -> bool {
-        self.governor.rung() == 0
+        self.chooser.rung() == 0
     }
 }
 

@@ -1,63 +1,103 @@
-//! The patches that may notice the casters; and what the casters throw on them, for which they are cut more finely.
+//! The patches that receive a shadow of the casters; and what the casters reflect on to them, for which they are cut more
+//! finely.
 
 use std::f32::consts::FRAC_1_PI;
 
+use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::scene::Difference;
-use crate::shafts::intensity_transfers::encoded;
-use crate::shafts::prepared::Prepared;
-use crate::shafts::source_tree::BoxM;
-use crate::shafts::surfels::{GroupedSurfels, LitSurfel, thrown_back};
-
-use super::LEAST_WEIGHT;
+use super::bounding::Aabb;
 use super::casters::PlacedCasters;
-use super::data::{PatchCorner, Source, ThrownCorner};
+use super::difference::Difference;
+use super::intensity_transfers::encoded;
+use super::room_transport::RoomTransport;
+use super::selection::LEAST_WEIGHT;
+use super::shadow_atlas::MappedSource;
+use super::surfels::{GroupedSurfels, LitSurfel, reflected_irradiance};
 
-/// What patches are told of the casters.
-pub(super) struct Notice<'a> {
-    pub room: &'a Prepared,
+/// A corner of a patch that shadows may reach: the twin of `PatchCorner` in shafts.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct PatchCorner {
+    /// In the world, metres.
+    pub position: Vec3,
+    /// Rows of the patch's three vertices.
+    pub rows: [u32; 3],
+    /// Weights of the first two there: 0 and 1.
+    pub weights: [f32; 2],
+    /// First of the patch's sources in the lists, and their number.
+    pub list: [u32; 2],
+}
+
+/// A corner of a part of a patch that casters reflect light on to: the twin of `ReflectedCorner` in shafts.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct ReflectedCorner {
+    /// In the world, metres.
+    pub position: Vec3,
+    /// What virtual things reflect on to it, less what it loses from patches among them.
+    pub irradiance: Vec3,
+}
+
+/// All that decides which patches receive a shadow.
+pub struct ReceiverInputs<'a> {
+    /// The room.
+    pub room: &'a RoomTransport,
+    /// The casters.
     pub casters: &'a PlacedCasters,
-    /// Of all patches that may notice, sorted: the rows of what follows.
+    /// Of all patches that may receive a shadow, sorted: the rows of what follows.
     pub vertices: &'a [u32],
-    pub sources: &'a [Source],
+    /// The sources that have a map.
+    pub sources: &'a [MappedSource],
     /// Light from each source at each vertex, packed; rows of as many as there are sources.
     pub transfers: &'a [[u32; 2]],
+    /// The casters' surfels.
     pub surfels: &'a GroupedSurfels,
     /// Irradiance that each vertex loses from patches among the casters.
     pub lost_nearby: &'a [Vec3],
+    /// In which terms light is taken out of the video.
     pub difference: Difference,
 }
 
-/// Patches that do notice.
+/// The patches that receive a shadow, or light that the casters reflect.
 #[derive(Default)]
-pub(super) struct Noticing {
+pub struct ReceiverPatches {
     /// Three for each patch that a source's shadow may reach.
     pub corners: Vec<PatchCorner>,
-    /// Three for each part of a patch that something is thrown on.
-    pub thrown: Vec<ThrownCorner>,
+    /// Three for each part of a patch that casters reflect light on to.
+    pub reflected: Vec<ReflectedCorner>,
     /// Numbers of sources, which the corners refer to.
     pub lists: Vec<u32>,
 }
 
-impl Notice<'_> {
+impl ReceiverPatches {
+    /// The box around all of them; `None` without any.
+    pub fn bounds(&self) -> Option<Aabb> {
+        let shadowed = self.corners.iter().map(|corner| corner.position);
+        let lit = self.reflected.iter().map(|corner| corner.position);
+        let is_empty = self.corners.is_empty() && self.reflected.is_empty();
+        (!is_empty).then(|| Aabb::around(shadowed.chain(lit)))
+    }
+}
+
+impl ReceiverInputs<'_> {
     /// The corners of some patches, those left out that neither a shadow reaches nor light that shows.
-    pub fn noticing(&self, patches: &[usize]) -> Noticing {
+    pub fn receivers(&self, patches: &[usize]) -> ReceiverPatches {
         /// Patches that are looked at in one go.
         const CHUNK: usize = 64;
         let shares = patches.par_chunks(CHUNK).map(|patches| {
-            let mut share = Noticing::default();
+            let mut share = ReceiverPatches::default();
             for &patch in patches {
                 self.add(patch, &mut share);
             }
             share
         });
-        let mut all = Noticing::default();
+        let mut all = ReceiverPatches::default();
         for share in shares.collect::<Vec<_>>() {
             let first = all.lists.len() as u32;
             all.lists.extend(share.lists);
-            all.thrown.extend(share.thrown);
+            all.reflected.extend(share.reflected);
             all.corners
                 .extend(share.corners.into_iter().map(|corner| PatchCorner {
                     list: [first + corner.list[0], corner.list[1]],
@@ -67,14 +107,12 @@ impl Notice<'_> {
         all
     }
 
-    fn add(&self, patch: usize, to: &mut Noticing) {
+    fn add(&self, index: usize, to: &mut ReceiverPatches) {
         let room = self.room;
-        let albedo = room.light[patch].albedo;
-        let patch = &room.patches.patches[patch];
+        let patch = &room.patches.patches[index];
         let row = |vertex: u32| self.vertices.binary_search(&vertex).unwrap_or(0) as u32;
         let rows = patch.vertices.map(row);
         let places = room.patches.corners(patch);
-        let normal = room.patches.normal(patch);
         let first = to.lists.len();
         let count = self.sources.len();
         to.lists.extend((0..count).filter_map(|index| {
@@ -92,22 +130,32 @@ impl Notice<'_> {
                 list,
             }));
         }
+        self.add_reflected(index, rows, to);
+    }
+
+    /// The parts of a patch that casters reflect light on to, if any of it shows.
+    fn add_reflected(&self, patch: usize, rows: [u32; 3], to: &mut ReceiverPatches) {
+        let room = self.room;
+        let albedo = room.light[patch].albedo;
+        let patch = &room.patches.patches[patch];
+        let places = room.patches.corners(patch);
+        let normal = room.patches.normal(patch);
         let lost = rows.map(|row| self.lost_nearby[row as usize]);
-        let seen = self.surfels.seen_from(BoxM::around(places));
+        let seen = self.surfels.seen_from(Aabb::around(places));
         let surfels: Vec<LitSurfel> = seen.copied().collect();
         let grid = Grid {
             count: self.casters.parts(places),
         };
         let weights: Vec<[f32; 2]> = grid.weights().collect();
-        let corners: Vec<ThrownCorner> = weights
+        let corners: Vec<ReflectedCorner> = weights
             .iter()
             .map(|&[a, b]| {
                 let c = 1.0 - a - b;
                 let mean = |[at_a, at_b, at_c]: [Vec3; 3]| at_a * a + at_b * b + at_c * c;
                 let position = mean(places);
-                ThrownCorner {
+                ReflectedCorner {
                     position,
-                    irradiance: thrown_back(position, normal, &surfels) - mean(lost),
+                    irradiance: reflected_irradiance(position, normal, &surfels) - mean(lost),
                 }
             })
             .collect();
@@ -115,7 +163,7 @@ impl Notice<'_> {
             .vertices
             .map(|vertex| room.irradiance[vertex as usize] * LEAST_WEIGHT);
         let least = least.into_iter().fold(Vec3::MAX, Vec3::min);
-        let gains = |corner: &ThrownCorner| corner.irradiance.abs().cmpgt(least).any();
+        let gains = |corner: &ReflectedCorner| corner.irradiance.abs().cmpgt(least).any();
         // What the camera sees of an irradiance.
         let shown = |irradiance: Vec3| irradiance * albedo * FRAC_1_PI;
         let light = |index: usize| {
@@ -126,16 +174,16 @@ impl Notice<'_> {
             of[0] * a + of[1] * b + of[2] * (1.0 - a - b)
         };
         let in_terms = |index: usize| match (self.difference, corners[index].irradiance) {
-            (Difference::Ratio, thrown) => thrown,
-            (Difference::Subtract, thrown) => shown(thrown),
-            // The paper has shadows alone; without what the casters throw back they are far too dark.
-            (Difference::Encoded, thrown) => {
-                encoded(shown(light(index) + thrown)) - encoded(shown(light(index)))
+            (Difference::Ratio, reflected) => reflected,
+            (Difference::Subtract, reflected) => shown(reflected),
+            // The paper has shadows alone; without what the casters reflect they are far too dark.
+            (Difference::Encoded, reflected) => {
+                encoded(shown(light(index) + reflected)) - encoded(shown(light(index)))
             }
         };
         if corners.iter().any(gains) {
             let triangles = grid.triangles().flatten();
-            to.thrown.extend(triangles.map(|index| ThrownCorner {
+            to.reflected.extend(triangles.map(|index| ReflectedCorner {
                 irradiance: in_terms(index),
                 ..corners[index]
             }));

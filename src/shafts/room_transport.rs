@@ -9,22 +9,23 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::bounds::Bounds;
 use crate::geometry::ray_caster::RayCaster;
 
-use super::hierarchy::{Arriving, Hierarchy, Marks};
+use super::bounding::Aabb;
+use super::hierarchy::{Arriving, Marks, ShaftHierarchy};
 use super::irradiance_volume::IrradianceVolume;
 pub use super::light_of_room::{PatchLight, PlacedProbe};
 use super::light_of_room::{hemisphere, light_of_room};
 use super::luminance;
-use super::patches::{Patches, RoomTriangle};
+use super::patches::{RoomPatches, RoomTriangle};
 use super::points::points_on;
 use super::receiver_tree::ReceiverTree;
 use super::selection::{Representative, WeighedSource, triangle_spread};
-use super::source_tree::{BoxM, Source, SourceTree};
+use super::source_tree::{PatchSource, SourceTree};
 use super::surfels::{LitSurfel, Surfel};
 use super::transfer::{Transfers, irradiance};
 
-/// How finely a room is worked out.
+/// The fineness in which a room is worked out.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
+pub struct RoomOptions {
     /// Patches, about.
     pub patches: usize,
     /// Part of all power that the sources send out, the brightest first, in (0, 1].
@@ -35,11 +36,11 @@ pub struct Options {
     pub least_part: f64,
 }
 
-/// What is known of a room.
+/// The transport of light in a room: who lights whom, and who may hide what.
 #[derive(Serialize, Deserialize)]
-pub struct Prepared {
+pub struct RoomTransport {
     /// The room, the table and the phantoms.
-    pub patches: Patches,
+    pub patches: RoomPatches,
     /// Light of each patch.
     pub light: Vec<PatchLight>,
     /// The sources.
@@ -55,7 +56,7 @@ pub struct Prepared {
     /// The receivers.
     pub receivers: ReceiverTree,
     /// Who may hide what from whom.
-    pub hierarchy: Hierarchy,
+    pub hierarchy: ShaftHierarchy,
     /// The light where virtual things may be.
     pub volume: IrradianceVolume,
     /// The patches' triangles.
@@ -69,21 +70,21 @@ fn no_triangles() -> RayCaster {
 
 /// Spacing of the irradiance volume's grid, metres.
 const VOLUME_SPACING_M: f32 = 0.06;
-/// How far it reaches beyond where things stand.
+/// The margin that it has around where things stand.
 const VOLUME_MARGIN_M: f64 = 0.15;
 
-impl Prepared {
+impl RoomTransport {
     /// Works a room out. `things` is around all phantoms but the table, and all virtual things where they first stand.
     pub fn new(
         triangles: &[RoomTriangle],
         probe: PlacedProbe<'_>,
         things: &[Bounds],
-        options: &Options,
+        options: &RoomOptions,
     ) -> Self {
         let brightness = |place: Vec3| luminance(probe.radiance_of(place));
         let mut focuses = things.to_vec();
         focuses.extend(Bounds::around([probe.position_m]));
-        let patches = Patches::new(triangles, options.patches, &focuses, brightness);
+        let patches = RoomPatches::new(triangles, options.patches, &focuses, brightness);
         let corners: Vec<[Vec3; 3]> = patches.patches.iter().map(|p| patches.corners(p)).collect();
         let caster = RayCaster::new(&corners);
         let light = light_of_room(&patches, &caster, probe);
@@ -94,7 +95,7 @@ impl Prepared {
         let sources = SourceTree::new(
             brightest
                 .into_iter()
-                .map(|patch| Source {
+                .map(|patch| PatchSource {
                     patch: patch as u32,
                     corners: corners[patch],
                     power: power(patch),
@@ -128,7 +129,8 @@ impl Prepared {
             irradiance.iter().map(|&light| luminance(light)).collect(),
         );
         let receivers = ReceiverTree::new(&patches, options.receivers_per_leaf);
-        let hierarchy = Hierarchy::new(&sources, &receivers, &arriving, options.least_part as f32);
+        let hierarchy =
+            ShaftHierarchy::new(&sources, &receivers, &arriving, options.least_part as f32);
         let radiance: Vec<Vec3> = light.iter().map(|light| light.radiance).collect();
         let volume = volume_around(things, &patches, &caster, &radiance);
         Self {
@@ -162,8 +164,8 @@ impl Prepared {
         self.volume = volume_around(things, &self.patches, &self.caster, &radiance);
     }
 
-    /// Marks what things in boxes may hide, and who may notice.
-    pub fn mark(&self, boxes: &[BoxM]) -> Marks {
+    /// Marks what things in boxes may hide, and which receivers may get their shadows.
+    pub fn mark(&self, boxes: &[Aabb]) -> Marks {
         let mut marks = Marks::new(&self.sources, &self.receivers);
         for bounds in boxes {
             self.hierarchy.mark(bounds, &mut marks);
@@ -326,7 +328,7 @@ impl Prepared {
     }
 }
 
-impl Prepared {
+impl RoomTransport {
     /// Irradiance of a surfel past what `caster` and the room hide: from representatives of sources, with their radiant
     /// intensities, and by `rays` from the patches of which `left` knows which part of their light the casters' shadows
     /// leave.
@@ -364,7 +366,7 @@ impl Prepared {
 const DIMMING_RAYS: usize = 48;
 /// Surfels that cover less of a place's hemisphere (over π) hide nothing that shows.
 const LEAST_COVERED: f32 = 1e-4;
-/// How far off a surfel rays start, metres: past the rounding of a simplified thing.
+/// The distance off a surfel at which rays start, metres: past the rounding of a simplified thing.
 const SURFEL_OFFSET_M: f32 = 1e-4;
 
 /// Patches by falling radiance until they have a part of all power, and the others (Gibson et al. 2003, section 4).
@@ -389,7 +391,7 @@ fn source_set(
 
 fn volume_around(
     things: &[Bounds],
-    patches: &Patches,
+    patches: &RoomPatches,
     caster: &RayCaster,
     radiance: &[Vec3],
 ) -> IrradianceVolume {
@@ -397,13 +399,13 @@ fn volume_around(
     IrradianceVolume::new(bounds, VOLUME_SPACING_M, patches, caster, radiance)
 }
 
-fn around(things: &[Bounds], margin_m: f64) -> BoxM {
+fn around(things: &[Bounds], margin_m: f64) -> Aabb {
     let corners = things.iter().flat_map(|bounds| {
         [bounds.low - margin_m, bounds.high + margin_m].map(|corner| corner.as_vec3())
     });
-    let bounds = BoxM::around(corners);
+    let bounds = Aabb::around(corners);
     match bounds.min.cmple(bounds.max).all() {
         true => bounds,
-        false => BoxM::around([Vec3::splat(-0.5), Vec3::splat(0.5)]),
+        false => Aabb::around([Vec3::splat(-0.5), Vec3::splat(0.5)]),
     }
 }

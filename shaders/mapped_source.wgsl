@@ -1,6 +1,6 @@
 // A source of light that casts shadows, and its map in the atlas.
 
-struct Source {
+struct MappedSource {
     // World to the tile: (u w, v w, unused, w) with w the depth along the map's axis, metres.
     map_from_world: mat4x4f,
     position: vec3f,

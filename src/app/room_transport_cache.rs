@@ -1,24 +1,28 @@
-//! Rooms that were worked out before, kept on disk by what they were made from: working one out takes seconds, reading it
-//! a fraction of one. What cannot be read or written is worked out again; nothing is lost by deleting the folder.
+//! Rooms' transport of light as it was worked out before, kept on disk by what it was made from: working it out takes
+//! seconds, reading it a fraction of one. What cannot be read or written is worked out again; nothing is lost by deleting
+//! the folder.
 
 use std::fs;
 use std::hash::{DefaultHasher, Hasher};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use crate::shafts::prepared::Prepared;
-
-use super::room::Room;
+use crate::geometry::camera::Intrinsics;
+use crate::render::{Gpu, RenderError, Renderer};
+use crate::scene::Scene;
+use crate::shafts::room::Room;
+use crate::shafts::room_transport::RoomTransport;
 
 /// Another layout, or another way to work rooms out.
 const VERSION: u32 = 2;
 /// The newest ones stay.
 const MOST_ROOMS: usize = 16;
 
-/// A room that is ready, and where it was found.
+/// A room's transport, and where it was found.
 pub struct ReadyRoom {
-    /// The room.
-    pub prepared: Prepared,
+    /// The transport.
+    pub transport: RoomTransport,
     /// The file that it was read from; `None` where it was worked out just now.
     pub read_from: Option<PathBuf>,
 }
@@ -28,35 +32,48 @@ pub fn folder() -> Option<PathBuf> {
     Some(dirs::cache_dir()?.join("gnomon").join("rooms"))
 }
 
-/// The room from a folder, or worked out and put there.
+/// A renderer of a scene whose room's transport is in the user's folder, or is put there.
+///
+/// # Errors
+/// A picture larger than the adapter can hold, or a device that failed.
+pub fn renderer(
+    gpu: Arc<Gpu>,
+    scene: &Scene,
+    intrinsics: Intrinsics,
+) -> Result<Renderer, RenderError> {
+    let transport = |room: &Room<'_>| ready(room, folder().as_deref()).transport;
+    Renderer::with_transport(gpu, scene, intrinsics, transport)
+}
+
+/// A room's transport from a folder, or worked out and put there.
 pub fn ready(room: &Room<'_>, folder: Option<&Path>) -> ReadyRoom {
     let path = folder.map(|folder| folder.join(format!("{:016x}.room", room.key())));
     if let Some(path) = &path
-        && let Some(prepared) = read(path)
+        && let Some(transport) = read(path)
     {
         return ReadyRoom {
-            prepared,
+            transport,
             read_from: Some(path.clone()),
         };
     }
-    let prepared = room.prepare();
+    let transport = room.transport();
     if let Some(path) = &path {
-        keep(path, &prepared);
+        keep(path, &transport);
     }
     ReadyRoom {
-        prepared,
+        transport,
         read_from: None,
     }
 }
 
-fn read(path: &Path) -> Option<Prepared> {
+fn read(path: &Path) -> Option<RoomTransport> {
     let bytes = fs::read(path).ok()?;
     let (sum, room) = bytes.split_at_checked(size_of::<u64>())?;
     if sum != checksum(room) {
         return None;
     }
-    let (version, prepared): (u32, Prepared) = postcard::from_bytes(room).ok()?;
-    (version == VERSION).then(|| prepared.with_caster())
+    let (version, transport): (u32, RoomTransport) = postcard::from_bytes(room).ok()?;
+    (version == VERSION).then(|| transport.with_caster())
 }
 
 fn checksum(bytes: &[u8]) -> [u8; 8] {
@@ -66,11 +83,11 @@ fn checksum(bytes: &[u8]) -> [u8; 8] {
 }
 
 /// Whole or not at all; a full disk keeps nothing.
-fn keep(path: &Path, prepared: &Prepared) {
+fn keep(path: &Path, transport: &RoomTransport) {
     let kept = || -> Option<()> {
         let folder = path.parent()?;
         fs::create_dir_all(folder).ok()?;
-        let bytes = postcard::to_stdvec(&(VERSION, prepared)).ok()?;
+        let bytes = postcard::to_stdvec(&(VERSION, transport)).ok()?;
         let mut file = tempfile::NamedTempFile::new_in(folder).ok()?;
         file.write_all(&checksum(&bytes)).ok()?;
         file.write_all(&bytes).ok()?;
@@ -98,7 +115,6 @@ fn forget_oldest(folder: &Path) -> Option<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Scene;
 
     #[test]
     fn a_room_is_read_as_it_was_kept_and_damage_is_worked_out_again() {
@@ -109,18 +125,18 @@ mod tests {
         let folder = folder.path();
         let ready_from = |scene: &Scene| {
             let probe = scene.probe.as_ref().unwrap();
-            ready(&Room::of(scene, probe), Some(folder))
+            ready(&scene.room(probe), Some(folder))
         };
         let first = ready_from(&scene);
         assert_eq!(first.read_from, None);
         let again = ready_from(&scene);
         let path = again.read_from.unwrap();
-        let bytes = |room: &Prepared| postcard::to_stdvec(room).unwrap();
-        assert!(bytes(&again.prepared) == bytes(&first.prepared));
+        let bytes = |room: &RoomTransport| postcard::to_stdvec(room).unwrap();
+        assert!(bytes(&again.transport) == bytes(&first.transport));
         let (origin, down) = (glam::Vec3::new(0.3, 0.2, 0.5), -glam::Vec3::Z);
-        let seen = |room: &Prepared| room.radiance_along(origin, down);
-        assert!(seen(&first.prepared).is_some());
-        assert_eq!(seen(&again.prepared), seen(&first.prepared));
+        let seen = |room: &RoomTransport| room.radiance_along(origin, down);
+        assert!(seen(&first.transport).is_some());
+        assert_eq!(seen(&again.transport), seen(&first.transport));
 
         let whole = fs::read(&path).unwrap();
         fs::write(&path, &whole[..whole.len() / 2]).unwrap();

@@ -6,27 +6,41 @@ use rayon::prelude::*;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
 use crate::light::Light;
-use crate::scene::{Scene, ShadowSettings, Shortcut, Technique};
+use crate::scene::{Scene, ShadowSettings, Shortcut};
 
 use super::anchor_geometry::{
-    AnchorGeometry, KnownLevels, Role, SurfaceBatch, Thing, VirtualCorners,
+    AnchorGeometry, AnchoredModel, KnownLevels, Role, SurfaceBatch, VirtualCorners,
 };
 use super::casters::{Casters, LitSides};
 use super::detail::chosen_levels;
 use super::gpu::Gpu;
 use super::indirect::Indirect;
 use super::insides::{Insides, insides};
+use super::screen_bounds::{ScreenBounds, screen_bounds};
+use super::shown::Shown;
 use super::surfaces::Sided;
-use super::touched::{Touched, touched_by_virtual};
-use super::uniforms::{LightSource, UniformRow, View, uniform_entry};
+use super::uniforms::{AnchorView, CameraLight, LIGHT_GROUP, UniformRow, VIEW_GROUP};
 use super::volumes::{Among, Volumes, set_scissor};
 
+/// The origin of a scene's light.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum LitBy {
+    /// The scene's lights, and what reflects them.
+    Lights,
+    /// A room, whose light a technique brings ([`GpuScene::set_indirect`]).
+    Room,
+}
+
 /// The scene as the present frame has it.
-pub(super) struct Stage {
+pub(super) struct GpuScene {
+    lit_by: LitBy,
     intrinsics: Intrinsics,
+    /// Those that cast shadow volumes.
     lights: Vec<Light>,
+    /// Whether any virtual thing has a glossy layer.
+    pub glossy: bool,
     batches: Vec<SurfaceBatch>,
-    things: Vec<Thing>,
+    things: Vec<AnchoredModel>,
     /// For each thing the level that is drawn.
     levels: Vec<usize>,
     max_silhouette_error_px: f64,
@@ -39,60 +53,39 @@ pub(super) struct Stage {
     virtual_corners: Vec<(usize, VirtualCorners)>,
     /// The camera as what stands on each anchor meets it, and after that as each virtual thing does.
     views: UniformRow,
-    light_sources: UniformRow,
+    camera_lights: UniformRow,
     view_group: wgpu::BindGroup,
     light_group: wgpu::BindGroup,
-    /// Layouts of groups 0 and 1 of every shader that draws geometry: the anchor's view, and a light.
-    pub layouts: [wgpu::BindGroupLayout; 2],
     camera_from_anchor: Vec<Option<DAffine3>>,
     /// Where things stand and which are there: phantoms, then virtual ones.
     standing: Vec<(DAffine3, bool)>,
     known_levels: KnownLevels,
 }
 
-impl Stage {
-    pub fn new(gpu: &Gpu, scene: &Scene, intrinsics: Intrinsics) -> Self {
+impl GpuScene {
+    pub fn new(gpu: &Gpu, scene: &Scene, intrinsics: Intrinsics, lit_by: LitBy) -> Self {
         let device = &gpu.device;
-        let layouts = ["view", "light"].map(|label| {
-            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                label: Some(label),
-                entries: &[uniform_entry(0, true)],
-            })
-        });
-        let group = |layout, row: &UniformRow| {
-            device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: None,
-                layout,
-                entries: &[wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: row.binding(),
-                }],
-            })
-        };
         let view_count = scene.anchors.len() + scene.virtuals.len();
-        let views = UniformRow::new::<View>(device, "views", view_count);
-        let light_sources = UniformRow::new::<LightSource>(device, "lights", scene.lights.len());
+        let views = UniformRow::new::<AnchorView>(device, "views", view_count);
+        let camera_lights = UniformRow::new::<CameraLight>(device, "lights", scene.lights.len());
         let mut known_levels = KnownLevels::default();
         let AnchorGeometry {
             batches,
             things,
             virtual_corners,
         } = AnchorGeometry::new(device, scene, &mut known_levels);
+        let world_virtuals = virtual_corners.iter().find(|(anchor, _)| *anchor == 0);
         Self {
+            lit_by,
             standing: standing(scene),
             known_levels,
-            casters: Casters::new(
-                device,
-                things.len(),
-                scene.lights.len(),
-                &layouts[1],
-                &scene.shadows,
-            ),
-            indirect: virtual_corners
-                .iter()
-                .filter(|_| scene.chosen_technique().0 == Technique::Volumes)
-                .find(|(anchor, _)| *anchor == 0)
-                .and_then(|(_, corners)| Indirect::new(scene, corners)),
+            casters: Casters::new(gpu, things.len(), scene.lights.len(), &scene.shadows),
+            indirect: match lit_by {
+                LitBy::Lights => {
+                    world_virtuals.and_then(|(_, corners)| Indirect::new(scene, corners))
+                }
+                LitBy::Room => None,
+            },
             virtual_corners,
             max_silhouette_error_px: scene.shadows.max_silhouette_error_px,
             shadows: scene.shadows,
@@ -100,24 +93,24 @@ impl Stage {
             insides: vec![Insides::Anywhere; things.len()],
             batches,
             things,
-            view_group: group(&layouts[0], &views),
-            light_group: group(&layouts[1], &light_sources),
+            view_group: gpu.bind_group(&VIEW_GROUP, [views.binding()]),
+            light_group: gpu.bind_group(&LIGHT_GROUP, [camera_lights.binding()]),
             camera_from_anchor: vec![None; scene.anchors.len()],
-            lights: match scene.chosen_technique().0 {
-                Technique::Shafts => Vec::new(),
-                _ => scene.lights.clone(),
-            },
+            lights: lights(scene, lit_by),
+            glossy: scene.virtuals.iter().any(|object| {
+                let mut materials = object.materials.iter();
+                materials.any(|material| material.roughness.is_some())
+            }),
             intrinsics,
-            layouts,
             views,
-            light_sources,
+            camera_lights,
         }
     }
 
-    /// Takes another state of the same scene: lights otherwise, things elsewhere, shown or hidden. What surroundings throw
-    /// back stays as it was gathered, where the same corners are there to get it.
+    /// Takes another state of the same scene: lights otherwise, things elsewhere, shown or hidden. What surroundings
+    /// reflect stays as it was gathered, where the same corners are there to get it.
     pub fn follow(&mut self, gpu: &Gpu, scene: &Scene) {
-        self.lights.clone_from(&scene.lights);
+        self.lights = lights(scene, self.lit_by);
         let standing = standing(scene);
         if self.standing == standing {
             return;
@@ -127,13 +120,7 @@ impl Stage {
             things,
             virtual_corners,
         } = AnchorGeometry::new(&gpu.device, scene, &mut self.known_levels);
-        self.casters = Casters::new(
-            &gpu.device,
-            things.len(),
-            scene.lights.len(),
-            &self.layouts[1],
-            &scene.shadows,
-        );
+        self.casters = Casters::new(gpu, things.len(), scene.lights.len(), &scene.shadows);
         let world_virtuals = virtual_corners.iter().find(|(anchor, _)| *anchor == 0);
         self.indirect = self
             .indirect
@@ -172,13 +159,13 @@ impl Stage {
         self.camera_from_anchor = camera_from_anchor.to_vec();
         for (anchor, pose) in camera_from_anchor.iter().enumerate() {
             if let Some(camera_from_anchor) = pose {
-                let view = View::new(&self.intrinsics, camera_from_anchor);
+                let view = AnchorView::new(&self.intrinsics, camera_from_anchor);
                 self.views.write(queue, anchor, &view);
             }
         }
         for thing in &self.things {
             if let (Some(tie), Some(pose)) = (thing.tie, camera_from_anchor[thing.anchor]) {
-                let view = View::new(&self.intrinsics, &pose).winning_ties(tie);
+                let view = AnchorView::new(&self.intrinsics, &pose).winning_ties(tie);
                 self.views.write(queue, self.view_of(thing), &view);
             }
         }
@@ -192,8 +179,8 @@ impl Stage {
             indirect.update(queue, &buffer, camera_from_anchor, &camera_from_world);
         }
         for (index, light) in self.lights.iter().enumerate() {
-            let light = LightSource::new(light, &camera_from_world);
-            self.light_sources.write(queue, index, &light);
+            let light = CameraLight::new(light, &camera_from_world);
+            self.camera_lights.write(queue, index, &light);
         }
         self.choose_levels(camera_from_anchor);
         let placed = self.things.iter().zip(&self.levels);
@@ -254,7 +241,7 @@ impl Stage {
     /// What passes draw from here on stands in the world.
     pub fn set_world(&self, pass: &mut wgpu::RenderPass<'_>) {
         pass.set_bind_group(0, &self.view_group, &[self.views.offset(0)]);
-        pass.set_bind_group(1, &self.light_group, &[self.light_sources.offset(0)]);
+        pass.set_bind_group(1, &self.light_group, &[self.camera_lights.offset(0)]);
     }
 
     /// Draws the real surfaces of all anchors but the world.
@@ -273,26 +260,41 @@ impl Stage {
         }
     }
 
-    /// Where the placed things and their shadows can be; `None` where nothing is placed.
-    pub fn touched(&self) -> Option<Touched> {
-        touched_by_virtual(
+    /// The camera.
+    pub fn intrinsics(&self) -> &Intrinsics {
+        &self.intrinsics
+    }
+
+    /// Where the anchors are.
+    pub fn camera_from_anchor(&self) -> &[Option<DAffine3>] {
+        &self.camera_from_anchor
+    }
+
+    /// Makes the shadow volumes that the picture shows. Returns where the placed things and their shadows can be; `None`
+    /// where nothing is placed.
+    pub fn cast_shadows(&mut self, gpu: &Gpu, shown: Shown) -> Option<ScreenBounds> {
+        let bounds = screen_bounds(
             &self.things,
             &self.lights,
             &self.camera_from_anchor,
             &self.intrinsics,
             self.shadows.without,
-        )
+        )?;
+        if shown == Shown::Composite && !bounds.pixels.is_empty() {
+            self.cast(gpu, &bounds, bounds.pixels);
+        }
+        Some(bounds)
     }
 
     /// Makes the shadow volumes that reach the pixels `within`.
-    pub fn cast(&mut self, gpu: &Gpu, touched: &Touched, within: PixelRect) {
+    pub fn cast(&mut self, gpu: &Gpu, bounds: &ScreenBounds, within: PixelRect) {
         self.casters.update(
             gpu,
             (&self.things, &self.levels),
             &self.lights,
             &self.camera_from_anchor,
             &self.intrinsics,
-            (touched, within),
+            (bounds, within),
         );
     }
 
@@ -318,7 +320,7 @@ impl Stage {
     pub fn draw_virtuals(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        [open, terminator, averted]: [&Sided; 3],
+        [open, terminator, back_facing]: [&Sided; 3],
         light: usize,
         within: PixelRect,
     ) {
@@ -333,7 +335,7 @@ impl Stage {
                 for (pipelines, sides) in [
                     (open, &surface.facing),
                     (terminator, &surface.terminator),
-                    (averted, &surface.averted),
+                    (back_facing, &surface.back_facing),
                 ] {
                     self.draw_sides(pass, pipelines, number, sides, within);
                 }
@@ -375,7 +377,7 @@ impl Stage {
         pass: &mut wgpu::RenderPass<'_>,
         pipelines: &Sided,
         number: usize,
-        thing: &Thing,
+        thing: &AnchoredModel,
         within: PixelRect,
     ) {
         let range = || thing.levels[self.levels[number]].range.clone();
@@ -444,7 +446,7 @@ impl Stage {
     }
 
     /// The things of a batch, with their numbers.
-    fn of_batch(&self, batch: &SurfaceBatch) -> impl Iterator<Item = (usize, &Thing)> {
+    fn of_batch(&self, batch: &SurfaceBatch) -> impl Iterator<Item = (usize, &AnchoredModel)> {
         let kind = (batch.role, batch.anchor);
         let things = self.things.iter().enumerate();
         things.filter(move |(_, thing)| (thing.role, thing.anchor) == kind)
@@ -452,23 +454,36 @@ impl Stage {
 
     fn set_light(&self, pass: &mut wgpu::RenderPass<'_>, light: usize) {
         pass.set_stencil_reference(0);
-        pass.set_bind_group(1, &self.light_group, &[self.light_sources.offset(light)]);
+        pass.set_bind_group(1, &self.light_group, &[self.camera_lights.offset(light)]);
     }
 
     /// Where in `views` a thing's is.
-    fn view_of(&self, thing: &Thing) -> usize {
+    fn view_of(&self, thing: &AnchoredModel) -> usize {
         match thing.tie {
             None => thing.anchor,
             Some(tie) => self.camera_from_anchor.len() + tie,
         }
     }
 
-    fn set_thing(&self, pass: &mut wgpu::RenderPass<'_>, batch: &SurfaceBatch, thing: &Thing) {
+    fn set_thing(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        batch: &SurfaceBatch,
+        thing: &AnchoredModel,
+    ) {
         let view = self.views.offset(self.view_of(thing));
         pass.set_bind_group(0, &self.view_group, &[view]);
         pass.set_vertex_buffer(0, batch.corners.slice(..));
         pass.set_vertex_buffer(1, batch.indirect.slice(..));
         pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
+    }
+}
+
+/// The lights of a scene that cast shadow volumes.
+fn lights(scene: &Scene, lit_by: LitBy) -> Vec<Light> {
+    match lit_by {
+        LitBy::Lights => scene.lights.clone(),
+        LitBy::Room => Vec::new(),
     }
 }
 

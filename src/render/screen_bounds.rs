@@ -1,4 +1,4 @@
-//! Where in the picture virtual things and shadows can be: the passes leave the rest alone.
+//! Bounds on screen: where in the picture virtual things and shadows can be. The passes leave the rest alone.
 
 use glam::{DAffine3, DVec3};
 
@@ -9,16 +9,16 @@ use crate::geometry::shadow_volume::LightPlace;
 use crate::light::Light;
 use crate::scene::{Shortcut, Shortcuts};
 
-use super::anchor_geometry::{Role, Thing};
+use super::anchor_geometry::{AnchoredModel, Role};
 
 const UNSEEN: ShadowReach = ShadowReach {
     pixels: PixelRect::NONE,
     end: None,
 };
 
-/// Where the things of a frame can change its picture.
+/// The pixels that a frame's things can change.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Touched {
+pub(super) struct ScreenBounds {
     /// All of it.
     pub pixels: PixelRect,
     /// Where virtual things can be.
@@ -27,7 +27,7 @@ pub(super) struct Touched {
     pub shadows: Vec<Vec<ShadowReach>>,
 }
 
-/// How far a caster's shadow reaches.
+/// The reach of a caster's shadow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ShadowReach {
     /// Where in the picture it can fall on anything; empty where there is none.
@@ -36,7 +36,7 @@ pub(super) struct ShadowReach {
     pub end: Option<HalfSpace>,
 }
 
-impl Touched {
+impl ScreenBounds {
     /// Where the passes make no difference between things and shadows.
     pub fn pixels_alone(pixels: PixelRect) -> Self {
         Self {
@@ -48,13 +48,13 @@ impl Touched {
 }
 
 /// What virtual things and their shadows can change, and how far all shadows reach; `None` where nothing is placed.
-pub(super) fn touched_by_virtual(
-    things: &[Thing],
+pub(super) fn screen_bounds(
+    things: &[AnchoredModel],
     lights: &[Light],
     camera_from_anchor: &[Option<DAffine3>],
     intrinsics: &Intrinsics,
     without: Shortcuts,
-) -> Option<Touched> {
+) -> Option<ScreenBounds> {
     let whole = PixelRect::whole(intrinsics.size_px);
     let scissored = |pixels: PixelRect| match without.has(Shortcut::Scissors) {
         true => whole,
@@ -62,7 +62,7 @@ pub(super) fn touched_by_virtual(
     };
     let camera_from_world = (*camera_from_anchor.first()?)?;
     let world_from_camera = camera_from_world.inverse();
-    let corners_in_world = |thing: &Thing| {
+    let corners_in_world = |thing: &AnchoredModel| {
         let world_from_anchor = world_from_camera * camera_from_anchor[thing.anchor]?;
         Some(
             thing
@@ -71,7 +71,7 @@ pub(super) fn touched_by_virtual(
                 .map(|corner| world_from_anchor.transform_point3(corner)),
         )
     };
-    let placed: Vec<(usize, &Thing, [DVec3; 8])> = things
+    let placed: Vec<(usize, &AnchoredModel, [DVec3; 8])> = things
         .iter()
         .enumerate()
         .filter_map(|(index, thing)| Some((index, thing, corners_in_world(thing)?)))
@@ -102,7 +102,7 @@ pub(super) fn touched_by_virtual(
             shadows[*index] = shadow;
         }
     }
-    Some(Touched {
+    Some(ScreenBounds {
         pixels: pixels.union(virtuals),
         virtuals,
         shadows,

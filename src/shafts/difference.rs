@@ -5,21 +5,46 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 
-use crate::scene::Difference;
-use crate::shafts::intensity_transfers::{SETS, intensity_transfers, set_of};
-use crate::shafts::luminance;
-use crate::shafts::prepared::Prepared;
+use super::intensity_transfers::{SETS, intensity_transfers, set_of};
+use super::luminance;
+use super::room_transport::RoomTransport;
+
+/// A way to take what virtual things hide of a room's light out of the video.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Difference {
+    /// Of the pixel's linear light as large a part as of the modelled light: the video keeps its texture, and the model's
+    /// reflectances do not matter.
+    Ratio,
+    /// The radiance that the model says is missing (Gibson et al. 2003, section 7; Debevec 1998).
+    Subtract,
+    /// Intensity transfers, from the encoded pixel (Gibson et al. 2003, section 7.1): for the record, as it was done where
+    /// pictures could not be added in linear light.
+    Encoded,
+}
+
+impl Difference {
+    /// The two in linear light, by the names that files use for `difference`.
+    pub const BY_NAME: [(&str, Self); 2] = [("ratio", Self::Ratio), ("subtract", Self::Subtract)];
+}
 
 /// Some vertices' light, and what each of some sources gives to it: rows of as many as there are sources.
-pub(super) struct Given {
+pub struct Given {
+    /// For each vertex.
     pub light: Vec<Vec3>,
+    /// Row by row, a row for each vertex.
     pub by_source: Vec<Vec3>,
+    /// Length of a row.
     pub source_count: usize,
 }
 
 impl Given {
     /// Irradiance in other terms.
-    pub fn in_terms_of(self, difference: Difference, room: &Prepared, vertices: &[u32]) -> Self {
+    pub fn in_terms_of(
+        self,
+        difference: Difference,
+        room: &RoomTransport,
+        vertices: &[u32],
+    ) -> Self {
         if difference == Difference::Ratio {
             return self;
         }
@@ -64,7 +89,7 @@ impl Given {
 }
 
 /// What each vertex reflects: the mean of its patches.
-fn reflectances(room: &Prepared, vertices: &[u32]) -> Vec<Vec3> {
+fn reflectances(room: &RoomTransport, vertices: &[u32]) -> Vec<Vec3> {
     let mut sums = vec![(Vec3::ZERO, 0.0); vertices.len()];
     for (patch, light) in room.patches.patches.iter().zip(&room.light) {
         for vertex in patch.vertices {

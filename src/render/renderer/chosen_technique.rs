@@ -1,0 +1,72 @@
+//! The technique that draws a renderer's shadows, with all that it alone needs.
+
+use super::super::accumulated::Accumulated;
+use super::super::background::Background;
+use super::super::direct::Direct;
+use super::super::gpu::Gpu;
+use super::super::gpu_scene::{GpuScene, LitBy};
+use super::super::shafts::Shafts;
+use super::super::technique::TechniquePasses;
+use crate::geometry::camera::Intrinsics;
+use crate::scene::{Scene, ShadowTechnique, Shortcut};
+use crate::shafts::room::Room;
+use crate::shafts::room_transport::RoomTransport;
+
+/// A renderer's technique.
+pub(super) enum ChosenTechnique {
+    /// One light and one sample, shaded straight into the picture.
+    Direct(Direct),
+    /// Several lights or samples, added up.
+    Accumulated(Accumulated),
+    /// A room's light.
+    Shafts(Box<Shafts>),
+}
+
+impl ChosenTechnique {
+    /// The technique of a scene, and the scene as it draws it; `transport` gives the light of a room.
+    pub fn new(
+        gpu: &Gpu,
+        scene: &Scene,
+        intrinsics: Intrinsics,
+        background: &Background,
+        transport: impl FnOnce(&Room<'_>) -> RoomTransport,
+    ) -> (Self, GpuScene) {
+        match (scene.chosen_technique().0, &scene.probe) {
+            (ShadowTechnique::Shafts, Some(probe)) => {
+                let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Room);
+                let glossy = gpu_scene.glossy;
+                let shafts = Shafts::new(gpu, scene, probe, background, glossy, transport);
+                (Self::Shafts(Box::new(shafts)), gpu_scene)
+            }
+            // (No scene that was read has shafts without a probe.)
+            (ShadowTechnique::Volumes | ShadowTechnique::Shafts, _) => {
+                let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Lights);
+                let (samples, glossy) = (scene.shadows.samples, gpu_scene.glossy);
+                let is_single = samples == 1 && scene.lights.len() == 1;
+                let technique = match is_single && !scene.shadows.without.has(Shortcut::Direct) {
+                    true => Self::Direct(Direct::new(gpu, background, glossy)),
+                    false => Self::Accumulated(Accumulated::new(gpu, background, samples, glossy)),
+                };
+                (technique, gpu_scene)
+            }
+        }
+    }
+
+    /// Its steps.
+    pub fn passes(&self) -> &dyn TechniquePasses {
+        match self {
+            Self::Direct(direct) => direct,
+            Self::Accumulated(accumulated) => accumulated,
+            Self::Shafts(shafts) => shafts.as_ref(),
+        }
+    }
+
+    /// Its steps that change it.
+    pub fn passes_mut(&mut self) -> &mut dyn TechniquePasses {
+        match self {
+            Self::Direct(direct) => direct,
+            Self::Accumulated(accumulated) => accumulated,
+            Self::Shafts(shafts) => shafts.as_mut(),
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! What the light of a room is worked out from.
+
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use glam::Vec3;
+
+use crate::geometry::bounds::Bounds;
+
+use super::patches::RoomTriangle;
+use super::room_transport::{PlacedProbe, RoomOptions, RoomTransport};
+
+/// All that the light of a scene's room depends on.
+pub struct Room<'a> {
+    /// The table and phantoms that stand in the world, and the parts of the room. Phantoms on moving anchors have no part
+    /// in it.
+    pub triangles: Vec<RoomTriangle>,
+    /// Around what is there to be lit: all phantoms that cast, and the virtual things, where they are.
+    pub things: Vec<Bounds>,
+    /// How finely it is worked out.
+    pub options: RoomOptions,
+    /// The light.
+    pub probe: PlacedProbe<'a>,
+}
+
+impl Room<'_> {
+    /// Works its light out: seconds.
+    pub fn transport(&self) -> RoomTransport {
+        RoomTransport::new(&self.triangles, self.probe, &self.things, &self.options)
+    }
+
+    /// Rooms with the same key have the same light wherever their things stand.
+    pub fn surfaces_key(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        for triangle in &self.triangles {
+            hash_vectors(&mut hasher, &triangle.corners);
+            hash_vectors(&mut hasher, triangle.albedo.as_slice());
+            hasher.write_u32(triangle.piece);
+        }
+        let RoomOptions {
+            patches,
+            source_power,
+            receivers_per_leaf,
+            least_part,
+        } = self.options;
+        for number in [patches, receivers_per_leaf] {
+            hasher.write_usize(number);
+        }
+        let PlacedProbe {
+            probe,
+            position_m,
+            exposure,
+        } = self.probe;
+        hash_numbers(&mut hasher, [source_power, least_part, f64::from(exposure)]);
+        hash_numbers(&mut hasher, position_m.to_array());
+        probe.size_px().hash(&mut hasher);
+        hash_vectors(&mut hasher, probe.pixels());
+        hasher.finish()
+    }
+
+    /// Rooms with the same key are the same.
+    pub fn key(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        hasher.write_u64(self.surfaces_key());
+        for Bounds { low, high } in &self.things {
+            hash_numbers(&mut hasher, low.to_array());
+            hash_numbers(&mut hasher, high.to_array());
+        }
+        hasher.finish()
+    }
+}
+
+fn hash_numbers(hasher: &mut impl Hasher, numbers: impl IntoIterator<Item = f64>) {
+    for number in numbers {
+        hasher.write_u64(number.to_bits());
+    }
+}
+
+fn hash_vectors(hasher: &mut impl Hasher, vectors: &[Vec3]) {
+    hasher.write_usize(vectors.len());
+    hasher.write(bytemuck::cast_slice(vectors));
+}
