@@ -12,7 +12,7 @@ use common::project_file;
 use common::random::Random;
 use common::sheets;
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
-use gnomon::app::board::board_block;
+use gnomon::app::jobs::board::board_block;
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::scene::{Anchor, Family, Marker, Scene, TrackingSettings};
 use gnomon::tracking::mapping::{LearntBoard, MapError, MapSettings, learn_board};

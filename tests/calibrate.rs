@@ -12,7 +12,7 @@ use common::prints::{
 };
 use common::sheets::CAMERA;
 use glam::{DAffine3, DMat3, DVec2};
-use gnomon::app::picture_files::{grey_png, write_bytes};
+use gnomon::app::files::picture_files::{grey_png, write_bytes};
 use gnomon::calibration::{
     CalibrateError, Calibration, Lack, Look, Target, TargetFinder, TargetMarkers, Views, solve,
 };

@@ -5,14 +5,13 @@ mod common;
 
 use common::composite::{Expected, Verdict};
 use common::judge::{ENOUGH, is_edge};
+use common::near_edges::{SAMPLES_PX, is_on_edge, is_uniform, sample_places};
 use common::random::{Random, random_camera, random_stage};
 use common::shapes;
 use common::{Stage, Thing, lamp, linear_of_level, look_at, sun};
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use gnomon::app::truth::FACES_AWAY;
-use gnomon::app::truth::ray_cast::{
-    Exact, GRAZES, SAMPLES_PX, Surface, View, World, is_uniform, pixels, sample_places,
-};
+use gnomon::app::truth::ray_cast::{Exact, GRAZES, Surface, View, World, pixels};
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::light::{Light, irradiance};
 use gnomon::render::{REAL, REAL_HIDES, VIRTUAL_HIDES};
@@ -330,7 +329,7 @@ fn hold_smooth_sphere(
         shaded += usize::from(facet.dot(towards) > 0.0 && high == 0.0);
         // On an edge of the mesh snapping decides on which side a sample lies, and a side of the volume begins there.
         if (most < low || least > high)
-            && !sample_places(center).any(|place| stage.world.is_on_edge(view, place, &light))
+            && !sample_places(center).any(|place| is_on_edge(&stage.world, view, place, &light))
         {
             wrong += 1;
             worst = worst.max((found - high).max(low - found));

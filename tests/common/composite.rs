@@ -14,12 +14,13 @@
 
 use glam::{DAffine3, DVec2, DVec3};
 use gnomon::app::truth::FACES_AWAY;
-use gnomon::app::truth::ray_cast::{Exact, GRAZES, SAMPLES_PX, Surface, View, World, pixels};
+use gnomon::app::truth::ray_cast::{Exact, GRAZES, Surface, View, World, pixels};
 use gnomon::geometry::mesh::Mesh;
 use gnomon::light::{Light, irradiance};
 use gnomon::render::{Layers, REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};
 use std::f64::consts::PI;
 
+use super::near_edges::{self, SAMPLES_PX};
 use super::{Picture, Stage};
 
 /// Linear; half a level of white is 0.0045 of it.
@@ -469,7 +470,7 @@ impl<'a> Expected<'a> {
     pub fn is_uniform(&self, index: usize) -> bool {
         let size_px = self.view.intrinsics.size_px;
         let center = &self.centers[index];
-        gnomon::app::truth::ray_cast::is_uniform(size_px, index, |_, other| {
+        near_edges::is_uniform(size_px, index, |_, other| {
             center.is_like(&self.centers[other])
         })
     }
@@ -699,7 +700,7 @@ impl<'a> Expected<'a> {
 
     fn is_on_edge(&self, place: DVec2) -> bool {
         let mut lights = self.lights.iter();
-        lights.any(|light| self.world.is_on_edge(&self.view, place, light))
+        lights.any(|light| near_edges::is_on_edge(&self.world, &self.view, place, light))
     }
 
     /// How far from a pixel's samples, pixels, there is what explains its value: 0 where their own states do; `None` if

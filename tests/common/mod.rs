@@ -4,6 +4,7 @@
 pub mod composite;
 pub mod degenerate;
 pub mod judge;
+pub mod near_edges;
 pub mod photographs;
 pub mod prints;
 pub mod random;

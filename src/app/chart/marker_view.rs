@@ -14,7 +14,7 @@ use super::measured::rounded;
 use super::peers_table::{LIGHT_M, Stage, TORUS_CENTER_M, torus};
 use super::shots::grey_frame;
 use super::tracking::bare_library;
-use crate::app::stats::quantile;
+use crate::app::stages::stats::quantile;
 use crate::app::truth::sheets::{camera_above, photograph, with_noise};
 use crate::app::truth::{PoseErrors, shifts_px};
 use crate::geometry::camera::Intrinsics;

@@ -28,11 +28,11 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context as _, Result, bail};
 
-use super::job_files::{JobFiles, Replacing};
-use super::locked_folder::lock;
-use super::picture_files::{write_rgb_png, write_text};
-use super::progress::Progress;
-use super::result_kind::ResultKind;
+use crate::app::files::job_files::{JobFiles, Replacing};
+use crate::app::files::lock;
+use crate::app::files::picture_files::{write_rgb_png, write_text};
+use crate::app::files::result_kind::ResultKind;
+use crate::app::stages::progress::Progress;
 use canvas::{bitmap, svg};
 use family::Chart;
 use lab::Lab;

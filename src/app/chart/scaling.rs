@@ -13,7 +13,7 @@ use super::lab::Lab;
 use super::measured::rounded;
 use super::peers_table::{LIGHT_M, SIZE_PX, Stage, TORUS_CENTER_M, WARM_UP_FRAMES, torus};
 use super::shots::{Shots, grey_frame};
-use crate::app::stats::quantile;
+use crate::app::stages::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
 use crate::geometry::camera::Intrinsics;
 use crate::render::{Gpu, Renderer, Shown};

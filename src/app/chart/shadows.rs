@@ -12,7 +12,7 @@ use super::figure::{Axis, Figure, Panel, Point, Rule, Series, pareto_front};
 use super::lab::Lab;
 use super::measured::rounded;
 use super::shots::{Shots, mean, mean_wrong_pct};
-use crate::app::stats::quantile;
+use crate::app::stages::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
 use crate::app::truth::{Drawn, Picture};
 use crate::render::{Renderer, Shown};

@@ -10,8 +10,8 @@ use super::family::Chart;
 use super::figure::{Axis, Figure, Panel, Point, Series, pareto_front};
 use super::lab::Lab;
 use super::measured::rounded;
-use crate::app::recording;
-use crate::app::stats::quantile;
+use crate::app::input::source;
+use crate::app::stages::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
 use crate::app::truth::{PoseErrors, TruePoses, shifts_px};
 use crate::capture::FrameSource;
@@ -134,7 +134,7 @@ impl Chart for Tracking {
             .map(|_| Tally::new(scene.anchors.len()))
             .collect();
         for round in 0..lab.rounds().min(3) {
-            let (mut source, intrinsics) = recording::open(&scene.camera)?;
+            let (mut source, intrinsics) = source::open(&scene.camera)?;
             let trackers = ways
                 .iter()
                 .map(|way| Tracker::new(&way.settings, &scene.anchors, intrinsics));

@@ -6,9 +6,9 @@ use anyhow::Result;
 
 use super::eye::Plan;
 use crate::app::authoring::SceneDocument;
-use crate::app::job_files::JobFiles;
-use crate::app::live_input::LiveInput;
-use crate::app::result_kind::ResultKind;
+use crate::app::files::job_files::JobFiles;
+use crate::app::files::result_kind::ResultKind;
+use crate::app::input::live_input::LiveInput;
 use crate::scene::CameraSettings;
 
 /// A scene or a camera that was read, before anything is opened.

@@ -9,9 +9,9 @@ use glam::DAffine3;
 
 use super::eye::TrackedPicture;
 use super::false_colour;
-use super::pipeline::Wake;
 use super::views::View;
-use crate::app::mailbox::{Mailbox, Taken};
+use crate::app::input::mailbox::{Mailbox, Taken};
+use crate::app::window::Wake;
 use crate::geometry::camera::Intrinsics;
 use crate::render::{Gpu, RenderError, Renderer, Shown};
 use crate::scene::{Scene, Shortcuts};

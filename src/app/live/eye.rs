@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec2;
 
-use crate::app::live_capture::Arrived;
+use crate::app::input::live_capture::Arrived;
 use crate::app::stopwatch::Stopwatch;
 use crate::capture::{Frame, check_frame_size};
 use crate::geometry::camera::Intrinsics;

@@ -5,25 +5,20 @@
 //! the only home of egui.
 
 pub mod beginning;
-pub mod calibrating;
 mod canvas;
 mod composite_video;
 mod demonstration;
 mod event_loop;
 mod eye;
 mod false_colour;
-mod fit;
 mod gizmo;
 mod keys;
 pub mod look;
 pub mod meters;
-pub mod notices;
-mod opening;
 mod overlays;
 pub mod panel;
 pub mod pipeline;
 mod recorders;
-mod screen;
 mod selection;
 mod shadow_clicks;
 mod shadow_lines;
@@ -41,12 +36,13 @@ use std::sync::{Arc, PoisonError};
 use anyhow::Result;
 
 use crate::app::stopwatch::Stopwatch;
+use crate::app::window::opening;
+use crate::app::window::screen::Screen;
 use crate::capture::live::Now;
 use crate::render::Gpu;
 use crate::scene::CameraSettings;
 use beginning::Opening;
 use event_loop::{PassEnd, Timed};
-use screen::Screen;
 use studio::Studio;
 use window::{Failure, Shared, Window};
 

@@ -4,13 +4,13 @@ use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Shape, Stroke, Vec2};
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::eye::TrackedPicture;
-use super::fit::Fit;
 use super::gizmo::{Gizmo, Handle, Target, light_place_m};
 use super::look::Look;
 use super::shadow_clicks::ShadowClicks;
 use super::shadow_lines::ShadowLines;
 use super::views::View;
 use super::wish::Overlay;
+use crate::app::window::fit::Fit;
 use crate::geometry::light_placing::Sight;
 use crate::scene::Scene;
 use crate::tracking::{Quad, Status, undistorted_pixel};

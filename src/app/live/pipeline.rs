@@ -7,13 +7,11 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 
 use super::eye::{Eye, Plan, TrackedPicture};
-use crate::app::live_capture::{Arrived, CaptureEvent, LiveCapture, Tap};
-use crate::app::mailbox::Mailbox;
+use crate::app::input::live_capture::{Arrived, CaptureEvent, LiveCapture, Tap};
+use crate::app::input::mailbox::Mailbox;
+use crate::app::window::Wake;
 use crate::capture::live::{LiveOptions, Now};
 use crate::geometry::camera::Intrinsics;
-
-/// Called, on the tracking thread, whenever there is something new to show.
-pub type Wake = Arc<dyn Fn() + Send + Sync>;
 
 /// Where frames come from.
 pub struct Input {

@@ -10,18 +10,18 @@ use eframe::egui::{
 };
 
 use super::event_loop::PassEnd;
-use super::fit::Fit;
 use super::gizmo::{Drag, Gizmo, Target};
 use super::keys::bindings;
 use super::look::Look;
-use super::notices::{CameraState, Weight};
 use super::overlays::Overlays;
 use super::panel::{Facts, Panel};
-use super::screen::Screen;
 use super::selection::selected_at;
 use super::shadow_lines::ShadowLines;
 use super::studio::Studio;
 use super::wish::{Clicks, Overlay, Selected, Wish};
+use crate::app::window::fit::Fit;
+use crate::app::window::notices::{CameraState, Weight};
+use crate::app::window::screen::Screen;
 use crate::geometry::light_placing::Sight;
 
 /// The window looks at the world at least this often, even when no frame comes.

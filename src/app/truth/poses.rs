@@ -34,11 +34,6 @@ impl TruePoses {
         })
     }
 
-    /// How many frames it knows.
-    pub fn frame_count(&self) -> usize {
-        self.frames.len()
-    }
-
     /// `camera_from_anchor` of each anchor in a frame: of the world, which is a board, and of lone markers that move.
     ///
     /// # Errors

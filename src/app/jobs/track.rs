@@ -1,0 +1,321 @@
+//! Track: a recording in; poses, detections and statistics out. No GPU, no virtual things.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::{Result, bail};
+
+use crate::app::files::detections_file::DetectionsText;
+use crate::app::files::job_files::{JobFiles, Replacing};
+use crate::app::files::picture_files::write_text;
+use crate::app::files::poses_file::PosesText;
+use crate::app::files::result_kind::ResultKind;
+use crate::app::input::live_capture::LiveCapture;
+use crate::app::input::live_input::LiveInput;
+use crate::app::input::mirror_watch::MirrorWatch;
+use crate::app::input::source;
+use crate::app::input::usual_tracking::usual_tracking;
+use crate::app::stages::report::Report;
+use crate::app::stages::stats::{Stats, detector_in_words, peak_memory_mib};
+use crate::app::stages::tally::Tally;
+use crate::app::stages::tracked::{Ended, Frames, Poser, TrackedFrame, each_tracked_frame};
+use crate::app::stopwatch::Stopwatch;
+use crate::capture::live::is_live;
+use crate::geometry::camera::Intrinsics;
+use crate::scene::{Anchor, CameraSettings, Family, TrackingSettings};
+use crate::tracking::{AnchorPose, Detector, Tracker, grey_from_rgba};
+
+/// What tracking is asked for.
+#[derive(Debug, Clone)]
+pub struct Request {
+    /// What is played, and what is looked for in it.
+    pub input: Input,
+    /// Where to write the poses.
+    pub poses: Option<PathBuf>,
+    /// Where to write every marker that the detector sees.
+    pub markers: Option<PathBuf>,
+    /// Where to write what it cost.
+    pub stats: Option<PathBuf>,
+    /// What the files may take the place of.
+    pub replacing: Replacing,
+}
+
+/// What is played, and what is looked for in it.
+#[derive(Debug, Clone)]
+pub enum Input {
+    /// A scene file says both.
+    Scene(PathBuf),
+    /// A recording, and the anchors and tracking settings of a scene file that may play another.
+    RecordingWithScene(CameraSettings, PathBuf),
+    /// A recording, and any markers of one family and size: each that is seen is an anchor.
+    LoneMarkers {
+        /// The recording.
+        camera: CameraSettings,
+        /// Of all its markers.
+        family: Family,
+        /// Side of their black squares, metres.
+        size_m: f64,
+        /// As in [`TrackingSettings`].
+        decimation: f64,
+    },
+}
+
+/// Runs it. `stop` ends it after the frames at hand, with whole files.
+///
+/// # Errors
+/// Anything that keeps a frame from being read or tracked, or a file from being written.
+pub fn track(request: &Request, stop: &AtomicBool) -> Result<Report> {
+    let watch = Stopwatch::start();
+    if [&request.poses, &request.markers, &request.stats]
+        .iter()
+        .all(|file| file.is_none())
+    {
+        bail!("nothing to do: give --poses, --markers or --stats");
+    }
+    let mut files = JobFiles::new(request.replacing);
+    let Plan {
+        camera,
+        settings,
+        anchors,
+        lists_found_alone,
+    } = Plan::of(&request.input, &mut files)?;
+    for (option, path, kind) in [
+        ("--poses", &request.poses, ResultKind::Poses),
+        ("--markers", &request.markers, ResultKind::Detections),
+        ("--stats", &request.stats, ResultKind::Stats),
+    ] {
+        if let Some(path) = path {
+            files.writes(option, path, kind);
+        }
+    }
+    files.check()?;
+    let (frames_in, intrinsics) = open(&camera)?;
+    let poser = Poser::Tracker(
+        Box::new(Tracker::new(&settings, &anchors, intrinsics)?),
+        MirrorWatch::new(&settings, &anchors),
+    );
+    let mut raw = request
+        .markers
+        .as_ref()
+        .map(|_| Raw::new(&settings, &anchors))
+        .transpose()?;
+    let mut frames = Vec::new();
+    let mut tally = Tally::new(anchors.len());
+    // A camera is tracked until somebody says stop.
+    let interrupts = matches!(frames_in, Frames::Recorded(_));
+    // What was done before a failure is kept: the files are finished either way.
+    let ended = each_tracked_frame(frames_in, poser, None, stop, |tracked| {
+        tally.add(&tracked);
+        if let Some(raw) = &mut raw {
+            raw.add(&tracked)?;
+        }
+        frames.push(KeptFrame::of(tracked));
+        Ok(())
+    });
+    let (ended, failure) = match ended {
+        Ok(ended) => (ended, None),
+        Err(error) => (Ended::default(), Some(error)),
+    };
+    let listed: Vec<usize> = (0..anchors.len())
+        .filter(|&anchor| !lists_found_alone || tally.lost[anchor] < tally.frames)
+        .collect();
+    if let Some(path) = &request.poses {
+        write_text(path, poses_text(&anchors, &listed, &frames).as_str())?;
+    }
+    if let (Some(path), Some(raw)) = (&request.markers, &raw) {
+        write_text(path, raw.text.as_str())?;
+    }
+    let lost = |&anchor: &usize| (anchors[anchor].name.clone(), tally.lost[anchor]);
+    if let Some(path) = &request.stats {
+        let stats = Stats {
+            source: camera.source.clone(),
+            size_px: intrinsics.size_px,
+            frames: tally.frames,
+            drawn: 0,
+            drops: ended.dropped,
+            lost: listed.iter().map(lost).collect(),
+            detector: detector_in_words(&settings),
+            technique: None,
+            adapter: None,
+            stages: tally.log.summary(),
+            total_secs: watch.elapsed_ms() * 1e-3,
+            peak_memory_mib: peak_memory_mib(),
+        };
+        write_text(
+            path,
+            &format!("{}\n", serde_json::to_string_pretty(&stats)?),
+        )?;
+    }
+    if let Some(failure) = failure {
+        return Err(failure);
+    }
+    let remarks = listed
+        .iter()
+        .map(lost)
+        .filter(|&(_, lost)| lost > 0)
+        .map(|(name, lost)| format!("\"{name}\" was not found in {lost} of them"))
+        .collect();
+    let done = if lists_found_alone {
+        format!("{} frames, {} markers found", tally.frames, listed.len())
+    } else {
+        format!("{} frames", tally.frames)
+    };
+    Ok(Report::new(
+        done,
+        remarks,
+        &anchors,
+        (&ended, &mut tally),
+        camera.mirror,
+        interrupts && stop.load(Ordering::Relaxed),
+    ))
+}
+
+/// Opens a recording or begins to open a camera, with its calibration.
+fn open(camera: &CameraSettings) -> Result<(Frames, Intrinsics)> {
+    if !is_live(&camera.source) {
+        let (source, intrinsics) = source::open(camera)?;
+        return Ok((Frames::Recorded(source), intrinsics));
+    }
+    let input = LiveInput::of(camera)?;
+    let Some(intrinsics) = input.calibration else {
+        bail!(
+            "{} carries no calibration: give one (--calibration FILE; in a scene, [camera] calibration)",
+            camera.source
+        );
+    };
+    let now = Arc::new(Stopwatch::clock());
+    let capture = LiveCapture::start(&camera.source, &input.options(false), now, None);
+    Ok((Frames::Live(capture, intrinsics), intrinsics))
+}
+
+/// What an [`Input`] comes to.
+struct Plan {
+    camera: CameraSettings,
+    settings: TrackingSettings,
+    anchors: Vec<Anchor>,
+    /// Whether anchors that no frame shows are left out: nobody named them.
+    lists_found_alone: bool,
+}
+
+impl Plan {
+    fn of(input: &Input, files: &mut JobFiles) -> Result<Self> {
+        Ok(match input {
+            Input::Scene(path) => {
+                let scene = files.reads_scene(path)?;
+                Self {
+                    camera: scene.camera,
+                    settings: scene.tracking,
+                    anchors: scene.anchors,
+                    lists_found_alone: false,
+                }
+            }
+            Input::RecordingWithScene(camera, path) => {
+                files.reads_camera(camera);
+                let scene = files.reads_scene_to_play_another(path)?;
+                Self {
+                    camera: camera.clone(),
+                    settings: scene.tracking,
+                    anchors: scene.anchors,
+                    lists_found_alone: false,
+                }
+            }
+            Input::LoneMarkers {
+                camera,
+                family,
+                size_m,
+                decimation,
+            } => {
+                files.reads_camera(camera);
+                files.reads_family(*family);
+                Self {
+                    camera: camera.clone(),
+                    settings: usual_tracking(*family, *decimation),
+                    anchors: lone_anchors(*family, *size_m),
+                    lists_found_alone: true,
+                }
+            }
+        })
+    }
+}
+
+/// An anchor for each marker of a family, by the name of its number.
+fn lone_anchors(family: Family, size_m: f64) -> Vec<Anchor> {
+    (0..family.id_count())
+        .map(|id| Anchor::lone(id.to_string(), family, id, size_m))
+        .collect()
+}
+
+/// What is kept of a frame until all anchors are known.
+struct KeptFrame {
+    index: u32,
+    time_secs: f64,
+    track_ms: Option<f64>,
+    /// By anchor, those alone that have a pose.
+    poses: BTreeMap<usize, AnchorPose>,
+}
+
+impl KeptFrame {
+    fn of(tracked: TrackedFrame) -> Self {
+        let found = tracked.poses.into_iter().enumerate();
+        Self {
+            index: tracked.frame.index,
+            time_secs: tracked.frame.time_secs,
+            track_ms: tracked.track_ms,
+            poses: found
+                .filter(|(_, pose)| pose.camera_from_anchor.is_some())
+                .collect(),
+        }
+    }
+}
+
+fn poses_text(anchors: &[Anchor], listed: &[usize], frames: &[KeptFrame]) -> PosesText {
+    let listed_anchors: Vec<Anchor> = listed.iter().map(|&k| anchors[k].clone()).collect();
+    let mut text = PosesText::new();
+    for frame in frames {
+        let poses: Vec<AnchorPose> = listed
+            .iter()
+            .map(|anchor| frame.poses.get(anchor).cloned().unwrap_or(AnchorPose::LOST))
+            .collect();
+        text.add_frame(
+            (frame.index, frame.time_secs),
+            &listed_anchors,
+            &poses,
+            (frame.track_ms, None),
+        );
+    }
+    text
+}
+
+/// A detector beside the tracker, which between its searches does not look at the whole picture.
+struct Raw {
+    detector: Detector,
+    grey: Vec<u8>,
+    text: DetectionsText,
+}
+
+impl Raw {
+    fn new(settings: &TrackingSettings, anchors: &[Anchor]) -> Result<Self> {
+        let markers = anchors.iter().flat_map(|anchor| &anchor.markers);
+        let families: Vec<Family> = markers.map(|marker| marker.family).collect();
+        Ok(Self {
+            detector: Detector::new(settings, &families)?,
+            grey: Vec::new(),
+            text: DetectionsText::new(),
+        })
+    }
+
+    fn add(&mut self, tracked: &TrackedFrame) -> Result<()> {
+        grey_from_rgba(&tracked.frame, &mut self.grey)?;
+        let detections = self.detector.detect(&self.grey, tracked.frame.size_px)?;
+        self.text.add_frame(tracked.frame.index, &detections);
+        Ok(())
+    }
+}
+
+/// Whether a path names a scene file rather than a recording.
+pub fn is_scene(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+}
