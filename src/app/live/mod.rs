@@ -1,11 +1,12 @@
 //! Live: the tabletop demo at the webcam. Capture → tracking → drawing and window, a thread each but the last, joined by
 //! mailboxes in which the newest frame alone lies.
 //!
-//! [`studio`] is all of it but the window, which knows nothing that a test could not do; `window` and what it shows are
+//! [`session`] is all of it but the window, which knows nothing that a test could not do; `window` and what it shows are
 //! the only home of egui.
 
 pub mod beginning;
 mod canvas;
+pub mod command;
 mod composite_video;
 mod demonstration;
 mod event_loop;
@@ -13,19 +14,18 @@ mod eye;
 mod false_colour;
 mod gizmo;
 mod keys;
-pub mod look;
 pub mod meters;
 mod overlays;
 pub mod panel;
 pub mod pipeline;
 mod recorders;
 mod selection;
+pub mod session;
 mod shadow_clicks;
 mod shadow_lines;
-pub mod studio;
 pub mod views;
 mod window;
-pub mod wish;
+pub mod window_state;
 
 pub use eye::{Plan, TrackedPicture};
 
@@ -43,7 +43,7 @@ use crate::render::Gpu;
 use crate::scene::CameraSettings;
 use beginning::Opening;
 use event_loop::{PassEnd, Timed};
-use studio::Studio;
+use session::LiveSession;
 use window::{Failure, Shared, Window};
 
 /// What the window opens on.
@@ -100,9 +100,9 @@ pub fn live(request: &Request, stop: &Arc<AtomicBool>) -> Result<()> {
             let state = creation.wgpu_render_state.as_ref();
             let screen = Screen::new(state.ok_or("the window does not draw with wgpu")?);
             let adapter = gpu.description().to_owned();
-            let studio = Studio::open(opening, gpu, &out, true, (clock, wake));
+            let session = LiveSession::open(opening, gpu, &out, true, (clock, wake));
             opened.store(true, Ordering::Relaxed);
-            Ok(Box::new(Window::new(studio, screen, adapter, shared)))
+            Ok(Box::new(Window::new(session, screen, adapter, shared)))
         }),
         &event_loop,
     );

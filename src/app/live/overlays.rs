@@ -3,13 +3,13 @@
 use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Shape, Stroke, Vec2};
 use glam::{DAffine3, DVec2, DVec3};
 
+use super::command::Overlay;
 use super::eye::TrackedPicture;
 use super::gizmo::{Gizmo, Handle, Target, light_place_m};
-use super::look::Look;
 use super::shadow_clicks::ShadowClicks;
 use super::shadow_lines::ShadowLines;
 use super::views::View;
-use super::wish::Overlay;
+use super::window_state::WindowState;
 use crate::app::window::fit::Fit;
 use crate::geometry::light_placing::Sight;
 use crate::scene::Scene;
@@ -38,25 +38,25 @@ pub struct Overlays<'a> {
 }
 
 impl Overlays<'_> {
-    /// Everything that `look` wants, without handles.
-    pub fn draw(&self, look: &Look, scene: Option<&Scene>, shadow_lines: &mut ShadowLines) {
-        if look.shows(Overlay::Rejected) {
+    /// Everything that `state` wants, without handles.
+    pub fn draw(&self, state: &WindowState, scene: Option<&Scene>, shadow_lines: &mut ShadowLines) {
+        if state.shows(Overlay::Rejected) {
             for quad in &self.picture.rejected {
                 self.outline(quad, Stroke::new(1.0, REJECTED));
             }
         }
-        if look.shows(Overlay::Outlines) {
+        if state.shows(Overlay::Outlines) {
             self.markers();
         }
         if let Some(scene) = scene {
-            if matches!(look.view, View::Silhouettes | View::Volumes) {
-                self.shadow_lines(scene, shadow_lines, look.view == View::Volumes);
+            if matches!(state.view, View::Silhouettes | View::Volumes) {
+                self.shadow_lines(scene, shadow_lines, state.view == View::Volumes);
             }
-            if look.shows(Overlay::Lights) {
+            if state.shows(Overlay::Lights) {
                 self.lights(scene);
             }
         }
-        if look.shows(Overlay::Axes) {
+        if state.shows(Overlay::Axes) {
             self.axes();
         }
     }

@@ -2,9 +2,9 @@
 
 use glam::{DVec2, Vec3};
 
+use super::command::Selected;
 use super::eye::TrackedPicture;
 use super::gizmo::light_place_m;
-use super::wish::Selected;
 use crate::geometry::light_placing::Sight;
 use crate::geometry::ray_caster::RayCaster;
 use crate::scene::Scene;
