@@ -102,139 +102,215 @@ fn draw_panel<B: DrawingBackend>(
     corner: [f64; 2],
     size: [f64; 2],
 ) -> Result<()> {
-    let left = match &panel.y.scale {
-        Scale::Names(names) => {
-            let widths: Result<Vec<f64>> = names
-                .iter()
-                .map(|name| canvas.text_width(name, LABEL_SIZE))
-                .collect();
-            widths?.into_iter().fold(0.0, f64::max) + 2.0 * TICK_GAP
-        }
-        _ => LEFT,
-    };
-    let frame = Taken {
-        low: [corner[0] + left, corner[1] + TOP],
-        high: [corner[0] + size[0] - RIGHT, corner[1] + size[1] - BOTTOM],
-    };
-    let points = || panel.series.iter().flat_map(|series| &series.points);
-    let ruled = |upright: bool| {
-        let rules = panel.rules.iter();
-        rules
-            .filter(move |rule| rule.upright == upright)
-            .map(|rule| rule.at)
-    };
-    let x = Ruler::new(
-        &panel.x,
-        points().map(|point| point.at[0]).chain(ruled(true)),
-    );
-    let y = Ruler::new(
-        &panel.y,
-        points().map(|point| point.at[1]).chain(ruled(false)),
-    );
-    let downwards = matches!(panel.y.scale, Scale::Names(_));
-    let place = |at: [f64; 2]| {
-        let up = if downwards {
-            1.0 - y.share(at[1])
-        } else {
-            y.share(at[1])
+    let plot = Plot::new(canvas, panel, corner, size)?;
+    plot.ticks(canvas)?;
+    plot.axes(canvas)?;
+    let points = panel.series.iter().flat_map(|series| &series.points);
+    let mut taken: Vec<Taken> = points
+        .map(|point| beside_mark(plot.place(point.at)))
+        .collect();
+    plot.rules(canvas, &mut taken)?;
+    plot.front(canvas, &mut taken)?;
+    plot.series(canvas)?;
+    plot.labels(canvas, &mut taken)
+}
+
+/// A panel in its place in the picture.
+struct Plot<'a> {
+    panel: &'a Panel,
+    corner: [f64; 2],
+    size: [f64; 2],
+    /// Between the axes.
+    frame: Taken,
+    x: Ruler,
+    y: Ruler,
+    /// Whether names are listed from the top.
+    downwards: bool,
+}
+
+impl<'a> Plot<'a> {
+    fn new<B: DrawingBackend>(
+        canvas: &Canvas<'_, B>,
+        panel: &'a Panel,
+        corner: [f64; 2],
+        size: [f64; 2],
+    ) -> Result<Self> {
+        let left = match &panel.y.scale {
+            Scale::Names(names) => {
+                let widths: Result<Vec<f64>> = names
+                    .iter()
+                    .map(|name| canvas.text_width(name, LABEL_SIZE))
+                    .collect();
+                widths?.into_iter().fold(0.0, f64::max) + 2.0 * TICK_GAP
+            }
+            _ => LEFT,
+        };
+        let points = || panel.series.iter().flat_map(|series| &series.points);
+        let ruled = |upright: bool| {
+            let rules = panel.rules.iter();
+            rules
+                .filter(move |rule| rule.upright == upright)
+                .map(|rule| rule.at)
+        };
+        Ok(Self {
+            panel,
+            corner,
+            size,
+            frame: Taken {
+                low: [corner[0] + left, corner[1] + TOP],
+                high: [corner[0] + size[0] - RIGHT, corner[1] + size[1] - BOTTOM],
+            },
+            x: Ruler::new(
+                &panel.x,
+                points().map(|point| point.at[0]).chain(ruled(true)),
+            ),
+            y: Ruler::new(
+                &panel.y,
+                points().map(|point| point.at[1]).chain(ruled(false)),
+            ),
+            downwards: matches!(panel.y.scale, Scale::Names(_)),
+        })
+    }
+
+    /// Where a pair of values lies in the picture.
+    fn place(&self, at: [f64; 2]) -> [f64; 2] {
+        let Taken { low, high } = self.frame;
+        let up = match self.downwards {
+            true => 1.0 - self.y.share(at[1]),
+            false => self.y.share(at[1]),
         };
         [
-            frame.low[0] + x.share(at[0]) * (frame.high[0] - frame.low[0]),
-            frame.high[1] - up * (frame.high[1] - frame.low[1]),
+            low[0] + self.x.share(at[0]) * (high[0] - low[0]),
+            high[1] - up * (high[1] - low[1]),
         ]
-    };
+    }
 
-    let mut free_from = f64::NEG_INFINITY;
-    for (value, name) in x.ticks() {
-        let [at, _] = place([value, 0.0]);
-        canvas.line(&[[at, frame.low[1]], [at, frame.high[1]]], FAINT, 0.8)?;
-        let half = canvas.text_width(&name, LABEL_SIZE)? / 2.0;
-        if at - half < free_from {
-            continue;
+    fn ticks<B: DrawingBackend>(&self, canvas: &Canvas<'_, B>) -> Result<()> {
+        let frame = &self.frame;
+        let mut free_from = f64::NEG_INFINITY;
+        for (value, name) in self.x.ticks() {
+            let [at, _] = self.place([value, 0.0]);
+            canvas.line(&[[at, frame.low[1]], [at, frame.high[1]]], FAINT, 0.8)?;
+            let half = canvas.text_width(&name, LABEL_SIZE)? / 2.0;
+            if at - half < free_from {
+                continue;
+            }
+            free_from = at + half + TICK_GAP;
+            let below = [at, frame.high[1] + TICK_GAP + 6.0];
+            canvas.text(&name, below, LABEL_SIZE, INK, Anchor::Middle)?;
         }
-        free_from = at + half + TICK_GAP;
-        let below = [at, frame.high[1] + TICK_GAP + 6.0];
-        canvas.text(&name, below, LABEL_SIZE, INK, Anchor::Middle)?;
-    }
-    for (value, name) in y.ticks() {
-        let at = place([f64::NAN, value])[1];
-        canvas.line(&[[frame.low[0], at], [frame.high[0], at]], FAINT, 0.8)?;
-        let beside = [frame.low[0] - TICK_GAP, at];
-        canvas.text(&name, beside, LABEL_SIZE, INK, Anchor::End)?;
-    }
-    let Taken { low, high } = frame;
-    let axes = [low, [low[0], high[1]], high];
-    canvas.line(&axes, INK, 1.2)?;
-    let title = [low[0], corner[1] + 17.0];
-    canvas.text(&panel.title, title, TEXT_SIZE, INK, Anchor::Start)?;
-    let below = [(low[0] + high[0]) / 2.0, corner[1] + size[1] - 16.0];
-    canvas.text(&panel.x.label, below, TEXT_SIZE, INK, Anchor::Middle)?;
-    if !downwards {
-        let beside = [corner[0] + 14.0, (low[1] + high[1]) / 2.0];
-        canvas.upright_text(&panel.y.label, beside, TEXT_SIZE)?;
+        for (value, name) in self.y.ticks() {
+            let at = self.place([f64::NAN, value])[1];
+            canvas.line(&[[frame.low[0], at], [frame.high[0], at]], FAINT, 0.8)?;
+            let beside = [frame.low[0] - TICK_GAP, at];
+            canvas.text(&name, beside, LABEL_SIZE, INK, Anchor::End)?;
+        }
+        Ok(())
     }
 
-    let mut taken: Vec<Taken> = points().map(|point| beside_mark(place(point.at))).collect();
-    for rule in &panel.rules {
-        let width = canvas.text_width(&rule.label, LABEL_SIZE)?;
-        let middles = if rule.upright {
-            let [at, _] = place([rule.at, 0.0]);
-            canvas.dashed(&[[at, low[1]], [at, high[1]]], GREY, 1.4, &[6.0, 4.0])?;
-            taken.push(along([at, low[1]], [at, high[1]]));
-            let across = width / 2.0 + 6.0;
-            let ends = [high[1] - 12.0, low[1] + 12.0];
-            ends.map(|y| [[at + across, y], [at - across, y]])
-        } else {
-            let at = place([f64::NAN, rule.at])[1];
-            canvas.dashed(&[[low[0], at], [high[0], at]], GREY, 1.4, &[6.0, 4.0])?;
-            taken.push(along([low[0], at], [high[0], at]));
-            let ends = [high[0] - width / 2.0 - 6.0, low[0] + width / 2.0 + 6.0];
-            ends.map(|x| [[x, at - 11.0], [x, at + 11.0]])
-        };
-        let spots = middles.into_iter().flatten();
-        let spot = least_covered(spots.map(|at| around(at, width)), &frame, &taken);
-        canvas.text(&rule.label, spot.middle(), LABEL_SIZE, GREY, Anchor::Middle)?;
-        taken.push(spot);
+    /// The axes with their labels, and the title.
+    fn axes<B: DrawingBackend>(&self, canvas: &Canvas<'_, B>) -> Result<()> {
+        let (panel, corner, size) = (self.panel, self.corner, self.size);
+        let Taken { low, high } = self.frame;
+        let axes = [low, [low[0], high[1]], high];
+        canvas.line(&axes, INK, 1.2)?;
+        let title = [low[0], corner[1] + 17.0];
+        canvas.text(&panel.title, title, TEXT_SIZE, INK, Anchor::Start)?;
+        let below = [(low[0] + high[0]) / 2.0, corner[1] + size[1] - 16.0];
+        canvas.text(&panel.x.label, below, TEXT_SIZE, INK, Anchor::Middle)?;
+        if !self.downwards {
+            let beside = [corner[0] + 14.0, (low[1] + high[1]) / 2.0];
+            canvas.upright_text(&panel.y.label, beside, TEXT_SIZE)?;
+        }
+        Ok(())
     }
-    if let (Some(first), Some(last)) = (panel.front.first(), panel.front.last()) {
+
+    fn rules<B: DrawingBackend>(
+        &self,
+        canvas: &Canvas<'_, B>,
+        taken: &mut Vec<Taken>,
+    ) -> Result<()> {
+        let Taken { low, high } = self.frame;
+        for rule in &self.panel.rules {
+            let width = canvas.text_width(&rule.label, LABEL_SIZE)?;
+            let middles = if rule.upright {
+                let [at, _] = self.place([rule.at, 0.0]);
+                canvas.dashed(&[[at, low[1]], [at, high[1]]], GREY, 1.4, &[6.0, 4.0])?;
+                taken.push(along([at, low[1]], [at, high[1]]));
+                let across = width / 2.0 + 6.0;
+                let ends = [high[1] - 12.0, low[1] + 12.0];
+                ends.map(|y| [[at + across, y], [at - across, y]])
+            } else {
+                let at = self.place([f64::NAN, rule.at])[1];
+                canvas.dashed(&[[low[0], at], [high[0], at]], GREY, 1.4, &[6.0, 4.0])?;
+                taken.push(along([low[0], at], [high[0], at]));
+                let ends = [high[0] - width / 2.0 - 6.0, low[0] + width / 2.0 + 6.0];
+                ends.map(|x| [[x, at - 11.0], [x, at + 11.0]])
+            };
+            let spots = middles.into_iter().flatten();
+            let spot = least_covered(spots.map(|at| around(at, width)), &self.frame, taken);
+            canvas.text(&rule.label, spot.middle(), LABEL_SIZE, GREY, Anchor::Middle)?;
+            taken.push(spot);
+        }
+        Ok(())
+    }
+
+    fn front<B: DrawingBackend>(
+        &self,
+        canvas: &Canvas<'_, B>,
+        taken: &mut Vec<Taken>,
+    ) -> Result<()> {
+        let front = &self.panel.front;
+        let (Some(first), Some(last)) = (front.first(), front.last()) else {
+            return Ok(());
+        };
+        let Taken { low, high } = self.frame;
         // Between two of its points nothing is known to be better than the dearer one's time at the other's error.
-        let mut steps = vec![[place(*first)[0], low[1]]];
-        for &point in &panel.front {
-            let [at_x, at_y] = place(point);
+        let mut steps = vec![[self.place(*first)[0], low[1]]];
+        for &point in front {
+            let [at_x, at_y] = self.place(point);
             steps.extend(steps.last().map(|&[_, before]| [at_x, before]));
             steps.push([at_x, at_y]);
         }
-        steps.push([high[0], place(*last)[1]]);
+        steps.push([high[0], self.place(*last)[1]]);
         canvas.line(&steps, GREY, 1.2)?;
         taken.extend(steps.windows(2).map(|ends| along(ends[0], ends[1])));
+        Ok(())
     }
-    for series in &panel.series {
-        let look = LOOKS[series.look % LOOKS.len()];
-        let places: Vec<[f64; 2]> = series.points.iter().map(|point| place(point.at)).collect();
-        if series.joined {
-            canvas.dashed(&places, look.0, 2.0, look.2)?;
+
+    fn series<B: DrawingBackend>(&self, canvas: &Canvas<'_, B>) -> Result<()> {
+        for series in &self.panel.series {
+            let look = LOOKS[series.look % LOOKS.len()];
+            let points = series.points.iter();
+            let places: Vec<[f64; 2]> = points.map(|point| self.place(point.at)).collect();
+            if series.joined {
+                canvas.dashed(&places, look.0, 2.0, look.2)?;
+            }
+            for &at in &places {
+                canvas.mark(at, look)?;
+            }
         }
-        for &at in &places {
-            canvas.mark(at, look)?;
-        }
+        Ok(())
     }
-    for series in &panel.series {
-        let look = LOOKS[series.look % LOOKS.len()];
-        for point in series.points.iter().filter(|point| !point.label.is_empty()) {
-            let width = canvas.text_width(&point.label, LABEL_SIZE)?;
-            let own = place(point.at);
-            let spot = free_spot(own, width, &frame, &taken);
-            canvas.text(
-                &point.label,
-                spot.middle(),
-                LABEL_SIZE,
-                look.0,
-                Anchor::Middle,
-            )?;
-            taken.push(spot);
+
+    fn labels<B: DrawingBackend>(
+        &self,
+        canvas: &Canvas<'_, B>,
+        taken: &mut Vec<Taken>,
+    ) -> Result<()> {
+        for series in &self.panel.series {
+            let color = LOOKS[series.look % LOOKS.len()].0;
+            for point in series.points.iter().filter(|point| !point.label.is_empty()) {
+                let width = canvas.text_width(&point.label, LABEL_SIZE)?;
+                let own = self.place(point.at);
+                let spot = free_spot(own, width, &self.frame, taken);
+                let middle = spot.middle();
+                canvas.text(&point.label, middle, LABEL_SIZE, color, Anchor::Middle)?;
+                taken.push(spot);
+            }
         }
+        Ok(())
     }
-    Ok(())
 }
 
 const LABEL_HEIGHT: f64 = 14.0;

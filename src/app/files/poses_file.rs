@@ -151,30 +151,14 @@ impl GivenPoses {
                     fields[frame]
                 )
             })?;
-            let name = fields[anchor];
-            let Some(anchor) = anchors.iter().position(|anchor| anchor.name == name) else {
-                let known: Vec<_> = anchors.iter().map(|anchor| anchor.name.as_str()).collect();
-                bail!(
-                    "line {line}: the scene has no anchor \"{name}\"; it has {}",
-                    known.join(", ")
-                );
-            };
+            let anchor = place_of(fields[anchor], anchors, line)?;
             let poses = by_frame
                 .entry(index)
                 .or_insert_with(|| vec![lost(); anchors.len()]);
             if pose.iter().all(|&column| fields[column].is_empty()) {
                 continue;
             }
-            let mut numbers = [0.0; 6];
-            for (number, &column) in numbers.iter_mut().zip(&pose) {
-                *number = fields[column]
-                    .parse()
-                    .ok()
-                    .filter(|number: &f64| number.is_finite())
-                    .with_context(|| {
-                        format!("line {line}: \"{}\" is not a finite number", fields[column])
-                    })?;
-            }
+            let numbers = finite_numbers(pose.map(|column| fields[column]), line)?;
             let [tx, ty, tz, rx, ry, rz] = numbers;
             let camera_from_anchor: DAffine3 =
                 pose_from_rodrigues(DVec3::new(tx, ty, tz), DVec3::new(rx, ry, rz));
@@ -205,6 +189,30 @@ impl GivenPoses {
             .cloned()
             .unwrap_or_else(|| vec![lost(); self.anchor_count])
     }
+}
+
+/// Which anchor of the scene a line speaks of.
+fn place_of(name: &str, anchors: &[Anchor], line: usize) -> Result<usize> {
+    let place = anchors.iter().position(|anchor| anchor.name == name);
+    place.with_context(|| {
+        let known: Vec<_> = anchors.iter().map(|anchor| anchor.name.as_str()).collect();
+        format!(
+            "line {line}: the scene has no anchor \"{name}\"; it has {}",
+            known.join(", ")
+        )
+    })
+}
+
+fn finite_numbers(fields: [&str; 6], line: usize) -> Result<[f64; 6]> {
+    let mut numbers = [0.0; 6];
+    for (number, field) in numbers.iter_mut().zip(fields) {
+        *number = field
+            .parse()
+            .ok()
+            .filter(|number: &f64| number.is_finite())
+            .with_context(|| format!("line {line}: \"{field}\" is not a finite number"))?;
+    }
+    Ok(numbers)
 }
 
 fn lost() -> AnchorPose {

@@ -75,101 +75,144 @@ pub fn track(request: &Request, stop: &AtomicBool) -> Result<Report> {
         bail!("nothing to do: give --poses, --markers or --stats");
     }
     let mut files = JobFiles::new(request.replacing);
-    let Plan {
-        camera,
-        settings,
-        anchors,
-        lists_found_alone,
-    } = Plan::of(&request.input, &mut files)?;
-    for (option, path, kind) in [
-        ("--poses", &request.poses, ResultKind::Poses),
-        ("--markers", &request.markers, ResultKind::Detections),
-        ("--stats", &request.stats, ResultKind::Stats),
-    ] {
-        if let Some(path) = path {
-            files.writes(option, path, kind);
-        }
-    }
+    let plan = Plan::of(&request.input, &mut files)?;
+    request.name_results(&mut files);
     files.check()?;
-    let (frames_in, intrinsics) = open(&camera)?;
+    let (frames_in, intrinsics) = open(&plan.camera)?;
     let poser = Poser::Tracker(
-        Box::new(Tracker::new(&settings, &anchors, intrinsics)?),
-        MirrorWatch::new(&settings, &anchors),
+        Box::new(Tracker::new(&plan.settings, &plan.anchors, intrinsics)?),
+        MirrorWatch::new(&plan.settings, &plan.anchors),
     );
-    let mut raw = request
+    let raw = request
         .markers
         .as_ref()
-        .map(|_| Raw::new(&settings, &anchors))
+        .map(|_| Raw::new(&plan.settings, &plan.anchors))
         .transpose()?;
-    let mut frames = Vec::new();
-    let mut tally = Tally::new(anchors.len());
+    let mut run = Run {
+        request,
+        tally: Tally::new(plan.anchors.len()),
+        plan,
+        intrinsics,
+        raw,
+        frames: Vec::new(),
+    };
     // A camera is tracked until somebody says stop.
     let interrupts = matches!(frames_in, Frames::Recorded(_));
     // What was done before a failure is kept: the files are finished either way.
-    let ended = each_tracked_frame(frames_in, poser, None, stop, |tracked| {
-        tally.add(&tracked);
-        if let Some(raw) = &mut raw {
-            raw.add(&tracked)?;
-        }
-        frames.push(KeptFrame::of(tracked));
-        Ok(())
-    });
+    let ended = each_tracked_frame(frames_in, poser, None, stop, |tracked| run.add(tracked));
     let (ended, failure) = match ended {
         Ok(ended) => (ended, None),
         Err(error) => (Ended::default(), Some(error)),
     };
-    let listed: Vec<usize> = (0..anchors.len())
-        .filter(|&anchor| !lists_found_alone || tally.lost[anchor] < tally.frames)
-        .collect();
-    if let Some(path) = &request.poses {
-        write_text(path, poses_text(&anchors, &listed, &frames).as_str())?;
-    }
-    if let (Some(path), Some(raw)) = (&request.markers, &raw) {
-        write_text(path, raw.text.as_str())?;
-    }
-    let lost = |&anchor: &usize| (anchors[anchor].name.clone(), tally.lost[anchor]);
-    if let Some(path) = &request.stats {
-        let stats = Stats {
-            source: camera.source.clone(),
-            size_px: intrinsics.size_px,
-            frames: tally.frames,
-            drawn: 0,
-            drops: ended.dropped,
-            lost: listed.iter().map(lost).collect(),
-            detector: detector_in_words(&settings),
-            technique: None,
-            adapter: None,
-            stages: tally.log.summary(),
-            total_secs: watch.elapsed_ms() * 1e-3,
-            peak_memory_mib: peak_memory_mib(),
-        };
-        write_text(
-            path,
-            &format!("{}\n", serde_json::to_string_pretty(&stats)?),
-        )?;
-    }
+    run.write(ended.dropped, &watch)?;
     if let Some(failure) = failure {
         return Err(failure);
     }
-    let remarks = listed
-        .iter()
-        .map(lost)
-        .filter(|&(_, lost)| lost > 0)
-        .map(|(name, lost)| format!("\"{name}\" was not found in {lost} of them"))
-        .collect();
-    let done = if lists_found_alone {
-        format!("{} frames, {} markers found", tally.frames, listed.len())
-    } else {
-        format!("{} frames", tally.frames)
-    };
-    Ok(Report::new(
-        done,
-        remarks,
-        &anchors,
-        (&ended, &mut tally),
-        camera.mirror,
-        interrupts && stop.load(Ordering::Relaxed),
-    ))
+    Ok(run.report(&ended, interrupts && stop.load(Ordering::Relaxed)))
+}
+
+impl Request {
+    fn name_results(&self, files: &mut JobFiles) {
+        for (option, path, kind) in [
+            ("--poses", &self.poses, ResultKind::Poses),
+            ("--markers", &self.markers, ResultKind::Detections),
+            ("--stats", &self.stats, ResultKind::Stats),
+        ] {
+            if let Some(path) = path {
+                files.writes(option, path, kind);
+            }
+        }
+    }
+}
+
+/// The state of the job as it goes.
+struct Run<'a> {
+    request: &'a Request,
+    plan: Plan,
+    intrinsics: Intrinsics,
+    /// `None` where nobody asks what the detector sees.
+    raw: Option<Raw>,
+    frames: Vec<KeptFrame>,
+    tally: Tally,
+}
+
+impl Run<'_> {
+    fn add(&mut self, tracked: TrackedFrame) -> Result<()> {
+        self.tally.add(&tracked);
+        if let Some(raw) = &mut self.raw {
+            raw.add(&tracked)?;
+        }
+        self.frames.push(KeptFrame::of(tracked));
+        Ok(())
+    }
+
+    /// The anchors that are written and told of.
+    fn listed(&self) -> Vec<usize> {
+        (0..self.plan.anchors.len())
+            .filter(|&anchor| {
+                !self.plan.lists_found_alone || self.tally.lost[anchor] < self.tally.frames
+            })
+            .collect()
+    }
+
+    /// An anchor's name, and the frames without a pose of it.
+    fn lost(&self, anchor: usize) -> (String, u32) {
+        (
+            self.plan.anchors[anchor].name.clone(),
+            self.tally.lost[anchor],
+        )
+    }
+
+    fn write(&self, drops: u32, watch: &Stopwatch) -> Result<()> {
+        let listed = self.listed();
+        if let Some(path) = &self.request.poses {
+            let text = poses_text(&self.plan.anchors, &listed, &self.frames);
+            write_text(path, text.as_str())?;
+        }
+        if let (Some(path), Some(raw)) = (&self.request.markers, &self.raw) {
+            write_text(path, raw.text.as_str())?;
+        }
+        if let Some(path) = &self.request.stats {
+            let stats = Stats {
+                source: self.plan.camera.source.clone(),
+                size_px: self.intrinsics.size_px,
+                frames: self.tally.frames,
+                drawn: 0,
+                drops,
+                lost: listed.iter().map(|&anchor| self.lost(anchor)).collect(),
+                detector: detector_in_words(&self.plan.settings),
+                technique: None,
+                adapter: None,
+                stages: self.tally.log.summary(),
+                total_secs: watch.elapsed_ms() * 1e-3,
+                peak_memory_mib: peak_memory_mib(),
+            };
+            write_text(path, &stats.text()?)?;
+        }
+        Ok(())
+    }
+
+    fn report(mut self, ended: &Ended, interrupted: bool) -> Report {
+        let listed = self.listed();
+        let lost = listed.iter().map(|&anchor| self.lost(anchor));
+        let remarks = lost
+            .filter(|&(_, lost)| lost > 0)
+            .map(|(name, lost)| format!("\"{name}\" was not found in {lost} of them"))
+            .collect();
+        let frames = self.tally.frames;
+        let done = match self.plan.lists_found_alone {
+            true => format!("{frames} frames, {} markers found", listed.len()),
+            false => format!("{frames} frames"),
+        };
+        Report::new(
+            done,
+            remarks,
+            &self.plan.anchors,
+            (ended, &mut self.tally),
+            self.plan.camera.mirror,
+            interrupted,
+        )
+    }
 }
 
 /// Opens a recording or begins to open a camera, with its calibration.

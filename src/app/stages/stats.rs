@@ -86,6 +86,16 @@ pub struct Stats {
     pub peak_memory_mib: Option<f64>,
 }
 
+impl Stats {
+    /// The file's text: JSON, for people too.
+    ///
+    /// # Errors
+    /// None, with numbers as these are.
+    pub fn text(&self) -> serde_json::Result<String> {
+        Ok(serde_json::to_string_pretty(self)? + "\n")
+    }
+}
+
 /// The detector of `--stats`.
 pub fn detector_in_words(tracking: &TrackingSettings) -> String {
     match tracking.detector {

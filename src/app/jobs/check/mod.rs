@@ -79,20 +79,29 @@ pub fn summary(scene: &Scene) -> String {
     {
         line(&mut text, label, &told);
     }
+    shadow_lines(&mut text, scene);
+    for warning in warnings(scene) {
+        text.push_str(&warning_line(&warning));
+    }
+    text
+}
+
+/// How shadows are made, and by which settings.
+fn shadow_lines(text: &mut String, scene: &Scene) {
     let (technique, reason) = scene.chosen_technique();
     line(
-        &mut text,
+        text,
         "technique",
         &format!("{}: {reason}", technique.name()),
     );
     if let Some(quality) = scene.shadows.quality {
-        line(&mut text, "quality", &quality_row(quality, &scene.shadows));
+        line(text, "quality", &quality_row(quality, &scene.shadows));
     }
     if let Some(budget) = budget_line(scene) {
-        line(&mut text, "budget", &budget);
+        line(text, "budget", &budget);
     }
     line(
-        &mut text,
+        text,
         "samples",
         &format!("{} per pixel", scene.shadows.samples),
     );
@@ -100,11 +109,7 @@ pub fn summary(scene: &Scene) -> String {
         0.0 => "all triangles at any distance".to_owned(),
         error_px => format!("silhouettes within {} px", short(error_px)),
     };
-    line(&mut text, "detail", &detail);
-    for warning in warnings(scene) {
-        text.push_str(&warning_line(&warning));
-    }
-    text
+    line(text, "detail", &detail);
 }
 
 /// A quality, and what the scene sets otherwise.

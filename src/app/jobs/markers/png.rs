@@ -6,6 +6,7 @@ use opencv::core::{Mat, Point, Scalar};
 use opencv::imgproc;
 
 use super::page::{Page, Rect, Text};
+use crate::app::files::picture_files::srgb_level;
 
 const MM_PER_INCH: f64 = 25.4;
 const FONT: i32 = imgproc::FONT_HERSHEY_SIMPLEX;
@@ -51,7 +52,10 @@ fn shapes(page: &Page, pixels_per_mm: f64) -> ([u32; 2], Vec<u8>) {
             add(&mut black, width, hole, pixels_per_mm, -1.0);
         }
     }
-    let levels = black.into_iter().map(|black| srgb(1.0 - black)).collect();
+    let levels = black
+        .into_iter()
+        .map(|black| srgb_level(1.0 - black))
+        .collect();
     (size_px, levels)
 }
 
@@ -74,17 +78,6 @@ fn add(black: &mut [f32], width: usize, rect: &Rect, pixels_per_mm: f64, sign: f
             black[y * width + x] += share * covered(x, left, right);
         }
     }
-}
-
-/// The level of a part of white paper's light.
-fn srgb(linear: f32) -> u8 {
-    let linear = linear.clamp(0.0, 1.0);
-    let encoded = if linear <= 0.003_130_8 {
-        12.92 * linear
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
-    };
-    (255.0 * encoded).round() as u8
 }
 
 fn letter(

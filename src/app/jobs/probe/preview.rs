@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
 
+use crate::app::files::picture_files::srgb_level;
 use crate::light::brightest::BrightLight;
 use crate::light::probe::Probe;
 
@@ -57,16 +58,6 @@ fn in_ring(light: &BrightLight, direction: DVec3) -> bool {
         .acos();
     let beyond = direction.angle_between(light.direction) - half - GAP;
     (0.0..RING).contains(&beyond)
-}
-
-fn srgb_level(linear: f32) -> u8 {
-    let linear = linear.clamp(0.0, 1.0);
-    let encoded = if linear <= 0.003_130_8 {
-        12.92 * linear
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
-    };
-    (255.0 * encoded).round() as u8
 }
 
 #[cfg(test)]

@@ -82,16 +82,7 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
     request.name_files(&mut files)?;
     files.check()?;
     let (source, intrinsics) = source::open(&scene.camera)?;
-    if !request.layers.is_empty() {
-        match &request.out {
-            Some(out) if Codec::of_path(out).is_some() => bail!(
-                "--layers writes PNGs beside the pictures: give --out a folder, not {}",
-                out.display()
-            ),
-            Some(_) => {}
-            None => bail!("--layers writes PNGs beside the pictures: give --out a folder for them"),
-        }
-    }
+    request.check_layers()?;
     let poser = match &request.poses_from {
         Some(path) => Poser::Given(GivenPoses::read(path, &scene.anchors)?),
         None => Poser::Tracker(
@@ -134,8 +125,7 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
     }
     if let Some(path) = &request.stats {
         let stats = run.stats(size_px, ended.dropped, adapter, watch.elapsed_ms() * 1e-3);
-        let text = serde_json::to_string_pretty(&stats)?;
-        write_text(path, &format!("{text}\n"))?;
+        write_text(path, &stats.text()?)?;
     }
     if let Some(failure) = failure {
         return Err(failure);
@@ -162,6 +152,23 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
 }
 
 impl Request {
+    /// Layers lie beside PNGs alone.
+    fn check_layers(&self) -> Result<()> {
+        if !self.layers.is_empty() {
+            match &self.out {
+                Some(out) if Codec::of_path(out).is_some() => bail!(
+                    "--layers writes PNGs beside the pictures: give --out a folder, not {}",
+                    out.display()
+                ),
+                Some(_) => {}
+                None => {
+                    bail!("--layers writes PNGs beside the pictures: give --out a folder for them")
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// What is read besides the scene, and what is written.
     fn name_files(&self, files: &mut JobFiles) -> Result<()> {
         if let Some(path) = &self.poses_from {
