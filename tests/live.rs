@@ -20,13 +20,13 @@ use gnomon::app::authoring::Edit;
 use gnomon::app::input::live_capture::Tapped;
 use gnomon::app::input::live_input::LiveInput;
 use gnomon::app::input::mailbox::Taken;
-use gnomon::app::live::Plan;
+use gnomon::app::live::TrackingPlan;
 use gnomon::app::live::beginning::Opening;
 use gnomon::app::live::command::{Clicks, RecordingCommand, SceneCommand};
 use gnomon::app::live::meters::Sample;
-use gnomon::app::live::pipeline::{Input, Pipeline};
+use gnomon::app::live::pipeline::{Pipeline, PipelineInput};
 use gnomon::app::live::session::LiveSession;
-use gnomon::app::live::views::View;
+use gnomon::app::live::views::ViewMode;
 use gnomon::app::live::window_state::WindowState;
 use gnomon::app::stopwatch::Stopwatch;
 use gnomon::app::window::Wake;
@@ -133,11 +133,11 @@ fn a_slow_window_gets_the_newest_frame_and_nothing_queues() {
     };
     let input = LiveInput::of(&camera).unwrap();
     let scene = Scene::load(&project_file("config/lamp.toml")).unwrap();
-    let plan = Plan::Follow {
+    let plan = TrackingPlan::Follow {
         settings: scene.tracking,
         anchors: scene.anchors.into(),
     };
-    let pipeline_input = Input {
+    let pipeline_input = PipelineInput {
         source: camera.source,
         options: input.options(false),
         calibration: input.calibration,
@@ -530,13 +530,16 @@ fn every_view_shows_something_else_and_leads_back() {
     run_until(&mut session, &state, "the end", has_ended);
     step(&mut session, &state);
     let composite = shown(&session);
-    let mut pictures: Vec<(View, Vec<u8>)> = Vec::new();
-    for (name, view) in View::BY_NAME {
+    let mut pictures: Vec<(ViewMode, Vec<u8>)> = Vec::new();
+    for (name, view) in ViewMode::BY_NAME {
         state.view = view;
         step(&mut session, &state);
         let picture = shown(&session);
         // Lines over the composite are the window's.
-        let is_composite = matches!(view, View::Composite | View::Silhouettes | View::Volumes);
+        let is_composite = matches!(
+            view,
+            ViewMode::Composite | ViewMode::Silhouettes | ViewMode::Volumes
+        );
         assert_eq!(picture == composite, is_composite, "{name}");
         if !is_composite {
             for (other, before) in &pictures {
@@ -545,7 +548,7 @@ fn every_view_shows_something_else_and_leads_back() {
             pictures.push((view, picture));
         }
     }
-    state.view = View::Composite;
+    state.view = ViewMode::Composite;
     step(&mut session, &state);
     assert!(shown(&session) == composite, "back again");
 }

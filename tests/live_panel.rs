@@ -9,7 +9,7 @@ use gnomon::app::live::command::{
 };
 use gnomon::app::live::meters::Meters;
 use gnomon::app::live::panel::{Facts, Panel};
-use gnomon::app::live::views::View;
+use gnomon::app::live::views::ViewMode;
 use gnomon::app::live::window_state::WindowState;
 use gnomon::light::Light;
 use gnomon::scene::{Placement, Scene, Shortcut};
@@ -134,7 +134,7 @@ fn views_and_overlays_are_behind_their_heading() {
     assert_eq!(clicked(&mut harness, "View"), []);
     assert_eq!(
         clicked(&mut harness, "depth"),
-        [LiveCommand::Window(WindowCommand::Show(View::Depth))]
+        [LiveCommand::Window(WindowCommand::Show(ViewMode::Depth))]
     );
     assert_eq!(
         clicked(&mut harness, "composite"),
@@ -217,7 +217,7 @@ fn shortcuts_are_switched_where_volumes_are_looked_at() {
     let mut harness = desk(Some(lamp()), None);
     _ = clicked(&mut harness, "View");
     assert!(harness.query_by_label("scissors").is_none());
-    harness.state_mut().state.view = View::Volumes;
+    harness.state_mut().state.view = ViewMode::Volumes;
     harness.run();
     assert_eq!(
         clicked(&mut harness, "scissors"),

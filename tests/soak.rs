@@ -12,7 +12,7 @@ use std::time::Instant;
 use gnomon::app::live::beginning::Opening;
 use gnomon::app::live::command::SceneCommand;
 use gnomon::app::live::session::LiveSession;
-use gnomon::app::live::views::View;
+use gnomon::app::live::views::ViewMode;
 use gnomon::app::live::window_state::WindowState;
 use gnomon::app::stopwatch::Stopwatch;
 use gnomon::render::Gpu;
@@ -55,10 +55,10 @@ fn an_hour_of_frames_leaves_memory_as_it_was() {
     for _ in 0..WARM_UP {
         session.edit_scene(SceneCommand::EndPreview, &state);
         for view in [
-            View::StencilCount,
-            View::Gain,
-            View::Phantoms,
-            View::Composite,
+            ViewMode::StencilCount,
+            ViewMode::Gain,
+            ViewMode::Phantoms,
+            ViewMode::Composite,
         ] {
             state.view = view;
             show_one(&mut session, &state);
@@ -71,10 +71,10 @@ fn an_hour_of_frames_leaves_memory_as_it_was() {
     for shown in 1..=wanted {
         // Now and then another view for a while, or the scene made anew.
         state.view = match shown % (5 * round) {
-            0..20 => View::StencilCount,
-            20..40 => View::Gain,
-            40..60 => View::Phantoms,
-            _ => View::Composite,
+            0..20 => ViewMode::StencilCount,
+            20..40 => ViewMode::Gain,
+            40..60 => ViewMode::Phantoms,
+            _ => ViewMode::Composite,
         };
         if shown % (5 * round) == 100 {
             session.edit_scene(SceneCommand::EndPreview, &state);

@@ -11,7 +11,7 @@ use common::shapes;
 use common::{Stage, Thing, lamp, linear_of_level, look_at, sun};
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use gnomon::app::truth::FACES_AWAY;
-use gnomon::app::truth::ray_cast::{Exact, GRAZES, Surface, View, World, pixels};
+use gnomon::app::truth::ray_cast::{Exact, GRAZES, SeenSurface, View, World, pixels};
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::light::{Light, irradiance};
 use gnomon::render::{REAL, REAL_HIDES, VIRTUAL_HIDES};
@@ -282,7 +282,7 @@ fn hold_smooth_sphere(
     let of_sphere = soup.triangles.len();
     let others = World::new(stage.world.triangles[of_sphere..].to_vec());
     // Radiance of a place on the sphere.
-    let radiance = |seen: &Surface| -> f64 {
+    let radiance = |seen: &SeenSurface| -> f64 {
         let corners = soup.triangles[seen.triangle].map(|index| index as usize);
         let [a, b, c] = stage.world.triangles[seen.triangle].corners;
         let across = (b - a).cross(c - a);
@@ -302,7 +302,7 @@ fn hold_smooth_sphere(
     let (mut held, mut backs, mut shaded, mut wrong, mut worst) = (0, 0, 0, 0, 0.0_f64);
     for (index, center) in pixels(view.intrinsics.size_px) {
         // All that a pixel's samples may be is between the least and the most within it.
-        let within: Option<Vec<Surface>> = (0..25)
+        let within: Option<Vec<SeenSurface>> = (0..25)
             .map(|step| {
                 let offset = DVec2::new(f64::from(step % 5) - 2.0, f64::from(step / 5) - 2.0);
                 let seen = stage.world.look(view, center + offset * 0.25);

@@ -14,7 +14,7 @@
 
 use glam::{DAffine3, DVec2, DVec3};
 use gnomon::app::truth::FACES_AWAY;
-use gnomon::app::truth::ray_cast::{Exact, GRAZES, Surface, View, World, pixels};
+use gnomon::app::truth::ray_cast::{Exact, GRAZES, SeenSurface, View, World, pixels};
 use gnomon::geometry::mesh::Mesh;
 use gnomon::light::{Light, irradiance};
 use gnomon::render::{Layers, REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};
@@ -37,7 +37,7 @@ const ENOUGH: usize = 12;
 /// What is seen at a place and which lights reach it.
 #[derive(Debug, Clone, Copy)]
 pub struct State {
-    pub surface: Option<Surface>,
+    pub surface: Option<SeenSurface>,
     /// Lights that reach a real surface in the video, or a virtual one past all casters.
     pub arriving: u32,
     /// Those of them that virtual things take from a real surface.
@@ -48,7 +48,7 @@ pub struct State {
 
 impl State {
     /// With each light's bits.
-    fn new(surface: Option<Surface>, bits: impl Iterator<Item = u8>) -> Self {
+    fn new(surface: Option<SeenSurface>, bits: impl Iterator<Item = u8>) -> Self {
         let mut state = Self {
             surface,
             arriving: 0,
@@ -426,7 +426,7 @@ impl<'a> Expected<'a> {
     }
 
     /// Where a ray at a place would meet the plane of a surface.
-    fn on_plane(&self, surface: &Surface, place: DVec2) -> DVec3 {
+    fn on_plane(&self, surface: &SeenSurface, place: DVec2) -> DVec3 {
         let eye = self.world_from_camera.translation;
         let plane = self.view.intrinsics.plane_from_pixel(place);
         let direction = self.world_from_camera.transform_vector3(plane.extend(1.0));
@@ -441,7 +441,7 @@ impl<'a> Expected<'a> {
     }
 
     /// Whether a part of the triangle lies behind the camera: there the driver cuts it.
-    fn reaches_behind(&self, surface: &Surface) -> bool {
+    fn reaches_behind(&self, surface: &SeenSurface) -> bool {
         let corners = self.world.triangles[surface.triangle].corners;
         let to_camera = &self.view.camera_from_world;
         corners

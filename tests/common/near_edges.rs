@@ -1,7 +1,7 @@
 //! Pixels beside edges, where rays and rasterization may differ: how close an edge comes, and what lies around.
 
 use glam::{DVec2, DVec3};
-use gnomon::app::truth::ray_cast::{NEAREST_M, Surface, View, World};
+use gnomon::app::truth::ray_cast::{NEAREST_M, SeenSurface, View, World};
 use gnomon::light::Light;
 
 /// Corners are snapped to 1/256 px, so an edge may pass a place on the other side that it is nearer to than this.
@@ -42,7 +42,7 @@ pub fn is_on_edge(world: &World, view: &View, place: DVec2, light: &Light) -> bo
     };
     // Where the shadow of a point falls on the plane of what is seen.
     let shadow_of = |point: DVec3| {
-        let Surface {
+        let SeenSurface {
             point: on, normal, ..
         } = seen?;
         let (from, way) = match *light {

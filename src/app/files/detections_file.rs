@@ -9,7 +9,7 @@ use crate::tracking::Detection;
 pub const HEADER: &str =
     "frame,id,x0_px,y0_px,x1_px,y1_px,x2_px,y2_px,x3_px,y3_px,family,border_cells,margin";
 
-/// Grows row by row; kept in memory, because the file appears whole or not at all.
+/// A detections file's text, which grows row by row; kept in memory, because the file appears whole or not at all.
 pub struct DetectionsText {
     text: String,
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-/// Why a job is not begun: nothing has been written.
+/// The reason why a job is not begun: nothing has been written.
 #[derive(Debug, thiserror::Error)]
 pub enum FileConflict {
     /// An output would be written over an input.

@@ -11,7 +11,7 @@ use super::result_kind::ResultKind;
 use super::video_writer::{Codec, Naming, VideoWriter};
 use crate::render::Layers;
 
-/// Takes frames one by one.
+/// The place that frames go to one by one.
 pub enum FrameSink {
     /// A video file.
     Video(VideoWriter),

@@ -17,7 +17,7 @@ const MOST_BYTES: u64 = 64 << 20;
 /// Enough to tell a result from other files where its beginning is enough.
 const FIRST_BYTES: u64 = 4096;
 
-/// What results may take the place of.
+/// The files that results may take the place of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Replacing {
     /// Older results of their kind.
@@ -42,8 +42,8 @@ struct Output {
     kind: ResultKind,
 }
 
-/// What is read.
-struct Input<'a> {
+/// A file or folder that is read.
+struct InputFile<'a> {
     path: &'a Path,
     found: Found,
     /// Of a folder, those that lie in it: they may be known elsewhere by other names.
@@ -126,8 +126,8 @@ impl JobFiles {
     /// # Errors
     /// The first output that would do harm.
     pub fn check(&self) -> Result<(), FileConflict> {
-        let inputs = self.inputs.iter().filter_map(|path| Input::at(path));
-        let inputs: Vec<Input> = inputs.collect();
+        let inputs = self.inputs.iter().filter_map(|path| InputFile::at(path));
+        let inputs: Vec<InputFile> = inputs.collect();
         let mut before: Vec<(&Output, Found)> = Vec::new();
         for output in &self.outputs {
             let found = Found::at(&output.path).map_err(|error| FileConflict::Io {
@@ -154,7 +154,7 @@ impl JobFiles {
     }
 }
 
-impl<'a> Input<'a> {
+impl<'a> InputFile<'a> {
     /// One that cannot be looked at is the business of whoever reads it.
     fn at(path: &'a Path) -> Option<Self> {
         let found = Found::at(path).ok()?;
@@ -224,7 +224,7 @@ impl Output {
         &self,
         own: &Found,
         frames: &[Found],
-        input: &Input,
+        input: &InputFile,
     ) -> Result<(), FileConflict> {
         let output = self.option;
         let read = &input.found;

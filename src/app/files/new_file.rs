@@ -24,7 +24,7 @@ static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 pub struct NewFile {
     /// As the user named it.
     path: PathBuf,
-    target: Target,
+    target: WriteTarget,
     /// Whether nothing may be there.
     is_first: bool,
     temporary: NamedTempFile,
@@ -32,8 +32,8 @@ pub struct NewFile {
     _listed: Listed,
 }
 
-/// Where what is written goes.
-enum Target {
+/// The place where what is written goes.
+enum WriteTarget {
     /// To this place, instead of what is there.
     Place(PathBuf),
     /// Through a device, a pipe or an open file.
@@ -68,10 +68,10 @@ impl NewFile {
 
     fn begin(path: &Path, is_first: bool) -> Result<Self, OutputError> {
         let create = || -> io::Result<Self> {
-            let target = Target::of(path)?;
+            let target = WriteTarget::of(path)?;
             let folder = match &target {
-                Target::Place(place) => place.parent().unwrap_or(Path::new("/")).to_owned(),
-                Target::Through(_) | Target::Stdout => std::env::temp_dir(),
+                WriteTarget::Place(place) => place.parent().unwrap_or(Path::new("/")).to_owned(),
+                WriteTarget::Through(_) | WriteTarget::Stdout => std::env::temp_dir(),
             };
             fs::create_dir_all(&folder)?;
             let mut suffix = std::ffi::OsString::new();
@@ -145,7 +145,7 @@ impl NewFile {
     /// The folder that it lies in now.
     fn put(mut self, sync: impl FnOnce(&File) -> io::Result<()>) -> io::Result<Option<PathBuf>> {
         match self.target {
-            Target::Place(place) => {
+            WriteTarget::Place(place) => {
                 if !is_at(self.temporary.path(), self.temporary.as_file()) {
                     return Err(vanished());
                 }
@@ -164,12 +164,12 @@ impl NewFile {
                 .map_err(|failed| failed.error)?;
                 return Ok(place.parent().map(Path::to_owned));
             }
-            Target::Through(place) => {
+            WriteTarget::Through(place) => {
                 // Appending does no harm to a device, and none to what an open file has already.
                 let mut device = File::options().append(true).open(place)?;
                 copy_from_start(self.temporary.as_file_mut(), &mut device)?;
             }
-            Target::Stdout => {
+            WriteTarget::Stdout => {
                 copy_from_start(self.temporary.as_file_mut(), &mut io::stdout().lock())?;
             }
         }
@@ -177,7 +177,7 @@ impl NewFile {
     }
 }
 
-impl Target {
+impl WriteTarget {
     fn of(path: &Path) -> io::Result<Self> {
         if is_stdout(path) {
             return Ok(Self::Stdout);

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-/// Why results cannot be written.
+/// The reason why results cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
     /// The encoder is not installed.

@@ -103,7 +103,7 @@ pub fn write_radiance(path: &Path, size_px: [usize; 2], rgb: &[Vec3]) -> Result<
     write_bytes(path, &bytes)
 }
 
-/// How radiance is written.
+/// A file format for radiance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RadianceFormat {
     /// Radiance HDR.

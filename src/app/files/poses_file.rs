@@ -16,7 +16,7 @@ use crate::tracking::{AnchorPose, Status};
 pub const HEADER: &str =
     "frame,time_s,anchor,status,markers,tx_m,ty_m,tz_m,rx,ry,rz,track_ms,render_ms";
 
-/// Grows row by row; kept in memory, because the file appears whole or not at all.
+/// A poses file's text, which grows row by row; kept in memory, because the file appears whole or not at all.
 pub struct PosesText {
     text: String,
 }

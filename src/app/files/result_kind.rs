@@ -7,7 +7,7 @@ use serde_json::Value as Json;
 use super::{anchor_block, detections_file, poses_file};
 use crate::light::response::Response;
 
-/// What a job writes under a name that it was given.
+/// The kind of thing that a job writes under a name that it was given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ResultKind {
     /// Poses (CSV).

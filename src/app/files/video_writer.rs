@@ -10,7 +10,7 @@ use super::file_identity::is_at;
 use super::new_file::{NewFile, vanished};
 use super::output_error::OutputError;
 
-/// How a video is encoded.
+/// A video's encoding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Codec {
     /// Small and played everywhere.
@@ -57,7 +57,7 @@ impl Codec {
     }
 }
 
-/// When a video gets its name.
+/// The moment at which a video gets its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Naming {
     /// When it is finished; dropped before, it is removed.

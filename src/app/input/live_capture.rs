@@ -14,7 +14,7 @@ use crate::capture::live::{LiveError, LiveEvent, LiveOptions, LiveSource, Now, O
 /// How soon the thread sees that it is to stop.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// What happens to the source, besides frames.
+/// An event of a live source, besides its frames.
 #[derive(Debug)]
 pub enum CaptureEvent {
     /// It is open; frames will follow.
@@ -29,10 +29,10 @@ pub enum CaptureEvent {
     Ended,
 }
 
-/// Takes everything, on the capture thread: it must not wait for anything.
+/// A call with everything that comes, on the capture thread: it must not wait for anything.
 pub type Tap = Box<dyn FnMut(Tapped) + Send>;
 
-/// What a tap takes.
+/// A thing that a tap is called with.
 #[derive(Debug, Clone, Copy)]
 pub enum Tapped<'a> {
     /// The source was opened, for the first time or again.
@@ -54,12 +54,12 @@ pub struct Arrived {
 pub struct LiveCapture {
     frames: Arc<Mailbox<Arrived>>,
     events: Receiver<CaptureEvent>,
-    shared: Arc<Shared>,
+    shared: Arc<CaptureShared>,
     thread: Option<JoinHandle<()>>,
 }
 
 #[derive(Default)]
-struct Shared {
+struct CaptureShared {
     stop: AtomicBool,
     tap: Mutex<Option<Tap>>,
     captured: AtomicU64,
@@ -72,9 +72,9 @@ impl LiveCapture {
     pub fn start(source: &str, options: &LiveOptions, now: Now, tap: Option<Tap>) -> Self {
         let frames = Arc::new(Mailbox::new());
         let (to_owner, events) = channel();
-        let shared = Arc::new(Shared {
+        let shared = Arc::new(CaptureShared {
             tap: Mutex::new(tap),
-            ..Shared::default()
+            ..CaptureShared::default()
         });
         let thread = {
             let (frames, shared) = (Arc::clone(&frames), Arc::clone(&shared));
@@ -148,7 +148,7 @@ fn capture(
     now: &Now,
     frames: &Mailbox<Arrived>,
     to_owner: &Sender<CaptureEvent>,
-    shared: &Shared,
+    shared: &CaptureShared,
 ) {
     while !shared.stop.load(Ordering::Relaxed) {
         let event = match source.next(PATIENCE) {
@@ -191,7 +191,7 @@ fn capture(
     }
 }
 
-impl Shared {
+impl CaptureShared {
     fn take(&self, arrived: Arrived, frames: &Mailbox<Arrived>) {
         self.captured.fetch_add(1, Ordering::Relaxed);
         self.tap(Tapped::Frame(&arrived.frame));

@@ -17,7 +17,7 @@ pub struct LiveInput {
 }
 
 impl LiveInput {
-    /// Reads the calibration; without another wish the camera is asked for the size that it was calibrated at.
+    /// Reads the calibration; unless the scene asks for another size the camera is asked for the size that it was calibrated at.
     ///
     /// # Errors
     /// A calibration that cannot be read.

@@ -3,21 +3,21 @@
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Holds at most one thing; a newer one takes its place.
+/// A place between threads for at most one thing; a newer one takes its place.
 #[derive(Debug)]
 pub struct Mailbox<T> {
-    content: Mutex<Content<T>>,
+    content: Mutex<MailboxContent<T>>,
     changed: Condvar,
 }
 
 #[derive(Debug)]
-struct Content<T> {
+struct MailboxContent<T> {
     newest: Option<T>,
     dropped: u64,
     is_closed: bool,
 }
 
-/// What was found in a mailbox.
+/// The contents of a mailbox when it was looked into.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Taken<T> {
     /// The newest thing.
@@ -32,7 +32,7 @@ impl<T> Mailbox<T> {
     /// Empty and open.
     pub fn new() -> Self {
         Self {
-            content: Mutex::new(Content {
+            content: Mutex::new(MailboxContent {
                 newest: None,
                 dropped: 0,
                 is_closed: false,
@@ -58,7 +58,8 @@ impl<T> Mailbox<T> {
 
     /// Waits for something new; `None` once the box is closed and empty.
     pub fn take(&self) -> Option<T> {
-        let waits = |content: &mut Content<T>| content.newest.is_none() && !content.is_closed;
+        let waits =
+            |content: &mut MailboxContent<T>| content.newest.is_none() && !content.is_closed;
         let content = self.changed.wait_while(self.content(), waits);
         content
             .unwrap_or_else(PoisonError::into_inner)
@@ -68,7 +69,8 @@ impl<T> Mailbox<T> {
 
     /// Waits for something new, at most this long: no time at all just looks.
     pub fn take_within(&self, patience: Duration) -> Taken<T> {
-        let waits = |content: &mut Content<T>| content.newest.is_none() && !content.is_closed;
+        let waits =
+            |content: &mut MailboxContent<T>| content.newest.is_none() && !content.is_closed;
         let waited = self
             .changed
             .wait_timeout_while(self.content(), patience, waits);
@@ -92,7 +94,7 @@ impl<T> Mailbox<T> {
     }
 
     /// A panic elsewhere leaves the content as whole as it was.
-    fn content(&self) -> MutexGuard<'_, Content<T>> {
+    fn content(&self) -> MutexGuard<'_, MailboxContent<T>> {
         self.content.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -111,16 +113,16 @@ mod tests {
     use std::thread;
 
     /// A thing that counts how many of its kind there are.
-    struct Counted(u64, Arc<AtomicI64>);
+    struct CountedItem(u64, Arc<AtomicI64>);
 
-    impl Counted {
+    impl CountedItem {
         fn new(number: u64, alive: &Arc<AtomicI64>) -> Self {
             alive.fetch_add(1, Ordering::SeqCst);
             Self(number, Arc::clone(alive))
         }
     }
 
-    impl Drop for Counted {
+    impl Drop for CountedItem {
         fn drop(&mut self) {
             self.1.fetch_sub(1, Ordering::SeqCst);
         }
@@ -140,7 +142,7 @@ mod tests {
             );
             move || {
                 for number in 0..PUT {
-                    assert!(mailbox.put(Counted::new(number, &alive)));
+                    assert!(mailbox.put(CountedItem::new(number, &alive)));
                     last_put.store(number as i64, Ordering::SeqCst);
                     thread::sleep(Duration::from_micros(200));
                 }
@@ -151,8 +153,10 @@ mod tests {
         loop {
             // Nothing put before this moment may come after it but the newest.
             let put_before = last_put.load(Ordering::SeqCst);
-            let Some(Counted(number, _)) =
-                mailbox.take().as_ref().map(|c| Counted::new(c.0, &alive))
+            let Some(CountedItem(number, _)) = mailbox
+                .take()
+                .as_ref()
+                .map(|c| CountedItem::new(c.0, &alive))
             else {
                 break;
             };

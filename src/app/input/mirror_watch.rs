@@ -6,7 +6,7 @@ use crate::capture::Frame;
 use crate::scene::{Anchor, Family, TrackingSettings};
 use crate::tracking::{Detector, grey_from_rgba};
 
-/// Watches the frames of a recording, and looks into a few of those that show nothing.
+/// A watch for mirrored recordings, which looks into a few of those frames that show nothing.
 pub(crate) struct MirrorWatch {
     settings: TrackingSettings,
     families: Vec<Family>,

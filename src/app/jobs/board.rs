@@ -23,11 +23,11 @@ use crate::tracking::{Detection, Detector, grey_from_rgba};
 /// More frames are not looked at: a long video is sampled.
 const MOST_FRAMES: u32 = 3000;
 
-/// What is to be learnt from what.
+/// A request to learn a board's layout: what is to be learnt from what.
 #[derive(Debug, Clone)]
-pub struct Request {
+pub struct BoardRequest {
     /// The recording.
-    pub input: Input,
+    pub input: BoardInput,
     /// Of all markers.
     pub family: Family,
     /// Sizes, gauge and tolerance.
@@ -42,9 +42,9 @@ pub struct Request {
     pub replacing: Replacing,
 }
 
-/// The recording.
+/// The recording that a board is learnt from.
 #[derive(Debug, Clone)]
-pub enum Input {
+pub enum BoardInput {
     /// What a scene file plays, with its tracking settings.
     Scene(PathBuf),
     /// A recording of its own.
@@ -69,14 +69,14 @@ pub struct Distance {
 ///
 /// # Errors
 /// Anything that keeps a frame from being read or the layout from being learnt; nothing is written then.
-pub fn board(request: &Request, stop: &AtomicBool) -> Result<()> {
+pub fn board(request: &BoardRequest, stop: &AtomicBool) -> Result<()> {
     let mut files = JobFiles::new(request.replacing);
     let (camera, settings) = match &request.input {
-        Input::Scene(path) => {
+        BoardInput::Scene(path) => {
             let scene = files.reads_scene(path)?;
             (scene.camera, scene.tracking)
         }
-        Input::Recording { camera, decimation } => {
+        BoardInput::Recording { camera, decimation } => {
             files.reads_camera(camera);
             (camera.clone(), usual_tracking(request.family, *decimation))
         }

@@ -20,11 +20,11 @@ use crate::scene::CameraSettings;
 
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// What is recorded.
+/// A request to record a session.
 #[derive(Debug, Clone)]
-pub struct Request {
+pub struct RecordRequest {
     /// The camera, the stream or the recording.
-    pub input: Input,
+    pub input: RecordInput,
     /// The session's folder.
     pub out: PathBuf,
     /// When to end by itself, seconds of frames.
@@ -33,9 +33,9 @@ pub struct Request {
     pub replacing: Replacing,
 }
 
-/// What says where the frames come from.
+/// The source of the frames, and what says so.
 #[derive(Debug, Clone)]
-pub enum Input {
+pub enum RecordInput {
     /// A scene file, which is copied into the session.
     Scene(PathBuf),
     /// A camera that no scene describes.
@@ -47,11 +47,11 @@ pub enum Input {
 /// # Errors
 /// A source that cannot be opened, frames that do not come, or a session that cannot be written; what was recorded until
 /// then is whole.
-pub fn record(request: &Request, stop: &AtomicBool) -> Result<String> {
+pub fn record(request: &RecordRequest, stop: &AtomicBool) -> Result<String> {
     let mut files = JobFiles::new(request.replacing);
     let (camera, scene) = match &request.input {
-        Input::Scene(path) => (files.reads_scene(path)?.camera, Some(path.clone())),
-        Input::Camera(camera) => {
+        RecordInput::Scene(path) => (files.reads_scene(path)?.camera, Some(path.clone())),
+        RecordInput::Camera(camera) => {
             files.reads_camera(camera);
             (camera.clone(), None)
         }
@@ -80,7 +80,7 @@ pub fn record(request: &Request, stop: &AtomicBool) -> Result<String> {
     Ok(summary(request, recorded, broken_pictures))
 }
 
-fn summary(request: &Request, recorded: Recorded, broken_pictures: u64) -> String {
+fn summary(request: &RecordRequest, recorded: Recorded, broken_pictures: u64) -> String {
     let Recorded { frames, dropped } = recorded;
     let mut text = format!("{frames} frames in {}", request.out.display());
     if dropped > 0 {

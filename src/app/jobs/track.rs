@@ -27,11 +27,11 @@ use crate::geometry::camera::Intrinsics;
 use crate::scene::{Anchor, CameraSettings, Family, TrackingSettings};
 use crate::tracking::{AnchorPose, Detector, Tracker, grey_from_rgba};
 
-/// What tracking is asked for.
+/// A request to track a recording or a camera.
 #[derive(Debug, Clone)]
-pub struct Request {
+pub struct TrackRequest {
     /// What is played, and what is looked for in it.
-    pub input: Input,
+    pub input: TrackInput,
     /// Where to write the poses.
     pub poses: Option<PathBuf>,
     /// Where to write every marker that the detector sees.
@@ -42,9 +42,9 @@ pub struct Request {
     pub replacing: Replacing,
 }
 
-/// What is played, and what is looked for in it.
+/// The recording that is tracked, and what is looked for in it.
 #[derive(Debug, Clone)]
-pub enum Input {
+pub enum TrackInput {
     /// A scene file says both.
     Scene(PathBuf),
     /// A recording, and the anchors and tracking settings of a scene file that may play another.
@@ -66,7 +66,7 @@ pub enum Input {
 ///
 /// # Errors
 /// Anything that keeps a frame from being read or tracked, or a file from being written.
-pub fn track(request: &Request, stop: &AtomicBool) -> Result<Report> {
+pub fn track(request: &TrackRequest, stop: &AtomicBool) -> Result<Report> {
     let watch = Stopwatch::start();
     if [&request.poses, &request.markers, &request.stats]
         .iter()
@@ -75,7 +75,7 @@ pub fn track(request: &Request, stop: &AtomicBool) -> Result<Report> {
         bail!("nothing to do: give --poses, --markers or --stats");
     }
     let mut files = JobFiles::new(request.replacing);
-    let plan = Plan::of(&request.input, &mut files)?;
+    let plan = TrackPlan::of(&request.input, &mut files)?;
     request.name_results(&mut files);
     files.check()?;
     let (frames_in, intrinsics) = open(&plan.camera)?;
@@ -88,7 +88,7 @@ pub fn track(request: &Request, stop: &AtomicBool) -> Result<Report> {
         .as_ref()
         .map(|_| Raw::new(&plan.settings, &plan.anchors))
         .transpose()?;
-    let mut run = Run {
+    let mut run = TrackRun {
         request,
         tally: Tally::new(plan.anchors.len()),
         plan,
@@ -111,7 +111,7 @@ pub fn track(request: &Request, stop: &AtomicBool) -> Result<Report> {
     Ok(run.report(&ended, interrupts && stop.load(Ordering::Relaxed)))
 }
 
-impl Request {
+impl TrackRequest {
     fn name_results(&self, files: &mut JobFiles) {
         for (option, path, kind) in [
             ("--poses", &self.poses, ResultKind::Poses),
@@ -126,9 +126,9 @@ impl Request {
 }
 
 /// The state of the job as it goes.
-struct Run<'a> {
-    request: &'a Request,
-    plan: Plan,
+struct TrackRun<'a> {
+    request: &'a TrackRequest,
+    plan: TrackPlan,
     intrinsics: Intrinsics,
     /// `None` where nobody asks what the detector sees.
     raw: Option<Raw>,
@@ -136,7 +136,7 @@ struct Run<'a> {
     tally: Tally,
 }
 
-impl Run<'_> {
+impl TrackRun<'_> {
     fn add(&mut self, tracked: TrackedFrame) -> Result<()> {
         self.tally.add(&tracked);
         if let Some(raw) = &mut self.raw {
@@ -233,8 +233,8 @@ fn open(camera: &CameraSettings) -> Result<(Frames, Intrinsics)> {
     Ok((Frames::Live(capture, intrinsics), intrinsics))
 }
 
-/// What an [`Input`] comes to.
-struct Plan {
+/// What an [`TrackInput`] comes to.
+struct TrackPlan {
     camera: CameraSettings,
     settings: TrackingSettings,
     anchors: Vec<Anchor>,
@@ -242,10 +242,10 @@ struct Plan {
     lists_found_alone: bool,
 }
 
-impl Plan {
-    fn of(input: &Input, files: &mut JobFiles) -> Result<Self> {
+impl TrackPlan {
+    fn of(input: &TrackInput, files: &mut JobFiles) -> Result<Self> {
         Ok(match input {
-            Input::Scene(path) => {
+            TrackInput::Scene(path) => {
                 let scene = files.reads_scene(path)?;
                 Self {
                     camera: scene.camera,
@@ -254,7 +254,7 @@ impl Plan {
                     lists_found_alone: false,
                 }
             }
-            Input::RecordingWithScene(camera, path) => {
+            TrackInput::RecordingWithScene(camera, path) => {
                 files.reads_camera(camera);
                 let scene = files.reads_scene_to_play_another(path)?;
                 Self {
@@ -264,7 +264,7 @@ impl Plan {
                     lists_found_alone: false,
                 }
             }
-            Input::LoneMarkers {
+            TrackInput::LoneMarkers {
                 camera,
                 family,
                 size_m,
@@ -290,7 +290,7 @@ fn lone_anchors(family: Family, size_m: f64) -> Vec<Anchor> {
         .collect()
 }
 
-/// What is kept of a frame until all anchors are known.
+/// The poses of a frame, kept until all anchors are known.
 struct KeptFrame {
     index: u32,
     time_secs: f64,

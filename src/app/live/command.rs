@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use glam::DVec2;
 
-use super::views::View;
+use super::views::ViewMode;
 use crate::app::authoring::Edit;
 use crate::geometry::light_placing::Freedom;
 use crate::scene::Shortcut;
 
-/// One thing that is asked for.
+/// One thing that a person asks for.
 #[derive(Debug, Clone, PartialEq)]
 pub enum LiveCommand {
     /// Of the scene and its file.
@@ -22,7 +22,7 @@ pub enum LiveCommand {
     Quit,
 }
 
-/// What is asked of the scene and its file.
+/// A command to the scene and its file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SceneCommand {
     /// Show an edit while it lasts (a drag).
@@ -52,7 +52,7 @@ pub enum SceneCommand {
     Save(PathBuf),
 }
 
-/// What is asked of the recorders.
+/// A command to the recorders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RecordingCommand {
     /// Save the picture.
@@ -63,13 +63,13 @@ pub enum RecordingCommand {
     ToggleVideo,
 }
 
-/// What is asked of the window, which has no part in the scene.
+/// A command to the window, which has no part in the scene.
 #[derive(Debug, Clone, PartialEq)]
 pub enum WindowCommand {
     /// Select a thing or a light, or nothing.
     Select(Option<Selected>),
     /// Show something else.
-    Show(View),
+    Show(ViewMode),
     /// Show or hide what lies over the picture.
     Toggle(Overlay),
     /// Take a shortcut of shadow volumes no more, or again.
@@ -144,7 +144,7 @@ pub enum Clicks {
     Find(Freedom),
 }
 
-/// What is selected.
+/// The thing or light that is selected.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Selected {
     /// A phantom or a virtual thing, by its name.
@@ -153,7 +153,7 @@ pub enum Selected {
     Light(usize),
 }
 
-/// What can lie over the picture.
+/// A kind of marks over the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Overlay {
     /// Outlines of the markers that were seen, with their numbers.

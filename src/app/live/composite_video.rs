@@ -97,7 +97,7 @@ fn write(
     Ok(written)
 }
 
-/// When the video's frames are due.
+/// The times at which the video's frames are due.
 struct Pace {
     fps: f64,
     begin_secs: Option<f64>,

@@ -3,7 +3,7 @@
 use eframe::egui::{Key, Modifiers};
 
 use super::command::{LiveCommand, Overlay, RecordingCommand, SceneCommand, WindowCommand};
-use super::views::View;
+use super::views::ViewMode;
 
 /// A key and what it is for.
 pub struct Binding {
@@ -126,7 +126,7 @@ pub fn bindings() -> Vec<Binding> {
         (Key::Num7, "7"),
         (Key::Num8, "8"),
     ];
-    let views = numbers.into_iter().zip(View::BY_NAME);
+    let views = numbers.into_iter().zip(ViewMode::BY_NAME);
     all.extend(views.map(|((key, name), (does, view))| {
         plain(key, name, does, WindowCommand::Show(view).into())
     }));
@@ -154,7 +154,7 @@ mod tests {
                 );
             }
         }
-        for (name, view) in View::BY_NAME {
+        for (name, view) in ViewMode::BY_NAME {
             assert!(
                 all.iter()
                     .any(|b| b.command == WindowCommand::Show(view).into()),

@@ -10,8 +10,8 @@ pub mod command;
 mod composite_video;
 mod demonstration;
 mod event_loop;
-mod eye;
 mod false_colour;
+mod frame_tracker;
 mod gizmo;
 mod keys;
 pub mod meters;
@@ -27,7 +27,7 @@ pub mod views;
 mod window;
 pub mod window_state;
 
-pub use eye::{Plan, TrackedPicture};
+pub use frame_tracker::{TrackedPicture, TrackingPlan};
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -44,22 +44,22 @@ use crate::scene::CameraSettings;
 use beginning::Opening;
 use event_loop::{PassEnd, Timed};
 use session::LiveSession;
-use window::{Failure, Shared, Window};
+use window::{Failure, LiveWindow, WindowShared};
 
-/// What the window opens on.
+/// The scene or camera that the window opens on.
 #[derive(Debug, Clone)]
-pub enum Input {
+pub enum LiveStart {
     /// A scene file.
     Scene(PathBuf),
     /// A camera or a recording that no scene describes: first use.
     Camera(CameraSettings),
 }
 
-/// What is asked for.
+/// A request to open the live window.
 #[derive(Debug, Clone)]
-pub struct Request {
+pub struct LiveRequest {
     /// What the window opens on.
-    pub input: Input,
+    pub input: LiveStart,
     /// The folder for what its keys record.
     pub out: PathBuf,
     /// Part of the wanted graphics adapter's name.
@@ -71,10 +71,10 @@ pub struct Request {
 /// # Errors
 /// A scene that cannot be read, no adapter, no display, a camera that cannot be opened, or a recording that could not be
 /// written; all recordings are whole then.
-pub fn live(request: &Request, stop: &Arc<AtomicBool>) -> Result<()> {
+pub fn live(request: &LiveRequest, stop: &Arc<AtomicBool>) -> Result<()> {
     let opening = match &request.input {
-        Input::Scene(path) => Opening::scene(path)?,
-        Input::Camera(camera) => Opening::camera(camera.clone())?,
+        LiveStart::Scene(path) => Opening::scene(path)?,
+        LiveStart::Camera(camera) => Opening::camera(camera.clone())?,
     };
     opening.files(&request.out).check()?;
     let gpu = Arc::new(Gpu::open(request.adapter.as_deref())?);
@@ -85,7 +85,7 @@ pub fn live(request: &Request, stop: &Arc<AtomicBool>) -> Result<()> {
     let pass_end = PassEnd::default();
     let title = format!("{} – gnomon", opening.title());
     let event_loop = opening::event_loop()?;
-    let shared = Shared {
+    let shared = WindowShared {
         stop: Arc::clone(stop),
         failure: Arc::clone(&failure),
         pass_end: pass_end.clone(),
@@ -102,7 +102,7 @@ pub fn live(request: &Request, stop: &Arc<AtomicBool>) -> Result<()> {
             let adapter = gpu.description().to_owned();
             let session = LiveSession::open(opening, gpu, &out, true, (clock, wake));
             opened.store(true, Ordering::Relaxed);
-            Ok(Box::new(Window::new(session, screen, adapter, shared)))
+            Ok(Box::new(LiveWindow::new(session, screen, adapter, shared)))
         }),
         &event_loop,
     );

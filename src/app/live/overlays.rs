@@ -4,13 +4,13 @@ use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Shape, Stroke, Vec2};
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::command::Overlay;
-use super::eye::TrackedPicture;
-use super::gizmo::{Gizmo, Handle, Target, light_place_m};
+use super::frame_tracker::TrackedPicture;
+use super::gizmo::{Gizmo, GizmoTarget, Handle, light_place_m};
 use super::shadow_clicks::ShadowClicks;
 use super::shadow_lines::ShadowLines;
-use super::views::View;
+use super::views::ViewMode;
 use super::window_state::WindowState;
-use crate::app::window::fit::Fit;
+use crate::app::window::fit::PictureFit;
 use crate::geometry::light_placing::Sight;
 use crate::scene::Scene;
 use crate::tracking::{Quad, Status, undistorted_pixel};
@@ -27,12 +27,12 @@ const REAL_EDGE: Color32 = Color32::from_rgb(90, 200, 255);
 const VIRTUAL_EDGE: Color32 = Color32::from_rgb(255, 120, 200);
 const GRIP: Color32 = Color32::from_rgb(255, 255, 255);
 
-/// Draws over a picture.
+/// Marks drawn over a picture.
 pub struct Overlays<'a> {
     /// Into the picture's place.
     pub painter: &'a Painter,
     /// Where that is.
-    pub fit: Fit,
+    pub fit: PictureFit,
     /// What is seen there.
     pub picture: &'a TrackedPicture,
 }
@@ -49,8 +49,8 @@ impl Overlays<'_> {
             self.markers();
         }
         if let Some(scene) = scene {
-            if matches!(state.view, View::Silhouettes | View::Volumes) {
-                self.shadow_lines(scene, shadow_lines, state.view == View::Volumes);
+            if matches!(state.view, ViewMode::Silhouettes | ViewMode::Volumes) {
+                self.shadow_lines(scene, shadow_lines, state.view == ViewMode::Volumes);
             }
             if state.shows(Overlay::Lights) {
                 self.lights(scene);
@@ -74,7 +74,7 @@ impl Overlays<'_> {
     }
 
     /// The handles of what is selected.
-    pub fn handles(&self, target: &Target, sight: &Sight) {
+    pub fn handles(&self, target: &GizmoTarget, sight: &Sight) {
         let Some(gizmo) = Gizmo::new(target, sight) else {
             return;
         };

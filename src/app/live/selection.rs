@@ -3,7 +3,7 @@
 use glam::{DVec2, Vec3};
 
 use super::command::Selected;
-use super::eye::TrackedPicture;
+use super::frame_tracker::TrackedPicture;
 use super::gizmo::light_place_m;
 use crate::geometry::light_placing::Sight;
 use crate::geometry::ray_caster::RayCaster;

@@ -8,15 +8,15 @@ use std::time::Duration;
 use anyhow::{Context as _, Result};
 
 use super::beginning::{Opening, plan_of, same_camera};
-use super::canvas::Canvas;
+use super::canvas::SceneCanvas;
 use super::command::{Clicks, Overlay, RecordingCommand, SceneCommand, Selected};
 use super::demonstration::{self, Demonstration};
-use super::eye::TrackedPicture;
+use super::frame_tracker::TrackedPicture;
 use super::meters::{Meters, Sample};
-use super::pipeline::{Input, Pipeline};
+use super::pipeline::{Pipeline, PipelineInput};
 use super::recorders::Recorders;
 use super::shadow_clicks::{self, ShadowClicks};
-use super::views::View;
+use super::views::ViewMode;
 use super::window_state::WindowState;
 use crate::app::authoring::{Edit, EditError, SceneDocument, SceneNews, SceneWatch};
 use crate::app::files::job_files::Replacing;
@@ -37,7 +37,7 @@ const ASSUMED_FPS: f64 = 30.0;
 /// A wait that is no shorter was one, milliseconds.
 const INSTANT_MS: f64 = 0.5;
 
-/// What there is of a scene.
+/// The scene, as far as there is one.
 enum SceneState {
     /// First use: nobody has said what stands on the table.
     Absent,
@@ -55,7 +55,7 @@ struct OpenScene {
     previewed: Option<Edit>,
 }
 
-/// Where a scene's file lies.
+/// The place of a scene's file.
 enum Origin {
     /// Where a person keeps it.
     Saved,
@@ -66,7 +66,7 @@ enum Origin {
     },
 }
 
-/// What picture there is.
+/// The picture, as far as there is one.
 enum PictureState {
     /// None has come yet.
     Awaited,
@@ -80,7 +80,7 @@ enum PictureState {
 struct DrawnPicture {
     tracked: TrackedPicture,
     /// The view that it was drawn in, while nothing has changed since.
-    drawn: Option<View>,
+    drawn: Option<ViewMode>,
     /// Its times, until its display is told of.
     pending: Option<Pending>,
 }
@@ -92,7 +92,7 @@ struct Pending {
     sample: Sample,
 }
 
-/// Everything but the window.
+/// The live program without its window.
 pub struct LiveSession {
     now: Now,
     wake: Wake,
@@ -104,7 +104,7 @@ pub struct LiveSession {
     scene: SceneState,
     picture: PictureState,
     pipeline: Pipeline,
-    canvas: Canvas,
+    canvas: SceneCanvas,
     recorders: Recorders,
     /// What there is to tell.
     pub notices: Notices,
@@ -175,9 +175,9 @@ impl PictureState {
     }
 
     /// What is shown of it: virtual things would hide the shadows that are to be clicked.
-    fn view(&self, state: &WindowState) -> View {
+    fn view(&self, state: &WindowState) -> ViewMode {
         match self {
-            Self::FindingLight(..) => View::Bare,
+            Self::FindingLight(..) => ViewMode::Bare,
             Self::Awaited | Self::Following(_) => state.view,
         }
     }
@@ -228,7 +228,7 @@ impl LiveSession {
         } = opening;
         let scene = document.as_ref().map(|document| document.scene().clone());
         let pipeline = Pipeline::start(
-            &Input {
+            &PipelineInput {
                 source: camera.source.clone(),
                 options: input.options(repeats),
                 calibration: input.calibration,
@@ -238,7 +238,7 @@ impl LiveSession {
             Arc::clone(&wake),
         );
         let mut session = Self {
-            canvas: Canvas::new(gpu, Arc::new(scene.unwrap_or_default()), Arc::clone(&wake)),
+            canvas: SceneCanvas::new(gpu, Arc::new(scene.unwrap_or_default()), Arc::clone(&wake)),
             recorders: Recorders::new(out.to_owned()),
             notices: Notices::new(),
             meters: Meters::default(),
@@ -590,7 +590,7 @@ impl LiveSession {
                 let clicks = self.clicks();
                 match clicks.map(|clicks| clicks.find(tracked, freedom)) {
                     None => {}
-                    Some(Err(why)) => self.tell(Weight::Trouble, why),
+                    Some(Err(reason)) => self.tell(Weight::Trouble, reason),
                     Some(Ok(found)) => {
                         let index = match state.selected {
                             Some(Selected::Light(index)) => index,
@@ -611,8 +611,8 @@ impl LiveSession {
                 };
                 match step {
                     Clicks::At(pixel) => {
-                        if let Err(why) = clicks.click(pixel) {
-                            self.tell(Weight::Trouble, why);
+                        if let Err(reason) = clicks.click(pixel) {
+                            self.tell(Weight::Trouble, reason);
                         }
                     }
                     _ => clicks.take_back(),

@@ -13,7 +13,7 @@ use super::command::{
     Clicks, Commands, LiveCommand, Overlay, SceneCommand, Selected, WindowCommand,
 };
 use super::event_loop::PassEnd;
-use super::gizmo::{Drag, Gizmo, Target};
+use super::gizmo::{Drag, Gizmo, GizmoTarget};
 use super::keys::bindings;
 use super::overlays::Overlays;
 use super::panel::{Facts, Panel};
@@ -21,7 +21,7 @@ use super::selection::selected_at;
 use super::session::LiveSession;
 use super::shadow_lines::ShadowLines;
 use super::window_state::WindowState;
-use crate::app::window::fit::Fit;
+use crate::app::window::fit::PictureFit;
 use crate::app::window::notices::{CameraState, Weight};
 use crate::app::window::screen::Screen;
 use crate::geometry::light_placing::Sight;
@@ -32,11 +32,11 @@ const PANEL_WIDTH: f32 = 330.0;
 const TROUBLE: Color32 = Color32::from_rgb(255, 190, 90);
 const RECORDING: Color32 = Color32::from_rgb(235, 60, 50);
 
-/// What ended the window before a person did.
+/// The error that ended the window before a person did.
 pub type Failure = Arc<Mutex<Option<anyhow::Error>>>;
 
-/// What the window and whoever opened it share.
-pub struct Shared {
+/// All that the window and whoever opened it share.
+pub struct WindowShared {
     /// Closes the window.
     pub stop: Arc<AtomicBool>,
     /// What goes wrong.
@@ -45,8 +45,8 @@ pub struct Shared {
     pub pass_end: PassEnd,
 }
 
-/// The window's state.
-pub struct Window {
+/// The state of the live window.
+pub struct LiveWindow {
     session: LiveSession,
     screen: Screen,
     state: WindowState,
@@ -54,13 +54,18 @@ pub struct Window {
     shadow_lines: ShadowLines,
     drag: Option<Drag>,
     adapter: String,
-    shared: Shared,
+    shared: WindowShared,
     full_screen: bool,
 }
 
-impl Window {
+impl LiveWindow {
     /// A window on a live session.
-    pub fn new(session: LiveSession, screen: Screen, adapter: String, shared: Shared) -> Self {
+    pub fn new(
+        session: LiveSession,
+        screen: Screen,
+        adapter: String,
+        shared: WindowShared,
+    ) -> Self {
         Self {
             session,
             screen,
@@ -141,7 +146,7 @@ impl Window {
             return None;
         };
         let texture = self.screen.texture(renderer, number);
-        let fit = Fit::within(area, size_px);
+        let fit = PictureFit::within(area, size_px);
         let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
         ui.painter().image(texture, fit.rect, whole, Color32::WHITE);
         let response = ui.interact(area, Id::unique("picture"), Sense::click_and_drag());
@@ -169,7 +174,7 @@ impl Window {
     }
 
     /// What the pointer does in the picture: it drags a handle, or selects.
-    fn point(&mut self, response: &Response, fit: &Fit) -> Option<LiveCommand> {
+    fn point(&mut self, response: &Response, fit: &PictureFit) -> Option<LiveCommand> {
         let pointer = response.interact_pointer_pos()?;
         let pixel = fit.pixel(pointer);
         if self.session.clicks().is_some() {
@@ -210,7 +215,7 @@ impl Window {
     }
 
     /// What is selected, with the camera as its anchor sees it.
-    fn target(&self) -> Option<(Target, Sight)> {
+    fn target(&self) -> Option<(GizmoTarget, Sight)> {
         let (scene, picture) = (self.session.scene()?, self.session.picture()?);
         let (target, anchor) = match self.state.selected.as_ref()? {
             Selected::Thing(name) => {
@@ -218,12 +223,12 @@ impl Window {
                 let anchor = things.find(|thing| thing.name == *name)?.anchor;
                 let placement = self.session.placement(name)?;
                 let name = name.clone();
-                (Target::Thing { name, placement }, anchor)
+                (GizmoTarget::Thing { name, placement }, anchor)
             }
             Selected::Light(index) => {
                 let light = *scene.lights.get(*index)?;
                 let index = *index;
-                (Target::Light { index, light }, 0)
+                (GizmoTarget::Light { index, light }, 0)
             }
         };
         let sight = Sight {
@@ -235,7 +240,7 @@ impl Window {
 
     fn say_in_the_middle(&self, ui: &Ui, area: Rect) {
         let text = match &self.session.notices.camera {
-            CameraState::Failed(why) => why.clone(),
+            CameraState::Failed(reason) => reason.clone(),
             CameraState::Ended => "The recording has no pictures.".to_owned(),
             _ => "Waiting for the first picture …".to_owned(),
         };
@@ -325,7 +330,7 @@ fn pressed(ctx: &Context) -> Commands {
     commands
 }
 
-impl eframe::App for Window {
+impl eframe::App for LiveWindow {
     fn logic(&mut self, ctx: &Context, _: &mut eframe::Frame) {
         ctx.request_repaint_after(PULSE);
         if self.shared.stop.load(Ordering::Relaxed) {
@@ -371,13 +376,13 @@ impl eframe::App for Window {
                 Err(error) => self.shared.fail(error.into()),
             }
         }
-        if let CameraState::Failed(why) = &self.session.notices.camera {
-            self.shared.fail(anyhow::anyhow!("{why}"));
+        if let CameraState::Failed(reason) = &self.session.notices.camera {
+            self.shared.fail(anyhow::anyhow!("{reason}"));
         }
     }
 }
 
-impl Shared {
+impl WindowShared {
     /// The first thing that goes wrong is the one that is told.
     fn fail(&self, error: anyhow::Error) {
         let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);

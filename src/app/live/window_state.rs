@@ -1,14 +1,14 @@
 //! The window's own state: what is shown, what lies over it, what is selected.
 
 use super::command::{Overlay, Selected, WindowCommand};
-use super::views::View;
+use super::views::ViewMode;
 use crate::scene::Shortcuts;
 
 /// The window's own state, apart from the scene's.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WindowState {
     /// What is shown.
-    pub view: View,
+    pub view: ViewMode,
     /// What lies over it.
     pub overlays: Vec<Overlay>,
     /// Whether the picture is held.
@@ -29,7 +29,7 @@ impl WindowState {
     /// The picture and the panel.
     pub fn new() -> Self {
         Self {
-            view: View::Composite,
+            view: ViewMode::Composite,
             overlays: Vec::new(),
             holds: false,
             panel: true,
@@ -45,7 +45,7 @@ impl WindowState {
         match command {
             WindowCommand::Select(selected) => self.selected.clone_from(selected),
             // The same again leads back to the picture.
-            WindowCommand::Show(view) if self.view == *view => self.view = View::Composite,
+            WindowCommand::Show(view) if self.view == *view => self.view = ViewMode::Composite,
             WindowCommand::Show(view) => self.view = *view,
             WindowCommand::Toggle(overlay) => {
                 let shown = self.overlays.iter().position(|shown| shown == overlay);
@@ -88,7 +88,7 @@ mod tests {
     #[test]
     fn the_same_command_twice_leads_back() {
         for command in [
-            WindowCommand::Show(View::Depth),
+            WindowCommand::Show(ViewMode::Depth),
             WindowCommand::Toggle(Overlay::Axes),
             WindowCommand::ToggleShortcut(Shortcut::Ends),
             WindowCommand::ToggleHold,

@@ -96,7 +96,7 @@ fn comments_of(table: &Table, key: &str) -> Option<String> {
     (!comments.is_empty()).then_some(comments)
 }
 
-/// What was copied, and what it is called now.
+/// The files that were copied, and what they are called now.
 struct Copies<'a> {
     session: &'a Path,
     known: BTreeMap<(FileKind, PathBuf), String>,

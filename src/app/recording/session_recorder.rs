@@ -22,7 +22,7 @@ pub struct SessionRecorder {
     thread: JoinHandle<Result<u32, OutputError>>,
 }
 
-/// What was recorded.
+/// The outcome of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Recorded {
     /// Frames in the session.

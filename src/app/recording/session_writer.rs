@@ -24,7 +24,7 @@ const ASSUMED_FPS: f64 = 30.0;
 /// Frames that remember which number they got, for poses that come later.
 const REMEMBERED: usize = 512;
 
-/// What a session is besides its frames.
+/// All that a session is besides its frames.
 #[derive(Debug, Clone, Default)]
 pub struct SessionHead {
     /// Frames per second that the video's own header says; `None`: 30. Each frame has its own time besides.

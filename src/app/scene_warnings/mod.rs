@@ -6,7 +6,7 @@ mod room;
 use crate::light::Light;
 use crate::scene::{Object, Scene};
 
-/// All of it, in words. Of lights and casters: lights inside closed casters of the world's anchor (where others are is not
+/// The warnings of a scene, in words; among them lights inside closed casters of the world's anchor (where others are is not
 /// known before there are pictures).
 pub fn warnings(scene: &Scene) -> Vec<String> {
     let casters = scene.phantoms.iter().chain(&scene.virtuals);

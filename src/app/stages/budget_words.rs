@@ -15,13 +15,13 @@ pub fn budget_words(governed: &Governed, p95_ms: f64) -> String {
              the least"
         );
     }
-    let why = match governed.is_at_the_end() {
+    let reason = match governed.is_at_the_end() {
         true => "there is nothing more to leave out",
         false => "frames take too different times",
     };
     format!(
         "the frame budget of {budget_ms} ms could not be held: 5 % of the frames took more than {p95_ms:.1} ms, with {lowest} \
-         at the least; {why}"
+         at the least; {reason}"
     )
 }
 

@@ -2,7 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// Counts frames, or measurements.
+/// A progress bar that counts frames, or measurements.
 pub struct Progress(ProgressBar);
 
 impl Progress {

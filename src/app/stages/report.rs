@@ -9,7 +9,7 @@ use crate::scene::Anchor;
 /// Markers of a size that is off by a smaller part are not worth a word.
 const TOLD_SIZE_ERROR: f64 = 0.01;
 
-/// What was done, and what was wrong.
+/// The outcome of a job on a recording: what was done, and what was wrong.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report {
     /// What was done, in words.

@@ -19,7 +19,7 @@ pub struct StageTimes {
     pub frames: usize,
 }
 
-/// Gathers times by stage.
+/// Times by stage, gathered frame by frame.
 #[derive(Debug, Default)]
 pub struct StageLog {
     samples_ms: BTreeMap<&'static str, Vec<f64>>,

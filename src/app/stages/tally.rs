@@ -7,7 +7,7 @@ use super::tracked::TrackedFrame;
 use crate::scene::Anchor;
 use crate::tracking::{Status, Why};
 
-/// Counts and times, frame by frame.
+/// Counts and times, gathered frame by frame.
 pub(crate) struct Tally {
     /// Times of all stages.
     pub log: StageLog,
@@ -53,11 +53,11 @@ impl Tally {
             *lost += u32::from(pose.camera_from_anchor.is_none());
         }
         for (hindered, pose) in self.hindered.iter_mut().zip(&tracked.poses) {
-            let why = pose
+            let reason = pose
                 .why
-                .filter(|why| matches!(why, Why::DoubleId | Why::NoPose));
-            if let Some(why) = why {
-                *hindered.entry(why).or_default() += 1;
+                .filter(|reason| matches!(reason, Why::DoubleId | Why::NoPose));
+            if let Some(reason) = reason {
+                *hindered.entry(reason).or_default() += 1;
             }
         }
     }
@@ -69,8 +69,8 @@ impl Tally {
             .zip(&self.hindered)
             .flat_map(|(anchor, hindered)| {
                 let name = &anchor.name;
-                hindered.iter().map(move |(why, frames)| {
-                    format!("{name} has no pose in {frames} frames: {why}")
+                hindered.iter().map(move |(reason, frames)| {
+                    format!("{name} has no pose in {frames} frames: {reason}")
                 })
             })
     }

@@ -25,7 +25,7 @@ pub(crate) const QUEUE: usize = 3;
 /// How soon a stop is seen while no frame comes.
 const LIVE_PATIENCE: Duration = Duration::from_millis(50);
 
-/// Where frames come from.
+/// The source of a job's frames.
 pub(crate) enum Frames {
     /// A recording: all of them.
     Recorded(FrameSource),
@@ -33,7 +33,7 @@ pub(crate) enum Frames {
     Live(LiveCapture, Intrinsics),
 }
 
-/// Where poses come from.
+/// The source of a job's poses.
 pub(crate) enum Poser {
     /// The pictures.
     Tracker(Box<Tracker>, MirrorWatch),
@@ -52,7 +52,7 @@ pub(crate) struct TrackedFrame {
     pub track_ms: Option<f64>,
 }
 
-/// What is known once a recording has ended.
+/// The knowledge that is there once a recording has ended.
 #[derive(Default)]
 pub(crate) struct Ended {
     /// What was wrong with the recording.
@@ -125,7 +125,7 @@ pub(crate) fn join<T>(handle: thread::ScopedJoinHandle<'_, Result<T>>) -> Result
         .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }
 
-/// What the first stage leaves behind.
+/// The outcome of the first stage.
 struct Captured {
     notices: Vec<Notice>,
     dropped: u32,

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::scene::Anchor;
 
-/// Where camera and markers were in each frame.
+/// The places of camera and markers in each frame.
 pub struct TruePoses {
     path: String,
     frames: Vec<Value>,

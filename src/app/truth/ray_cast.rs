@@ -47,9 +47,9 @@ pub struct Triangle {
     pub corners: [DVec3; 3],
 }
 
-/// What a ray meets first.
+/// The surface that a ray meets first.
 #[derive(Debug, Clone, Copy)]
-pub struct Surface {
+pub struct SeenSurface {
     /// Of the triangle.
     pub role: u8,
     /// Its index.
@@ -73,12 +73,12 @@ pub struct View {
     pub camera_from_world: DAffine3,
 }
 
-/// What is seen at each pixel's centre, rows from the top.
+/// The surfaces seen at each pixel's centre, rows from the top.
 pub struct Exact {
     /// Width and height.
     pub size_px: [u32; 2],
     /// By pixel.
-    pub surfaces: Vec<Option<Surface>>,
+    pub surfaces: Vec<Option<SeenSurface>>,
     /// For each light and pixel.
     pub bits: Vec<Vec<u8>>,
 }
@@ -88,9 +88,9 @@ pub struct World {
     /// All of them.
     pub triangles: Vec<Triangle>,
     most_nearness: f64,
-    visible: Hierarchy,
-    real_casters: Hierarchy,
-    virtual_casters: Hierarchy,
+    visible: BoxHierarchy,
+    real_casters: BoxHierarchy,
+    virtual_casters: BoxHierarchy,
 }
 
 impl World {
@@ -98,7 +98,7 @@ impl World {
     pub fn new(triangles: Vec<Triangle>) -> Self {
         let where_ = |takes: &dyn Fn(&Triangle) -> bool| {
             let indices = (0..triangles.len()).filter(|&index| takes(&triangles[index]));
-            Hierarchy::new(&triangles, indices.collect())
+            BoxHierarchy::new(&triangles, indices.collect())
         };
         let things = triangles.iter().map(|triangle| triangle.thing + 1).max();
         Self {
@@ -111,7 +111,7 @@ impl World {
     }
 
     /// What a pixel (or a place within one) sees.
-    pub fn look(&self, view: &View, pixel: DVec2) -> Option<Surface> {
+    pub fn look(&self, view: &View, pixel: DVec2) -> Option<SeenSurface> {
         let world_from_camera = view.camera_from_world.inverse();
         let eye = world_from_camera.translation;
         let plane = view.intrinsics.plane_from_pixel(pixel);
@@ -131,7 +131,7 @@ impl World {
         } = self.triangles[triangle];
         let normal = plane_normal(&corners);
         let point = eye + direction * distance;
-        Some(Surface {
+        Some(SeenSurface {
             role,
             triangle,
             thing,
@@ -175,7 +175,7 @@ impl World {
 
     /// Who takes a light from a surface. `lift_m` moves the start of the ray off it along its normal: 0 is the truth;
     /// other renderers lift by some 0.1 mm against self-shadowing.
-    pub fn bits(&self, surface: &Surface, light: &Light, lift_m: f64) -> u8 {
+    pub fn bits(&self, surface: &SeenSurface, light: &Light, lift_m: f64) -> u8 {
         let start = surface.point + surface.normal * lift_m;
         let (to_light, reach) = match *light {
             Light::Point { position_m, .. } => (position_m - surface.point, 1.0),
@@ -197,7 +197,7 @@ impl World {
                     && surface.normal.dot(corners[0] - surface.point).abs() <= surface.tie_m
                 || is_in_plane(light, corners, normal)
         };
-        let hides = |casters: &Hierarchy| casters.is_hit(&self.triangles, &ray, &hides_nothing);
+        let hides = |casters: &BoxHierarchy| casters.is_hit(&self.triangles, &ray, &hides_nothing);
         let bit = |holds: bool, bit: u8| if holds { bit } else { 0 };
         bit(sine < 0.0, FACES_AWAY)
             | bit(sine.abs() < GRAZING, GRAZES)
@@ -207,11 +207,12 @@ impl World {
 
     /// A ray through each pixel's centre, and from what it meets one to each light.
     pub fn cast(&self, lights: &[Light], view: &View, lift_m: f64) -> Exact {
-        let surfaces: Vec<Option<Surface>> = pixels(view.intrinsics.size_px)
+        let surfaces: Vec<Option<SeenSurface>> = pixels(view.intrinsics.size_px)
             .map(|(_, pixel)| self.look(view, pixel))
             .collect();
         let bits_of = |light: &Light| {
-            let bits = |seen: &Option<Surface>| seen.map_or(0, |s| self.bits(&s, light, lift_m));
+            let bits =
+                |seen: &Option<SeenSurface>| seen.map_or(0, |s| self.bits(&s, light, lift_m));
             surfaces.iter().map(bits).collect()
         };
         Exact {
@@ -284,7 +285,7 @@ impl Triangle {
 }
 
 /// Boxes around triangles, halved at the median of the longest side.
-struct Hierarchy {
+struct BoxHierarchy {
     /// Indices of triangles, in the order of the leaves.
     order: Vec<usize>,
     nodes: Vec<Node>,
@@ -293,10 +294,10 @@ struct Hierarchy {
 struct Node {
     low: DVec3,
     high: DVec3,
-    content: Content,
+    content: NodeContent,
 }
 
-enum Content {
+enum NodeContent {
     /// A range of `order`.
     Leaf(usize, usize),
     /// The other child follows its parent.
@@ -305,7 +306,7 @@ enum Content {
 
 const LEAF: usize = 4;
 
-impl Hierarchy {
+impl BoxHierarchy {
     fn new(triangles: &[Triangle], order: Vec<usize>) -> Self {
         let mut made = Self {
             order,
@@ -329,7 +330,7 @@ impl Hierarchy {
         self.nodes.push(Node {
             low: low - slack,
             high: high + slack,
-            content: Content::Leaf(start, end),
+            content: NodeContent::Leaf(start, end),
         });
         if end - start <= LEAF {
             return;
@@ -339,7 +340,7 @@ impl Hierarchy {
         let middle = (end - start) / 2;
         self.order[start..end].select_nth_unstable_by(middle, |a, b| place(a).total_cmp(&place(b)));
         self.add(triangles, start, start + middle);
-        self.nodes[node].content = Content::SecondChild(self.nodes.len());
+        self.nodes[node].content = NodeContent::SecondChild(self.nodes.len());
         self.add(triangles, start + middle, end);
     }
 
@@ -367,8 +368,8 @@ impl Hierarchy {
                 continue;
             }
             match node.content {
-                Content::SecondChild(second) => open.extend([second, index + 1]),
-                Content::Leaf(start, end) => {
+                NodeContent::SecondChild(second) => open.extend([second, index + 1]),
+                NodeContent::Leaf(start, end) => {
                     for &triangle in &self.order[start..end] {
                         let shortened = triangles[triangle]
                             .hit(&Ray { reach, ..*ray })

@@ -5,14 +5,14 @@ use glam::DVec2;
 
 /// A picture in its place.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Fit {
+pub struct PictureFit {
     /// Where it lies, points.
     pub rect: Rect,
     /// Width and height of the picture, pixels.
     pub size_px: [u32; 2],
 }
 
-impl Fit {
+impl PictureFit {
     /// A picture in the middle of an area.
     pub fn within(area: Rect, size_px: [u32; 2]) -> Self {
         let size = Vec2::new(size_px[0].max(1) as f32, size_px[1].max(1) as f32);
@@ -49,7 +49,7 @@ mod tests {
     fn a_picture_keeps_its_aspect_in_any_window() {
         for (width, height) in [(1000.0, 300.0), (300.0, 1000.0), (640.0, 480.0), (1.0, 1.0)] {
             let area = Rect::from_min_size(Pos2::new(20.0, 10.0), Vec2::new(width, height));
-            let fit = Fit::within(area, [640, 480]);
+            let fit = PictureFit::within(area, [640, 480]);
             assert!((fit.rect.aspect_ratio() - 4.0 / 3.0).abs() < 1e-4);
             assert!(area.expand(1e-3).contains_rect(fit.rect));
             let touches_width = (fit.rect.width() - width).abs() < 1e-3;
@@ -57,14 +57,14 @@ mod tests {
             let pixel = DVec2::new(12.25, 400.0);
             assert!((fit.pixel(fit.place_of(pixel)) - pixel).length() < 0.05);
         }
-        let none = Fit::within(Rect::ZERO, [640, 480]);
+        let none = PictureFit::within(Rect::ZERO, [640, 480]);
         assert!(none.pixel(Pos2::ZERO).is_finite(), "a window made tiny");
     }
 
     #[test]
     fn the_first_pixels_centre_is_half_a_pixel_in() {
         let area = Rect::from_min_size(Pos2::ZERO, Vec2::new(1280.0, 960.0));
-        let fit = Fit::within(area, [640, 480]);
+        let fit = PictureFit::within(area, [640, 480]);
         assert_eq!(fit.place_of(DVec2::ZERO), Pos2::new(1.0, 1.0));
         assert_eq!(
             fit.place_of(DVec2::new(639.5, 479.5)),

@@ -7,5 +7,5 @@ pub(crate) mod screen;
 
 use std::sync::Arc;
 
-/// Called, on another thread, whenever there is something new to show.
+/// A call from another thread whenever there is something new to show.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;

@@ -8,7 +8,7 @@ const STAYS_SECS: f64 = 6.0;
 /// Passing notices that are shown at once; the oldest make room.
 const MOST_PASSING: usize = 4;
 
-/// How serious it is.
+/// The seriousness of a notice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Weight {
     /// Something was done.
@@ -17,7 +17,7 @@ pub enum Weight {
     Trouble,
 }
 
-/// How the camera does.
+/// The state of the camera.
 #[derive(Debug, Clone, PartialEq)]
 pub enum CameraState {
     /// It is being opened.
@@ -32,7 +32,7 @@ pub enum CameraState {
     Ended,
 }
 
-/// What there is to tell.
+/// Messages for the person at the window.
 #[derive(Debug)]
 pub struct Notices {
     /// How the camera does.
@@ -81,9 +81,9 @@ impl Notices {
     pub fn shown(&self, now_secs: f64) -> Vec<(Weight, String)> {
         let camera = match &self.camera {
             CameraState::Opening | CameraState::Open(_) => None,
-            CameraState::Failed(why) => Some(why.clone()),
-            CameraState::Lost(why) => Some(format!(
-                "{why}. The last picture stays; the camera is taken up again when it is back."
+            CameraState::Failed(reason) => Some(reason.clone()),
+            CameraState::Lost(reason) => Some(format!(
+                "{reason}. The last picture stays; the camera is taken up again when it is back."
             )),
             CameraState::Ended => Some("The recording has come to its end.".to_owned()),
         };
@@ -92,7 +92,7 @@ impl Notices {
             self.scene.clone(),
             self.tracking
                 .as_ref()
-                .map(|why| format!("Not tracked: {why}")),
+                .map(|reason| format!("Not tracked: {reason}")),
         ];
         let passing = self.passing.iter();
         let passing = passing.filter(|(told_secs, ..)| now_secs - told_secs < STAYS_SECS);

@@ -20,9 +20,9 @@ use crate::capture::{FrameSource, Notice, calibration_text};
 use crate::scene::WantedFormat;
 use crate::tracking::grey_from_rgba;
 
-/// What a calibration is made of.
+/// A request to calibrate a camera.
 #[derive(Debug, Clone)]
-pub struct Request {
+pub struct CalibrateRequest {
     /// Videos, folders of pictures, single pictures; all of one camera at one size.
     pub sources: Vec<String>,
     /// What they show.
@@ -39,7 +39,7 @@ pub struct Request {
     pub replacing: Replacing,
 }
 
-/// How the window is opened.
+/// Settings of the window in which a camera is calibrated.
 #[derive(Debug, Clone, Default)]
 pub struct Watch {
     /// What a webcam is asked for.
@@ -48,7 +48,7 @@ pub struct Watch {
     pub adapter: Option<String>,
 }
 
-/// What a calibration gave.
+/// The outcome of a calibration, in words.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Done {
     /// All of it in words: views, errors, the camera.
@@ -68,7 +68,7 @@ const MOST_RMS_PX: f64 = 1.0;
 ///
 /// # Errors
 /// Pictures that cannot be read or give no calibration, files that cannot be written.
-pub fn calibrate(request: &Request, stop: &Arc<AtomicBool>) -> Result<Done> {
+pub fn calibrate(request: &CalibrateRequest, stop: &Arc<AtomicBool>) -> Result<Done> {
     let out = &request.out;
     let is_toml = out.extension().is_some_and(|extension| extension == "toml");
     if !is_toml && !is_stdout(out) {
@@ -77,7 +77,7 @@ pub fn calibrate(request: &Request, stop: &Arc<AtomicBool>) -> Result<Done> {
     request.files().check()?;
     let pictures = match &request.watch {
         Some(watch) => watched(request, watch, stop)?,
-        None => Pictures::of_recordings(request, stop)?,
+        None => TargetPictures::of_recordings(request, stop)?,
     };
     let calibration = solve(&pictures.views)?;
     let summary = pictures.summary(&calibration);
@@ -101,7 +101,11 @@ pub fn calibrate(request: &Request, stop: &Arc<AtomicBool>) -> Result<Done> {
 }
 
 /// What somebody holds to a camera.
-fn watched(request: &Request, watch: &Watch, stop: &Arc<AtomicBool>) -> Result<Pictures> {
+fn watched(
+    request: &CalibrateRequest,
+    watch: &Watch,
+    stop: &Arc<AtomicBool>,
+) -> Result<TargetPictures> {
     let [source] = &request.sources[..] else {
         bail!(
             "a camera is calibrated alone, in a window; several recordings together without --watch"
@@ -119,7 +123,7 @@ fn watched(request: &Request, watch: &Watch, stop: &Arc<AtomicBool>) -> Result<P
         watch.adapter.as_deref(),
         stop,
     )?;
-    Ok(Pictures {
+    Ok(TargetPictures {
         views: held.views,
         names: held
             .times_secs
@@ -130,7 +134,7 @@ fn watched(request: &Request, watch: &Watch, stop: &Arc<AtomicBool>) -> Result<P
     })
 }
 
-impl Request {
+impl CalibrateRequest {
     fn files(&self) -> JobFiles {
         let mut files = JobFiles::new(self.replacing);
         for source in &self.sources {
@@ -148,15 +152,15 @@ impl Request {
 }
 
 /// The pictures of all sources, numbered as they come.
-struct Pictures {
+struct TargetPictures {
     views: Views,
     /// By number.
     names: Vec<String>,
     notices: Vec<String>,
 }
 
-impl Pictures {
-    fn of_recordings(request: &Request, stop: &AtomicBool) -> Result<Self> {
+impl TargetPictures {
+    fn of_recordings(request: &CalibrateRequest, stop: &AtomicBool) -> Result<Self> {
         let mut pictures = Self {
             views: Views::new(request.target)?,
             names: Vec::new(),

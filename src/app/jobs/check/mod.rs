@@ -147,14 +147,14 @@ fn line(text: &mut String, label: &str, value: &str) {
 
 /// A row of a table, and what there is to say about it.
 #[derive(Default)]
-struct Row {
+struct TableRow {
     cells: Vec<String>,
     /// Empty, or what stands on a line of its own below the row.
     note: String,
 }
 
 /// Rows of cells in aligned columns, the label before the first; notes stand under the second column.
-fn rows(text: &mut String, label: &str, rows: Vec<Row>) {
+fn rows(text: &mut String, label: &str, rows: Vec<TableRow>) {
     if rows.is_empty() {
         return line(text, label, "none");
     }
@@ -179,7 +179,7 @@ fn rows(text: &mut String, label: &str, rows: Vec<Row>) {
     }
 }
 
-fn anchor_row((number, anchor): (usize, &Anchor)) -> Row {
+fn anchor_row((number, anchor): (usize, &Anchor)) -> TableRow {
     let markers = &anchor.markers;
     let family = markers
         .first()
@@ -207,13 +207,13 @@ fn anchor_row((number, anchor): (usize, &Anchor)) -> Row {
             String::new()
         },
     ];
-    Row {
+    TableRow {
         cells,
-        ..Row::default()
+        ..TableRow::default()
     }
 }
 
-fn object_row(object: &Object, anchors: &[Anchor], with_levels: bool) -> Row {
+fn object_row(object: &Object, anchors: &[Anchor], with_levels: bool) -> TableRow {
     let anchor = anchors
         .get(object.anchor)
         .map_or("nothing", |anchor| &anchor.name);
@@ -232,7 +232,7 @@ fn object_row(object: &Object, anchors: &[Anchor], with_levels: bool) -> Row {
     } else {
         "casts no shadow"
     };
-    Row {
+    TableRow {
         cells: vec![
             object.name.clone(),
             format!("on {anchor}"),
@@ -333,7 +333,7 @@ fn counted(count: usize, noun: &str) -> String {
     format!("{count} {}", if count == 1 { noun } else { &nouns })
 }
 
-fn light_row((number, light): (usize, &Light)) -> Row {
+fn light_row((number, light): (usize, &Light)) -> TableRow {
     let (kind, place, power) = match light {
         Light::Point {
             position_m,
@@ -352,9 +352,9 @@ fn light_row((number, light): (usize, &Light)) -> Row {
             format!("irradiance {}", vector(*irradiance)),
         ),
     };
-    Row {
+    TableRow {
         cells: vec![number.to_string(), kind.to_owned(), place, power],
-        ..Row::default()
+        ..TableRow::default()
     }
 }
 

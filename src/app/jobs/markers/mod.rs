@@ -30,13 +30,13 @@ const LABEL_MM: f64 = 4.0;
 const SIZES_MM: [f64; 2] = [3.0, 400.0];
 const DPIS: [f64; 2] = [50.0, 2400.0];
 
-/// What is to be printed.
+/// A request for sheets to print.
 #[derive(Debug, Clone)]
-pub struct Request {
+pub struct MarkersRequest {
     /// The sheet: .pdf, .svg or .png.
     pub out: PathBuf,
     /// What is on it.
-    pub sheet: Sheet,
+    pub sheet: MarkerSheet,
     /// The paper.
     pub paper: Paper,
     /// Whether it lies on its side.
@@ -47,9 +47,9 @@ pub struct Request {
     pub replacing: Replacing,
 }
 
-/// What is on a sheet.
+/// The contents of a printed sheet.
 #[derive(Debug, Clone)]
-pub enum Sheet {
+pub enum MarkerSheet {
     /// Markers in rows and columns, which are one anchor.
     Board {
         /// Of all markers.
@@ -84,7 +84,7 @@ pub enum Sheet {
 ///
 /// # Errors
 /// What does not fit on the paper, a marker that the family does not have, a file that cannot be written.
-pub fn markers(request: &Request) -> Result<Vec<PathBuf>> {
+pub fn markers(request: &MarkersRequest) -> Result<Vec<PathBuf>> {
     let out = request.out.as_path();
     let kind = ResultKind::of_sheet(out);
     let kind = kind.with_context(|| {
@@ -103,11 +103,11 @@ pub fn markers(request: &Request) -> Result<Vec<PathBuf>> {
     );
     let size_mm = request.paper.size_mm(request.landscape);
     let (pages, block) = match &request.sheet {
-        Sheet::Board { .. } => {
+        MarkerSheet::Board { .. } => {
             let (page, block) = board(&request.sheet, size_mm)?;
             (vec![page], Some(block))
         }
-        Sheet::Lone {
+        MarkerSheet::Lone {
             family,
             ids,
             size_mm: marker_mm,
@@ -115,7 +115,7 @@ pub fn markers(request: &Request) -> Result<Vec<PathBuf>> {
             let (pages, block) = lone(*family, ids, *marker_mm, size_mm)?;
             (pages, Some(block))
         }
-        Sheet::Target(target) => (vec![calibration_target(target, size_mm)?], None),
+        MarkerSheet::Target(target) => (vec![calibration_target(target, size_mm)?], None),
     };
     match (kind, pages.as_slice()) {
         (ResultKind::Pdf, pages) => write_bytes(out, &pdf::bytes(pages))?,
@@ -136,18 +136,18 @@ pub fn markers(request: &Request) -> Result<Vec<PathBuf>> {
     Ok(written)
 }
 
-impl Request {
+impl MarkersRequest {
     fn files(&self, kind: ResultKind, beside: &Path) -> JobFiles {
         let mut files = JobFiles::new(self.replacing);
         files.writes("--out", &self.out, kind);
         let family = match &self.sheet {
-            Sheet::Board { family, .. } | Sheet::Lone { family, .. } => Some(*family),
-            Sheet::Target(target) => target.markers.as_ref().map(|markers| markers.family),
+            MarkerSheet::Board { family, .. } | MarkerSheet::Lone { family, .. } => Some(*family),
+            MarkerSheet::Target(target) => target.markers.as_ref().map(|markers| markers.family),
         };
         if let Some(family) = family {
             files.reads_family(family);
         }
-        if !matches!(self.sheet, Sheet::Target(_)) {
+        if !matches!(self.sheet, MarkerSheet::Target(_)) {
             files.writes("the text beside --out,", beside, ResultKind::PrintedMarkers);
         }
         files
@@ -155,8 +155,8 @@ impl Request {
 }
 
 /// The page of a board in the middle of the paper, and its `[[board]]`, whose origin is the board's centre.
-fn board(sheet: &Sheet, size_mm: [f64; 2]) -> Result<(Page, String)> {
-    let Sheet::Board {
+fn board(sheet: &MarkerSheet, size_mm: [f64; 2]) -> Result<(Page, String)> {
+    let MarkerSheet::Board {
         family,
         first_id,
         rows,

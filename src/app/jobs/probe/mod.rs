@@ -30,9 +30,9 @@ const LIGHTS_TOLD: usize = 8;
 /// Exposures farther apart leave levels that no picture shows well, stops.
 const WIDEST_STEP_STOPS: f64 = 4.5;
 
-/// What the pictures show.
+/// The projection of the pictures that a probe is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum ProbePictureKind {
     /// A mirror ball.
     Ball,
     /// Debevec's angular map.
@@ -41,15 +41,15 @@ pub enum Kind {
     Panorama,
 }
 
-/// What is asked for.
+/// A request to make a probe.
 #[derive(Debug, Clone)]
-pub struct Request {
+pub struct ProbeRequest {
     /// Exposures of one view; or one picture in linear radiance (.hdr, .exr).
     pub pictures: Vec<PathBuf>,
     /// Exposure times, as a list (`1/8,1/30`) or a file; from the pictures' EXIF without.
     pub exposures: Option<String>,
     /// What they show.
-    pub kind: Kind,
+    pub kind: ProbePictureKind,
     /// The ball's or the map's outline; found without.
     pub crop: Option<Circle>,
     /// From the camera to the ball's middle, in radii of the ball; infinite where it was far.
@@ -77,7 +77,7 @@ pub struct Request {
     pub replacing: Replacing,
 }
 
-/// What came of it, in words.
+/// The lights and remarks that came of it, in words.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Told {
     /// The lights, a row each under a header.
@@ -90,20 +90,20 @@ pub struct Told {
 ///
 /// # Errors
 /// Pictures that cannot be read or do not fit together, times that do not fit them, no ball; nothing is written then.
-pub fn probe(request: &Request) -> Result<Told> {
+pub fn probe(request: &ProbeRequest) -> Result<Told> {
     check(request)?;
     let mut remarks = Vec::new();
     let source = match &request.pictures[..] {
-        [path] if radiance_format(path).is_ok() => Source::read(request, path, &mut remarks)?,
-        _ => Source::merged(request, &mut remarks)?,
+        [path] if radiance_format(path).is_ok() => ProbeSource::read(request, path, &mut remarks)?,
+        _ => ProbeSource::merged(request, &mut remarks)?,
     };
     let picture_px = source.picture.size_px();
     let projection = match (request.kind, source.circle) {
-        (Kind::Ball, Some(circle)) => Projection::Ball {
+        (ProbePictureKind::Ball, Some(circle)) => Projection::Ball {
             circle,
             distance_radii: request.ball_distance_radii,
         },
-        (Kind::Angular, Some(circle)) => Projection::Angular(circle),
+        (ProbePictureKind::Angular, Some(circle)) => Projection::Angular(circle),
         _ => Projection::Panorama,
     };
     let width_px = (request.width_px)
@@ -119,7 +119,7 @@ pub fn probe(request: &Request) -> Result<Told> {
         ));
     }
     let probe = match request.kind {
-        Kind::Ball => brightened(&unwrapped.probe, 1.0 / request.ball_reflectance)?,
+        ProbePictureKind::Ball => brightened(&unwrapped.probe, 1.0 / request.ball_reflectance)?,
         _ => unwrapped.probe,
     };
     let lights = brightest(&probe, LIGHTS_TOLD);
@@ -143,7 +143,7 @@ pub fn probe(request: &Request) -> Result<Told> {
 }
 
 /// What can be known before any picture is read.
-fn check(request: &Request) -> Result<()> {
+fn check(request: &ProbeRequest) -> Result<()> {
     radiance_format(&request.out)?;
     let mut files = JobFiles::new(request.replacing);
     for read in request.pictures.iter().chain(&request.response) {
@@ -170,29 +170,29 @@ fn check(request: &Request) -> Result<()> {
             preview.display()
         );
     }
-    if request.kind != Kind::Ball {
+    if request.kind != ProbePictureKind::Ball {
         ensure!(
             request.ball_distance_radii.is_infinite() && request.ball_reflectance == 1.0,
             "--ball-distance and --reflectance are a ball's (--kind ball)"
         );
     }
     ensure!(
-        request.kind != Kind::Panorama || request.crop.is_none(),
+        request.kind != ProbePictureKind::Panorama || request.crop.is_none(),
         "a panorama is taken whole; --crop is a ball's or an angular map's"
     );
     Ok(())
 }
 
-/// Radiance, from whichever way.
-struct Source {
+/// Radiance as a picture, read or merged from exposures.
+struct ProbeSource {
     picture: RadiancePicture,
     circle: Option<Circle>,
     response: Option<Response>,
 }
 
-impl Source {
+impl ProbeSource {
     /// A picture that is in radiance already.
-    fn read(request: &Request, path: &Path, remarks: &mut Vec<String>) -> Result<Self> {
+    fn read(request: &ProbeRequest, path: &Path, remarks: &mut Vec<String>) -> Result<Self> {
         let needless = request.exposures.is_some()
             || request.response.is_some()
             || request.save_response.is_some()
@@ -215,7 +215,7 @@ impl Source {
         }
         let [width, height] = picture.size_px();
         let circle = match request.kind {
-            Kind::Panorama => None,
+            ProbePictureKind::Panorama => None,
             _ if request.crop.is_some() || width == height => {
                 Some(outline(request, picture.size_px())?)
             }
@@ -233,7 +233,7 @@ impl Source {
     }
 
     /// Several exposures.
-    fn merged(request: &Request, remarks: &mut Vec<String>) -> Result<Self> {
+    fn merged(request: &ProbeRequest, remarks: &mut Vec<String>) -> Result<Self> {
         let amounts = exposures(request)?;
         ensure!(
             request.pictures.len() > 1 || request.response.is_some(),
@@ -255,8 +255,8 @@ impl Source {
             remarks.push(format!("moved by (right,down px): {}", shifts.join("  ")));
         }
         let circle = match request.kind {
-            Kind::Panorama => None,
-            Kind::Ball if request.crop.is_none() => {
+            ProbePictureKind::Panorama => None,
+            ProbePictureKind::Ball if request.crop.is_none() => {
                 let found = ball::find(&bracket)?.ok_or_else(|| {
                     anyhow!("no ball was found in the pictures; give its outline, --crop X,Y,RADIUS in pixels")
                 })?;
@@ -315,7 +315,7 @@ impl Source {
 }
 
 /// The outline that is given, or that fills the picture.
-fn outline(request: &Request, size_px: [usize; 2]) -> Result<Circle> {
+fn outline(request: &ProbeRequest, size_px: [usize; 2]) -> Result<Circle> {
     let Some(circle) = request.crop else {
         return Ok(Circle::inscribed(size_px));
     };
@@ -335,18 +335,18 @@ fn outline(request: &Request, size_px: [usize; 2]) -> Result<Circle> {
     Ok(circle)
 }
 
-fn check_shape(request: &Request, [width, height]: [usize; 2]) -> Result<()> {
+fn check_shape(request: &ProbeRequest, [width, height]: [usize; 2]) -> Result<()> {
     let what = request.pictures[0].display();
     match request.kind {
-        Kind::Panorama => ensure!(
+        ProbePictureKind::Panorama => ensure!(
             width == 2 * height,
             "{what}: {width} x {height} pixels; a panorama of all directions is twice as wide as high"
         ),
-        Kind::Angular => ensure!(
+        ProbePictureKind::Angular => ensure!(
             request.crop.is_some() || width == height,
             "{what}: {width} x {height} pixels; an angular map is square, or give its outline, --crop X,Y,RADIUS"
         ),
-        Kind::Ball => {}
+        ProbePictureKind::Ball => {}
     }
     Ok(())
 }
@@ -401,7 +401,7 @@ fn read_response(path: &Path) -> Result<Response> {
 }
 
 /// One for each picture, in seconds (or what EXIF makes of time, sensitivity and aperture).
-fn exposures(request: &Request) -> Result<Vec<f64>> {
+fn exposures(request: &ProbeRequest) -> Result<Vec<f64>> {
     let pictures = &request.pictures;
     let Some(given) = &request.exposures else {
         return pictures

@@ -11,7 +11,7 @@ const SHEET_WIDTH_PX: u32 = 1600;
 const GAP_PX: u32 = 4;
 const BACKGROUND: [u8; 4] = [255; 4];
 
-/// Collects evenly spaced frames of a replay, whose length need not be known.
+/// A sheet of evenly spaced frames of a replay, whose length need not be known.
 pub struct ContactSheet {
     columns: u32,
     most_cells: usize,

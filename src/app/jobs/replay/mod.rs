@@ -38,9 +38,9 @@ use crate::app::stages::tracked::{
 use crate::app::stopwatch::Stopwatch;
 use contact_sheet::ContactSheet;
 
-/// What a replay is asked for.
+/// A request to replay a recording.
 #[derive(Debug, Clone, Default)]
-pub struct Request {
+pub struct ReplayRequest {
     /// The scene file.
     pub scene: PathBuf,
     /// A video (by its extension) or a folder of PNGs; `None`: nothing is drawn, which needs no GPU.
@@ -71,7 +71,7 @@ pub struct Request {
 ///
 /// # Errors
 /// Anything that keeps a frame from being read, tracked, drawn or written; files are then not left half-written.
-pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
+pub fn replay(request: &ReplayRequest, stop: &AtomicBool) -> Result<Report> {
     let watch = Stopwatch::start();
     let mut files = JobFiles::new(request.replacing);
     let mut scene = files.reads_scene(&request.scene)?;
@@ -91,12 +91,12 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
         ),
     };
     let drawing = (request.out.is_some() || request.sheet.is_some())
-        .then(|| Drawing::open(request, &scene, &source, intrinsics))
+        .then(|| ReplayDrawing::open(request, &scene, &source, intrinsics))
         .transpose()?;
     if drawing.is_none() && request.poses.is_none() && request.stats.is_none() {
         bail!("nothing to do: give --out, --sheet, --poses or --stats");
     }
-    let mut run = Run {
+    let mut run = ReplayRun {
         request,
         scene: &scene,
         poses: PosesText::new(),
@@ -151,7 +151,7 @@ pub fn replay(request: &Request, stop: &AtomicBool) -> Result<Report> {
     ))
 }
 
-impl Request {
+impl ReplayRequest {
     /// Layers lie beside PNGs alone.
     fn check_layers(&self) -> Result<()> {
         if !self.layers.is_empty() {
@@ -197,16 +197,16 @@ struct DrawnFrame {
     layers: Option<Layers>,
 }
 
-/// What drawing needs, opened before the first frame so that mistakes show at once.
-struct Drawing {
+/// The renderer and the files of a replay, opened before the first frame so that mistakes show at once.
+struct ReplayDrawing {
     gpu: Arc<Gpu>,
     renderer: Renderer,
     files: Files,
 }
 
-impl Drawing {
+impl ReplayDrawing {
     fn open(
-        request: &Request,
+        request: &ReplayRequest,
         scene: &Scene,
         source: &FrameSource,
         intrinsics: Intrinsics,
@@ -233,8 +233,8 @@ impl Drawing {
 }
 
 /// The state of a replay as it goes.
-struct Run<'a> {
-    request: &'a Request,
+struct ReplayRun<'a> {
+    request: &'a ReplayRequest,
     scene: &'a Scene,
     poses: PosesText,
     tally: Tally,
@@ -243,13 +243,13 @@ struct Run<'a> {
     governed: Option<Governed>,
 }
 
-impl Run<'_> {
+impl ReplayRun<'_> {
     /// Capture → tracking → rendering (here) → writing.
     fn all_frames(
         &mut self,
         source: FrameSource,
         poser: Poser,
-        drawing: Option<Drawing>,
+        drawing: Option<ReplayDrawing>,
         last: Option<u32>,
         stop: &AtomicBool,
     ) -> Result<Ended> {
@@ -417,12 +417,12 @@ struct Files {
     size_px: [u32; 2],
 }
 
-/// For each stage what each frame took.
+/// Times of each frame, by stage.
 type StageSamples = Vec<(&'static str, Vec<f64>)>;
 
 /// Writes pictures and layers as they come, and finishes the files; gives what each stage took per frame.
 fn write_stage(
-    request: &Request,
+    request: &ReplayRequest,
     files: Option<Files>,
     from_renderer: &Receiver<DrawnFrame>,
 ) -> Result<StageSamples> {

@@ -14,9 +14,9 @@ use std::path::Path;
 use eframe::egui::{CollapsingHeader, ScrollArea, Ui};
 
 use super::command::{Commands, Overlay, RecordingCommand, SceneCommand, WindowCommand};
-use super::eye::TrackedPicture;
+use super::frame_tracker::TrackedPicture;
 use super::meters::Meters;
-use super::views::View;
+use super::views::ViewMode;
 use super::window_state::WindowState;
 use crate::scene::{Placement, Scene, Shortcut};
 use editing::Editing;
@@ -133,7 +133,7 @@ fn recording(ui: &mut Ui, facts: &Facts<'_>, commands: &mut Commands) {
 
 fn view(ui: &mut Ui, look: &WindowState, commands: &mut Commands) {
     ui.horizontal_wrapped(|ui| {
-        for (name, view) in View::BY_NAME {
+        for (name, view) in ViewMode::BY_NAME {
             if ui.selectable_label(look.view == view, name).clicked() && look.view != view {
                 commands.push(WindowCommand::Show(view));
             }
@@ -146,7 +146,7 @@ fn view(ui: &mut Ui, look: &WindowState, commands: &mut Commands) {
         }
     }
     // Where somebody looks for a wrong shadow.
-    if matches!(look.view, View::StencilCount | View::Volumes) {
+    if matches!(look.view, ViewMode::StencilCount | ViewMode::Volumes) {
         ui.label("Shortcuts of shadow volumes").on_hover_text(
             "They change no pixel: one that does when it is switched off is what a wrong pixel comes from.",
         );

@@ -1,26 +1,26 @@
 //! What the window says to the person who holds the target.
 
-use super::watcher::{Solved, Standing};
+use super::watcher::{SolvedViews, ViewsStanding};
 use crate::calibration::{FEWEST_VIEWS, Lack, Moment, Target};
 
 /// What to do next.
-pub fn advice(standing: &Standing, target: &Target) -> String {
-    let wish = wish(standing);
+pub fn advice(standing: &ViewsStanding, target: &Target) -> String {
+    let next_view = next_view(standing);
     match standing.moment {
         Some(Moment::NoTarget) if target.markers.is_some() => {
-            format!("The board is not seen. {wish}")
+            format!("The board is not seen. {next_view}")
         }
         Some(Moment::NoTarget) => {
-            format!("The chessboard is not seen: it must be whole in the picture. {wish}")
+            format!("The chessboard is not seen: it must be whole in the picture. {next_view}")
         }
         Some(Moment::Moves) => "Hold it still …".to_owned(),
-        Some(Moment::Taken) => format!("Taken. {wish}"),
-        Some(Moment::Known) | None => wish,
+        Some(Moment::Taken) => format!("Taken. {next_view}"),
+        Some(Moment::Known) | None => next_view,
     }
 }
 
 /// What the views lack most.
-fn wish(standing: &Standing) -> String {
+fn next_view(standing: &ViewsStanding) -> String {
     let of = |wanted: fn(&Lack) -> bool| standing.lacks.iter().find(|lack| wanted(lack));
     if standing.taken > 0
         && let Some(Lack::Coverage { missing, .. }) =
@@ -42,7 +42,7 @@ fn wish(standing: &Standing) -> String {
 }
 
 /// What there is.
-pub fn balance(standing: &Standing) -> String {
+pub fn balance(standing: &ViewsStanding) -> String {
     let views = match standing.taken {
         1 => "1 view".to_owned(),
         taken => format!("{taken} views"),
@@ -52,14 +52,14 @@ pub fn balance(standing: &Standing) -> String {
         .as_ref()
         .map_or(0.0, |coverage| coverage.share());
     let solved = match &standing.solved {
-        Some(Ok(Solved {
+        Some(Ok(SolvedViews {
             rms_px,
             focal_px: [focal_px, deviation_px],
         })) => format!(
             " · {rms_px:.2} px rms · focal length {:.1} ± {:.1}, {:.1} ± {:.1} px",
             focal_px.x, deviation_px.x, focal_px.y, deviation_px.y
         ),
-        Some(Err(why)) => format!(" · {why}"),
+        Some(Err(reason)) => format!(" · {reason}"),
         None => format!(" of the {FEWEST_VIEWS} that are the least"),
     };
     format!(
@@ -69,10 +69,10 @@ pub fn balance(standing: &Standing) -> String {
 }
 
 /// Why there is nothing to write yet; `None` where there is.
-pub fn refusal(standing: Option<&Standing>) -> Option<String> {
+pub fn refusal(standing: Option<&ViewsStanding>) -> Option<String> {
     match standing.map(|standing| (standing.taken, &standing.solved)) {
         Some((_, Some(Ok(_)))) => None,
-        Some((_, Some(Err(why)))) => Some(why.clone()),
+        Some((_, Some(Err(reason)))) => Some(reason.clone()),
         other => Some(format!(
             "At least {FEWEST_VIEWS} different views are needed; there are {}.",
             other.map_or(0, |(taken, _)| taken)
@@ -88,7 +88,7 @@ mod tests {
     #[test]
     fn it_says_what_is_lacking_most_and_when_it_is_enough() {
         let chessboard = Target::chessboard([8, 5], 0.025).unwrap();
-        let mut standing = Standing {
+        let mut standing = ViewsStanding {
             moment: Some(Moment::NoTarget),
             size_px: [640, 480],
             target_px: None,
@@ -110,7 +110,7 @@ mod tests {
             first.contains("must be whole") && first.contains("Hold the target"),
             "{first}"
         );
-        assert!(refusal(Some(&standing)).is_some_and(|why| why.contains("there are 0")));
+        assert!(refusal(Some(&standing)).is_some_and(|reason| reason.contains("there are 0")));
         (standing.taken, standing.moment) = (1, Some(Moment::Taken));
         assert_eq!(
             advice(&standing, &chessboard),
@@ -126,7 +126,7 @@ mod tests {
         standing.lacks.clear();
         standing.solved = Some(Err("no focal length".to_owned()));
         assert_eq!(refusal(Some(&standing)).as_deref(), Some("no focal length"));
-        standing.solved = Some(Ok(Solved {
+        standing.solved = Some(Ok(SolvedViews {
             rms_px: 0.123,
             focal_px: [DVec2::new(600.0, 601.0), DVec2::new(1.0, 2.0)],
         }));

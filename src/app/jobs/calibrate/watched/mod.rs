@@ -16,9 +16,9 @@ use crate::calibration::{Taker, Target, Views};
 use crate::capture::live::{LiveOptions, Now};
 use crate::render::Gpu;
 use watcher::Watcher;
-use window::{Ending, Window};
+use window::{CalibrationWindow, Ending};
 
-/// What somebody held to the camera.
+/// Views of a target that somebody held to the camera.
 pub struct Held {
     /// The views that were taken.
     pub views: Views,
@@ -51,7 +51,7 @@ pub fn views(
             let wake = Arc::new(move || context.request_repaint());
             let watcher = Watcher::start(&source, &options, taker, &now, wake);
             opened.store(true, Ordering::Relaxed);
-            let window = Window::new(watcher, target, now, stop, ending);
+            let window = CalibrationWindow::new(watcher, target, now, stop, ending);
             Ok(Box::new(window) as Box<dyn eframe::App>)
         }
     };

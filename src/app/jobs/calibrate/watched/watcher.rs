@@ -23,18 +23,18 @@ use crate::tracking::grey_from_rgba;
 /// How soon an order is obeyed while no picture comes.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// What a person wants.
+/// An instruction of the person at the window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Order {
+pub enum WatcherOrder {
     /// The next picture is a view, wherever the target is.
     Take,
     /// The view that was taken last is none.
     DropLast,
 }
 
-/// How things are after a picture.
+/// The state of the views after a picture.
 #[derive(Debug, Clone)]
-pub struct Standing {
+pub struct ViewsStanding {
     /// What became of the picture; `None` after an order.
     pub moment: Option<Moment>,
     /// Width and height of the pictures.
@@ -48,14 +48,14 @@ pub struct Standing {
     /// Where their corners are.
     pub coverage: Option<Coverage>,
     /// What they give, from [`FEWEST_VIEWS`] on.
-    pub solved: Option<Result<Solved, String>>,
+    pub solved: Option<Result<SolvedViews, String>>,
     /// Pictures of another size than the first: they are passed over.
     pub passed_over: Option<[u32; 2]>,
 }
 
 /// A calibration in a few words.
 #[derive(Debug, Clone, Copy)]
-pub struct Solved {
+pub struct SolvedViews {
     /// Root mean square distance of the corners, pixels.
     pub rms_px: f64,
     /// Focal lengths and their standard deviations, pixels.
@@ -66,8 +66,8 @@ pub struct Solved {
 pub struct Watcher {
     capture: Option<LiveCapture>,
     frames: Arc<Mailbox<Arc<Frame>>>,
-    standings: Arc<Mailbox<Standing>>,
-    orders: Option<Sender<Order>>,
+    standings: Arc<Mailbox<ViewsStanding>>,
+    orders: Option<Sender<WatcherOrder>>,
     thread: Option<JoinHandle<Result<Held, CalibrateError>>>,
 }
 
@@ -87,7 +87,7 @@ impl Watcher {
         let capture = LiveCapture::start(source, options, Arc::clone(now), Some(tap));
         let standings = Arc::new(Mailbox::new());
         let (orders, to_obey) = channel();
-        let stage = Stage {
+        let stage = WatcherStage {
             taker,
             times_secs: Vec::new(),
             solved: None,
@@ -112,7 +112,7 @@ impl Watcher {
     }
 
     /// How things are now, if that is new.
-    pub fn standing(&self) -> Option<Standing> {
+    pub fn standing(&self) -> Option<ViewsStanding> {
         newest(&self.standings)
     }
 
@@ -122,7 +122,7 @@ impl Watcher {
     }
 
     /// Tells the thread that looks what to do.
-    pub fn order(&self, order: Order) {
+    pub fn order(&self, order: WatcherOrder) {
         if let Some(orders) = &self.orders {
             // A thread that has ended tells why when it is asked for what it has.
             _ = orders.send(order);
@@ -165,18 +165,18 @@ fn newest<T>(mailbox: &Mailbox<T>) -> Option<T> {
     }
 }
 
-struct Stage {
+struct WatcherStage {
     taker: Taker,
     times_secs: Vec<f64>,
-    solved: Option<Result<Solved, String>>,
-    orders: Receiver<Order>,
+    solved: Option<Result<SolvedViews, String>>,
+    orders: Receiver<WatcherOrder>,
     /// Whether the next picture is to be taken.
     by_hand: bool,
-    standings: Arc<Mailbox<Standing>>,
+    standings: Arc<Mailbox<ViewsStanding>>,
     wake: Wake,
 }
 
-impl Stage {
+impl WatcherStage {
     /// Until nobody gives orders any more.
     fn run(mut self, captured: &Mailbox<Arrived>) -> Result<Held, CalibrateError> {
         loop {
@@ -201,10 +201,10 @@ impl Stage {
         })
     }
 
-    fn obey(&mut self, order: Order) {
+    fn obey(&mut self, order: WatcherOrder) {
         match order {
-            Order::Take => self.by_hand = true,
-            Order::DropLast => {
+            WatcherOrder::Take => self.by_hand = true,
+            WatcherOrder::DropLast => {
                 if self.taker.drop_last() {
                     self.solve();
                 }
@@ -236,7 +236,7 @@ impl Stage {
     fn solve(&mut self) {
         let views = self.taker.views();
         self.solved = (views.kept().len() >= FEWEST_VIEWS).then(|| {
-            let solved = solve(views).map(|calibration| Solved {
+            let solved = solve(views).map(|calibration| SolvedViews {
                 rms_px: calibration.rms_px,
                 focal_px: [
                     calibration.intrinsics.focal_px,
@@ -249,7 +249,7 @@ impl Stage {
 
     fn tell(&self, moment: Option<Moment>, view: Option<&View>, passed_over: Option<[u32; 2]>) {
         let views = self.taker.views();
-        self.standings.put(Standing {
+        self.standings.put(ViewsStanding {
             moment,
             size_px: views.size_px().unwrap_or_default(),
             target_px: view.map(|view| (view.outline_px(), view.pixels().collect())),

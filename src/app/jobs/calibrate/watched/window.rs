@@ -12,8 +12,8 @@ use eframe::egui::{
 
 use super::Held;
 use super::advice::{advice, balance, refusal};
-use super::watcher::{Order, Standing, Watcher};
-use crate::app::window::fit::Fit;
+use super::watcher::{ViewsStanding, Watcher, WatcherOrder};
+use crate::app::window::fit::PictureFit;
 use crate::app::window::notices::{CameraState, Notices, Weight};
 use crate::calibration::{Coverage, Moment, Target};
 use crate::capture::live::Now;
@@ -30,7 +30,7 @@ const TROUBLE: Color32 = Color32::from_rgb(255, 190, 90);
 const MARGIN: f32 = 8.0;
 const KEYS: &str = "Space take · Backspace drop the last · Enter finish · Esc give up";
 
-/// How it ended.
+/// The end of a calibration window.
 pub enum Ending {
     /// There are views to calibrate with.
     Enough(Box<Held>),
@@ -40,20 +40,20 @@ pub enum Ending {
     Failed(anyhow::Error),
 }
 
-/// The window's state.
-pub struct Window {
+/// The state of a calibration window.
+pub struct CalibrationWindow {
     /// `None` once it has ended.
     watcher: Option<Watcher>,
     target: Target,
     picture: Option<(TextureHandle, [u32; 2])>,
-    standing: Option<Standing>,
+    standing: Option<ViewsStanding>,
     notices: Notices,
     now: Now,
     stop: Arc<AtomicBool>,
     ending: Arc<Mutex<Option<Ending>>>,
 }
 
-impl Window {
+impl CalibrationWindow {
     /// A window on a camera; how it ended is left in `ending`.
     pub fn new(
         watcher: Watcher,
@@ -111,8 +111,8 @@ impl Window {
         }
         if watcher.has_failed() {
             self.finish(ctx);
-        } else if let CameraState::Failed(why) = &self.notices.camera {
-            let error = anyhow!("{why}");
+        } else if let CameraState::Failed(reason) = &self.notices.camera {
+            let error = anyhow!("{reason}");
             self.end(ctx, Ending::Failed(error));
         }
     }
@@ -135,15 +135,15 @@ impl Window {
         if pressed(Key::Enter) {
             match refusal(self.standing.as_ref()) {
                 None => self.finish(ctx),
-                Some(why) => self.notices.tell((self.now)(), Weight::Trouble, why),
+                Some(reason) => self.notices.tell((self.now)(), Weight::Trouble, reason),
             }
         }
         if let Some(watcher) = &self.watcher {
             if pressed(Key::Space) {
-                watcher.order(Order::Take);
+                watcher.order(WatcherOrder::Take);
             }
             if pressed(Key::Backspace) {
-                watcher.order(Order::DropLast);
+                watcher.order(WatcherOrder::DropLast);
             }
         }
     }
@@ -179,7 +179,7 @@ impl Window {
         let mut top = line(painter, area, area.top(), &says, (20.0, Color32::WHITE));
         // Between the two.
         let rest = Rect::from_x_y_ranges(area.x_range(), top..=foot_top.max(top));
-        let fit = Fit::within(rest, *size_px);
+        let fit = PictureFit::within(rest, *size_px);
         let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
         painter.image(texture.id(), fit.rect, whole, Color32::WHITE);
         // What was found in a picture of another size lies elsewhere in this one.
@@ -217,7 +217,7 @@ fn text_width(area: Rect) -> f32 {
 }
 
 /// The parts of the picture in which no view has a corner.
-fn tint(painter: &Painter, fit: &Fit, coverage: &Coverage) {
+fn tint(painter: &Painter, fit: &PictureFit, coverage: &Coverage) {
     let cell = fit.rect.size() / Vec2::new(coverage.columns as f32, coverage.rows as f32);
     for (k, &views) in coverage.views.iter().enumerate() {
         let place = Vec2::new((k % coverage.columns) as f32, (k / coverage.columns) as f32);
@@ -228,7 +228,7 @@ fn tint(painter: &Painter, fit: &Fit, coverage: &Coverage) {
     }
 }
 
-fn outline(painter: &Painter, fit: &Fit, standing: &Standing) {
+fn outline(painter: &Painter, fit: &PictureFit, standing: &ViewsStanding) {
     let color = match standing.moment {
         Some(Moment::Taken) => TAKEN,
         Some(Moment::Moves) => MOVES,
@@ -243,7 +243,7 @@ fn outline(painter: &Painter, fit: &Fit, standing: &Standing) {
     }
 }
 
-impl eframe::App for Window {
+impl eframe::App for CalibrationWindow {
     fn logic(&mut self, ctx: &Context, _: &mut eframe::Frame) {
         ctx.request_repaint_after(PULSE);
         if self.stop.load(Ordering::Relaxed) {

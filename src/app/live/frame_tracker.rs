@@ -16,9 +16,9 @@ use crate::tracking::{
 /// Tangent of half the angle that a camera nobody has calibrated is taken to see across: most webcams see about 60°.
 const GUESSED_HALF_WIDTH: f64 = 0.577;
 
-/// What is looked for in frames.
+/// The markers that are looked for in frames.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Plan {
+pub enum TrackingPlan {
     /// The anchors of a scene.
     Follow {
         /// How they are found.
@@ -55,10 +55,10 @@ pub struct TrackedPicture {
     pub trouble: Option<String>,
 }
 
-/// Looks at frames, one after the other.
-pub struct Eye {
+/// The tracker of live frames, made anew where their size or the plan changes.
+pub struct FrameTracker {
     calibration: Option<Intrinsics>,
-    plan: Plan,
+    plan: TrackingPlan,
     /// Made for the frames' size.
     worker: Option<([u32; 2], Worker)>,
 }
@@ -68,9 +68,9 @@ enum Worker {
     Looks(Box<Detector>),
 }
 
-impl Eye {
+impl FrameTracker {
     /// `calibration`: `None` where the camera has none, and a guess must do.
-    pub fn new(calibration: Option<Intrinsics>, plan: Plan) -> Self {
+    pub fn new(calibration: Option<Intrinsics>, plan: TrackingPlan) -> Self {
         Self {
             calibration,
             plan,
@@ -79,7 +79,7 @@ impl Eye {
     }
 
     /// From now on something else is looked for.
-    pub fn set_plan(&mut self, plan: Plan) {
+    pub fn set_plan(&mut self, plan: TrackingPlan) {
         if self.plan != plan {
             self.plan = plan;
             self.worker = None;
@@ -90,8 +90,8 @@ impl Eye {
     pub fn look(&mut self, arrived: Arrived, now_secs: f64, with_rejected: bool) -> TrackedPicture {
         let Arrived { frame, at_secs } = arrived;
         let anchors: Arc<[Anchor]> = match &self.plan {
-            Plan::Follow { anchors, .. } => Arc::clone(anchors),
-            Plan::Look => Arc::new([]),
+            TrackingPlan::Follow { anchors, .. } => Arc::clone(anchors),
+            TrackingPlan::Look => Arc::new([]),
         };
         let unfit = self.calibration.as_ref().and_then(|calibration| {
             let checked = check_frame_size(calibration, frame.size_px, "the camera");
@@ -156,12 +156,12 @@ impl Eye {
 }
 
 impl Worker {
-    fn new(plan: &Plan, intrinsics: Intrinsics) -> Result<Self, TrackingError> {
+    fn new(plan: &TrackingPlan, intrinsics: Intrinsics) -> Result<Self, TrackingError> {
         Ok(match plan {
-            Plan::Follow { settings, anchors } => {
+            TrackingPlan::Follow { settings, anchors } => {
                 Self::Follows(Box::new(Tracker::new(settings, anchors, intrinsics)?))
             }
-            Plan::Look => {
+            TrackingPlan::Look => {
                 // No tracker chases what a quick search misses.
                 let settings = TrackingSettings {
                     library_edges: true,
@@ -207,7 +207,7 @@ mod tests {
     #[test]
     fn a_frame_that_does_not_fit_the_calibration_is_still_shown() {
         let (scene, arrived, intrinsics) = lamp();
-        let plan = Plan::Follow {
+        let plan = TrackingPlan::Follow {
             settings: scene.tracking.clone(),
             anchors: scene.anchors.into(),
         };
@@ -215,11 +215,12 @@ mod tests {
             size_px: [320, 240],
             ..intrinsics
         };
-        let picture = Eye::new(Some(other), plan.clone()).look(arrived.clone(), 2.01, false);
+        let picture =
+            FrameTracker::new(Some(other), plan.clone()).look(arrived.clone(), 2.01, false);
         assert!(picture.trouble.unwrap().contains("320"));
         assert_eq!(picture.poses, [AnchorPose::LOST]);
         assert_eq!(picture.intrinsics.size_px, picture.frame.size_px);
-        let picture = Eye::new(Some(intrinsics), plan).look(arrived, 2.01, false);
+        let picture = FrameTracker::new(Some(intrinsics), plan).look(arrived, 2.01, false);
         assert_eq!(picture.trouble, None);
         assert!(picture.poses[0].camera_from_anchor.is_some());
         assert!((picture.wait_ms - 10.0).abs() < 1e-9);
@@ -228,8 +229,8 @@ mod tests {
     #[test]
     fn without_a_scene_every_marker_is_seen() {
         let (_, arrived, _) = lamp();
-        let mut eye = Eye::new(None, Plan::Look);
-        let picture = eye.look(arrived, 2.0, false);
+        let mut tracker = FrameTracker::new(None, TrackingPlan::Look);
+        let picture = tracker.look(arrived, 2.0, false);
         let ids: Vec<u32> = picture.detections.iter().map(|seen| seen.id).collect();
         // Shadows lie across two of the six.
         assert!([0, 2, 3, 4].iter().all(|id| ids.contains(id)), "{ids:?}");
