@@ -18,7 +18,7 @@ use gnomon::scene::{Shortcut, Shortcuts};
 
 use common::{Csv, Times, at_least_one, read_obj, shared_folder};
 use gnomon::app::chart::peers_table::{
-    LIGHT_M, SIZE_PX, Stage, TORUS_CENTER_M, WARM_UP_FRAMES, torus,
+    LIGHT_M, PeersStage, SIZE_PX, TORUS_CENTER_M, WARM_UP_FRAMES, torus,
 };
 
 /// Times frames with shadow volumes.
@@ -58,7 +58,7 @@ fn samples(written: &str) -> Result<u32, String> {
 /// What is timed.
 struct Case {
     name: &'static str,
-    stage: Stage,
+    stage: PeersStage,
 }
 
 fn main() -> Result<()> {
@@ -176,7 +176,7 @@ fn four_scenes(only: Option<&str>, samples: u32) -> Result<Vec<Case>> {
             };
             Ok(Case {
                 name,
-                stage: Stage::new(vec![caster], &[LIGHT_M], SIZE_PX, samples),
+                stage: PeersStage::new(vec![caster], &[LIGHT_M], SIZE_PX, samples),
             })
         })
         .collect()
@@ -239,7 +239,7 @@ fn time_shortcuts(
 }
 
 /// A renderer with its picture.
-fn renderer(gpu: &Arc<Gpu>, stage: &Stage) -> Result<Renderer> {
+fn renderer(gpu: &Arc<Gpu>, stage: &PeersStage) -> Result<Renderer> {
     let mut renderer = Renderer::new(Arc::clone(gpu), &stage.scene, stage.intrinsics)?;
     let size_px = stage.intrinsics.size_px;
     renderer.upload(&Frame {
@@ -260,7 +260,7 @@ struct FrameTimes {
     gpu_picture: Option<Times>,
 }
 
-fn time(gpu: &Arc<Gpu>, stage: &Stage, frames: usize) -> Result<FrameTimes> {
+fn time(gpu: &Arc<Gpu>, stage: &PeersStage, frames: usize) -> Result<FrameTimes> {
     let mut renderer = renderer(gpu, stage)?;
     let mut host_ms = [(); 3].map(|()| Vec::with_capacity(frames));
     let mut gpu_ms = [(); 2].map(|()| Vec::with_capacity(frames));

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result, bail};
 use clap::{Args, Parser, Subcommand};
 
-use gnomon::app::board::Distance;
 use gnomon::app::chart;
-use gnomon::app::job_files::Replacing;
-use gnomon::app::layer_files::Layer;
-use gnomon::app::probe::exposure_of;
+use gnomon::app::files::job_files::Replacing;
+use gnomon::app::files::layer_files::Layer;
+use gnomon::app::jobs::board::Distance;
+use gnomon::app::jobs::probe::exposure_of;
 use gnomon::calibration::{Target, TargetMarkers};
 use gnomon::light::probe_maps::Circle;
 use gnomon::scene::{Family, PixelFormat, Shortcut, TrackingSettings, WantedFormat};

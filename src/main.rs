@@ -11,20 +11,20 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Context as _, Result, bail};
 use clap::Parser;
 
-use gnomon::app::board::{self, board};
-use gnomon::app::calibrate;
-use gnomon::app::cameras;
 use gnomon::app::chart::{self, chart};
-use gnomon::app::check;
-use gnomon::app::first_look::first_look;
+use gnomon::app::files::new_file::{exit_without_traces, is_stdout};
+use gnomon::app::jobs::board::{self, board};
+use gnomon::app::jobs::calibrate;
+use gnomon::app::jobs::cameras;
+use gnomon::app::jobs::check;
+use gnomon::app::jobs::check::first_look::first_look;
+use gnomon::app::jobs::markers::{self, MarkerSheet, Paper};
+use gnomon::app::jobs::probe;
+use gnomon::app::jobs::record;
+use gnomon::app::jobs::replay::{self, replay};
+use gnomon::app::jobs::track::{self, is_scene, track};
 use gnomon::app::live;
-use gnomon::app::markers::{self, Paper, Sheet};
-use gnomon::app::new_file::{exit_without_traces, is_stdout};
-use gnomon::app::probe;
-use gnomon::app::record;
-use gnomon::app::replay::{self, replay};
-use gnomon::app::report::Report;
-use gnomon::app::track::{self, is_scene, track};
+use gnomon::app::stages::report::Report;
 use gnomon::capture::live::is_live;
 use gnomon::scene::{CameraSettings, Scene};
 use gnomon::tracking::mapping::MapSettings;
@@ -77,11 +77,11 @@ fn run_live(args: LiveArgs) -> Result<()> {
     let stop = interrupts()?;
     let input = if is_scene(&args.source) {
         args.recording.refuse_beside(&args.source)?;
-        live::Input::Scene(args.source)
+        live::LiveStart::Scene(args.source)
     } else {
-        live::Input::Camera(camera_of(&args.source, &args.recording)?)
+        live::LiveStart::Camera(camera_of(&args.source, &args.recording)?)
     };
-    let request = live::Request {
+    let request = live::LiveRequest {
         input,
         out: args.out,
         adapter: args.adapter,
@@ -91,7 +91,7 @@ fn run_live(args: LiveArgs) -> Result<()> {
 
 fn run_replay(args: ReplayArgs) -> Result<()> {
     let stop = interrupts()?;
-    let request = replay::Request {
+    let request = replay::ReplayRequest {
         replacing: args.force.replacing(),
         scene: args.scene,
         out: args.out,
@@ -114,7 +114,7 @@ fn run_chart(args: ChartArgs) -> Result<()> {
         true => "charts/quick",
         false => "charts",
     };
-    let request = chart::Request {
+    let request = chart::ChartRequest {
         replacing: args.force.replacing(),
         out: args.out.unwrap_or_else(|| out.into()),
         only: args.only,
@@ -128,7 +128,7 @@ fn run_chart(args: ChartArgs) -> Result<()> {
 
 fn run_track(args: TrackArgs) -> Result<()> {
     let stop = interrupts()?;
-    let request = track::Request {
+    let request = track::TrackRequest {
         replacing: args.force.replacing(),
         input: track_input(&args)?,
         poses: args.poses,
@@ -144,7 +144,7 @@ fn run_markers(args: MarkersArgs) -> Result<()> {
     // Each kind of sheet requires its sizes (`requires` above).
     let mm = |size: Option<f64>| size.unwrap_or(f64::NAN);
     let sheet = match (args.board, args.ids) {
-        (Some([columns, rows]), _) => Sheet::Board {
+        (Some([columns, rows]), _) => MarkerSheet::Board {
             family,
             first_id: args.first_id,
             rows,
@@ -153,14 +153,14 @@ fn run_markers(args: MarkersArgs) -> Result<()> {
             gap_mm: mm(args.gap_mm),
             name: args.name,
         },
-        (_, Some(ids)) => Sheet::Lone {
+        (_, Some(ids)) => MarkerSheet::Lone {
             family,
             ids,
             size_mm: mm(args.size_mm),
         },
-        _ => Sheet::Target(args.target.target()?),
+        _ => MarkerSheet::Target(args.target.target()?),
     };
-    let written = markers::markers(&markers::Request {
+    let written = markers::markers(&markers::MarkersRequest {
         replacing: args.force.replacing(),
         out: args.out,
         sheet,
@@ -185,7 +185,7 @@ fn run_calibrate(args: CalibrateArgs) -> Result<()> {
         wanted: args.wanted.wanted(),
         adapter: args.adapter,
     });
-    let request = calibrate::Request {
+    let request = calibrate::CalibrateRequest {
         replacing: args.force.replacing(),
         watch,
         sources: args.source,
@@ -216,9 +216,9 @@ fn run_board(args: BoardArgs) -> Result<()> {
     let stop = interrupts()?;
     let input = if is_scene(&args.from) {
         args.recording.refuse_beside(&args.from)?;
-        board::Input::Scene(args.from.clone())
+        board::BoardInput::Scene(args.from.clone())
     } else {
-        board::Input::Recording {
+        board::BoardInput::Recording {
             camera: camera_of(&args.from, &args.recording)?,
             decimation: args.recording.decimation(),
         }
@@ -229,7 +229,7 @@ fn run_board(args: BoardArgs) -> Result<()> {
             args.plane_tolerance_mm
         );
     }
-    let request = board::Request {
+    let request = board::BoardRequest {
         replacing: args.force.replacing(),
         input,
         family: args.family.family()?,
@@ -250,11 +250,11 @@ fn run_record(args: RecordArgs) -> Result<()> {
     let stop = interrupts()?;
     let input = if is_scene(&args.source) {
         args.recording.refuse_beside(&args.source)?;
-        record::Input::Scene(args.source)
+        record::RecordInput::Scene(args.source)
     } else {
-        record::Input::Camera(camera_of(&args.source, &args.recording)?)
+        record::RecordInput::Camera(camera_of(&args.source, &args.recording)?)
     };
-    let request = record::Request {
+    let request = record::RecordRequest {
         replacing: args.force.replacing(),
         input,
         out: args.out,
@@ -266,14 +266,14 @@ fn run_record(args: RecordArgs) -> Result<()> {
 
 fn run_probe(args: ProbeArgs) -> Result<()> {
     end_at_interrupt()?;
-    let request = probe::Request {
+    let request = probe::ProbeRequest {
         replacing: args.force.replacing(),
         pictures: args.pictures,
         exposures: args.exposures,
         kind: match args.kind {
-            ProbeKindArg::Ball => probe::Kind::Ball,
-            ProbeKindArg::Angular => probe::Kind::Angular,
-            ProbeKindArg::Panorama => probe::Kind::Panorama,
+            ProbeKindArg::Ball => probe::ProbePictureKind::Ball,
+            ProbeKindArg::Angular => probe::ProbePictureKind::Angular,
+            ProbeKindArg::Panorama => probe::ProbePictureKind::Panorama,
         },
         crop: args.crop,
         ball_distance_radii: args.ball_distance.unwrap_or(f64::INFINITY),
@@ -299,7 +299,7 @@ fn run_probe(args: ProbeArgs) -> Result<()> {
     Ok(())
 }
 
-fn track_input(args: &TrackArgs) -> Result<track::Input> {
+fn track_input(args: &TrackArgs) -> Result<track::TrackInput> {
     if is_scene(&args.source) {
         args.recording.refuse_beside(&args.source)?;
         if args.anchors.is_some() || args.size_mm.is_some() {
@@ -308,15 +308,15 @@ fn track_input(args: &TrackArgs) -> Result<track::Input> {
                 args.source.display()
             );
         }
-        return Ok(track::Input::Scene(args.source.clone()));
+        return Ok(track::TrackInput::Scene(args.source.clone()));
     }
     let camera = camera_of(&args.source, &args.recording)?;
     match (&args.anchors, args.size_mm) {
         (Some(_), _) if args.recording.decimation.is_some() => {
             bail!("--anchors takes the scene's [tracking]; --decimation does not go with it")
         }
-        (Some(scene), _) => Ok(track::Input::RecordingWithScene(camera, scene.clone())),
-        (None, Some(size_mm)) => Ok(track::Input::LoneMarkers {
+        (Some(scene), _) => Ok(track::TrackInput::RecordingWithScene(camera, scene.clone())),
+        (None, Some(size_mm)) => Ok(track::TrackInput::LoneMarkers {
             camera,
             family: args.family.family()?,
             size_m: size_m(size_mm)?,

@@ -1,54 +1,19 @@
-//! The jobs: replay, live, record, track, board, calibrate, probe, markers, check, chart; their clock, files and progress.
+//! The jobs of the program, and what they share: its clock, files, frames, stages and windows.
+//!
+//! A job (each module of [`jobs`], [`live`] and [`chart`]) imports no other job; what two of them need lies in a group below
+//! them. Lowest first: [`stopwatch`] → [`files`] → [`input`] → [`recording`] → [`stages`] → `scene_warnings` →
+//! [`authoring`] → [`truth`] → [`window`] → the jobs. Charts alone know [`truth`]. `tests/architecture.rs` keeps that.
 
-mod anchor_block;
 pub mod authoring;
-pub mod board;
-mod budget_words;
-pub mod calibrate;
-pub mod cameras;
-mod capture_talk;
 pub mod chart;
-pub mod check;
-mod check_budget;
-mod check_degenerate;
-mod check_room;
-pub mod contact_sheet;
-pub mod detections_file;
-mod file_conflict;
-mod file_identity;
-pub mod first_look;
-mod frame_folder;
-pub mod job_files;
-pub mod layer_files;
+pub mod files;
+pub mod input;
+pub mod jobs;
 pub mod live;
-pub mod live_capture;
-pub mod live_input;
-mod locked_folder;
-pub mod mailbox;
-pub mod markers;
-mod mirror_watch;
-pub mod new_file;
-pub mod output;
-mod output_error;
-pub mod picture_files;
-pub mod poses_file;
-pub mod probe;
-mod probe_preview;
-mod progress;
-pub mod record;
-mod recording;
-pub mod replay;
-pub mod report;
-pub mod result_kind;
+pub mod recording;
 pub mod room_transport_cache;
-mod scene_copy;
-mod session_folder;
-pub mod session_recorder;
-pub mod session_writer;
-pub mod stats;
+pub mod scene_warnings;
+pub mod stages;
 pub mod stopwatch;
-mod tally;
-pub mod track;
-mod tracked;
 pub mod truth;
-pub mod video_writer;
+pub mod window;

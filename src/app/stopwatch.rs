@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-/// Runs from its making.
+/// A stopwatch that runs from its making.
 #[derive(Debug, Clone, Copy)]
 pub struct Stopwatch(Instant);
 

@@ -14,12 +14,13 @@
 
 use glam::{DAffine3, DVec2, DVec3};
 use gnomon::app::truth::FACES_AWAY;
-use gnomon::app::truth::ray_cast::{Exact, GRAZES, SAMPLES_PX, Surface, View, World, pixels};
+use gnomon::app::truth::ray_cast::{Exact, GRAZES, SeenSurface, View, World, pixels};
 use gnomon::geometry::mesh::Mesh;
 use gnomon::light::{Light, irradiance};
 use gnomon::render::{Layers, REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};
 use std::f64::consts::PI;
 
+use super::near_edges::{self, SAMPLES_PX};
 use super::{Picture, Stage};
 
 /// Linear; half a level of white is 0.0045 of it.
@@ -36,7 +37,7 @@ const ENOUGH: usize = 12;
 /// What is seen at a place and which lights reach it.
 #[derive(Debug, Clone, Copy)]
 pub struct State {
-    pub surface: Option<Surface>,
+    pub surface: Option<SeenSurface>,
     /// Lights that reach a real surface in the video, or a virtual one past all casters.
     pub arriving: u32,
     /// Those of them that virtual things take from a real surface.
@@ -47,7 +48,7 @@ pub struct State {
 
 impl State {
     /// With each light's bits.
-    fn new(surface: Option<Surface>, bits: impl Iterator<Item = u8>) -> Self {
+    fn new(surface: Option<SeenSurface>, bits: impl Iterator<Item = u8>) -> Self {
         let mut state = Self {
             surface,
             arriving: 0,
@@ -425,7 +426,7 @@ impl<'a> Expected<'a> {
     }
 
     /// Where a ray at a place would meet the plane of a surface.
-    fn on_plane(&self, surface: &Surface, place: DVec2) -> DVec3 {
+    fn on_plane(&self, surface: &SeenSurface, place: DVec2) -> DVec3 {
         let eye = self.world_from_camera.translation;
         let plane = self.view.intrinsics.plane_from_pixel(place);
         let direction = self.world_from_camera.transform_vector3(plane.extend(1.0));
@@ -440,7 +441,7 @@ impl<'a> Expected<'a> {
     }
 
     /// Whether a part of the triangle lies behind the camera: there the driver cuts it.
-    fn reaches_behind(&self, surface: &Surface) -> bool {
+    fn reaches_behind(&self, surface: &SeenSurface) -> bool {
         let corners = self.world.triangles[surface.triangle].corners;
         let to_camera = &self.view.camera_from_world;
         corners
@@ -469,7 +470,7 @@ impl<'a> Expected<'a> {
     pub fn is_uniform(&self, index: usize) -> bool {
         let size_px = self.view.intrinsics.size_px;
         let center = &self.centers[index];
-        gnomon::app::truth::ray_cast::is_uniform(size_px, index, |_, other| {
+        near_edges::is_uniform(size_px, index, |_, other| {
             center.is_like(&self.centers[other])
         })
     }
@@ -699,7 +700,7 @@ impl<'a> Expected<'a> {
 
     fn is_on_edge(&self, place: DVec2) -> bool {
         let mut lights = self.lights.iter();
-        lights.any(|light| self.world.is_on_edge(&self.view, place, light))
+        lights.any(|light| near_edges::is_on_edge(&self.world, &self.view, place, light))
     }
 
     /// How far from a pixel's samples, pixels, there is what explains its value: 0 where their own states do; `None` if

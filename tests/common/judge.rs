@@ -2,9 +2,11 @@
 
 use glam::DVec2;
 use gnomon::app::truth::FACES_AWAY;
-use gnomon::app::truth::ray_cast::{Exact, GRAZES, View, World, is_uniform};
+use gnomon::app::truth::ray_cast::{Exact, GRAZES, View, World};
 use gnomon::light::Light;
 use gnomon::render::{REAL, REAL_HIDES, VIRTUAL_HIDES};
+
+use super::near_edges::{is_on_edge, is_uniform, places_around};
 
 /// So many pixels that are surely wrong: the rest of a picture's need no rays to say so.
 pub const ENOUGH: usize = 20;
@@ -48,7 +50,7 @@ pub fn is_edge(
         let found = seen.map_or((0, 0), |s| (s.role, world.bits(&s, light, 0.0)));
         found != value(index)
     };
-    World::places_around(center).any(differs) || world.is_on_edge(view, center, light)
+    places_around(center).any(differs) || is_on_edge(world, view, center, light)
 }
 
 /// Holds the bits of a light at real pixels that face it; `exact` may come from elsewhere than `world`.
@@ -80,7 +82,7 @@ pub fn shadow_error(
         ];
         let center = DVec2::new(f64::from(x), f64::from(y));
         let looks = error.unsnapped < ENOUGH;
-        error.unsnapped += usize::from(!looks || !world.is_on_edge(view, center, light));
+        error.unsnapped += usize::from(!looks || !is_on_edge(world, view, center, light));
         if error.far >= ENOUGH || !is_edge(world, view, exact, index, light, exact_bits) {
             error.far += 1;
             error.first_far.get_or_insert([x, y]);

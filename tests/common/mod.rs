@@ -4,6 +4,7 @@
 pub mod composite;
 pub mod degenerate;
 pub mod judge;
+pub mod near_edges;
 pub mod photographs;
 pub mod prints;
 pub mod random;
@@ -17,7 +18,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
-use gnomon::app::chart::known_scene::{AMBIENT, KnownScene, Placed, world_of};
+use gnomon::app::chart::known_scene::{AMBIENT, KnownScene, PlacedMesh, world_of};
 use gnomon::app::truth::ray_cast::{Triangle, View, World};
 use gnomon::capture::Frame;
 use gnomon::geometry::camera::Intrinsics;
@@ -399,8 +400,8 @@ pub struct StabilityRow {
 /// Reads `FOLDER/NAME.json` and its exact mask.
 pub fn stability_row(folder: &Path, name: &str) -> StabilityRow {
     let known = KnownScene::read(folder, name).expect("a row");
-    let things = |placed: &[Placed]| -> Vec<Thing> {
-        let thing = |placed: &Placed| {
+    let things = |placed: &[PlacedMesh]| -> Vec<Thing> {
+        let thing = |placed: &PlacedMesh| {
             Thing::new(Shape::File(placed.mesh.clone())).placed(placed.world_from_object)
         };
         placed.iter().map(thing).collect()

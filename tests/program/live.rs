@@ -2,6 +2,7 @@
 //! change are followed, and what is recorded replays.
 
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex, Weak};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -9,18 +10,19 @@ use std::time::{Duration, Instant};
 use crate::common::{gpu, project_file};
 use glam::DVec3;
 use gnomon::app::authoring::Edit;
-use gnomon::app::live::Plan;
+use gnomon::app::input::live_capture::Tapped;
+use gnomon::app::input::live_input::LiveInput;
+use gnomon::app::input::mailbox::Taken;
+use gnomon::app::live::TrackingPlan;
 use gnomon::app::live::beginning::Opening;
-use gnomon::app::live::look::Look;
+use gnomon::app::live::command::{Clicks, RecordingCommand, SceneCommand};
 use gnomon::app::live::meters::Sample;
-use gnomon::app::live::pipeline::{Input, Pipeline};
-use gnomon::app::live::studio::Studio;
-use gnomon::app::live::views::View;
-use gnomon::app::live::wish::{Clicks, Wish};
-use gnomon::app::live_capture::Tapped;
-use gnomon::app::live_input::LiveInput;
-use gnomon::app::mailbox::Taken;
+use gnomon::app::live::pipeline::{Pipeline, PipelineInput};
+use gnomon::app::live::session::LiveSession;
+use gnomon::app::live::views::ViewMode;
+use gnomon::app::live::window_state::WindowState;
 use gnomon::app::stopwatch::Stopwatch;
+use gnomon::app::window::Wake;
 use gnomon::capture::{Frame, FrameSource};
 use gnomon::geometry::light_placing::{LightFreedom, PosedCamera};
 use gnomon::light::Light;
@@ -41,33 +43,48 @@ fn lamp_in(folder: &Path) -> PathBuf {
     path
 }
 
-fn open(path: &Path, out: &Path, repeats: bool) -> Studio {
-    let opening = Opening::scene(path).unwrap();
-    let now = Arc::new(Stopwatch::clock());
-    Studio::open(opening, gpu(), out, repeats, (now, Arc::new(|| ())))
+fn open(path: &Path, out: &Path, repeats: bool) -> LiveSession {
+    open_waking(path, out, repeats, Arc::new(|| ()))
 }
 
-/// Moves a studio on, as a window does, until something holds.
-fn run_until(studio: &mut Studio, look: &Look, what: &str, holds: impl Fn(&Studio) -> bool) {
+fn open_waking(path: &Path, out: &Path, repeats: bool, wake: Wake) -> LiveSession {
+    let opening = Opening::scene(path).unwrap();
+    let now = Arc::new(Stopwatch::clock());
+    LiveSession::open(opening, gpu(), out, repeats, (now, wake))
+}
+
+/// Whether the last frame is shown as well as can be: the camera's end is known before that frame is tracked.
+fn has_ended(session: &LiveSession) -> bool {
+    let last = session.picture().map(|picture| picture.frame.index);
+    !session.is_live() && session.is_settled() && last == Some(119)
+}
+
+/// Moves a session on, as a window does, until something holds.
+fn run_until(
+    session: &mut LiveSession,
+    state: &WindowState,
+    what: &str,
+    holds: impl Fn(&LiveSession) -> bool,
+) {
     let began = Instant::now();
-    while !holds(studio) {
+    while !holds(session) {
         assert!(began.elapsed() < SOON, "not in time: {what}");
-        step(studio, look);
+        step(session, state);
     }
 }
 
-fn step(studio: &mut Studio, look: &Look) {
-    if studio.step(look).unwrap() {
-        let now_secs = studio.now_secs();
-        studio.was_shown(now_secs).unwrap();
+fn step(session: &mut LiveSession, state: &WindowState) {
+    if session.step(state).unwrap() {
+        let now_secs = session.now_secs();
+        session.was_shown(now_secs).unwrap();
     } else {
         thread::sleep(Duration::from_millis(2));
     }
 }
 
-/// What a renderer made for this scene and nothing before draws of the studio's frame.
-fn drawn_afresh(studio: &Studio, scene: &Scene) -> Vec<u8> {
-    let picture = studio.picture().unwrap();
+/// What a renderer made for this scene and nothing before draws of the session's frame.
+fn drawn_afresh(session: &LiveSession, scene: &Scene) -> Vec<u8> {
+    let picture = session.picture().unwrap();
     let mut renderer = Renderer::new(gpu(), scene, picture.intrinsics).unwrap();
     renderer.upload(&picture.frame).unwrap();
     let poses = picture.poses.iter();
@@ -78,9 +95,15 @@ fn drawn_afresh(studio: &Studio, scene: &Scene) -> Vec<u8> {
     renderer.read_picture().unwrap()
 }
 
-fn shown(studio: &Studio) -> Vec<u8> {
-    let (renderer, ..) = studio.renderer().unwrap();
+fn shown(session: &LiveSession) -> Vec<u8> {
+    let (renderer, ..) = session.renderer().unwrap();
     renderer.read_picture().unwrap()
+}
+
+/// Bytes that are clearly others.
+fn count_off(picture: &[u8], exact: &[u8]) -> usize {
+    let pairs = picture.iter().zip(exact);
+    pairs.filter(|(a, b)| a.abs_diff(**b) > 24).count()
 }
 
 /// The torus of the lamp's scene, elsewhere.
@@ -103,11 +126,11 @@ fn a_slow_window_gets_the_newest_frame_and_nothing_queues() {
     };
     let input = LiveInput::of(&camera).unwrap();
     let scene = Scene::load(&project_file("config/lamp.toml")).unwrap();
-    let plan = Plan::Follow {
+    let plan = TrackingPlan::Follow {
         settings: scene.tracking,
         anchors: scene.anchors.into(),
     };
-    let pipeline_input = Input {
+    let pipeline_input = PipelineInput {
         source: camera.source,
         options: input.options(false),
         calibration: input.calibration,
@@ -171,13 +194,13 @@ fn a_recording_is_shown_in_time_with_the_poses_of_its_own_images() {
         recorded.push(frame);
     }
     let began = Instant::now();
-    let mut studio = open(&path, folder.path(), false);
-    let look = Look::new();
+    let mut session = open(&path, folder.path(), false);
+    let state = WindowState::new();
     let mut seen = 0;
-    while studio.is_live() {
+    while session.is_live() {
         assert!(began.elapsed() < SOON, "it ends");
-        step(&mut studio, &look);
-        let Some(picture) = studio.picture() else {
+        step(&mut session, &state);
+        let Some(picture) = session.picture() else {
             continue;
         };
         let index = picture.frame.index as usize;
@@ -201,8 +224,8 @@ fn a_recording_is_shown_in_time_with_the_poses_of_its_own_images() {
         began.elapsed().as_secs_f64() >= 119.0 / 30.0,
         "in real time"
     );
-    let idle_ms = studio.meters.median(Sample::idle_ms).unwrap();
-    let latency_ms = studio.meters.median(|sample| sample.latency_ms).unwrap();
+    let idle_ms = session.meters.median(Sample::idle_ms).unwrap();
+    let latency_ms = session.meters.median(|sample| sample.latency_ms).unwrap();
     eprintln!("latency {latency_ms:.1} ms, of which waiting {idle_ms:.1} ms");
     assert!(latency_ms > 0.0);
     assert!(
@@ -215,30 +238,26 @@ fn a_recording_is_shown_in_time_with_the_poses_of_its_own_images() {
 fn what_is_edited_is_drawn_as_if_it_had_always_been_so() {
     let folder = tempfile::tempdir().unwrap();
     let path = lamp_in(folder.path());
-    let mut studio = open(&path, folder.path(), true);
-    let look = Look::new();
-    run_until(&mut studio, &look, "the scene is drawn", |studio| {
-        studio.picture().is_some() && studio.is_settled()
+    let mut session = open(&path, folder.path(), true);
+    let state = WindowState::new();
+    run_until(&mut session, &state, "the scene is drawn", |session| {
+        session.picture().is_some() && session.is_settled()
     });
     let before = Scene::load(&path).unwrap();
     assert!(
-        shown(&studio) == drawn_afresh(&studio, &before),
+        shown(&session) == drawn_afresh(&session, &before),
         "the scene"
     );
 
     // While it is dragged, the file is as it was and what can be shown at once is shown.
     let text_before = std::fs::read_to_string(&path).unwrap();
-    studio.fulfil(Wish::Preview(moved_torus()), &look);
-    step(&mut studio, &look);
+    session.edit_scene(SceneCommand::Preview(moved_torus()), &state);
+    step(&mut session, &state);
     assert_eq!(std::fs::read_to_string(&path).unwrap(), text_before);
     let mut dragged = before.clone();
     assert!(moved_torus().show_in(&mut dragged));
-    let exact = drawn_afresh(&studio, &dragged);
-    let off = shown(&studio)
-        .iter()
-        .zip(&exact)
-        .filter(|(a, b)| a.abs_diff(**b) > 24)
-        .count();
+    let exact = drawn_afresh(&session, &dragged);
+    let off = count_off(&shown(&session), &exact);
     // Only what surroundings throw on the torus may be that of the place it was at.
     assert!(off * 1000 < exact.len(), "{off} of {} bytes", exact.len());
 
@@ -249,37 +268,45 @@ fn what_is_edited_is_drawn_as_if_it_had_always_been_so() {
             intensity: DVec3::splat(0.8),
         },
     };
-    studio.fulfil(Wish::Commit(moved_torus()), &look);
-    studio.fulfil(Wish::Commit(dimmed), &look);
+    session.edit_scene(SceneCommand::Commit(moved_torus()), &state);
+    session.edit_scene(SceneCommand::Commit(dimmed), &state);
     run_until(
-        &mut studio,
-        &look,
+        &mut session,
+        &state,
         "the edits are drawn",
-        Studio::is_settled,
+        LiveSession::is_settled,
     );
-    step(&mut studio, &look);
+    step(&mut session, &state);
     let written = Scene::load(&path).unwrap();
     assert_ne!(written.lights, before.lights);
     assert!(
-        shown(&studio) == drawn_afresh(&studio, &written),
+        shown(&session) == drawn_afresh(&session, &written),
         "the edits"
     );
 
-    studio.fulfil(Wish::Undo, &look);
-    studio.fulfil(Wish::Undo, &look);
+    session.edit_scene(SceneCommand::Undo, &state);
+    session.edit_scene(SceneCommand::Undo, &state);
     assert_eq!(std::fs::read_to_string(&path).unwrap(), text_before);
-    run_until(&mut studio, &look, "the scene is back", Studio::is_settled);
-    step(&mut studio, &look);
-    assert!(shown(&studio) == drawn_afresh(&studio, &before), "undone");
+    run_until(
+        &mut session,
+        &state,
+        "the scene is back",
+        LiveSession::is_settled,
+    );
+    step(&mut session, &state);
+    assert!(shown(&session) == drawn_afresh(&session, &before), "undone");
 }
 
 #[test]
-fn a_saved_scene_shows_within_half_a_second_and_a_mistake_keeps_the_last() {
+fn a_saved_scene_wakes_the_window_and_shows_at_once_and_a_mistake_keeps_the_last() {
     let folder = tempfile::tempdir().unwrap();
     let path = lamp_in(folder.path());
-    let mut studio = open(&path, folder.path(), true);
-    let look = Look::new();
-    run_until(&mut studio, &look, "the scene is drawn", Studio::is_settled);
+    let (to_window, wakes) = channel();
+    let wake = Arc::new(move || _ = to_window.send(()));
+    let mut session = open_waking(&path, folder.path(), false, wake);
+    let state = WindowState::new();
+    run_until(&mut session, &state, "the end", has_ended);
+    let before = session.scene().unwrap().clone();
     let text = std::fs::read_to_string(&path).unwrap();
 
     std::fs::write(
@@ -287,15 +314,23 @@ fn a_saved_scene_shows_within_half_a_second_and_a_mistake_keeps_the_last() {
         text.replace("[-0.26, 0.24, 0.46]", "[0.3, 0.1, 0.4]"),
     )
     .unwrap();
-    let saved = Instant::now();
-    let is_taken = |studio: &Studio| {
-        let light = studio.scene().unwrap().lights[0];
+    let is_taken = |session: &LiveSession| {
+        let light = session.scene().unwrap().lights[0];
         matches!(light, Light::Point { position_m, .. } if position_m.x == 0.3)
     };
-    run_until(&mut studio, &look, "the file is taken", is_taken);
-    step(&mut studio, &look);
-    let took = saved.elapsed();
-    assert!(took < Duration::from_millis(500), "{took:?}");
+    // No frame comes any more, and the window looks at nothing unless it is woken.
+    while !is_taken(&session) {
+        let woken = wakes.recv_timeout(SOON);
+        woken.expect("the saved file wakes the window");
+        step(&mut session, &state);
+    }
+    // The step that took the file drew it, whatever renderer has yet to come.
+    let after = session.scene().unwrap().clone();
+    let picture = shown(&session);
+    let [off_before, off_after] =
+        [&before, &after].map(|scene| count_off(&picture, &drawn_afresh(&session, scene)));
+    eprintln!("{off_after} bytes off the saved scene, {off_before} off the one before");
+    assert!(off_after * 10 < off_before);
 
     std::fs::write(
         &path,
@@ -303,21 +338,21 @@ fn a_saved_scene_shows_within_half_a_second_and_a_mistake_keeps_the_last() {
             .replace("kind = ", "kinnd = "),
     )
     .unwrap();
-    run_until(&mut studio, &look, "the mistake is told", |studio| {
-        studio.notices.scene.is_some()
+    run_until(&mut session, &state, "the mistake is told", |session| {
+        session.notices.scene.is_some()
     });
-    let told = studio.notices.scene.clone().unwrap();
+    let told = session.notices.scene.clone().unwrap();
     let line = text
         .lines()
         .position(|line| line.starts_with("kind = "))
         .unwrap()
         + 1;
     assert!(told.contains(&format!("lamp.toml:{line}:")), "{told}");
-    assert!(is_taken(&studio), "the last good scene stays");
+    assert!(is_taken(&session), "the last good scene stays");
 
     std::fs::write(&path, &text).unwrap();
-    run_until(&mut studio, &look, "the mistake is mended", |studio| {
-        studio.notices.scene.is_none()
+    run_until(&mut session, &state, "the mistake is mended", |session| {
+        session.notices.scene.is_none()
     });
 }
 
@@ -326,21 +361,21 @@ fn what_is_recorded_is_what_came() {
     let folder = tempfile::tempdir().unwrap();
     let path = lamp_in(folder.path());
     let out = folder.path().join("recorded");
-    let mut studio = open(&path, &out, false);
-    let look = Look::new();
-    run_until(&mut studio, &look, "a picture", |studio| {
-        studio.picture().is_some()
+    let mut session = open(&path, &out, false);
+    let state = WindowState::new();
+    run_until(&mut session, &state, "a picture", |session| {
+        session.picture().is_some()
     });
-    studio.fulfil(Wish::ToggleSession, &look);
-    studio.fulfil(Wish::ToggleVideo, &look);
-    assert_eq!(studio.records(), [true, true]);
-    studio.fulfil(Wish::Screenshot, &look);
+    session.record(RecordingCommand::ToggleSession);
+    session.record(RecordingCommand::ToggleVideo);
+    assert_eq!(session.records(), [true, true]);
+    session.record(RecordingCommand::Screenshot);
     let picture = image::open(out.join("picture-001.png")).unwrap().to_rgba8();
-    assert_eq!(picture.as_raw(), &shown(&studio));
-    run_until(&mut studio, &look, "the recording's end", |studio| {
-        !studio.is_live()
+    assert_eq!(picture.as_raw(), &shown(&session));
+    run_until(&mut session, &state, "the recording's end", |session| {
+        !session.is_live()
     });
-    for said in studio.finish() {
+    for said in session.finish() {
         said.unwrap();
     }
     let mut lamp = FrameSource::open(project_file("recordings/lamp").to_str().unwrap()).unwrap();
@@ -375,33 +410,33 @@ fn first_use_puts_something_on_a_marker_and_saves_a_scene() {
     let opening = Opening::camera(camera).unwrap();
     let now = Arc::new(Stopwatch::clock());
     let clock = (now as _, Arc::new(|| ()) as _);
-    let mut studio = Studio::open(opening, gpu(), folder.path(), true, clock);
-    let look = Look::new();
-    let sees = |studio: &Studio| {
-        let seen = studio.picture().map(|picture| &picture.detections);
+    let mut session = LiveSession::open(opening, gpu(), folder.path(), true, clock);
+    let state = WindowState::new();
+    let sees = |session: &LiveSession| {
+        let seen = session.picture().map(|picture| &picture.detections);
         seen.is_some_and(|seen| seen.iter().any(|marker| marker.id == 4))
     };
-    run_until(&mut studio, &look, "markers are seen", sees);
-    assert!(studio.scene().is_none());
+    run_until(&mut session, &state, "markers are seen", sees);
+    assert!(session.scene().is_none());
     let nothing = Scene::default();
     assert!(
-        shown(&studio) == drawn_afresh(&studio, &nothing),
+        shown(&session) == drawn_afresh(&session, &nothing),
         "the video alone"
     );
 
     let (id, size_m) = (4, 0.044);
-    studio.fulfil(Wish::Demonstrate { id, size_m }, &look);
-    let is_there = |studio: &Studio| {
-        let pose = studio.picture().and_then(|p| p.poses.first());
-        studio.is_settled() && pose.is_some_and(|pose| pose.camera_from_anchor.is_some())
+    session.edit_scene(SceneCommand::Demonstrate { id, size_m }, &state);
+    let is_there = |session: &LiveSession| {
+        let pose = session.picture().and_then(|p| p.poses.first());
+        session.is_settled() && pose.is_some_and(|pose| pose.camera_from_anchor.is_some())
     };
-    run_until(&mut studio, &look, "the marker is tracked", is_there);
-    assert!(studio.is_unsaved());
-    let scene = studio.scene().unwrap().clone();
-    assert!(shown(&studio) == drawn_afresh(&studio, &scene));
-    let (renderer, ..) = studio.renderer().unwrap();
+    run_until(&mut session, &state, "the marker is tracked", is_there);
+    assert!(session.is_unsaved());
+    let scene = session.scene().unwrap().clone();
+    assert!(shown(&session) == drawn_afresh(&session, &scene));
+    let (renderer, ..) = session.renderer().unwrap();
     let with_it = renderer.read_picture().unwrap();
-    let video = &studio.picture().unwrap().frame.rgba;
+    let video = &session.picture().unwrap().frame.rgba;
     let red = with_it
         .chunks(4)
         .zip(video.chunks(4))
@@ -410,8 +445,8 @@ fn first_use_puts_something_on_a_marker_and_saves_a_scene() {
     assert!(red > 200, "a red torus is seen: {red} pixels");
 
     let saved = folder.path().join("mine.toml");
-    studio.fulfil(Wish::Save(saved.clone()), &look);
-    assert!(!studio.is_unsaved());
+    session.edit_scene(SceneCommand::Save(saved.clone()), &state);
+    assert!(!session.is_unsaved());
     assert_eq!(Scene::load(&saved).unwrap().anchors[0].markers[0].id, 4);
     assert!(folder.path().join("torus.obj").is_file());
 }
@@ -428,23 +463,23 @@ fn a_light_is_found_by_clicks_on_corners_and_their_shadows() {
         text.replace("[-0.26, 0.24, 0.46]", "[0.4, -0.1, 0.3]"),
     )
     .unwrap();
-    let mut studio = open(&path, folder.path(), true);
-    let mut look = Look::new();
-    let is_tracked = |studio: &Studio| {
-        let pose = studio.picture().and_then(|picture| picture.poses.first());
+    let mut session = open(&path, folder.path(), true);
+    let mut state = WindowState::new();
+    let is_tracked = |session: &LiveSession| {
+        let pose = session.picture().and_then(|picture| picture.poses.first());
         pose.is_some_and(|pose| pose.camera_from_anchor.is_some())
     };
-    run_until(&mut studio, &look, "the world is seen", is_tracked);
-    look.holds = true;
-    let frame = studio.picture().unwrap().frame.index;
-    studio.fulfil(Wish::Clicks(Clicks::Begin), &look);
-    let picture = studio.picture().unwrap().clone();
+    run_until(&mut session, &state, "the world is seen", is_tracked);
+    state.holds = true;
+    let frame = session.picture().unwrap().frame.index;
+    session.edit_scene(SceneCommand::Clicks(Clicks::Begin), &state);
+    let picture = session.picture().unwrap().clone();
     let sight = PosedCamera {
         intrinsics: picture.intrinsics,
         camera_from_world: picture.poses[0].camera_from_anchor.unwrap(),
     };
     // What a person sees: corners high up on the house, and where their shadows fall on the table.
-    let house = &studio.scene().unwrap().phantoms;
+    let house = &session.scene().unwrap().phantoms;
     let house = house
         .iter()
         .find(|phantom| phantom.name == "house")
@@ -461,16 +496,19 @@ fn a_light_is_found_by_clicks_on_corners_and_their_shadows() {
         let shadow_m = corner_m - away * (corner_m.z / away.z);
         for (clicked_m, off_px) in [(*corner_m, 2.0), (shadow_m, -1.0)] {
             let pixel = sight.pixel(clicked_m).unwrap() + off_px;
-            studio.fulfil(Wish::Clicks(Clicks::At(pixel)), &look);
+            session.edit_scene(SceneCommand::Clicks(Clicks::At(pixel)), &state);
         }
     }
-    assert_eq!(studio.clicks().unwrap().pairs_px().len(), 2);
+    assert_eq!(session.clicks().unwrap().pairs_px().len(), 2);
     for _ in 0..20 {
-        step(&mut studio, &look);
+        step(&mut session, &state);
     }
-    assert_eq!(studio.picture().unwrap().frame.index, frame, "it is held");
-    studio.fulfil(Wish::Clicks(Clicks::Find(LightFreedom::Point)), &look);
-    assert!(studio.clicks().is_none(), "{:?}", studio.notices);
+    assert_eq!(session.picture().unwrap().frame.index, frame, "it is held");
+    session.edit_scene(
+        SceneCommand::Clicks(Clicks::Find(LightFreedom::Point)),
+        &state,
+    );
+    assert!(session.clicks().is_none(), "{:?}", session.notices);
     let written = Scene::load(&path).unwrap();
     let Light::Point { position_m, .. } = written.lights[0] else {
         panic!("a lamp");
@@ -483,22 +521,21 @@ fn a_light_is_found_by_clicks_on_corners_and_their_shadows() {
 fn every_view_shows_something_else_and_leads_back() {
     let folder = tempfile::tempdir().unwrap();
     let path = lamp_in(folder.path());
-    let mut studio = open(&path, folder.path(), false);
-    let mut look = Look::new();
-    // The camera's end is known before its last frame is tracked.
-    run_until(&mut studio, &look, "the end", |studio| {
-        let last = studio.picture().map(|picture| picture.frame.index);
-        !studio.is_live() && studio.is_settled() && last == Some(119)
-    });
-    step(&mut studio, &look);
-    let composite = shown(&studio);
-    let mut pictures: Vec<(View, Vec<u8>)> = Vec::new();
-    for (name, view) in View::BY_NAME {
-        look.view = view;
-        step(&mut studio, &look);
-        let picture = shown(&studio);
+    let mut session = open(&path, folder.path(), false);
+    let mut state = WindowState::new();
+    run_until(&mut session, &state, "the end", has_ended);
+    step(&mut session, &state);
+    let composite = shown(&session);
+    let mut pictures: Vec<(ViewMode, Vec<u8>)> = Vec::new();
+    for (name, view) in ViewMode::BY_NAME {
+        state.view = view;
+        step(&mut session, &state);
+        let picture = shown(&session);
         // Lines over the composite are the window's.
-        let is_composite = matches!(view, View::Composite | View::Silhouettes | View::Volumes);
+        let is_composite = matches!(
+            view,
+            ViewMode::Composite | ViewMode::Silhouettes | ViewMode::Volumes
+        );
         assert_eq!(picture == composite, is_composite, "{name}");
         if !is_composite {
             for (other, before) in &pictures {
@@ -507,9 +544,9 @@ fn every_view_shows_something_else_and_leads_back() {
             pictures.push((view, picture));
         }
     }
-    look.view = View::Composite;
-    step(&mut studio, &look);
-    assert!(shown(&studio) == composite, "back again");
+    state.view = ViewMode::Composite;
+    step(&mut session, &state);
+    assert!(shown(&session) == composite, "back again");
 }
 
 #[test]
@@ -517,13 +554,13 @@ fn it_ends_at_once_whatever_it_is_at() {
     let folder = tempfile::tempdir().unwrap();
     let path = lamp_in(folder.path());
     for steps in [0, 1, 40] {
-        let mut studio = open(&path, folder.path(), true);
-        let look = Look::new();
+        let mut session = open(&path, folder.path(), true);
+        let state = WindowState::new();
         for _ in 0..steps {
-            step(&mut studio, &look);
+            step(&mut session, &state);
         }
         let began = Instant::now();
-        drop(studio);
+        drop(session);
         let took = began.elapsed();
         assert!(
             took < Duration::from_secs(10),

@@ -1,35 +1,37 @@
-//! The panel of the live window, driven as a person does: what is clicked and dragged becomes what is wished for.
+//! The panel of the live window, driven as a person does: what is clicked and dragged becomes what is asked for.
 
 use eframe::egui::accesskit::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use gnomon::app::authoring::Edit;
-use gnomon::app::live::look::Look;
+use gnomon::app::live::command::{
+    Clicks, LiveCommand, Overlay, RecordingCommand, SceneCommand, Selected, WindowCommand,
+};
 use gnomon::app::live::meters::Meters;
 use gnomon::app::live::panel::{Facts, Panel};
-use gnomon::app::live::views::View;
-use gnomon::app::live::wish::{Clicks, Overlay, Selected, Wish};
+use gnomon::app::live::views::ViewMode;
+use gnomon::app::live::window_state::WindowState;
 use gnomon::light::Light;
 use gnomon::scene::{Placement, Scene, Shortcut};
 
-/// A panel on a scene, and all that was wished for.
+/// A panel on a scene, and all that was asked for.
 struct Desk {
     panel: Panel,
     scene: Option<Scene>,
-    look: Look,
-    wishes: Vec<Wish>,
+    state: WindowState,
+    commands: Vec<LiveCommand>,
 }
 
 fn desk(scene: Option<Scene>, selected: Option<Selected>) -> Harness<'static, Desk> {
-    let look = Look {
+    let state = WindowState {
         selected,
-        ..Look::new()
+        ..WindowState::new()
     };
     let desk = Desk {
         panel: Panel::default(),
         scene,
-        look,
-        wishes: Vec::new(),
+        state,
+        commands: Vec::new(),
     };
     Harness::builder()
         .with_size([330.0, 1400.0])
@@ -51,8 +53,8 @@ fn desk(scene: Option<Scene>, selected: Option<Selected>) -> Harness<'static, De
                     records: [false, true],
                     clicks: None,
                 };
-                let wishes = desk.panel.show(ui, &facts, &desk.look);
-                desk.wishes.extend(wishes);
+                let commands = desk.panel.show(ui, &facts, &desk.state);
+                desk.commands.extend(commands);
             },
             desk,
         )
@@ -63,35 +65,44 @@ fn lamp() -> Scene {
     Scene::load(&path).expect("the demo's scene")
 }
 
-/// Clicks on what has this label: what is wished for then.
-fn clicked(harness: &mut Harness<'_, Desk>, label: &str) -> Vec<Wish> {
+/// Clicks on what has this label: what is asked for then.
+fn clicked(harness: &mut Harness<'_, Desk>, label: &str) -> Vec<LiveCommand> {
     harness.run();
-    harness.state_mut().wishes.clear();
+    harness.state_mut().commands.clear();
     // A field that is named by a button has the same label.
     let button = harness.query_by_role_and_label(Role::Button, label);
     button
         .unwrap_or_else(|| harness.get_by_label(label))
         .click();
     harness.run();
-    std::mem::take(&mut harness.state_mut().wishes)
+    std::mem::take(&mut harness.state_mut().commands)
 }
 
 #[test]
-fn buttons_wish_for_what_they_say() {
+fn buttons_ask_for_what_they_say() {
     let mut harness = desk(Some(lamp()), None);
-    assert_eq!(clicked(&mut harness, "Picture"), [Wish::Screenshot]);
+    assert_eq!(
+        clicked(&mut harness, "Picture"),
+        [LiveCommand::Recording(RecordingCommand::Screenshot)]
+    );
     assert_eq!(
         clicked(&mut harness, "Record session"),
-        [Wish::ToggleSession]
+        [LiveCommand::Recording(RecordingCommand::ToggleSession)]
     );
-    assert_eq!(clicked(&mut harness, "End video"), [Wish::ToggleVideo]);
-    assert_eq!(clicked(&mut harness, "Undo: place \"torus\""), [Wish::Undo]);
+    assert_eq!(
+        clicked(&mut harness, "End video"),
+        [LiveCommand::Recording(RecordingCommand::ToggleVideo)]
+    );
+    assert_eq!(
+        clicked(&mut harness, "Undo: place \"torus\""),
+        [LiveCommand::Scene(SceneCommand::Undo)]
+    );
     assert_eq!(
         clicked(&mut harness, "Redo"),
         [],
         "there is nothing to redo"
     );
-    let select = |selected| [Wish::Select(Some(selected))];
+    let select = |selected| [LiveCommand::Window(WindowCommand::Select(Some(selected)))];
     assert_eq!(
         clicked(&mut harness, "torus"),
         select(Selected::Thing("torus".to_owned()))
@@ -107,11 +118,13 @@ fn buttons_wish_for_what_they_say() {
     );
     assert_eq!(
         clicked(&mut harness, "Find the light in the picture"),
-        [Wish::Clicks(Clicks::Begin)]
+        [LiveCommand::Scene(SceneCommand::Clicks(Clicks::Begin))]
     );
     assert_eq!(
         clicked(&mut harness, "remove"),
-        [Wish::Commit(Edit::RemoveLight(0))]
+        [LiveCommand::Scene(SceneCommand::Commit(Edit::RemoveLight(
+            0
+        )))]
     );
 }
 
@@ -119,7 +132,10 @@ fn buttons_wish_for_what_they_say() {
 fn views_and_overlays_are_behind_their_heading() {
     let mut harness = desk(Some(lamp()), None);
     assert_eq!(clicked(&mut harness, "View"), []);
-    assert_eq!(clicked(&mut harness, "depth"), [Wish::Show(View::Depth)]);
+    assert_eq!(
+        clicked(&mut harness, "depth"),
+        [LiveCommand::Window(WindowCommand::Show(ViewMode::Depth))]
+    );
     assert_eq!(
         clicked(&mut harness, "composite"),
         [],
@@ -127,7 +143,9 @@ fn views_and_overlays_are_behind_their_heading() {
     );
     assert_eq!(
         clicked(&mut harness, "marker outlines"),
-        [Wish::Toggle(Overlay::Outlines)]
+        [LiveCommand::Window(WindowCommand::Toggle(
+            Overlay::Outlines
+        ))]
     );
 }
 
@@ -135,9 +153,9 @@ fn views_and_overlays_are_behind_their_heading() {
 fn the_knobs_of_the_technique_are_edits() {
     let mut harness = desk(Some(lamp()), None);
     assert_eq!(clicked(&mut harness, "Shadows"), []);
-    let wishes = clicked(&mut harness, "1");
-    let [Wish::Commit(Edit::Shadows(shadows))] = wishes[..] else {
-        panic!("{wishes:?}");
+    let commands = clicked(&mut harness, "1");
+    let [LiveCommand::Scene(SceneCommand::Commit(Edit::Shadows(shadows)))] = commands[..] else {
+        panic!("{commands:?}");
     };
     assert_eq!(shadows.samples, 1);
     assert_eq!(shadows.technique, lamp().shadows.technique);
@@ -155,11 +173,12 @@ fn a_dragged_field_is_shown_while_it_is_held_and_made_when_it_is_let_go() {
         harness.hover_at(field + eframe::egui::Vec2::new(10.0 * moved as f32, 0.0));
         harness.step();
     }
-    let held = std::mem::take(&mut harness.state_mut().wishes);
+    let held = std::mem::take(&mut harness.state_mut().commands);
     assert!(!held.is_empty(), "it is shown while it is dragged");
-    for wish in &held {
-        let Wish::Preview(Edit::Light { index: 0, light }) = wish else {
-            panic!("{wish:?}");
+    for command in &held {
+        let LiveCommand::Scene(SceneCommand::Preview(Edit::Light { index: 0, light })) = command
+        else {
+            panic!("{command:?}");
         };
         let Light::Point { position_m, .. } = light else {
             panic!("{light:?}");
@@ -168,9 +187,15 @@ fn a_dragged_field_is_shown_while_it_is_held_and_made_when_it_is_let_go() {
     }
     harness.drop_at(field + eframe::egui::Vec2::new(40.0, 0.0));
     harness.run();
-    let made = std::mem::take(&mut harness.state_mut().wishes);
+    let made = std::mem::take(&mut harness.state_mut().commands);
     assert!(
-        matches!(made[..], [Wish::Commit(Edit::Light { index: 0, .. })]),
+        matches!(
+            made[..],
+            [LiveCommand::Scene(SceneCommand::Commit(Edit::Light {
+                index: 0,
+                ..
+            }))]
+        ),
         "{made:?}"
     );
 }
@@ -192,10 +217,12 @@ fn shortcuts_are_switched_where_volumes_are_looked_at() {
     let mut harness = desk(Some(lamp()), None);
     _ = clicked(&mut harness, "View");
     assert!(harness.query_by_label("scissors").is_none());
-    harness.state_mut().look.view = View::Volumes;
+    harness.state_mut().state.view = ViewMode::Volumes;
     harness.run();
     assert_eq!(
         clicked(&mut harness, "scissors"),
-        [Wish::ToggleShortcut(Shortcut::Scissors)]
+        [LiveCommand::Window(WindowCommand::ToggleShortcut(
+            Shortcut::Scissors
+        ))]
     );
 }

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use gnomon::app::live::beginning::Opening;
-use gnomon::app::live::look::Look;
-use gnomon::app::live::studio::Studio;
-use gnomon::app::live::views::View;
-use gnomon::app::live::wish::Wish;
+use gnomon::app::live::command::SceneCommand;
+use gnomon::app::live::session::LiveSession;
+use gnomon::app::live::views::ViewMode;
+use gnomon::app::live::window_state::WindowState;
 use gnomon::app::stopwatch::Stopwatch;
 use gnomon::render::Gpu;
 
@@ -43,38 +43,38 @@ fn an_hour_of_frames_leaves_memory_as_it_was() {
     let now = Arc::new(move || clock() * HASTE);
     let gpu = Arc::new(Gpu::open(None).unwrap());
     let opening = Opening::scene(&path).unwrap();
-    let mut studio = Studio::open(opening, gpu, folder.path(), true, (now, Arc::new(|| ())));
-    let mut look = Look::new();
+    let mut session = LiveSession::open(opening, gpu, folder.path(), true, (now, Arc::new(|| ())));
+    let mut state = WindowState::new();
     let began = Instant::now();
     // Drivers and allocators keep some of what renderers leave: ever less, so that is first let settle.
     for _ in 0..WARM_UP {
-        studio.fulfil(Wish::EndPreview, &look);
+        session.edit_scene(SceneCommand::EndPreview, &state);
         for view in [
-            View::StencilCount,
-            View::Gain,
-            View::Phantoms,
-            View::Composite,
+            ViewMode::StencilCount,
+            ViewMode::Gain,
+            ViewMode::Phantoms,
+            ViewMode::Composite,
         ] {
-            look.view = view;
-            show_one(&mut studio, &look);
+            state.view = view;
+            show_one(&mut session, &state);
         }
-        while !studio.is_settled() {
-            show_one(&mut studio, &look);
+        while !session.is_settled() {
+            show_one(&mut session, &state);
         }
     }
     let (round, mut samples) = ((wanted / ROUNDS).max(1), Vec::new());
     for shown in 1..=wanted {
         // Now and then another view for a while, or the scene made anew.
-        look.view = match shown % (5 * round) {
-            0..20 => View::StencilCount,
-            20..40 => View::Gain,
-            40..60 => View::Phantoms,
-            _ => View::Composite,
+        state.view = match shown % (5 * round) {
+            0..20 => ViewMode::StencilCount,
+            20..40 => ViewMode::Gain,
+            40..60 => ViewMode::Phantoms,
+            _ => ViewMode::Composite,
         };
         if shown % (5 * round) == 100 {
-            studio.fulfil(Wish::EndPreview, &look);
+            session.edit_scene(SceneCommand::EndPreview, &state);
         }
-        show_one(&mut studio, &look);
+        show_one(&mut session, &state);
         if shown.is_multiple_of(round) {
             let resident_mib = resident_mib();
             samples.push(resident_mib);
@@ -85,7 +85,7 @@ fn an_hour_of_frames_leaves_memory_as_it_was() {
     let (early, late) = samples.split_at(samples.len() / 2);
     let most = |of: &[f64]| of.iter().copied().fold(0.0, f64::max);
     let growth_mib = most(late) - most(early);
-    let (captured, dropped) = studio.frames();
+    let (captured, dropped) = session.frames();
     eprintln!(
         "{wanted} frames shown of {captured} ({dropped:?} dropped) in {:.0} s; {:.1} MiB at most in the first half, \
          {:.1} MiB in the second: {growth_mib:+.1} MiB",
@@ -99,13 +99,13 @@ fn an_hour_of_frames_leaves_memory_as_it_was() {
     );
 }
 
-/// Moves the studio on to its next frame.
-fn show_one(studio: &mut Studio, look: &Look) {
-    while !studio.step(look).unwrap() {
+/// Moves the session on to its next frame.
+fn show_one(session: &mut LiveSession, state: &WindowState) {
+    while !session.step(state).unwrap() {
         std::thread::yield_now();
     }
-    let now_secs = studio.now_secs();
-    studio.was_shown(now_secs).unwrap();
+    let now_secs = session.now_secs();
+    session.was_shown(now_secs).unwrap();
 }
 
 /// Memory that is in use now, as Linux counts it.

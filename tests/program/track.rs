@@ -7,7 +7,7 @@ use std::process::Output;
 
 use assert_cmd::Command;
 use glam::{DAffine3, DQuat, DVec3};
-use gnomon::app::picture_files::write_rgb_png;
+use gnomon::app::files::picture_files::write_rgb_png;
 use gnomon::capture::FrameSource;
 use gnomon::scene::Scene;
 

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use crate::common::prints::{BENT_CAMERA, CHESSBOARD, Photographer, Print, good_poses};
 use crate::common::signals::{self, Signal};
-use gnomon::app::video_writer::{Codec, Naming, VideoWriter};
+use gnomon::app::files::video_writer::{Codec, Naming, VideoWriter};
 use gnomon::capture::{FrameSource, load_calibration};
 
 const SOON: Duration = Duration::from_secs(90);

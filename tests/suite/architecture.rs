@@ -17,12 +17,31 @@ const FLOORS: [&str; 9] = [
     "app",
 ];
 
+/// The groups of `app`, lowest first; the jobs stand on all of them.
+const APP_GROUPS: [&str; 9] = [
+    "stopwatch",
+    "files",
+    "input",
+    "recording",
+    "stages",
+    "scene_warnings",
+    "authoring",
+    "truth",
+    "window",
+];
+
+/// The jobs that are folders of `app`; the others are modules of `app::jobs`.
+const LARGE_JOBS: [&str; 2] = ["live", "chart"];
+
+/// What has a window.
+const WINDOWS: &[&str] = &["app/window/", "app/live/", "app/jobs/calibrate/watched/"];
+
 /// A word of code, and the only places (below `src/`) where it may stand.
 const HOMES: [(&str, &[&str]); 12] = [
     // The window shows a texture of the renderer's.
-    ("wgpu", &["render/", "app/live/screen.rs"]),
-    ("eframe", &["app/live/"]),
-    ("egui", &["app/live/"]),
+    ("wgpu", &["render/", "app/window/screen.rs"]),
+    ("eframe", WINDOWS),
+    ("egui", WINDOWS),
     ("egui_plot", &["app/live/"]),
     ("naga", &["render/"]),
     (
@@ -32,7 +51,7 @@ const HOMES: [(&str, &[&str]); 12] = [
             "capture/",
             "tracking/",
             "calibration/",
-            "app/markers/png.rs",
+            "app/jobs/markers/png.rs",
         ],
     ),
     ("nokhwa", &["capture/"]),
@@ -55,6 +74,16 @@ fn imports_go_down() {
     assert!(complaints.is_empty(), "\n{}", complaints.join("\n"));
 }
 
+/// What two jobs need lies in a group below them, and charts alone know the truth.
+#[test]
+fn jobs_import_no_other_job() {
+    let complaints: Vec<String> = sources()
+        .iter()
+        .flat_map(|(file, text)| bad_app_imports(file, text))
+        .collect();
+    assert!(complaints.is_empty(), "\n{}", complaints.join("\n"));
+}
+
 #[test]
 fn neighbours_do_not_import_in_a_circle() {
     let circles = circles(&sources());
@@ -70,7 +99,7 @@ fn libraries_and_the_clock_stay_at_home() {
     assert!(complaints.is_empty(), "\n{}", complaints.join("\n"));
 }
 
-/// Whatever else is written goes through `app/new_file.rs`: whole, beside its place, under a name that nobody foresees.
+/// Whatever else is written goes through `app/files/new_file.rs`: whole, beside its place, under a name that nobody foresees.
 #[test]
 fn files_are_written_in_few_places() {
     const WRITES: [&str; 7] = [
@@ -85,7 +114,7 @@ fn files_are_written_in_few_places() {
     const HOMES: [&str; 3] = [
         // Kept measurements: appended to, and begun anew.
         "app/chart/measured.rs",
-        "app/session_folder.rs",
+        "app/recording/session_folder.rs",
         // A camera's device, to be read.
         "capture/live/webcam.rs",
     ];
@@ -153,6 +182,41 @@ mod the_checks {
             "const X: &str = r#\"crate::app \" \"#; const Y: char = '\"'; // \" crate::app"
         ));
         assert!(!bad("main.rs", "use gnomon::app; use crate::cli;"));
+    }
+
+    #[test]
+    fn a_job_that_knows_another_is_caught() {
+        let bad = |file, text| !bad_app_imports(file, text).is_empty();
+        for (file, text) in [
+            ("app/jobs/replay/mod.rs", "use crate::app::jobs::track::X;"),
+            ("app/jobs/board.rs", "use super::track::X;"),
+            ("app/jobs/board.rs", "use crate::app::live::X;"),
+            (
+                "app/live/mod.rs",
+                "fn f() { crate::app::jobs::check::f(); }",
+            ),
+            ("app/live/look.rs", "use crate::app::chart::X;"),
+            ("app/jobs/check/mod.rs", "use crate::app::truth::X;"),
+            ("app/window/fit.rs", "use crate::app::truth::X;"),
+            ("app/stages/tally.rs", "use crate::app::jobs::track::X;"),
+            ("app/files/output.rs", "use crate::app::stages::stats::X;"),
+            ("app/attic.rs", "use crate::app::files::X;"),
+            ("app/live/mod.rs", "use crate::app::attic::X;"),
+            ("app/live/mod.rs", "use crate::app::*;"),
+        ] {
+            assert!(bad(file, text), "{file}: {text}");
+        }
+        for (file, text) in [
+            ("app/jobs/replay/mod.rs", "use super::replay::sheet::X;"),
+            ("app/jobs/replay/sheet.rs", "use super::X;"),
+            ("app/live/mod.rs", "use crate::app::stages::stats::X;"),
+            ("app/chart/lab.rs", "use crate::app::truth::X;"),
+            ("app/stages/tally.rs", "use crate::app::files::X;"),
+            ("app/mod.rs", "pub use jobs::track::X;"),
+            ("main.rs", "use gnomon::app::jobs::track::X;"),
+        ] {
+            assert!(!bad(file, text), "{file}: {text}");
+        }
     }
 
     #[test]
@@ -252,6 +316,66 @@ fn bad_imports(file: &str, text: &str) -> Vec<String> {
                 Some(floor) if floor <= own_floor => return None,
                 Some(_) => format!("{own} stands below {target}"),
                 None => format!("'{target}' is no floor"),
+            };
+            Some(format!(
+                "src/{file}: crate::{}: {complaint}",
+                import.join("::")
+            ))
+        })
+        .collect()
+}
+
+/// A module's part of `app`.
+#[derive(Clone, Copy, PartialEq)]
+enum AppPart<'a> {
+    /// `app` itself, and `app::jobs`, which only name what lies in them.
+    List,
+    /// By its place in [`APP_GROUPS`].
+    Group(usize),
+    /// By its name.
+    Job(&'a str),
+    /// What nobody has told a place.
+    Unknown,
+}
+
+/// `None` for what does not lie in `app`.
+fn app_part(module: &[String]) -> Option<AppPart<'_>> {
+    let module: Vec<&str> = module.iter().map(String::as_str).collect();
+    let group = |name: &str| APP_GROUPS.iter().position(|group| *group == name);
+    Some(match module[..] {
+        ["app"] | ["app", "jobs"] => AppPart::List,
+        ["app", "jobs", job, ..] if job != "*" => AppPart::Job(job),
+        ["app", job, ..] if LARGE_JOBS.contains(&job) => AppPart::Job(job),
+        ["app", name, ..] => group(name).map_or(AppPart::Unknown, AppPart::Group),
+        _ => return None,
+    })
+}
+
+fn bad_app_imports(file: &str, text: &str) -> Vec<String> {
+    let module = module_of(file);
+    let Some(own) = app_part(&module) else {
+        return Vec::new();
+    };
+    if own == AppPart::Unknown {
+        return vec![format!(
+            "src/{file}: no group of app; tests/architecture.rs lists them"
+        )];
+    }
+    let truth = APP_GROUPS.iter().position(|group| *group == "truth");
+    let knows_truth =
+        own == AppPart::Job("chart") || matches!(own, AppPart::Group(at) if Some(at) == truth);
+    imports(file, text)
+        .into_iter()
+        .filter_map(|import| {
+            let complaint = match (own, app_part(&import)?) {
+                (_, AppPart::Unknown) => "no group of app",
+                (_, AppPart::Group(at)) if Some(at) == truth && !knows_truth => {
+                    "charts alone know the truth"
+                }
+                (AppPart::Group(own), AppPart::Group(at)) if at > own => "stands above",
+                (AppPart::Group(_), AppPart::Job(_)) => "jobs stand above",
+                (AppPart::Job(own), AppPart::Job(other)) if own != other => "another job",
+                _ => return None,
             };
             Some(format!(
                 "src/{file}: crate::{}: {complaint}",

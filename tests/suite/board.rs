@@ -10,7 +10,7 @@ use crate::common::random::Random;
 use crate::common::sheets;
 use assert_cmd::Command;
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
-use gnomon::app::board::board_block;
+use gnomon::app::jobs::board::board_block;
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::scene::{Anchor, Family, Marker, Scene, TrackingSettings};
 use gnomon::tracking::mapping::{LearntBoard, MapError, MapSettings, learn_board};

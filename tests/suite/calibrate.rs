@@ -10,7 +10,7 @@ use crate::common::prints::{
 use crate::common::sheets::CAMERA;
 use assert_cmd::Command;
 use glam::{DAffine3, DMat3, DVec2};
-use gnomon::app::picture_files::{grey_png, write_bytes};
+use gnomon::app::files::picture_files::{grey_png, write_bytes};
 use gnomon::calibration::{
     CalibrateError, Calibration, Lack, Target, TargetFinder, TargetLook, TargetMarkers, Views,
     solve,

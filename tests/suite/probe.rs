@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::common::random::Random;
 use assert_cmd::Command;
 use glam::{DMat3, DVec2, DVec3};
-use gnomon::app::picture_files::{write_radiance, write_rgb_png};
+use gnomon::app::files::picture_files::{write_radiance, write_rgb_png};
 use gnomon::light::probe::Probe;
 use gnomon::light::probe_maps::world_from_camera;
 use gnomon::light::response::Response;
@@ -109,7 +109,8 @@ fn photographs(folder: &Path) -> Vec<PathBuf> {
         .iter()
         .enumerate()
         .map(|(index, time)| {
-            let time = gnomon::app::probe::exposure_of(time).expect("a test's own numbers fit");
+            let time =
+                gnomon::app::jobs::probe::exposure_of(time).expect("a test's own numbers fit");
             let rgba: Vec<u8> = radiance
                 .iter()
                 .flat_map(|radiance| {

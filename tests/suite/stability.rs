@@ -3,12 +3,13 @@
 
 use crate::common::composite::Expected;
 use crate::common::judge::shadow_error;
+use crate::common::near_edges::is_uniform;
 use crate::common::random::Random;
 use crate::common::shapes::{self, Soup};
 use crate::common::{Stage, Thing, lamp, look_at, look_with_up, project_file, stability_row, sun};
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use gnomon::app::truth::FACES_AWAY;
-use gnomon::app::truth::ray_cast::{Ray, Triangle, View, World, is_uniform};
+use gnomon::app::truth::ray_cast::{Ray, Triangle, View, World};
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::light::Light;
 use gnomon::render::{Layers, REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};

@@ -3,14 +3,13 @@
 
 use crate::common::composite::{Expected, Verdict};
 use crate::common::judge::{ENOUGH, is_edge};
+use crate::common::near_edges::{SAMPLES_PX, is_on_edge, is_uniform, sample_places};
 use crate::common::random::{Random, random_camera, random_stage};
 use crate::common::shapes;
 use crate::common::{Stage, Thing, lamp, linear_of_level, look_at, sun};
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use gnomon::app::truth::FACES_AWAY;
-use gnomon::app::truth::ray_cast::{
-    Exact, GRAZES, SAMPLES_PX, Surface, View, World, is_uniform, pixels, sample_places,
-};
+use gnomon::app::truth::ray_cast::{Exact, GRAZES, SeenSurface, View, World, pixels};
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::light::{Light, irradiance};
 use gnomon::render::{REAL, REAL_HIDES, VIRTUAL_HIDES};
@@ -281,7 +280,7 @@ fn hold_smooth_sphere(
     let of_sphere = soup.triangles.len();
     let others = World::new(stage.world.triangles[of_sphere..].to_vec());
     // Radiance of a place on the sphere.
-    let radiance = |seen: &Surface| -> f64 {
+    let radiance = |seen: &SeenSurface| -> f64 {
         let corners = soup.triangles[seen.triangle].map(|index| index as usize);
         let [a, b, c] = stage.world.triangles[seen.triangle].corners;
         let across = (b - a).cross(c - a);
@@ -301,7 +300,7 @@ fn hold_smooth_sphere(
     let (mut held, mut backs, mut shaded, mut wrong, mut worst) = (0, 0, 0, 0, 0.0_f64);
     for (index, center) in pixels(view.intrinsics.size_px) {
         // All that a pixel's samples may be is between the least and the most within it.
-        let within: Option<Vec<Surface>> = (0..25)
+        let within: Option<Vec<SeenSurface>> = (0..25)
             .map(|step| {
                 let offset = DVec2::new(f64::from(step % 5) - 2.0, f64::from(step / 5) - 2.0);
                 let seen = stage.world.look(view, center + offset * 0.25);
@@ -328,7 +327,7 @@ fn hold_smooth_sphere(
         shaded += usize::from(facet.dot(towards) > 0.0 && high == 0.0);
         // On an edge of the mesh snapping decides on which side a sample lies, and a side of the volume begins there.
         if (most < low || least > high)
-            && !sample_places(center).any(|place| stage.world.is_on_edge(view, place, &light))
+            && !sample_places(center).any(|place| is_on_edge(&stage.world, view, place, &light))
         {
             wrong += 1;
             worst = worst.max((found - high).max(low - found));

@@ -7,8 +7,8 @@ use super::edit::Edit;
 use super::history::{History, Step};
 use super::watch::{Known, OutsideChange, SceneWatch};
 use super::written::{Unfit, placement_of, touched_by, with_edit};
-use crate::app::output::OutputError;
-use crate::app::picture_files::write_text;
+use crate::app::files::output_error::OutputError;
+use crate::app::files::picture_files::write_text;
 use crate::scene::{Placement, Scene, SceneError};
 
 /// What an outside change is called in the history.

@@ -21,18 +21,18 @@ pub const FAINT: RGBColor = RGBColor(215, 215, 215);
 pub const GREY: RGBColor = RGBColor(120, 120, 120);
 
 /// Colours that colour-blind eyes tell apart (Okabe & Ito 2008), each with a mark and dashes of its own for printers.
-pub const LOOKS: [Look; 6] = [
-    Look(RGBColor(0, 114, 178), Mark::Disc, &[]),
-    Look(RGBColor(213, 94, 0), Mark::Square, &[9.0, 4.0]),
-    Look(RGBColor(0, 158, 115), Mark::Triangle, &[2.0, 3.0]),
-    Look(RGBColor(150, 80, 130), Mark::Diamond, &[9.0, 3.0, 2.0, 3.0]),
-    Look(RGBColor(190, 130, 0), Mark::Ring, &[5.0, 3.0]),
-    Look(RGBColor(0, 0, 0), Mark::Cross, &[1.5, 4.0]),
+pub const LOOKS: [SeriesLook; 6] = [
+    SeriesLook(RGBColor(0, 114, 178), Mark::Disc, &[]),
+    SeriesLook(RGBColor(213, 94, 0), Mark::Square, &[9.0, 4.0]),
+    SeriesLook(RGBColor(0, 158, 115), Mark::Triangle, &[2.0, 3.0]),
+    SeriesLook(RGBColor(150, 80, 130), Mark::Diamond, &[9.0, 3.0, 2.0, 3.0]),
+    SeriesLook(RGBColor(190, 130, 0), Mark::Ring, &[5.0, 3.0]),
+    SeriesLook(RGBColor(0, 0, 0), Mark::Cross, &[1.5, 4.0]),
 ];
 
 /// Colour, mark and dashes (lengths of ink and gap) of a series.
 #[derive(Clone, Copy)]
-pub struct Look(pub RGBColor, pub Mark, pub &'static [f64]);
+pub struct SeriesLook(pub RGBColor, pub Mark, pub &'static [f64]);
 
 /// The shape of a point.
 #[derive(Clone, Copy)]
@@ -53,7 +53,7 @@ pub enum Mark {
 
 /// Where a text lies against its place.
 #[derive(Clone, Copy, PartialEq)]
-pub enum Anchor {
+pub enum TextAnchor {
     /// It begins there.
     Start,
     /// Its middle is there.
@@ -63,7 +63,7 @@ pub enum Anchor {
 }
 
 /// A sheet to draw on; the unit is a 96th of an inch, y goes down.
-pub struct Canvas<'a, B: DrawingBackend> {
+pub struct ChartCanvas<'a, B: DrawingBackend> {
     area: &'a DrawingArea<B, Shift>,
 }
 
@@ -72,7 +72,7 @@ pub trait Drawing {
     /// Width and height, units.
     fn size(&self) -> [f64; 2];
     /// Draws it all.
-    fn draw<B: DrawingBackend>(&self, canvas: &Canvas<'_, B>) -> Result<()>;
+    fn draw<B: DrawingBackend>(&self, canvas: &ChartCanvas<'_, B>) -> Result<()>;
 }
 
 /// A drawing as the text of an SVG file.
@@ -111,7 +111,7 @@ fn draw_on<B: DrawingBackend>(backend: B, drawing: &impl Drawing) -> Result<()> 
         .map_err(|_| anyhow!("the charts' font cannot be read"))?;
     let area = backend.into_drawing_area();
     area.fill(&WHITE).map_err(told)?;
-    drawing.draw(&Canvas { area: &area })?;
+    drawing.draw(&ChartCanvas { area: &area })?;
     area.present().map_err(told)
 }
 
@@ -128,7 +128,7 @@ fn stroke(color: RGBColor, width: f64) -> ShapeStyle {
     ShapeStyle::from(&color).stroke_width((width * PIXELS_PER_UNIT).round().max(1.0) as u32)
 }
 
-impl<B: DrawingBackend> Canvas<'_, B> {
+impl<B: DrawingBackend> ChartCanvas<'_, B> {
     /// A line through some places.
     ///
     /// # Errors
@@ -177,8 +177,8 @@ impl<B: DrawingBackend> Canvas<'_, B> {
     }
 
     /// A mark in its look.
-    pub fn mark(&self, [x, y]: [f64; 2], look: Look) -> Result<()> {
-        let Look(color, mark, _) = look;
+    pub fn mark(&self, [x, y]: [f64; 2], look: SeriesLook) -> Result<()> {
+        let SeriesLook(color, mark, _) = look;
         let corners = |corners: &[[f64; 2]]| -> Result<()> {
             let places: Vec<_> = corners.iter().map(|[a, b]| place([x + a, y + b])).collect();
             self.area
@@ -211,12 +211,12 @@ impl<B: DrawingBackend> Canvas<'_, B> {
         at: [f64; 2],
         size: f64,
         color: RGBColor,
-        anchor: Anchor,
+        anchor: TextAnchor,
     ) -> Result<()> {
         let horizontal = match anchor {
-            Anchor::Start => HPos::Left,
-            Anchor::Middle => HPos::Center,
-            Anchor::End => HPos::Right,
+            TextAnchor::Start => HPos::Left,
+            TextAnchor::Middle => HPos::Center,
+            TextAnchor::End => HPos::Right,
         };
         let style = style(size, color).pos(Pos::new(horizontal, VPos::Center));
         self.area

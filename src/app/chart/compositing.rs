@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::family::Chart;
-use super::figure::{Axis, Figure, Panel, Point, Series};
+use super::figure::{Axis, Figure, FigurePanel, Point, Series};
 use super::lab::Lab;
 use super::measured::rounded;
 use super::shots::{Shots, mean};
@@ -24,7 +24,7 @@ pub struct Compositing;
 
 /// One way at one number of sources: those that get a shadow each, or those that are hidden.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Row {
+pub struct CompositingRow {
     unit: String,
     way: String,
     sources: usize,
@@ -68,7 +68,7 @@ impl Chart for Compositing {
         sources drawn by lot, some of them hidden at random, and how far the level is off that the intensity transfers \
         lead to, for sets of 25 and 25, 38 and 12, and one of all 50; at four vertices of the room. Right the room again, \
         with all real reflectances said to be brighter or darker than they are.";
-    type Row = Row;
+    type Row = CompositingRow;
 
     fn inputs(&self, lab: &Lab<'_>) -> Result<Vec<PathBuf>> {
         let room = lab.recording(ROOM)?;
@@ -83,7 +83,7 @@ impl Chart for Compositing {
         Ok(units.iter().map(|unit| (*unit).to_owned()).collect())
     }
 
-    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
+    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<CompositingRow>>> {
         let recording = lab.recording(ROOM)?;
         let scene = recording.load_scene()?;
         if unit == SETS {
@@ -107,7 +107,7 @@ impl Chart for Compositing {
                 scene.shadows.shafts.sources = Some(sources);
                 let errors = shots.errors(&shots.draw(&lab.gpu()?, &scene)?)?;
                 let of = |of| Some(rounded(mean(&errors, of)));
-                rows.push(Row {
+                rows.push(CompositingRow {
                     unit: unit.to_owned(),
                     way: way.to_owned(),
                     sources: sources as usize,
@@ -122,9 +122,9 @@ impl Chart for Compositing {
         Ok(Some(rows))
     }
 
-    fn figure(&self, rows: &[Row]) -> Figure {
-        type Metric = (&'static str, fn(&Row) -> Option<f64>);
-        let at = |row: &Row| match row.unit.as_str() {
+    fn figure(&self, rows: &[CompositingRow]) -> Figure {
+        type Metric = (&'static str, fn(&CompositingRow) -> Option<f64>);
+        let at = |row: &CompositingRow| match row.unit.as_str() {
             ALBEDO => row.albedo,
             _ => row.sources as f64,
         };
@@ -145,12 +145,12 @@ impl Chart for Compositing {
                     .filter_map(|row| Some(Point::named(at(row), value(row)?, "")))
                     .collect(),
             });
-            Panel {
+            FigurePanel {
                 title: title.to_owned(),
                 x,
                 y: Axis::from_zero(name),
                 series: series.collect(),
-                ..Panel::default()
+                ..FigurePanel::default()
             }
         };
         let sets = IN_FIRST.map(set_name);
@@ -210,7 +210,7 @@ fn set_name(in_first: usize) -> String {
 }
 
 /// Gibson et al. 2003, figure 3.
-fn sets(scene: &Scene, trials: usize) -> Result<Vec<Row>> {
+fn sets(scene: &Scene, trials: usize) -> Result<Vec<CompositingRow>> {
     let probe = scene.probe.as_ref().context("the room has a probe")?;
     let room = scene.room(probe);
     let room =
@@ -226,7 +226,7 @@ fn sets(scene: &Scene, trials: usize) -> Result<Vec<Row>> {
                 squared += squared_error(radiance, &sources, hidden, in_first, &mut random);
             }
             let rms = (squared / trials as f64).sqrt();
-            rows.push(Row {
+            rows.push(CompositingRow {
                 unit: SETS.to_owned(),
                 way: set_name(in_first),
                 sources: hidden,

@@ -9,10 +9,10 @@ use glam::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::family::Chart;
-use super::figure::{Axis, Figure, Panel, Point, Series};
+use super::figure::{Axis, Figure, FigurePanel, Point, Series};
 use super::lab::Lab;
 use super::measured::rounded;
-use super::peers_table::{SIZE_PX, Stage, torus};
+use super::peers_table::{PeersStage, SIZE_PX, torus};
 use super::shots::{Shots, grey_frame};
 use crate::app::truth::{Drawn, around, compare, draw, edges};
 use crate::render::{Gpu, Layers, REAL, Renderer, VIRTUAL_HIDES};
@@ -38,7 +38,7 @@ pub struct Displacement;
 
 /// One displacement in one of the scenes.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Row {
+pub struct DisplacementRow {
     scene: String,
     phantoms: String,
     amount: f64,
@@ -52,7 +52,7 @@ const MOVED: &str = "moved, mm";
 const TURNED: &str = "turned, degrees";
 const LEFT_OUT: &str = "left out";
 
-/// What is done to phantoms.
+/// A change to phantoms.
 #[derive(Clone, Copy)]
 enum Change {
     Moved { by_m: DVec3 },
@@ -81,7 +81,7 @@ fn steps() -> Vec<(&'static str, f64, Vec<Change>)> {
 }
 
 /// The four figures of a row; the last one where there is a truth.
-type Errors = ([f64; 3], Option<f64>);
+type DisplacementErrors = ([f64; 3], Option<f64>);
 
 impl Chart for Displacement {
     const NAME: &'static str = "displacement";
@@ -90,7 +90,7 @@ impl Chart for Displacement {
         the same with the box's phantom in its place. *lamp*: house and tin off alike, against the path-traced truth. Means \
         over four directions or both senses. A rim pixel's factor is off by more than 0.1; on *lamp* those within 6 pixels \
         of an outline count.";
-    type Row = Row;
+    type Row = DisplacementRow;
 
     fn inputs(&self, lab: &Lab<'_>) -> Result<Vec<PathBuf>> {
         let recording = lab.recording(LAMP)?;
@@ -101,7 +101,7 @@ impl Chart for Displacement {
         Ok(vec![BOX_SCENE.to_owned(), LAMP.to_owned()])
     }
 
-    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
+    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<DisplacementRow>>> {
         let gpu = lab.gpu()?;
         match unit {
             BOX_SCENE => {
@@ -141,8 +141,8 @@ impl Chart for Displacement {
         }
     }
 
-    fn figure(&self, rows: &[Row]) -> Figure {
-        type Metric = (&'static str, fn(&Row) -> f64);
+    fn figure(&self, rows: &[DisplacementRow]) -> Figure {
+        type Metric = (&'static str, fn(&DisplacementRow) -> f64);
         let metrics: [Metric; 3] = [
             ("wrong shadow, % of pixels", |row| row.wrong_shadow_pct),
             ("error of the factor, rms", |row| row.factor_rms),
@@ -167,12 +167,12 @@ impl Chart for Displacement {
                         .map(|row| Point::at(row.amount, value(row)))
                         .collect(),
                 });
-                panels.push(Panel {
+                panels.push(FigurePanel {
                     title: name.to_owned(),
                     x: Axis::from_zero(label),
                     y: Axis::from_zero(name),
                     series: series.collect(),
-                    ..Panel::default()
+                    ..FigurePanel::default()
                 });
             }
         }
@@ -200,8 +200,8 @@ impl Chart for Displacement {
 fn rows(
     lab: &Lab<'_>,
     scene: &str,
-    errors: impl Fn(Change) -> Result<Vec<Errors>>,
-) -> Result<Option<Vec<Row>>> {
+    errors: impl Fn(Change) -> Result<Vec<DisplacementErrors>>,
+) -> Result<Option<Vec<DisplacementRow>>> {
     let mut rows = Vec::new();
     for (phantoms, amount, changes) in steps().into_iter().step_by(lab.step()) {
         if lab.is_stopped() {
@@ -217,7 +217,7 @@ fn rows(
             rounded(all.iter().map(|(errors, _)| errors[column]).sum::<f64>() / count)
         };
         let residuals: Option<Vec<f64>> = all.iter().map(|(_, residual)| *residual).collect();
-        rows.push(Row {
+        rows.push(DisplacementRow {
             scene: scene.to_owned(),
             phantoms: phantoms.to_owned(),
             amount,
@@ -243,7 +243,7 @@ fn change_phantom(phantom: &mut Object, change: Change) {
 
 /// The layers of the torus's shadow across the box.
 fn shoot_box(gpu: &Arc<Gpu>, change: Change) -> Result<Layers> {
-    let mut stage = Stage::new(vec![(torus(2_500, 0.7), TORUS_M)], &[LAMP_M], SIZE_PX, 4);
+    let mut stage = PeersStage::new(vec![(torus(2_500, 0.7), TORUS_M)], &[LAMP_M], SIZE_PX, 4);
     // The box is the last phantom. What the real one casts is in the video wherever the phantom stands.
     if let Change::LeftOut = change {
         stage.scene.phantoms.pop();

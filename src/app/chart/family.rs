@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 use super::figure::Figure;
 use super::lab::Lab;
 
-/// One chart: a CSV and its picture.
+/// A chart: a CSV and its picture.
 pub trait Chart {
     /// Of its files.
     const NAME: &'static str;

@@ -12,12 +12,12 @@ pub struct Figure {
     /// Width and height of each panel with its axes, in units of a 96th of an inch.
     pub panel_size: [f64; 2],
     /// Row by row.
-    pub panels: Vec<Panel>,
+    pub panels: Vec<FigurePanel>,
 }
 
 /// One plot.
 #[derive(Debug, Clone, Default)]
-pub struct Panel {
+pub struct FigurePanel {
     /// What it shows, above it.
     pub title: String,
     /// To the right.
@@ -43,7 +43,7 @@ pub struct Axis {
     pub spans: Vec<f64>,
 }
 
-/// How values become places.
+/// A mapping of values to places.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub enum Scale {
     /// Evenly.

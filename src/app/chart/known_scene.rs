@@ -18,9 +18,9 @@ use crate::scene::{Object, Scene};
 /// A scene and its exact mask.
 pub struct KnownScene {
     /// The real things.
-    pub phantoms: Vec<Placed>,
+    pub phantoms: Vec<PlacedMesh>,
     /// The virtual things.
-    pub virtuals: Vec<Placed>,
+    pub virtuals: Vec<PlacedMesh>,
     /// Its point light.
     pub lights: Vec<Light>,
     /// A pixel's integer coordinate is its centre, here as everywhere.
@@ -32,7 +32,7 @@ pub struct KnownScene {
 }
 
 /// A mesh at its place.
-pub struct Placed {
+pub struct PlacedMesh {
     /// Its OBJ file.
     pub mesh: PathBuf,
     /// Rotation and translation.
@@ -47,8 +47,8 @@ struct File {
     width: u32,
     height: u32,
     camera: Camera,
-    phantoms: Vec<Thing>,
-    virtuals: Vec<Thing>,
+    phantoms: Vec<ThingEntry>,
+    virtuals: Vec<ThingEntry>,
     lights: Vec<Lamp>,
 }
 
@@ -60,7 +60,7 @@ struct Camera {
 }
 
 #[derive(Deserialize)]
-struct Thing {
+struct ThingEntry {
     obj: String,
     transform: Option<Value>,
 }
@@ -80,10 +80,10 @@ impl KnownScene {
         let path = folder.join(format!("{name}.json"));
         let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
         let file: File = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
-        let place = |thing: &Thing| {
+        let place = |thing: &ThingEntry| {
             let transform = thing.transform.as_ref();
             let pose = transform.map_or(Ok(DAffine3::IDENTITY), affine);
-            Ok(Placed {
+            Ok(PlacedMesh {
                 mesh: folder.join(&thing.obj),
                 world_from_object: pose.with_context(|| path.display().to_string())?,
             })

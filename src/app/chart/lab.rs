@@ -11,7 +11,7 @@ use super::measured::program_number;
 use crate::render::Gpu;
 use crate::scene::Scene;
 
-/// Where measuring takes place.
+/// The surroundings of a measurement: device, recordings, whether it is to stop.
 pub struct Lab<'a> {
     /// Fewer rounds, for a look.
     pub quick: bool,

@@ -8,10 +8,10 @@ use glam::DAffine3;
 use serde::{Deserialize, Serialize};
 
 use super::family::Chart;
-use super::figure::{Axis, Figure, Panel, Point, Rule, Series};
+use super::figure::{Axis, Figure, FigurePanel, Point, Rule, Series};
 use super::lab::Lab;
 use super::measured::rounded;
-use super::peers_table::{LIGHT_M, SIZE_PX, Stage, TORUS_CENTER_M, torus};
+use super::peers_table::{LIGHT_M, PeersStage, SIZE_PX, TORUS_CENTER_M, torus};
 use super::shots::{Shots, grey_frame};
 use crate::app::truth::changed_by;
 use crate::capture::Frame;
@@ -37,7 +37,7 @@ pub struct LeftOut;
 
 /// One thing left out of one recording, the mean of its key frames.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Row {
+pub struct LeftOutRow {
     recording: String,
     left_out: String,
     max_silhouette_error_px: f64,
@@ -54,7 +54,7 @@ pub struct Row {
 }
 
 /// A composite and the triangles in it.
-struct Drawn {
+struct DrawnRow {
     rgba: Vec<u8>,
     triangles: f64,
 }
@@ -69,7 +69,7 @@ struct Looks {
 impl Looks {
     fn of(lab: &Lab<'_>, unit: &str) -> Result<Self> {
         if unit == FINE_TORUS {
-            let stage = Stage::new(
+            let stage = PeersStage::new(
                 vec![(torus(100_000, 1.0), TORUS_CENTER_M)],
                 &[LIGHT_M],
                 SIZE_PX,
@@ -96,7 +96,7 @@ impl Looks {
     }
 }
 
-fn draw(lab: &Lab<'_>, looks: &Looks) -> Result<Vec<Drawn>> {
+fn draw(lab: &Lab<'_>, looks: &Looks) -> Result<Vec<DrawnRow>> {
     let mut renderer = crate::app::room_transport_cache::renderer(
         Arc::clone(&lab.gpu()?),
         &looks.scene,
@@ -105,7 +105,7 @@ fn draw(lab: &Lab<'_>, looks: &Looks) -> Result<Vec<Drawn>> {
     let drawn = looks.frames.iter().map(|(frame, camera_from_anchor)| {
         renderer.upload(frame)?;
         renderer.draw(camera_from_anchor, Shown::Composite);
-        Ok(Drawn {
+        Ok(DrawnRow {
             rgba: renderer.read_picture()?,
             triangles: renderer.triangles() as f64,
         })
@@ -120,7 +120,7 @@ impl Chart for LeftOut {
         coarse as silhouettes may move, and with volumes counted without caps where that is safe (which changes nothing), \
         against the same with all triangles and caps; and in the room, where shadows are soft, the sources that get none of \
         their own, against all. The picture's error is the root mean square over all its pixels.";
-    type Row = Row;
+    type Row = LeftOutRow;
 
     fn inputs(&self, lab: &Lab<'_>) -> Result<Vec<PathBuf>> {
         lab.recording_inputs()
@@ -134,7 +134,7 @@ impl Chart for LeftOut {
         Ok(names)
     }
 
-    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
+    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<LeftOutRow>>> {
         let mut looks = Looks::of(lab, unit)?;
         let scene = &mut looks.scene;
         scene.shadows.max_silhouette_error_px = 0.0;
@@ -177,10 +177,10 @@ impl Chart for LeftOut {
             let squares: f64 = squares.sum();
             let changed: f64 = changes.iter().map(|(px, ..)| *px as f64).sum();
             let [width, height] = looks.intrinsics.size_px.map(f64::from);
-            let triangles = |drawn: &[Drawn]| {
+            let triangles = |drawn: &[DrawnRow]| {
                 rounded(drawn.iter().map(|drawn| drawn.triangles).sum::<f64>() / count)
             };
-            rows.push(Row {
+            rows.push(LeftOutRow {
                 recording: unit.to_owned(),
                 left_out: left_out.to_owned(),
                 max_silhouette_error_px,
@@ -199,10 +199,10 @@ impl Chart for LeftOut {
         Ok(Some(rows))
     }
 
-    fn figure(&self, rows: &[Row]) -> Figure {
+    fn figure(&self, rows: &[LeftOutRow]) -> Figure {
         let mut recordings: Vec<&str> = rows.iter().map(|row| row.recording.as_str()).collect();
         recordings.dedup();
-        type Metric = (&'static str, fn(&Row) -> f64);
+        type Metric = (&'static str, fn(&LeftOutRow) -> f64);
         let metrics: [Metric; 2] = [
             ("triangles drawn, % of all", |row| {
                 100.0 * row.triangles / row.of_triangles.max(1.0)
@@ -210,7 +210,7 @@ impl Chart for LeftOut {
             ("the picture's error, levels of 255", |row| row.rms_levels),
         ];
         let mut panels = metrics
-            .map(|(name, value)| Panel {
+            .map(|(name, value)| FigurePanel {
                 title: name.to_owned(),
                 x: Axis::log("silhouettes may move by, px"),
                 y: Axis::from_zero(name),
@@ -233,13 +233,13 @@ impl Chart for LeftOut {
                     at: DEFAULT_PX,
                     label: "balanced".to_owned(),
                 }],
-                ..Panel::default()
+                ..FigurePanel::default()
             })
             .to_vec();
         let few = rows.iter().filter(|row| row.left_out == SOURCES);
         let few = few.filter_map(|row| Some((row, f64::from(row.sources?))));
         let (name, value) = metrics[1];
-        panels.push(Panel {
+        panels.push(FigurePanel {
             title: format!("few sources: {name}"),
             x: Axis::log("sources with a shadow each"),
             y: Axis::from_zero(name),
@@ -259,7 +259,7 @@ impl Chart for LeftOut {
                 at: 50.0,
                 label: "balanced".to_owned(),
             }],
-            ..Panel::default()
+            ..FigurePanel::default()
         });
         let at_default = rows
             .iter()

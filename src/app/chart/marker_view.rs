@@ -8,13 +8,13 @@ use glam::{DAffine3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::family::Chart;
-use super::figure::{Axis, Figure, Panel, Point, Series};
+use super::figure::{Axis, Figure, FigurePanel, Point, Series};
 use super::lab::Lab;
 use super::measured::rounded;
-use super::peers_table::{LIGHT_M, Stage, TORUS_CENTER_M, torus};
+use super::peers_table::{LIGHT_M, PeersStage, TORUS_CENTER_M, torus};
 use super::shots::grey_frame;
 use super::tracking::bare_library;
-use crate::app::stats::quantile;
+use crate::app::stages::stats::quantile;
 use crate::app::truth::sheets::{camera_above, photograph, with_noise};
 use crate::app::truth::{PoseErrors, shifts_px};
 use crate::geometry::camera::Intrinsics;
@@ -46,7 +46,7 @@ pub struct MarkerView;
 
 /// One library at one size and tilt.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Row {
+pub struct MarkerViewRow {
     varied: String,
     side_px: f64,
     tilt_deg: f64,
@@ -129,14 +129,14 @@ fn pose(side_px: f64, tilt_deg: f64, picture: u32) -> DAffine3 {
 
 /// A torus over the sheet in the light of a lamp, drawn with poses of the sheet.
 struct ShadowBench {
-    stage: Stage,
+    stage: PeersStage,
     renderer: Renderer,
 }
 
 impl ShadowBench {
     fn new(lab: &Lab<'_>) -> Result<Self> {
         let caster = (torus(2_500, 0.5), TORUS_CENTER_M);
-        let mut stage = Stage::new(vec![caster], &[LIGHT_M], CAMERA.size_px, 1);
+        let mut stage = PeersStage::new(vec![caster], &[LIGHT_M], CAMERA.size_px, 1);
         // The box, which is not on the sheet.
         stage.scene.phantoms.pop();
         let mut renderer = Renderer::new(lab.gpu()?, &stage.scene, CAMERA)?;
@@ -172,7 +172,7 @@ impl Chart for MarkerView {
         frontal, tilts with sides of 50 pixels. Shift is that of chart tracking, whose four places lie up to 9 cm from \
         the anchor. A lone marker has two poses: where the wrong one is taken, the 95 % panel jumps. Shadow: of a torus 6 cm \
         above the sheet, drawn with the found pose instead of the true one; pixels wrongly in or out of it, of those in it.";
-    type Row = Row;
+    type Row = MarkerViewRow;
 
     fn inputs(&self, _: &Lab<'_>) -> Result<Vec<PathBuf>> {
         Ok(Vec::new())
@@ -182,7 +182,7 @@ impl Chart for MarkerView {
         Ok(vec![SIZE.to_owned(), TILT.to_owned()])
     }
 
-    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
+    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<MarkerViewRow>>> {
         let pictures = if lab.quick { 2 } else { 40 };
         let mut rows = Vec::new();
         let mut bench = ShadowBench::new(lab)?;
@@ -213,7 +213,7 @@ impl Chart for MarkerView {
                 }
                 for ((library, _), (errors, wrong_pct)) in ways().iter().zip(&errors) {
                     let has_any = !wrong_pct.is_empty();
-                    rows.push(Row {
+                    rows.push(MarkerViewRow {
                         varied: unit.to_owned(),
                         side_px,
                         tilt_deg,
@@ -231,8 +231,8 @@ impl Chart for MarkerView {
         Ok(Some(rows))
     }
 
-    fn figure(&self, rows: &[Row]) -> Figure {
-        type Metric = (&'static str, fn(&Row) -> Option<f64>);
+    fn figure(&self, rows: &[MarkerViewRow]) -> Figure {
+        type Metric = (&'static str, fn(&MarkerViewRow) -> Option<f64>);
         let metrics: [Metric; 4] = [
             ("pictures with a pose, %", |row| Some(row.with_pose_pct)),
             ("shift, median, px", |row| row.shift_median_px),
@@ -264,7 +264,7 @@ impl Chart for MarkerView {
                             })
                             .collect(),
                     });
-                    panels.push(Panel {
+                    panels.push(FigurePanel {
                         title: layout.to_owned(),
                         x: match varied {
                             SIZE => Axis::log(label),
@@ -278,7 +278,7 @@ impl Chart for MarkerView {
                             _ => Axis::log(name),
                         },
                         series: series.collect(),
-                        ..Panel::default()
+                        ..FigurePanel::default()
                     });
                 }
             }

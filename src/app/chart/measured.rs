@@ -169,13 +169,13 @@ mod tests {
     use serde::Deserialize;
 
     #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-    struct Row {
+    struct MeasuredRow {
         name: String,
         error_px: Option<f64>,
     }
 
-    fn row(name: &str, error_px: Option<f64>) -> Row {
-        Row {
+    fn row(name: &str, error_px: Option<f64>) -> MeasuredRow {
+        MeasuredRow {
             name: name.to_owned(),
             error_px,
         }
@@ -194,8 +194,8 @@ mod tests {
 
         let again = Measured::open(&path, 7).unwrap();
         assert!(again.has("lamp") && again.has("hand") && !again.has("room"));
-        assert_eq!(again.rows::<Row>(&units).unwrap().len(), 3);
-        assert_eq!(again.rows::<Row>(&units[..1]).unwrap(), lamp);
+        assert_eq!(again.rows::<MeasuredRow>(&units).unwrap().len(), 3);
+        assert_eq!(again.rows::<MeasuredRow>(&units[..1]).unwrap(), lamp);
 
         // Wherever the second unit was cut off, the first is whole and the second is gone.
         let second = whole.find("# hand").unwrap();

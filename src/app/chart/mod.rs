@@ -28,19 +28,19 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context as _, Result, bail};
 
-use super::job_files::{JobFiles, Replacing};
-use super::locked_folder::lock;
-use super::picture_files::{write_rgb_png, write_text};
-use super::progress::Progress;
-use super::result_kind::ResultKind;
+use crate::app::files::job_files::{JobFiles, Replacing};
+use crate::app::files::lock;
+use crate::app::files::picture_files::{write_rgb_png, write_text};
+use crate::app::files::result_kind::ResultKind;
+use crate::app::stages::progress::Progress;
 use canvas::{bitmap, svg};
 use family::Chart;
 use lab::Lab;
 use measured::{Measured, made_from, to_csv};
 
-/// What charts are asked for.
+/// A request to measure charts.
 #[derive(Debug, Clone)]
-pub struct Request {
+pub struct ChartRequest {
     /// Where they go.
     pub out: PathBuf,
     /// These alone, by name or by family; none: all.
@@ -76,7 +76,7 @@ fn all() -> [Box<dyn AnyChart>; 11] {
     [
         Box::new(tracking::Tracking),
         Box::new(shadows::Shadows),
-        Box::new(pictures::Pictures),
+        Box::new(pictures::PicturesChart),
         Box::new(moved::Moved),
         Box::new(compositing::Compositing),
         Box::new(left_out::LeftOut),
@@ -106,7 +106,7 @@ pub fn names() -> Vec<&'static str> {
 ///
 /// # Errors
 /// A name that no chart has, an interrupt, or whatever keeps a chart from being measured or written.
-pub fn chart(request: &Request, stop: &AtomicBool) -> Result<String> {
+pub fn chart(request: &ChartRequest, stop: &AtomicBool) -> Result<String> {
     let wanted = |chart: &dyn AnyChart| {
         let names = [chart.name(), chart.family()];
         request.only.is_empty()
@@ -164,7 +164,7 @@ pub fn chart(request: &Request, stop: &AtomicBool) -> Result<String> {
 }
 
 /// What charts of these names are made from, and the files that they are.
-fn files_of(request: &Request, names: impl Iterator<Item = &'static str>) -> JobFiles {
+fn files_of(request: &ChartRequest, names: impl Iterator<Item = &'static str>) -> JobFiles {
     let mut files = JobFiles::new(request.replacing);
     let folders = INPUTS.iter().map(Path::new);
     for folder in folders.chain(request.sessions.as_deref()) {

@@ -11,11 +11,11 @@ use serde::Serialize;
 use super::AnyChart;
 use super::lab::Lab;
 use super::measured::{rounded, to_csv};
-use super::sheet::{Part, Sheet, changed_part};
+use super::sheet::{Sheet, SheetPart, changed_part};
 use super::shots::Shots;
-use crate::app::picture_files::{write_rgb_png, write_text};
-use crate::app::progress::Progress;
-use crate::app::truth::{Drawn, Picture, draw};
+use crate::app::files::picture_files::{write_rgb_png, write_text};
+use crate::app::stages::progress::Progress;
+use crate::app::truth::{Drawn, LinearPicture, draw};
 use crate::render::VIRTUAL;
 use crate::scene::Scene;
 
@@ -28,7 +28,7 @@ pub struct Moved;
 
 /// One picture.
 #[derive(Debug, Clone, Serialize)]
-struct Row {
+struct MovedRow {
     thing: String,
     x_m: f64,
     y_m: f64,
@@ -115,16 +115,16 @@ impl AnyChart for Moved {
                 drawn.push(draw(&mut renderer, &shot.frame, &shot.camera_from_anchor)?);
             }
             let changed = |drawn: &Drawn| {
-                let bare = Picture::from_rgba(width, &drawn.bare);
-                changed_part(&Picture::from_rgba(width, &drawn.out).minus(&bare))
+                let bare = LinearPicture::from_rgba(width, &drawn.bare);
+                changed_part(&LinearPicture::from_rgba(width, &drawn.out).minus(&bare))
             };
             let parts = drawn.iter().filter_map(changed);
-            let whole = parts.reduce(|all: Part, part| all.union(&part));
+            let whole = parts.reduce(|all: SheetPart, part| all.union(&part));
             let whole = whole.context("it is seen")?;
             let mut cells = Vec::new();
             for (scene, drawn) in states.iter().zip(&drawn) {
                 let place = scene.virtuals[0].anchor_from_object.translation;
-                let row = Row {
+                let row = MovedRow {
                     thing: thing.to_owned(),
                     x_m: place.x,
                     y_m: place.y,
@@ -140,7 +140,7 @@ impl AnyChart for Moved {
                         row.darkest
                     ),
                 };
-                let picture = Picture::from_rgba(width, &drawn.out);
+                let picture = LinearPicture::from_rgba(width, &drawn.out);
                 cells.push(whole.cut(label, &picture, |level| level));
                 rows.push(row);
             }

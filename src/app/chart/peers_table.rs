@@ -50,7 +50,7 @@ pub fn turn(frame: usize) -> DMat3 {
 }
 
 /// A scene whose virtual things turn in every frame, each on an anchor of its own.
-pub struct Stage {
+pub struct PeersStage {
     /// Phantoms on the first anchor, each virtual thing on one of its own.
     pub scene: Scene,
     /// Of the camera.
@@ -59,7 +59,7 @@ pub struct Stage {
     centers_m: Vec<DVec3>,
 }
 
-impl Stage {
+impl PeersStage {
     /// The peers' table and box, which cast no shadow there either, and the turning casters at their places.
     pub fn new(
         casters: Vec<(Mesh, DVec3)>,

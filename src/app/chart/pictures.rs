@@ -8,11 +8,11 @@ use super::AnyChart;
 use super::lab::Lab;
 use super::sheet::{Cell, Sheet, changed_part};
 use super::shots::{Shot, Shots, mean};
-use crate::app::picture_files::write_rgb_png;
-use crate::app::progress::Progress;
-use crate::app::stats::quantile;
+use crate::app::files::picture_files::write_rgb_png;
+use crate::app::stages::progress::Progress;
+use crate::app::stages::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
-use crate::app::truth::{Drawn, Picture};
+use crate::app::truth::{Drawn, LinearPicture};
 use crate::render::{Renderer, Shown, VIRTUAL};
 use crate::scene::{Quality, Scene, ShadowSettings, ShadowTechnique};
 
@@ -21,9 +21,9 @@ const NAME: &str = "shadow-pictures";
 const STRONGER: f64 = 4.0;
 
 /// The pictures.
-pub struct Pictures;
+pub struct PicturesChart;
 
-impl AnyChart for Pictures {
+impl AnyChart for PicturesChart {
     fn name(&self) -> &'static str {
         NAME
     }
@@ -143,11 +143,11 @@ fn two_rows(
     let change = shot.truth.with.minus(&shot.truth.without);
     let part = changed_part(&change)?;
     let (_, first) = drawn.first()?;
-    let bare = Picture::from_rgba(width, &first.bare);
+    let bare = LinearPicture::from_rgba(width, &first.bare);
     let mut pictures = vec![part.cut(format!("{recording}: bare video"), &bare, |level| level)];
     let mut errors = vec![part.cut(String::new(), &change, |level| 128.0 - STRONGER * level)];
     for (name, drawn) in drawn {
-        let out = Picture::from_rgba(width, &drawn.out);
+        let out = LinearPicture::from_rgba(width, &drawn.out);
         let error = error(&out, &bare, shot);
         pictures.push(part.cut(name.clone(), &out, |level| level));
         errors.push(part.cut(String::new(), &error, |level| 128.0 + STRONGER * level));
@@ -157,7 +157,7 @@ fn two_rows(
 }
 
 /// On virtual surfaces of the picture itself, on real ones of what the virtual things change: the video's noise is none.
-fn error(out: &Picture, bare: &Picture, shot: &Shot) -> Picture {
+fn error(out: &LinearPicture, bare: &LinearPicture, shot: &Shot) -> LinearPicture {
     let change = shot.truth.with.minus(&shot.truth.without);
     let mut error = out.minus(bare).minus(&change);
     let whole = out.minus(&shot.truth.with);

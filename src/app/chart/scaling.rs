@@ -8,12 +8,12 @@ use glam::{DAffine3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::family::Chart;
-use super::figure::{Axis, Figure, Panel, Point, Series, power_law};
+use super::figure::{Axis, Figure, FigurePanel, Point, Series, power_law};
 use super::lab::Lab;
 use super::measured::rounded;
-use super::peers_table::{LIGHT_M, SIZE_PX, Stage, TORUS_CENTER_M, WARM_UP_FRAMES, torus};
+use super::peers_table::{LIGHT_M, PeersStage, SIZE_PX, TORUS_CENTER_M, WARM_UP_FRAMES, torus};
 use super::shots::{Shots, grey_frame};
-use crate::app::stats::quantile;
+use crate::app::stages::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
 use crate::geometry::camera::Intrinsics;
 use crate::render::{Gpu, Renderer, Shown};
@@ -24,7 +24,7 @@ pub struct Scaling;
 
 /// A stage of one size.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Row {
+pub struct ScalingRow {
     varied: String,
     value: f64,
     samples: u32,
@@ -42,7 +42,7 @@ const ROOM: &str = "room";
 const SOURCE_COUNTS: [u32; 7] = [1, 3, 10, 20, 50, 100, 200];
 const QUICK_SOURCE_COUNTS: [u32; 3] = [1, 5, 25];
 
-/// What is drawn.
+/// A drawn scene with its camera and its poses.
 struct Setup {
     scene: Scene,
     intrinsics: Intrinsics,
@@ -50,8 +50,8 @@ struct Setup {
     poses: Box<dyn Fn(usize) -> Vec<Option<DAffine3>>>,
 }
 
-impl From<Stage> for Setup {
-    fn from(stage: Stage) -> Self {
+impl From<PeersStage> for Setup {
+    fn from(stage: PeersStage) -> Self {
         Self {
             scene: stage.scene.clone(),
             intrinsics: stage.intrinsics,
@@ -88,7 +88,7 @@ fn rooms(lab: &Lab<'_>, samples: u32) -> Result<Vec<(f64, Setup)>> {
 }
 
 /// The sizes of a sweep with their stages: the peers' torus over the table, one thing varied.
-fn sweep(lab: &Lab<'_>, varied: &str, samples: u32) -> Vec<(f64, Stage)> {
+fn sweep(lab: &Lab<'_>, varied: &str, samples: u32) -> Vec<(f64, PeersStage)> {
     let one = |triangles| vec![(torus(triangles, 1.0), TORUS_CENTER_M)];
     let sizes: &[u32] = match varied {
         "triangles" if lab.quick => &[100, 300, 1_000, 3_000, 10_000],
@@ -100,14 +100,14 @@ fn sweep(lab: &Lab<'_>, varied: &str, samples: u32) -> Vec<(f64, Stage)> {
     let sizes = sizes.iter().step_by(lab.step());
     let stage = |&size: &u32| match varied {
         "triangles" => {
-            let stage = Stage::new(one(size as usize), &[LIGHT_M], SIZE_PX, samples);
+            let stage = PeersStage::new(one(size as usize), &[LIGHT_M], SIZE_PX, samples);
             (stage.triangles() as f64, stage)
         }
         "lights" => {
             // A ring at the lamp's height, which it is the first of.
             let around = |index: u32| DQuat::from_rotation_z(f64::from(index) * 0.7) * LIGHT_M;
             let places: Vec<DVec3> = (0..size).map(around).collect();
-            let stage = Stage::new(one(TRIANGLES), &places, SIZE_PX, samples);
+            let stage = PeersStage::new(one(TRIANGLES), &places, SIZE_PX, samples);
             (f64::from(size), stage)
         }
         "casters" => {
@@ -117,12 +117,12 @@ fn sweep(lab: &Lab<'_>, varied: &str, samples: u32) -> Vec<(f64, Stage)> {
                 let place = DVec3::new(-0.21 + 0.06 * column, -0.09 + 0.06 * row, 0.04);
                 (small.clone(), place)
             });
-            let stage = Stage::new(grid.collect(), &[LIGHT_M], SIZE_PX, samples);
+            let stage = PeersStage::new(grid.collect(), &[LIGHT_M], SIZE_PX, samples);
             (f64::from(size), stage)
         }
         _ => {
             let size_px = [size * 4 / 3, size];
-            let stage = Stage::new(one(TRIANGLES), &[LIGHT_M], size_px, samples);
+            let stage = PeersStage::new(one(TRIANGLES), &[LIGHT_M], size_px, samples);
             (f64::from(size_px[0]) * f64::from(size_px[1]), stage)
         }
     };
@@ -138,7 +138,7 @@ impl Chart for Scaling {
         back. Sources: soft shadows by shafts in the room that ships, where nothing \
         moves but the camera. The number at a line is its slope, the exponent of growth over the upper half of its sizes. Memory is what \
         the graphics driver has given to the program.";
-    type Row = Row;
+    type Row = ScalingRow;
 
     fn inputs(&self, lab: &Lab<'_>) -> Result<Vec<PathBuf>> {
         let recordings = lab.recordings()?.into_iter();
@@ -150,7 +150,7 @@ impl Chart for Scaling {
         Ok(SWEEPS.map(str::to_owned).to_vec())
     }
 
-    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
+    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<ScalingRow>>> {
         let gpu = lab.gpu()?;
         let (warm_up, frames) = if lab.quick {
             (1, 3)
@@ -185,7 +185,7 @@ impl Chart for Scaling {
                 }
             }
             for (bench, (value, _)) in benches.iter().zip(&stages) {
-                rows.push(Row {
+                rows.push(ScalingRow {
                     varied: unit.to_owned(),
                     value: *value,
                     samples,
@@ -198,8 +198,8 @@ impl Chart for Scaling {
         Ok(Some(rows))
     }
 
-    fn figure(&self, rows: &[Row]) -> Figure {
-        type Metric = (&'static str, fn(&Row) -> Option<f64>);
+    fn figure(&self, rows: &[ScalingRow]) -> Figure {
+        type Metric = (&'static str, fn(&ScalingRow) -> Option<f64>);
         let metrics: [Metric; 2] = [
             ("time per frame, ms", |row| Some(row.frame_median_ms)),
             ("graphics memory, MiB", |row| row.gpu_memory_mib),
@@ -228,12 +228,12 @@ impl Chart for Scaling {
                         points: points.collect(),
                     }
                 });
-                panels.push(Panel {
+                panels.push(FigurePanel {
                     title: varied.to_owned(),
                     x: Axis::log(varied),
                     y: Axis::log(name),
                     series: series.collect(),
-                    ..Panel::default()
+                    ..FigurePanel::default()
                 });
             }
         }

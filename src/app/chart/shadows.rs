@@ -8,13 +8,13 @@ use anyhow::Result;
 use serde::{Deserialize, Serialize};
 
 use super::family::Chart;
-use super::figure::{Axis, Figure, Panel, Point, Rule, Series, pareto_front};
+use super::figure::{Axis, Figure, FigurePanel, Point, Rule, Series, pareto_front};
 use super::lab::Lab;
 use super::measured::rounded;
 use super::shots::{Shots, mean, mean_wrong_pct};
-use crate::app::stats::quantile;
+use crate::app::stages::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
-use crate::app::truth::{Drawn, Picture};
+use crate::app::truth::{Drawn, LinearPicture};
 use crate::render::Shown;
 use crate::scene::{Counting, Quality, Scene, ShadowSettings, ShaftSettings, Technique};
 
@@ -23,7 +23,7 @@ pub struct Shadows;
 
 /// One way to make the shadows of one recording.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Row {
+pub struct ShadowsRow {
     recording: String,
     technique: String,
     setting: String,
@@ -51,19 +51,19 @@ const TRUTH: &str = "truth on the video";
 const BARE: &str = "bare video";
 
 /// A way to make shadows and the scene that asks for it.
-struct Way {
+struct ShadowWay {
     technique: &'static str,
     setting: String,
     scene: Scene,
 }
 
 /// What each technique has to set. Another one adds its ways here.
-fn ways(scene: &Scene) -> Vec<Way> {
+fn ways(scene: &Scene) -> Vec<ShadowWay> {
     let mut ways = Vec::new();
     let mut add = |technique, setting: String, shadows: ShadowSettings| {
         let mut scene = scene.clone();
         scene.shadows = shadows;
-        ways.push(Way {
+        ways.push(ShadowWay {
             technique,
             setting,
             scene,
@@ -132,7 +132,7 @@ impl Chart for Shadows {
         A setting is the samples per pixel and by how much coarser versions of things may move their silhouettes; \
         `depth-fail` counts volumes that way everywhere. What is left of the error is light between surfaces and what the \
         torus hides of the surroundings, which point lights do not have.";
-    type Row = Row;
+    type Row = ShadowsRow;
 
     fn inputs(&self, lab: &Lab<'_>) -> Result<Vec<PathBuf>> {
         lab.recording_inputs()
@@ -142,7 +142,7 @@ impl Chart for Shadows {
         lab.recording_names()
     }
 
-    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
+    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<ShadowsRow>>> {
         const DRAWS: usize = 4;
         // Frames of software drivers with many sources take half a second each.
         let (longest_ms, least_draws) = if lab.quick { (2e3, 1) } else { (6e4, 3) };
@@ -200,10 +200,10 @@ impl Chart for Shadows {
         Ok(Some(rows))
     }
 
-    fn figure(&self, rows: &[Row]) -> Figure {
+    fn figure(&self, rows: &[ShadowsRow]) -> Figure {
         let mut recordings: Vec<&str> = rows.iter().map(|row| row.recording.as_str()).collect();
         recordings.dedup();
-        type Metric = (&'static str, fn(&Row) -> f64);
+        type Metric = (&'static str, fn(&ShadowsRow) -> f64);
         let metrics: [Metric; 3] = [
             ("residual on real pixels", |row| row.residual_real),
             ("error of the factor, rms", |row| row.factor_rms),
@@ -237,7 +237,7 @@ impl Chart for Shadows {
                         label: technique.to_owned(),
                     })
                 };
-                panels.push(Panel {
+                panels.push(FigurePanel {
                     title: format!("{recording}: {name}"),
                     x: Axis::log("time per frame, ms"),
                     y: Axis::log(name),
@@ -263,10 +263,10 @@ fn row(
     setting: &str,
     shots: &Shots,
     drawn: &[Drawn],
-) -> Result<Row> {
+) -> Result<ShadowsRow> {
     let errors = shots.errors(drawn)?;
     let of = |of| rounded(mean(&errors, of));
-    Ok(Row {
+    Ok(ShadowsRow {
         recording: recording.to_owned(),
         technique: technique.to_owned(),
         setting: setting.to_owned(),
@@ -287,7 +287,7 @@ fn with_truth(shots: &Shots, drawn: &[Drawn]) -> Vec<Drawn> {
         .map(|(shot, drawn)| {
             let width = shots.size_px()[0] as usize;
             let change = shot.truth.with.minus(&shot.truth.without);
-            let out = Picture::from_rgba(width, &drawn.bare).plus(&change);
+            let out = LinearPicture::from_rgba(width, &drawn.bare).plus(&change);
             let mut with_truth = drawn.clone();
             with_truth.out = out
                 .pixels

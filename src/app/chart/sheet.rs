@@ -3,8 +3,8 @@
 use anyhow::Result;
 use plotters::prelude::DrawingBackend;
 
-use super::canvas::{Anchor, Canvas, Drawing, INK, PIXELS_PER_UNIT, bitmap};
-use crate::app::truth::Picture;
+use super::canvas::{ChartCanvas, Drawing, INK, PIXELS_PER_UNIT, TextAnchor, bitmap};
+use crate::app::truth::LinearPicture;
 
 /// Each pixel is drawn as a square of so many.
 const ENLARGED: usize = 2;
@@ -36,13 +36,13 @@ pub struct Sheet {
 }
 
 /// A rectangle of pixels: from, to (exclusive).
-pub struct Part {
+pub struct SheetPart {
     from: [usize; 2],
     to: [usize; 2],
 }
 
 /// What a change touches, with some room.
-pub fn changed_part(change: &Picture) -> Option<Part> {
+pub fn changed_part(change: &LinearPicture) -> Option<SheetPart> {
     let (width, height) = (change.width, change.pixels.len() / change.width);
     let changed = change
         .pixels
@@ -50,8 +50,8 @@ pub fn changed_part(change: &Picture) -> Option<Part> {
         .enumerate()
         .filter(|(_, pixel)| pixel.iter().any(|level| level.abs() > CHANGED_LEVELS));
     let places = changed.map(|(index, _)| [index % width, index / width]);
-    let around = places.fold(None, |part: Option<Part>, place| {
-        let mut part = part.unwrap_or(Part {
+    let around = places.fold(None, |part: Option<SheetPart>, place| {
+        let mut part = part.unwrap_or(SheetPart {
             from: place,
             to: place,
         });
@@ -59,7 +59,7 @@ pub fn changed_part(change: &Picture) -> Option<Part> {
         part.to = [0, 1].map(|axis| part.to[axis].max(place[axis]));
         Some(part)
     })?;
-    Some(Part {
+    Some(SheetPart {
         from: around.from.map(|low| low.saturating_sub(MARGIN_PX)),
         to: [
             (around.to[0] + MARGIN_PX).min(width),
@@ -68,7 +68,7 @@ pub fn changed_part(change: &Picture) -> Option<Part> {
     })
 }
 
-impl Part {
+impl SheetPart {
     /// What all of two parts lie in.
     pub fn union(self, other: &Self) -> Self {
         Self {
@@ -78,7 +78,7 @@ impl Part {
     }
 
     /// That part of a picture, its levels changed.
-    pub fn cut(&self, label: String, picture: &Picture, level: impl Fn(f64) -> f64) -> Cell {
+    pub fn cut(&self, label: String, picture: &LinearPicture, level: impl Fn(f64) -> f64) -> Cell {
         let byte = |value: f64| level(value).round().clamp(0.0, 255.0) as u8;
         let rows = self.from[1]..self.to[1];
         let pixels = rows.flat_map(|y| (self.from[0]..self.to[0]).map(move |x| (x, y)));
@@ -149,12 +149,12 @@ impl Drawing for Sheet {
         far.map(|end| (end + GAP).ceil())
     }
 
-    fn draw<B: DrawingBackend>(&self, canvas: &Canvas<'_, B>) -> Result<()> {
-        canvas.text(self.title, [GAP, 24.0], 22.0, INK, Anchor::Start)?;
-        canvas.text(self.reading, [GAP, 50.0], 15.5, INK, Anchor::Start)?;
+    fn draw<B: DrawingBackend>(&self, canvas: &ChartCanvas<'_, B>) -> Result<()> {
+        canvas.text(self.title, [GAP, 24.0], 22.0, INK, TextAnchor::Start)?;
+        canvas.text(self.reading, [GAP, 50.0], 15.5, INK, TextAnchor::Start)?;
         for ([x, y], cell) in self.placed() {
             let above = [x, y - LABEL / 2.0];
-            canvas.text(&cell.label, above, 15.5, INK, Anchor::Start)?;
+            canvas.text(&cell.label, above, 15.5, INK, TextAnchor::Start)?;
         }
         Ok(())
     }

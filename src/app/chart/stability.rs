@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result};
 use serde::{Deserialize, Serialize};
 
 use super::family::Chart;
-use super::figure::{Axis, Figure, Panel, Point, Rule, Scale, Series};
+use super::figure::{Axis, Figure, FigurePanel, Point, Rule, Scale, Series};
 use super::known_scene::{KnownScene, world_of};
 use super::lab::Lab;
 use super::measured::{from_csv, rounded};
@@ -29,7 +29,7 @@ pub struct Stability;
 
 /// A program in one of the situations.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Row {
+pub struct StabilityRow {
     row: String,
     program: String,
     least_wrong_pct: Option<f64>,
@@ -62,7 +62,7 @@ impl Chart for Stability {
         1.12 and Irrlicht 1.8 against the masks of `tests/stability` (`peers.csv`), the worst where there are several. \
         Those masks' rays start 0.1 mm above the surface, which shows near the camera and under low light: gnomon is also \
         held against them.";
-    type Row = Row;
+    type Row = StabilityRow;
 
     fn inputs(&self, _: &Lab<'_>) -> Result<Vec<PathBuf>> {
         Ok(vec![PathBuf::from(FOLDER)])
@@ -74,7 +74,7 @@ impl Chart for Stability {
         Ok(rows)
     }
 
-    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
+    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<StabilityRow>>> {
         if lab.is_stopped() {
             return Ok(None);
         }
@@ -87,7 +87,7 @@ impl Chart for Stability {
         }
         let ours = |program: &str, of: fn(&Wrong) -> f64| {
             let all = || wrong.iter().map(of);
-            Row {
+            StabilityRow {
                 row: unit.to_owned(),
                 program: program.to_owned(),
                 least_wrong_pct: all().reduce(f64::min).map(rounded),
@@ -100,7 +100,7 @@ impl Chart for Stability {
             ours(OURS_BY_MASK, |wrong| wrong.by_mask_pct),
         ];
         let theirs = peers.into_iter().filter(|peer| !peer.program.is_empty());
-        let theirs = theirs.map(|peer| Row {
+        let theirs = theirs.map(|peer| StabilityRow {
             row: peer.row,
             program: peer.program,
             least_wrong_pct: peer.least_wrong_pct,
@@ -110,7 +110,7 @@ impl Chart for Stability {
         Ok(Some(ours.into_iter().chain(theirs).collect()))
     }
 
-    fn figure(&self, rows: &[Row]) -> Figure {
+    fn figure(&self, rows: &[StabilityRow]) -> Figure {
         let mut names: Vec<String> = rows.iter().map(|row| row.row.clone()).collect();
         names.dedup();
         let programs = [
@@ -144,7 +144,7 @@ impl Chart for Stability {
             reading: "Wrong pixels in the worst case of each row; left of the dashed line only edges are. Both signs of gnomon are one picture.".to_owned(),
             columns: 1,
             panel_size: [1000.0, 90.0 + 44.0 * names.len() as f64],
-            panels: vec![Panel {
+            panels: vec![FigurePanel {
                 title: "wrong pixels, percent of the real ones that face the light".to_owned(),
                 x: Axis {
                     spans: vec![LEAST_SHOWN_PCT, 100.0],

@@ -7,11 +7,11 @@ use anyhow::{Context as _, Result};
 use serde::{Deserialize, Serialize};
 
 use super::family::Chart;
-use super::figure::{Axis, Figure, Panel, Point, Series, pareto_front};
+use super::figure::{Axis, Figure, FigurePanel, Point, Series, pareto_front};
 use super::lab::Lab;
 use super::measured::rounded;
-use crate::app::recording;
-use crate::app::stats::quantile;
+use crate::app::input::source;
+use crate::app::stages::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
 use crate::app::truth::{PoseErrors, TruePoses, shifts_px};
 use crate::capture::FrameSource;
@@ -26,7 +26,7 @@ pub struct Tracking;
 
 /// One way to track one anchor of one recording.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Row {
+pub struct TrackingRow {
     recording: String,
     anchor: String,
     library: String,
@@ -42,7 +42,7 @@ pub struct Row {
 }
 
 /// A library, what is set in it, and as what.
-struct Way {
+struct TrackingWay {
     library: &'static str,
     setting: &'static str,
     settings: TrackingSettings,
@@ -64,9 +64,9 @@ pub fn bare_library() -> TrackingSettings {
     }
 }
 
-fn ways() -> Vec<Way> {
+fn ways() -> Vec<TrackingWay> {
     let bare = bare_library();
-    let april = |setting, decimation| Way {
+    let april = |setting, decimation| TrackingWay {
         library: APRILTAG,
         setting,
         settings: TrackingSettings {
@@ -74,7 +74,7 @@ fn ways() -> Vec<Way> {
             ..bare.clone()
         },
     };
-    let aruco = |setting, aruco_refinement| Way {
+    let aruco = |setting, aruco_refinement| TrackingWay {
         library: ARUCO,
         setting,
         settings: TrackingSettings {
@@ -83,7 +83,7 @@ fn ways() -> Vec<Way> {
             ..bare.clone()
         },
     };
-    let ours = |setting, search, pose_from_pixels, filter| Way {
+    let ours = |setting, search, pose_from_pixels, filter| TrackingWay {
         library: OURS,
         setting,
         settings: TrackingSettings {
@@ -114,7 +114,7 @@ impl Chart for Tracking {
         about the anchor in the picture, jitter how much that changes from frame to frame. The bare libraries give \
         corners, from which the pose of the whole board is solved; gnomon's ways add to each other: corners fitted again, \
         the pose from all edge pixels, the last place looked at first, the filter. The line is the Pareto front.";
-    type Row = Row;
+    type Row = TrackingRow;
 
     fn inputs(&self, lab: &Lab<'_>) -> Result<Vec<PathBuf>> {
         lab.recording_inputs()
@@ -124,17 +124,17 @@ impl Chart for Tracking {
         lab.recording_names()
     }
 
-    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
+    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<TrackingRow>>> {
         let recording = lab.recording(unit)?;
         let scene = recording.load_scene()?;
         let truth = TruePoses::read(&recording.folder)?;
         let ways = ways();
-        let mut tallies: Vec<Tally> = ways
+        let mut tallies: Vec<WayTally> = ways
             .iter()
-            .map(|_| Tally::new(scene.anchors.len()))
+            .map(|_| WayTally::new(scene.anchors.len()))
             .collect();
         for round in 0..lab.rounds().min(3) {
-            let (mut source, intrinsics) = recording::open(&scene.camera)?;
+            let (mut source, intrinsics) = source::open(&scene.camera)?;
             let trackers = ways
                 .iter()
                 .map(|way| Tracker::new(&way.settings, &scene.anchors, intrinsics));
@@ -171,7 +171,7 @@ impl Chart for Tracking {
             let anchors = scene.anchors.iter().zip(&tally.errors).zip(&tally.markers);
             anchors.map(|((anchor, errors), &markers)| {
                 let frames = tally.least_ms.len();
-                Row {
+                TrackingRow {
                     recording: unit.to_owned(),
                     anchor: anchor.name.clone(),
                     library: way.library.to_owned(),
@@ -190,7 +190,7 @@ impl Chart for Tracking {
         Ok(Some(rows.collect()))
     }
 
-    fn figure(&self, rows: &[Row]) -> Figure {
+    fn figure(&self, rows: &[TrackingRow]) -> Figure {
         let mut places: Vec<(&str, &str)> = Vec::new();
         for row in rows {
             let place = (row.recording.as_str(), row.anchor.as_str());
@@ -198,7 +198,7 @@ impl Chart for Tracking {
                 places.push(place);
             }
         }
-        type Metric = (&'static str, fn(&Row) -> Option<f64>);
+        type Metric = (&'static str, fn(&TrackingRow) -> Option<f64>);
         let metrics: [Metric; 3] = [
             ("shift, median, px", |row| row.shift_median_px),
             ("shift, 95 % of frames, px", |row| row.shift_p95_px),
@@ -207,10 +207,10 @@ impl Chart for Tracking {
         let mut panels = Vec::new();
         for (label, value) in metrics {
             for &(recording, anchor) in &places {
-                let here = |row: &&Row| row.recording == recording && row.anchor == anchor;
-                let point = |row: &Row| Some([row.frame_median_ms, value(row)?]);
+                let here = |row: &&TrackingRow| row.recording == recording && row.anchor == anchor;
+                let point = |row: &TrackingRow| Some([row.frame_median_ms, value(row)?]);
                 let series = [APRILTAG, ARUCO, OURS].into_iter().enumerate();
-                panels.push(Panel {
+                panels.push(FigurePanel {
                     title: format!("{recording}: {anchor}"),
                     x: Axis::log("time per frame, ms"),
                     y: Axis::log(label),
@@ -231,7 +231,7 @@ impl Chart for Tracking {
                         })
                         .collect(),
                     front: pareto_front(rows.iter().filter(here).filter_map(point)),
-                    ..Panel::default()
+                    ..FigurePanel::default()
                 });
             }
         }
@@ -248,7 +248,7 @@ impl Chart for Tracking {
 }
 
 /// A setting, and how often it gives a pose where that is not always.
-fn label_of(row: &Row) -> String {
+fn label_of(row: &TrackingRow) -> String {
     if row.with_pose_pct == 100.0 {
         row.setting.clone()
     } else {
@@ -261,8 +261,8 @@ fn next_frame(lab: &Lab<'_>, source: &mut FrameSource) -> Result<Option<crate::c
     Ok(frame.filter(|frame| !lab.quick || frame.index < QUICK_FRAMES))
 }
 
-/// What is gathered of one way.
-struct Tally {
+/// All that is gathered of one way.
+struct WayTally {
     /// Of each frame the least of all rounds: nothing takes less than it needs.
     least_ms: Vec<f64>,
     /// By anchor.
@@ -271,7 +271,7 @@ struct Tally {
     markers: Vec<u32>,
 }
 
-impl Tally {
+impl WayTally {
     fn new(anchors: usize) -> Self {
         Self {
             least_ms: Vec::new(),

@@ -8,7 +8,7 @@ use glam::{DAffine3, DQuat, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::family::Chart;
-use super::figure::{Axis, Figure, Panel, Point, Series};
+use super::figure::{Axis, Figure, FigurePanel, Point, Series};
 use super::lab::Lab;
 use super::measured::rounded;
 use super::shots::{Shot, Shots, mean, mean_wrong_pct};
@@ -23,7 +23,7 @@ pub struct WrongPose;
 
 /// A pose error of one kind and size.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Row {
+pub struct WrongPoseRow {
     pose: String,
     shift_px: f64,
     wrong_shadow_pct: f64,
@@ -64,7 +64,7 @@ impl Chart for WrongPose {
     const SHOWS: &'static str = "What an error of the camera's pose does: the frames of *lamp* drawn at poses that are off \
         by so many pixels (the mean of four directions, or of both senses), against the path-traced truth. Residual is the \
         picture's error over that of the bare video, on real pixels, where 0 is what the camera would have taken.";
-    type Row = Row;
+    type Row = WrongPoseRow;
 
     fn inputs(&self, lab: &Lab<'_>) -> Result<Vec<PathBuf>> {
         let recording = lab.recording(RECORDING)?;
@@ -75,7 +75,7 @@ impl Chart for WrongPose {
         Ok(vec![MOVED.to_owned(), TURNED.to_owned()])
     }
 
-    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<Row>>> {
+    fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<WrongPoseRow>>> {
         let recording = lab.recording(RECORDING)?;
         let scene = recording.load_scene()?;
         let shots = Shots::of(lab, &recording, &scene)?;
@@ -112,7 +112,7 @@ impl Chart for WrongPose {
                     errors.push(compare(shot.frame.index, &shot.truth, &drawn)?);
                 }
             }
-            rows.push(Row {
+            rows.push(WrongPoseRow {
                 pose: unit.to_owned(),
                 shift_px: rounded(shift_px / errors.len().max(1) as f64),
                 wrong_shadow_pct: rounded(mean_wrong_pct(&errors).context("a lamp's shadow")?),
@@ -124,8 +124,8 @@ impl Chart for WrongPose {
         Ok(Some(rows))
     }
 
-    fn figure(&self, rows: &[Row]) -> Figure {
-        type Metric = (&'static str, fn(&Row) -> f64);
+    fn figure(&self, rows: &[WrongPoseRow]) -> Figure {
+        type Metric = (&'static str, fn(&WrongPoseRow) -> f64);
         let metrics: [Metric; 3] = [
             ("wrong shadow, % of pixels", |row| row.wrong_shadow_pct),
             ("error of the factor, rms", |row| row.factor_rms),
@@ -143,12 +143,12 @@ impl Chart for WrongPose {
                     .map(|row| Point::at(row.shift_px, value(row)))
                     .collect(),
             });
-            Panel {
+            FigurePanel {
                 title: name.to_owned(),
                 x: Axis::from_zero("pose off by, px"),
                 y: Axis::from_zero(name),
                 series: series.collect(),
-                ..Panel::default()
+                ..FigurePanel::default()
             }
         });
         Figure {

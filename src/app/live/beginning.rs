@@ -4,11 +4,11 @@ use std::path::Path;
 
 use anyhow::Result;
 
-use super::eye::Plan;
+use super::frame_tracker::TrackingPlan;
 use crate::app::authoring::SceneDocument;
-use crate::app::job_files::JobFiles;
-use crate::app::live_input::LiveInput;
-use crate::app::result_kind::ResultKind;
+use crate::app::files::job_files::JobFiles;
+use crate::app::files::result_kind::ResultKind;
+use crate::app::input::live_input::LiveInput;
 use crate::scene::CameraSettings;
 
 /// A scene or a camera that was read, before anything is opened.
@@ -70,10 +70,10 @@ impl Opening {
 }
 
 /// What is looked for in a scene's frames.
-pub(super) fn plan_of(document: Option<&SceneDocument>) -> Plan {
-    document.map_or(Plan::Look, |document| {
+pub(super) fn plan_of(document: Option<&SceneDocument>) -> TrackingPlan {
+    document.map_or(TrackingPlan::Look, |document| {
         let scene = document.scene();
-        Plan::Follow {
+        TrackingPlan::Follow {
             settings: scene.tracking.clone(),
             anchors: scene.anchors.clone().into(),
         }

@@ -7,34 +7,34 @@ use std::time::Duration;
 
 use glam::DAffine3;
 
-use super::eye::TrackedPicture;
 use super::false_colour;
-use super::pipeline::Wake;
-use super::views::View;
-use crate::app::mailbox::{Mailbox, Taken};
+use super::frame_tracker::TrackedPicture;
+use super::views::ViewMode;
+use crate::app::input::mailbox::{Mailbox, Taken};
+use crate::app::window::Wake;
 use crate::geometry::camera::Intrinsics;
 use crate::render::{Gpu, RenderError, Renderer, Shown};
 use crate::scene::{Scene, Shortcuts};
 
 /// A renderer that is wanted.
 #[derive(Clone)]
-struct Order {
+struct RendererOrder {
     scene: Arc<Scene>,
     intrinsics: Intrinsics,
 }
 
 struct Made {
-    order: Order,
+    order: RendererOrder,
     renderer: Result<Renderer, RenderError>,
 }
 
 /// The picture of a scene that changes, through a camera that may change.
-pub struct Canvas {
+pub struct SceneCanvas {
     gpu: Arc<Gpu>,
     scene: Arc<Scene>,
     /// `None` before the first picture.
-    current: Option<(Order, Renderer)>,
-    orders: Arc<Mailbox<Order>>,
+    current: Option<(RendererOrder, Renderer)>,
+    orders: Arc<Mailbox<RendererOrder>>,
     made: Arc<Mailbox<Made>>,
     /// Shortcuts that are switched off.
     without: Shortcuts,
@@ -43,10 +43,10 @@ pub struct Canvas {
     maker: Option<JoinHandle<()>>,
 }
 
-impl Canvas {
+impl SceneCanvas {
     /// A canvas for a scene; `wake` is called when a better renderer is ready.
     pub fn new(gpu: Arc<Gpu>, scene: Arc<Scene>, wake: Wake) -> Self {
-        let orders: Arc<Mailbox<Order>> = Arc::default();
+        let orders: Arc<Mailbox<RendererOrder>> = Arc::default();
         let made: Arc<Mailbox<Made>> = Arc::default();
         let maker = {
             let (gpu, orders, made) = (Arc::clone(&gpu), Arc::clone(&orders), Arc::clone(&made));
@@ -93,7 +93,7 @@ impl Canvas {
                 order.scene = Arc::clone(&scene);
             }
             if lasting || !follows {
-                self.orders.put(Order {
+                self.orders.put(RendererOrder {
                     scene: Arc::clone(&scene),
                     intrinsics: order.intrinsics,
                 });
@@ -142,12 +142,13 @@ impl Canvas {
         if !is_of_now && !renderer.follow(&self.scene) {
             return Ok(false);
         }
-        let fits = |(order, _): &(Order, Renderer)| order.intrinsics == made.order.intrinsics;
+        let fits =
+            |(order, _): &(RendererOrder, Renderer)| order.intrinsics == made.order.intrinsics;
         if !self.current.as_ref().is_some_and(fits) {
             return Ok(false);
         }
         self.awaits = !is_of_now;
-        let order = Order {
+        let order = RendererOrder {
             scene: Arc::clone(&self.scene),
             ..made.order
         };
@@ -159,8 +160,8 @@ impl Canvas {
     ///
     /// # Errors
     /// The device failed, or cannot hold a picture of that size.
-    pub fn draw(&mut self, picture: &TrackedPicture, view: View) -> Result<(), RenderError> {
-        let fits = |(order, _): &(Order, Renderer)| order.intrinsics == picture.intrinsics;
+    pub fn draw(&mut self, picture: &TrackedPicture, view: ViewMode) -> Result<(), RenderError> {
+        let fits = |(order, _): &(RendererOrder, Renderer)| order.intrinsics == picture.intrinsics;
         if !self.current.as_ref().is_some_and(fits) {
             self.begin(picture.intrinsics)?;
         }
@@ -180,20 +181,22 @@ impl Canvas {
                 false => (vec![None; anchors.len()], vec![0.0; anchors.len()]),
             };
         let shown = match view {
-            View::Bare => Shown::Bare,
+            ViewMode::Bare => Shown::Bare,
             _ => Shown::Composite,
         };
         renderer.draw_fading(&placed, &visibility, shown);
         let size_px = picture.intrinsics.size_px;
         let replaced = match view {
-            View::Composite | View::Bare | View::Silhouettes | View::Volumes => None,
-            View::StencilCount => {
+            ViewMode::Composite | ViewMode::Bare | ViewMode::Silhouettes | ViewMode::Volumes => {
+                None
+            }
+            ViewMode::StencilCount => {
                 let role = renderer.layers()?.role;
                 Some(false_colour::counts(&renderer.stencil_counts()?, &role))
             }
-            View::Depth => Some(false_colour::depth(&renderer.layers()?.depth_m)),
-            View::Gain => Some(false_colour::gain(&renderer.layers()?.gain)),
-            View::Phantoms => {
+            ViewMode::Depth => Some(false_colour::depth(&renderer.layers()?.depth_m)),
+            ViewMode::Gain => Some(false_colour::gain(&renderer.layers()?.gain)),
+            ViewMode::Phantoms => {
                 let focal_px = picture.intrinsics.focal_px.x as f32;
                 renderer.draw(&placed, Shown::Bare);
                 let (layers, video) = (renderer.layers()?, renderer.read_picture()?);
@@ -229,12 +232,12 @@ impl Canvas {
         });
         let renderer =
             crate::app::room_transport_cache::renderer(Arc::clone(&self.gpu), &empty, intrinsics)?;
-        let order = Order {
+        let order = RendererOrder {
             scene: empty,
             intrinsics,
         };
         self.current = Some((order, renderer));
-        self.orders.put(Order {
+        self.orders.put(RendererOrder {
             scene: Arc::clone(&self.scene),
             intrinsics,
         });
@@ -243,7 +246,7 @@ impl Canvas {
     }
 }
 
-impl Drop for Canvas {
+impl Drop for SceneCanvas {
     fn drop(&mut self) {
         self.orders.close();
         self.made.close();

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 
-use crate::app::output::OutputError;
-use crate::app::video_writer::{Codec, Naming, VideoWriter};
+use crate::app::files::output_error::OutputError;
+use crate::app::files::video_writer::{Codec, Naming, VideoWriter};
 
 /// Frames that may wait for the encoder; more are left out, and the one before is seen for longer.
 const QUEUE: usize = 16;
@@ -97,7 +97,7 @@ fn write(
     Ok(written)
 }
 
-/// When the video's frames are due.
+/// The times at which the video's frames are due.
 struct Pace {
     fps: f64,
     begin_secs: Option<f64>,

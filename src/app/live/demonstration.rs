@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-use crate::app::anchor_block;
-use crate::app::output::OutputError;
-use crate::app::picture_files::{write_first, write_text};
+use crate::app::files::anchor_block;
+use crate::app::files::output_error::OutputError;
+use crate::app::files::picture_files::{write_first, write_text};
 use crate::scene::{CameraSettings, Family, Marker};
 
 /// The thing that is put on the marker; it lies beside the scene's file.

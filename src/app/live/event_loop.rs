@@ -11,7 +11,7 @@ use winit::window::WindowId;
 
 use crate::capture::live::Now;
 
-/// When the last pass ended.
+/// The time when the last pass ended.
 #[derive(Debug, Clone, Default)]
 pub struct PassEnd(Arc<AtomicU64>);
 

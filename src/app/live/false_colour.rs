@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use crate::app::files::picture_files::srgb_level;
 use crate::render::Layers;
 
 /// Role of a phantom's surface in [`Layers::role`].
@@ -52,15 +53,7 @@ pub fn depth(depth_m: &[f32]) -> Vec<u8> {
 
 /// The factor on the video's light as it is: white where nothing is taken away.
 pub fn gain(gain: &[[f32; 3]]) -> Vec<u8> {
-    let encoded = |factor: f32| {
-        let factor = factor.clamp(0.0, 1.0);
-        let encoded = match factor <= 0.003_130_8 {
-            true => 12.92 * factor,
-            false => 1.055 * factor.powf(1.0 / 2.4) - 0.055,
-        };
-        (encoded * 255.0).round() as u8
-    };
-    opaque(gain.iter().map(|factors| factors.map(encoded)))
+    opaque(gain.iter().map(|factors| factors.map(srgb_level)))
 }
 
 /// Phantoms over the video, shaded by how they face the camera.

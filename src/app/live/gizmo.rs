@@ -16,7 +16,7 @@ pub const SPHERE_M: f64 = 0.3;
 /// Points of a ring.
 const RING: usize = 48;
 
-/// What can be dragged.
+/// A handle that can be dragged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Handle {
     /// Along x, y or z of the anchor.
@@ -31,9 +31,9 @@ pub enum Handle {
     Sphere,
 }
 
-/// What is selected, in the numbers of the scene.
+/// The selected thing or light, in the numbers of the scene.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Target {
+pub enum GizmoTarget {
     /// A phantom or a virtual thing.
     Thing {
         /// Its name.
@@ -52,7 +52,7 @@ pub enum Target {
 
 /// The handles of a target, as a camera sees them. The sight's world is the space of the target's anchor.
 pub struct Gizmo<'a> {
-    target: &'a Target,
+    target: &'a GizmoTarget,
     sight: &'a PosedCamera,
     origin_m: DVec3,
     origin_px: DVec2,
@@ -63,14 +63,14 @@ pub struct Gizmo<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drag {
     handle: Handle,
-    target: Target,
+    target: GizmoTarget,
     /// What the pointer's ray met first: a place in the anchor's space; for scale the distance in the picture, pixels.
     start: DVec3,
 }
 
 impl<'a> Gizmo<'a> {
     /// `None` where the target is behind the camera.
-    pub fn new(target: &'a Target, sight: &'a PosedCamera) -> Option<Self> {
+    pub fn new(target: &'a GizmoTarget, sight: &'a PosedCamera) -> Option<Self> {
         let origin_m = target.origin_m();
         let origin_px = sight.pixel(origin_m)?;
         let depth_m = sight.camera_from_world.transform_point3(origin_m).z;
@@ -91,7 +91,7 @@ impl<'a> Gizmo<'a> {
     /// The handles that there are, each as a line in the picture.
     pub fn handles(&self) -> Vec<(Handle, Vec<DVec2>)> {
         let all: &[Handle] = match self.target {
-            Target::Thing { .. } => &[
+            GizmoTarget::Thing { .. } => &[
                 Handle::Axis(0),
                 Handle::Axis(1),
                 Handle::Axis(2),
@@ -99,7 +99,7 @@ impl<'a> Gizmo<'a> {
                 Handle::Turn,
                 Handle::Scale,
             ],
-            Target::Light {
+            GizmoTarget::Light {
                 light: Light::Point { .. },
                 ..
             } => &[
@@ -109,7 +109,7 @@ impl<'a> Gizmo<'a> {
                 Handle::Plane,
                 Handle::Sphere,
             ],
-            Target::Light { .. } => &[Handle::Sphere],
+            GizmoTarget::Light { .. } => &[Handle::Sphere],
         };
         all.iter()
             .filter_map(|&handle| {
@@ -180,7 +180,7 @@ impl<'a> Gizmo<'a> {
     }
 }
 
-impl Target {
+impl GizmoTarget {
     fn origin_m(&self) -> DVec3 {
         match self {
             Self::Thing { placement, .. } => placement.position_m,
@@ -202,7 +202,7 @@ impl Drag {
     pub fn edit(&self, sight: &PosedCamera, pointer_px: DVec2) -> Option<Edit> {
         let here = place(self.handle, &self.target, sight, pointer_px)?;
         Some(match &self.target {
-            Target::Thing { name, placement } => {
+            GizmoTarget::Thing { name, placement } => {
                 let mut placement = *placement;
                 match self.handle {
                     Handle::Axis(_) | Handle::Plane => placement.position_m += here - self.start,
@@ -225,7 +225,7 @@ impl Drag {
                     placement,
                 }
             }
-            Target::Light { index, light } => {
+            GizmoTarget::Light { index, light } => {
                 let mut light = *light;
                 match (&mut light, self.handle) {
                     (Light::Point { position_m, .. }, Handle::Sphere) => *position_m = here,
@@ -242,7 +242,12 @@ impl Drag {
 }
 
 /// Where a pointer's ray meets what a handle moves along.
-fn place(handle: Handle, target: &Target, sight: &PosedCamera, pointer_px: DVec2) -> Option<DVec3> {
+fn place(
+    handle: Handle,
+    target: &GizmoTarget,
+    sight: &PosedCamera,
+    pointer_px: DVec2,
+) -> Option<DVec3> {
     let origin_m = target.origin_m();
     let (eye_m, direction) = sight.ray(pointer_px);
     match handle {
@@ -317,8 +322,8 @@ mod tests {
         }
     }
 
-    fn thing() -> Target {
-        Target::Thing {
+    fn thing() -> GizmoTarget {
+        GizmoTarget::Thing {
             name: "torus".to_owned(),
             placement: Placement {
                 position_m: DVec3::new(0.02, 0.03, 0.04),
@@ -328,7 +333,7 @@ mod tests {
         }
     }
 
-    fn dragged(target: &Target, handle: Handle, to_m: DVec3) -> Edit {
+    fn dragged(target: &GizmoTarget, handle: Handle, to_m: DVec3) -> Edit {
         let sight = sight();
         let gizmo = Gizmo::new(target, &sight).unwrap();
         let handles = gizmo.handles();
@@ -402,7 +407,7 @@ mod tests {
             position_m,
             intensity: DVec3::ONE,
         };
-        let target = Target::Light { index: 1, light };
+        let target = GizmoTarget::Light { index: 1, light };
         let sight = sight();
         let start = position_m;
         let drag = Drag {
@@ -429,7 +434,7 @@ mod tests {
             assert!((moved_m.length() - position_m.length()).abs() < 1e-9);
             assert!(moved_m.z >= 0.0);
         }
-        let target = Target::Light {
+        let target = GizmoTarget::Light {
             index: 0,
             light: Light::Directional {
                 direction: DVec3::NEG_Z,

@@ -2,8 +2,8 @@
 
 use eframe::egui::{Key, Modifiers};
 
-use super::views::View;
-use super::wish::{Overlay, Wish};
+use super::command::{LiveCommand, Overlay, RecordingCommand, SceneCommand, WindowCommand};
+use super::views::ViewMode;
 
 /// A key and what it is for.
 pub struct Binding {
@@ -15,75 +15,105 @@ pub struct Binding {
     pub name: &'static str,
     /// What it does.
     pub does: &'static str,
-    /// The same as a wish.
-    pub wish: Wish,
+    /// What it asks for.
+    pub command: LiveCommand,
 }
 
 /// All keys, in the order in which they are listed; those that need more held keys come before those that need fewer.
 pub fn bindings() -> Vec<Binding> {
-    let plain = |key, name, does, wish| Binding {
+    let plain = |key, name, does, command| Binding {
         modifiers: Modifiers::NONE,
         key,
         name,
         does,
-        wish,
+        command,
     };
-    let with = |modifiers, key, name, does, wish| Binding {
+    let with = |modifiers, key, name, does, command| Binding {
         modifiers,
-        ..plain(key, name, does, wish)
+        ..plain(key, name, does, command)
     };
-    let command = Modifiers::COMMAND;
+    let ctrl = Modifiers::COMMAND;
     let mut all = vec![
-        plain(Key::P, "P", "show or hide the panel", Wish::TogglePanel),
-        plain(Key::F11, "F11", "full screen", Wish::ToggleFullScreen),
-        plain(Key::F, "F", "full screen", Wish::ToggleFullScreen),
-        plain(Key::Questionmark, "?", "list the keys", Wish::ToggleKeys),
-        plain(Key::F1, "F1", "list the keys", Wish::ToggleKeys),
+        plain(
+            Key::P,
+            "P",
+            "show or hide the panel",
+            WindowCommand::TogglePanel.into(),
+        ),
+        plain(
+            Key::F11,
+            "F11",
+            "full screen",
+            WindowCommand::ToggleFullScreen.into(),
+        ),
+        plain(
+            Key::F,
+            "F",
+            "full screen",
+            WindowCommand::ToggleFullScreen.into(),
+        ),
+        plain(
+            Key::Questionmark,
+            "?",
+            "list the keys",
+            WindowCommand::ToggleKeys.into(),
+        ),
+        plain(
+            Key::F1,
+            "F1",
+            "list the keys",
+            WindowCommand::ToggleKeys.into(),
+        ),
         with(
-            command | Modifiers::SHIFT,
+            ctrl | Modifiers::SHIFT,
             Key::Z,
             "Ctrl+Shift+Z",
             "redo",
-            Wish::Redo,
+            SceneCommand::Redo.into(),
         ),
-        with(command, Key::Z, "Ctrl+Z", "undo", Wish::Undo),
-        with(command, Key::Q, "Ctrl+Q", "quit", Wish::Quit),
-        plain(Key::S, "S", "save the picture", Wish::Screenshot),
+        with(ctrl, Key::Z, "Ctrl+Z", "undo", SceneCommand::Undo.into()),
+        with(ctrl, Key::Q, "Ctrl+Q", "quit", LiveCommand::Quit),
+        plain(
+            Key::S,
+            "S",
+            "save the picture",
+            RecordingCommand::Screenshot.into(),
+        ),
         plain(
             Key::R,
             "R",
             "record the camera as a session, or end that",
-            Wish::ToggleSession,
+            RecordingCommand::ToggleSession.into(),
         ),
         plain(
             Key::V,
             "V",
             "record the composite as a video, or end that",
-            Wish::ToggleVideo,
+            RecordingCommand::ToggleVideo.into(),
         ),
         plain(
             Key::Space,
             "Space",
             "hold the picture, or let it go on",
-            Wish::ToggleHold,
+            WindowCommand::ToggleHold.into(),
         ),
         plain(
             Key::H,
             "H",
             "hide or show the selected thing",
-            Wish::ToggleSelected,
+            SceneCommand::ToggleSelected.into(),
         ),
         plain(
             Key::Delete,
             "Del",
             "take the selected thing or light out of the scene",
-            Wish::RemoveSelected,
+            SceneCommand::RemoveSelected.into(),
         ),
         plain(
             Key::Escape,
             "Esc",
             "select nothing; leave the full screen",
-            Wish::Escape,
+            WindowCommand::Escape.into(),
         ),
     ];
     let numbers = [
@@ -96,14 +126,15 @@ pub fn bindings() -> Vec<Binding> {
         (Key::Num7, "7"),
         (Key::Num8, "8"),
     ];
-    let views = numbers.into_iter().zip(View::BY_NAME);
-    all.extend(views.map(|((key, name), (does, view))| plain(key, name, does, Wish::Show(view))));
+    let views = numbers.into_iter().zip(ViewMode::BY_NAME);
+    all.extend(views.map(|((key, name), (does, view))| {
+        plain(key, name, does, WindowCommand::Show(view).into())
+    }));
     let letters = [(Key::M, "M"), (Key::A, "A"), (Key::J, "J"), (Key::L, "L")];
     let overlays = letters.into_iter().zip(Overlay::BY_NAME);
-    all.extend(
-        overlays
-            .map(|((key, name), (does, overlay))| plain(key, name, does, Wish::Toggle(overlay))),
-    );
+    all.extend(overlays.map(|((key, name), (does, overlay))| {
+        plain(key, name, does, WindowCommand::Toggle(overlay).into())
+    }));
     all
 }
 
@@ -123,12 +154,17 @@ mod tests {
                 );
             }
         }
-        for (name, view) in View::BY_NAME {
-            assert!(all.iter().any(|b| b.wish == Wish::Show(view)), "{name}");
+        for (name, view) in ViewMode::BY_NAME {
+            assert!(
+                all.iter()
+                    .any(|b| b.command == WindowCommand::Show(view).into()),
+                "{name}"
+            );
         }
         for (name, overlay) in Overlay::BY_NAME {
             assert!(
-                all.iter().any(|b| b.wish == Wish::Toggle(overlay)),
+                all.iter()
+                    .any(|b| b.command == WindowCommand::Toggle(overlay).into()),
                 "{name}"
             );
         }

@@ -1,38 +1,33 @@
 //! Live: the tabletop demo at the webcam. Capture → tracking → drawing and window, a thread each but the last, joined by
 //! mailboxes in which the newest frame alone lies.
 //!
-//! [`studio`] is all of it but the window, which knows nothing that a test could not do; `window` and what it shows are
+//! [`session`] is all of it but the window, which knows nothing that a test could not do; `window` and what it shows are
 //! the only home of egui.
 
 pub mod beginning;
-pub mod calibrating;
 mod canvas;
+pub mod command;
 mod composite_video;
 mod demonstration;
 mod event_loop;
-mod eye;
 mod false_colour;
-mod fit;
+mod frame_tracker;
 mod gizmo;
 mod keys;
-pub mod look;
 pub mod meters;
-pub mod notices;
-mod opening;
 mod overlays;
 pub mod panel;
 pub mod pipeline;
 mod recorders;
-mod screen;
 mod selection;
+pub mod session;
 mod shadow_clicks;
 mod shadow_lines;
-pub mod studio;
 pub mod views;
 mod window;
-pub mod wish;
+pub mod window_state;
 
-pub use eye::{Plan, TrackedPicture};
+pub use frame_tracker::{TrackedPicture, TrackingPlan};
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -41,29 +36,30 @@ use std::sync::{Arc, PoisonError};
 use anyhow::Result;
 
 use crate::app::stopwatch::Stopwatch;
+use crate::app::window::opening;
+use crate::app::window::screen::Screen;
 use crate::capture::live::Now;
 use crate::render::Gpu;
 use crate::scene::CameraSettings;
 use beginning::Opening;
 use event_loop::{PassEnd, Timed};
-use screen::Screen;
-use studio::Studio;
-use window::{Failure, Shared, Window};
+use session::LiveSession;
+use window::{Failure, LiveWindow, WindowShared};
 
-/// What the window opens on.
+/// The scene or camera that the window opens on.
 #[derive(Debug, Clone)]
-pub enum Input {
+pub enum LiveStart {
     /// A scene file.
     Scene(PathBuf),
     /// A camera or a recording that no scene describes: first use.
     Camera(CameraSettings),
 }
 
-/// What is asked for.
+/// A request to open the live window.
 #[derive(Debug, Clone)]
-pub struct Request {
+pub struct LiveRequest {
     /// What the window opens on.
-    pub input: Input,
+    pub input: LiveStart,
     /// The folder for what its keys record.
     pub out: PathBuf,
     /// Part of the wanted graphics adapter's name.
@@ -75,10 +71,10 @@ pub struct Request {
 /// # Errors
 /// A scene that cannot be read, no adapter, no display, a camera that cannot be opened, or a recording that could not be
 /// written; all recordings are whole then.
-pub fn live(request: &Request, stop: &Arc<AtomicBool>) -> Result<()> {
+pub fn live(request: &LiveRequest, stop: &Arc<AtomicBool>) -> Result<()> {
     let opening = match &request.input {
-        Input::Scene(path) => Opening::scene(path)?,
-        Input::Camera(camera) => Opening::camera(camera.clone())?,
+        LiveStart::Scene(path) => Opening::scene(path)?,
+        LiveStart::Camera(camera) => Opening::camera(camera.clone())?,
     };
     opening.files(&request.out).check()?;
     let gpu = Arc::new(Gpu::open(request.adapter.as_deref())?);
@@ -89,7 +85,7 @@ pub fn live(request: &Request, stop: &Arc<AtomicBool>) -> Result<()> {
     let pass_end = PassEnd::default();
     let title = format!("{} – gnomon", opening.title());
     let event_loop = opening::event_loop()?;
-    let shared = Shared {
+    let shared = WindowShared {
         stop: Arc::clone(stop),
         failure: Arc::clone(&failure),
         pass_end: pass_end.clone(),
@@ -104,9 +100,9 @@ pub fn live(request: &Request, stop: &Arc<AtomicBool>) -> Result<()> {
             let state = creation.wgpu_render_state.as_ref();
             let screen = Screen::new(state.ok_or("the window does not draw with wgpu")?);
             let adapter = gpu.description().to_owned();
-            let studio = Studio::open(opening, gpu, &out, true, (clock, wake));
+            let session = LiveSession::open(opening, gpu, &out, true, (clock, wake));
             opened.store(true, Ordering::Relaxed);
-            Ok(Box::new(Window::new(studio, screen, adapter, shared)))
+            Ok(Box::new(LiveWindow::new(session, screen, adapter, shared)))
         }),
         &event_loop,
     );

@@ -3,14 +3,14 @@
 use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Shape, Stroke, Vec2};
 use glam::{DAffine3, DVec2, DVec3};
 
-use super::eye::TrackedPicture;
-use super::fit::Fit;
-use super::gizmo::{Gizmo, Handle, Target, light_place_m};
-use super::look::Look;
+use super::command::Overlay;
+use super::frame_tracker::TrackedPicture;
+use super::gizmo::{Gizmo, GizmoTarget, Handle, light_place_m};
 use super::shadow_clicks::ShadowClicks;
 use super::shadow_lines::ShadowLines;
-use super::views::View;
-use super::wish::Overlay;
+use super::views::ViewMode;
+use super::window_state::WindowState;
+use crate::app::window::fit::PictureFit;
 use crate::geometry::light_placing::PosedCamera;
 use crate::scene::Scene;
 use crate::tracking::{Quad, Status};
@@ -27,36 +27,36 @@ const REAL_EDGE: Color32 = Color32::from_rgb(90, 200, 255);
 const VIRTUAL_EDGE: Color32 = Color32::from_rgb(255, 120, 200);
 const GRIP: Color32 = Color32::from_rgb(255, 255, 255);
 
-/// Draws over a picture.
+/// Marks drawn over a picture.
 pub struct Overlays<'a> {
     /// Into the picture's place.
     pub painter: &'a Painter,
     /// Where that is.
-    pub fit: Fit,
+    pub fit: PictureFit,
     /// What is seen there.
     pub picture: &'a TrackedPicture,
 }
 
 impl Overlays<'_> {
-    /// Everything that `look` wants, without handles.
-    pub fn draw(&self, look: &Look, scene: Option<&Scene>, shadow_lines: &mut ShadowLines) {
-        if look.shows(Overlay::Rejected) {
+    /// Everything that `state` wants, without handles.
+    pub fn draw(&self, state: &WindowState, scene: Option<&Scene>, shadow_lines: &mut ShadowLines) {
+        if state.shows(Overlay::Rejected) {
             for quad in &self.picture.rejected {
                 self.outline(quad, Stroke::new(1.0, REJECTED));
             }
         }
-        if look.shows(Overlay::Outlines) {
+        if state.shows(Overlay::Outlines) {
             self.markers();
         }
         if let Some(scene) = scene {
-            if matches!(look.view, View::Silhouettes | View::Volumes) {
-                self.shadow_lines(scene, shadow_lines, look.view == View::Volumes);
+            if matches!(state.view, ViewMode::Silhouettes | ViewMode::Volumes) {
+                self.shadow_lines(scene, shadow_lines, state.view == ViewMode::Volumes);
             }
-            if look.shows(Overlay::Lights) {
+            if state.shows(Overlay::Lights) {
                 self.lights(scene);
             }
         }
-        if look.shows(Overlay::Axes) {
+        if state.shows(Overlay::Axes) {
             self.axes();
         }
     }
@@ -74,7 +74,7 @@ impl Overlays<'_> {
     }
 
     /// The handles of what is selected.
-    pub fn handles(&self, target: &Target, sight: &PosedCamera) {
+    pub fn handles(&self, target: &GizmoTarget, sight: &PosedCamera) {
         let Some(gizmo) = Gizmo::new(target, sight) else {
             return;
         };

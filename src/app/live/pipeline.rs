@@ -6,17 +6,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 
-use super::eye::{Eye, Plan, TrackedPicture};
-use crate::app::live_capture::{Arrived, CaptureEvent, LiveCapture, Tap};
-use crate::app::mailbox::Mailbox;
+use super::frame_tracker::{FrameTracker, TrackedPicture, TrackingPlan};
+use crate::app::input::live_capture::{Arrived, CaptureEvent, LiveCapture, Tap};
+use crate::app::input::mailbox::Mailbox;
+use crate::app::window::Wake;
 use crate::capture::live::{LiveOptions, Now};
 use crate::geometry::camera::Intrinsics;
 
-/// Called, on the tracking thread, whenever there is something new to show.
-pub type Wake = Arc<dyn Fn() + Send + Sync>;
-
-/// Where frames come from.
-pub struct Input {
+/// The source of the frames, and how it is opened.
+pub struct PipelineInput {
     /// As `capture::live` takes it.
     pub source: String,
     /// How it is opened.
@@ -31,14 +29,14 @@ pub struct Pipeline {
     capture: Option<LiveCapture>,
     captured: Arc<Mailbox<Arrived>>,
     tracked: Arc<Mailbox<TrackedPicture>>,
-    plans: Sender<Plan>,
+    plans: Sender<TrackingPlan>,
     wants_rejected: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Pipeline {
     /// Begins to read and to track.
-    pub fn start(input: &Input, plan: Plan, now: &Now, wake: Wake) -> Self {
+    pub fn start(input: &PipelineInput, plan: TrackingPlan, now: &Now, wake: Wake) -> Self {
         let capture = LiveCapture::start(&input.source, &input.options, Arc::clone(now), None);
         let captured = capture.frames();
         let tracked = Arc::new(Mailbox::new());
@@ -47,7 +45,7 @@ impl Pipeline {
         let thread = {
             let (captured, tracked) = (Arc::clone(&captured), Arc::clone(&tracked));
             let stage = TrackingStage {
-                eye: Eye::new(input.calibration, plan),
+                tracker: FrameTracker::new(input.calibration, plan),
                 new_plans,
                 wants_rejected: Arc::clone(&wants_rejected),
                 now: Arc::clone(now),
@@ -76,7 +74,7 @@ impl Pipeline {
     }
 
     /// From now on, at the next frame, something else is looked for.
-    pub fn set_plan(&self, plan: Plan) {
+    pub fn set_plan(&self, plan: TrackingPlan) {
         // A thread that has ended tracks nothing any more.
         _ = self.plans.send(plan);
     }
@@ -122,8 +120,8 @@ impl Drop for Pipeline {
 }
 
 struct TrackingStage {
-    eye: Eye,
-    new_plans: Receiver<Plan>,
+    tracker: FrameTracker,
+    new_plans: Receiver<TrackingPlan>,
     wants_rejected: Arc<AtomicBool>,
     now: Now,
     wake: Wake,
@@ -133,10 +131,10 @@ impl TrackingStage {
     fn run(mut self, captured: &Mailbox<Arrived>, tracked: &Mailbox<TrackedPicture>) {
         while let Some(arrived) = captured.take() {
             if let Some(plan) = self.new_plans.try_iter().last() {
-                self.eye.set_plan(plan);
+                self.tracker.set_plan(plan);
             }
             let wants_rejected = self.wants_rejected.load(Ordering::Relaxed);
-            let picture = self.eye.look(arrived, (self.now)(), wants_rejected);
+            let picture = self.tracker.look(arrived, (self.now)(), wants_rejected);
             if !tracked.put(picture) {
                 return;
             }

@@ -4,14 +4,14 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::composite_video::CompositeVideo;
-use super::eye::TrackedPicture;
+use super::frame_tracker::TrackedPicture;
 use super::pipeline::Pipeline;
-use crate::app::output::OutputError;
-use crate::app::picture_files::{rgb_png, write_first};
-use crate::app::session_recorder::SessionRecorder;
-use crate::app::session_writer::SessionHead;
+use crate::app::files::output_error::OutputError;
+use crate::app::files::picture_files::{rgb_png, write_first};
+use crate::app::recording::session_recorder::SessionRecorder;
+use crate::app::recording::session_writer::SessionHead;
 
-/// What is being recorded, and where to.
+/// The recordings that are under way, and where to.
 pub struct Recorders {
     folder: PathBuf,
     session: Option<(PathBuf, SessionRecorder)>,

@@ -2,9 +2,9 @@
 
 use glam::{DVec2, Vec3};
 
-use super::eye::TrackedPicture;
+use super::command::Selected;
+use super::frame_tracker::TrackedPicture;
 use super::gizmo::light_place_m;
-use super::wish::Selected;
 use crate::geometry::light_placing::PosedCamera;
 use crate::geometry::ray_caster::RayCaster;
 use crate::scene::Scene;

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::eye::TrackedPicture;
+use super::frame_tracker::TrackedPicture;
 use crate::app::authoring::{Edit, FoundLight, PickedVertex, PicturedThings, ShadowClick};
 use crate::geometry::light_placing::LightFreedom;
 use crate::light::Light;

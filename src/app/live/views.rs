@@ -1,8 +1,8 @@
 //! What the window can show in place of the picture.
 
-/// What is shown.
+/// A way to look at the scene, in place of the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum View {
+pub enum ViewMode {
     /// The video with the virtual things.
     #[default]
     Composite,
@@ -22,7 +22,7 @@ pub enum View {
     Gain,
 }
 
-impl View {
+impl ViewMode {
     /// All of them, by their names.
     pub const BY_NAME: [(&str, Self); 8] = [
         ("composite", Self::Composite),

@@ -1,4 +1,4 @@
-//! The window: picture, panel, keys, notices. It shows what the studio has and takes wishes to it.
+//! The window: picture, panel, keys, notices. It shows what the live session has and takes commands to it.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -9,19 +9,21 @@ use eframe::egui::{
     Rect, Response, RichText, Sense, Ui, Vec2, ViewportCommand,
 };
 
+use super::command::{
+    Clicks, Commands, LiveCommand, Overlay, SceneCommand, Selected, WindowCommand,
+};
 use super::event_loop::PassEnd;
-use super::fit::Fit;
-use super::gizmo::{Drag, Gizmo, Target};
+use super::gizmo::{Drag, Gizmo, GizmoTarget};
 use super::keys::bindings;
-use super::look::Look;
-use super::notices::{CameraState, Weight};
 use super::overlays::Overlays;
 use super::panel::{Facts, Panel};
-use super::screen::Screen;
 use super::selection::selected_at;
+use super::session::LiveSession;
 use super::shadow_lines::ShadowLines;
-use super::studio::Studio;
-use super::wish::{Clicks, Overlay, Selected, Wish};
+use super::window_state::WindowState;
+use crate::app::window::fit::PictureFit;
+use crate::app::window::notices::{CameraState, Weight};
+use crate::app::window::screen::Screen;
 use crate::geometry::light_placing::PosedCamera;
 
 /// The window looks at the world at least this often, even when no frame comes.
@@ -30,11 +32,11 @@ const PANEL_WIDTH: f32 = 330.0;
 const TROUBLE: Color32 = Color32::from_rgb(255, 190, 90);
 const RECORDING: Color32 = Color32::from_rgb(235, 60, 50);
 
-/// What ended the window before a person did.
+/// The error that ended the window before a person did.
 pub type Failure = Arc<Mutex<Option<anyhow::Error>>>;
 
-/// What the window and whoever opened it share.
-pub struct Shared {
+/// All that the window and whoever opened it share.
+pub struct WindowShared {
     /// Closes the window.
     pub stop: Arc<AtomicBool>,
     /// What goes wrong.
@@ -43,28 +45,33 @@ pub struct Shared {
     pub pass_end: PassEnd,
 }
 
-/// The window's state.
-pub struct Window {
-    studio: Studio,
+/// The state of the live window.
+pub struct LiveWindow {
+    session: LiveSession,
     screen: Screen,
-    look: Look,
+    state: WindowState,
     panel: Panel,
     shadow_lines: ShadowLines,
     drag: Option<Drag>,
     adapter: String,
-    shared: Shared,
+    shared: WindowShared,
     full_screen: bool,
 }
 
-impl Window {
-    /// A window on a studio.
-    pub fn new(studio: Studio, screen: Screen, adapter: String, shared: Shared) -> Self {
+impl LiveWindow {
+    /// A window on a live session.
+    pub fn new(
+        session: LiveSession,
+        screen: Screen,
+        adapter: String,
+        shared: WindowShared,
+    ) -> Self {
         Self {
-            studio,
+            session,
             screen,
             adapter,
             shared,
-            look: Look::new(),
+            state: WindowState::new(),
             panel: Panel::default(),
             shadow_lines: ShadowLines::default(),
             drag: None,
@@ -72,77 +79,80 @@ impl Window {
         }
     }
 
-    fn fulfil(&mut self, ctx: &Context, wishes: Vec<Wish>) {
-        for wish in wishes {
-            if wish == Wish::Quit {
-                ctx.send_viewport_cmd(ViewportCommand::Close);
-            } else if !self.look.take(&wish) {
-                let removes = wish == Wish::RemoveSelected;
-                self.studio.fulfil(wish, &self.look);
-                if removes {
-                    self.look.selected = None;
+    fn run(&mut self, ctx: &Context, commands: Commands) {
+        for command in commands {
+            match command {
+                LiveCommand::Scene(command) => {
+                    let removes = command == SceneCommand::RemoveSelected;
+                    self.session.edit_scene(command, &self.state);
+                    if removes {
+                        self.state.selected = None;
+                    }
                 }
+                LiveCommand::Recording(command) => self.session.record(command),
+                LiveCommand::Window(command) => self.state.apply(&command),
+                LiveCommand::Quit => ctx.send_viewport_cmd(ViewportCommand::Close),
             }
         }
-        if self.look.full_screen != self.full_screen {
-            self.full_screen = self.look.full_screen;
+        if self.state.full_screen != self.full_screen {
+            self.full_screen = self.state.full_screen;
             ctx.send_viewport_cmd(ViewportCommand::Fullscreen(self.full_screen));
         }
     }
 
-    fn side_panel(&mut self, ui: &mut Ui) -> Vec<Wish> {
-        let (studio, look, adapter) = (&self.studio, &self.look, &self.adapter);
-        let document = studio.document();
-        let camera = match &studio.notices.camera {
+    fn side_panel(&mut self, ui: &mut Ui) -> Commands {
+        let (session, state, adapter) = (&self.session, &self.state, &self.adapter);
+        let document = session.document();
+        let camera = match &session.notices.camera {
             CameraState::Opening => "The camera is being opened …".to_owned(),
             CameraState::Open(what) => what.clone(),
             CameraState::Failed(_) => "No camera".to_owned(),
             CameraState::Lost(_) => "The camera is gone".to_owned(),
             CameraState::Ended => "The recording has ended".to_owned(),
         };
-        let placement = |thing: &str| studio.placement(thing);
+        let placement = |thing: &str| session.placement(thing);
         let facts = Facts {
-            scene: studio.scene(),
+            scene: session.scene(),
             path: document.map(|document| document.path()),
-            unsaved: studio.is_unsaved(),
+            unsaved: session.is_unsaved(),
             placement: &placement,
             history: [
                 document.and_then(|document| document.next_undo()),
                 document.and_then(|document| document.next_redo()),
             ],
-            picture: studio.picture(),
-            meters: &studio.meters,
-            now_secs: studio.now_secs(),
-            frames: studio.frames(),
+            picture: session.picture(),
+            meters: &session.meters,
+            now_secs: session.now_secs(),
+            frames: session.frames(),
             camera: &camera,
             adapter,
-            records: studio.records(),
-            clicks: studio
+            records: session.records(),
+            clicks: session
                 .clicks()
                 .map(|clicks| (clicks.pairs_px().len(), clicks.vertex().is_some())),
         };
         let panel = &mut self.panel;
         eframe::egui::Panel::right("panel")
             .default_size(PANEL_WIDTH)
-            .show(ui, |ui| panel.show(ui, &facts, look))
+            .show(ui, |ui| panel.show(ui, &facts, state))
             .inner
     }
 
     /// The picture in its place, with what lies over it.
-    fn picture(&mut self, ui: &mut Ui) -> Vec<Wish> {
+    fn picture(&mut self, ui: &mut Ui) -> Option<LiveCommand> {
         let area = ui.max_rect();
-        let Some((renderer, size_px, number)) = self.studio.renderer() else {
+        let Some((renderer, size_px, number)) = self.session.renderer() else {
             self.say_in_the_middle(ui, area);
-            return Vec::new();
+            return None;
         };
         let texture = self.screen.texture(renderer, number);
-        let fit = Fit::within(area, size_px);
+        let fit = PictureFit::within(area, size_px);
         let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
         ui.painter().image(texture, fit.rect, whole, Color32::WHITE);
         let response = ui.interact(area, Id::unique("picture"), Sense::click_and_drag());
-        let wishes = self.point(&response, &fit);
-        let Some(picture) = self.studio.picture() else {
-            return wishes;
+        let command = self.point(&response, &fit);
+        let Some(picture) = self.session.picture() else {
+            return command;
         };
         let painter = ui.painter_at(fit.rect);
         let overlays = Overlays {
@@ -150,29 +160,26 @@ impl Window {
             fit,
             picture,
         };
-        let scene = self.studio.scene();
-        overlays.draw(&self.look, scene, &mut self.shadow_lines);
+        let scene = self.session.scene();
+        overlays.draw(&self.state, scene, &mut self.shadow_lines);
         if scene.is_none() {
             overlays.markers();
         }
-        if let Some(clicks) = self.studio.clicks() {
+        if let Some(clicks) = self.session.clicks() {
             overlays.clicks(clicks);
         } else if let Some((target, sight)) = self.target() {
             overlays.handles(&target, &sight);
         }
-        wishes
+        command
     }
 
     /// What the pointer does in the picture: it drags a handle, or selects.
-    fn point(&mut self, response: &Response, fit: &Fit) -> Vec<Wish> {
-        let Some(pointer) = response.interact_pointer_pos() else {
-            return Vec::new();
-        };
+    fn point(&mut self, response: &Response, fit: &PictureFit) -> Option<LiveCommand> {
+        let pointer = response.interact_pointer_pos()?;
         let pixel = fit.pixel(pointer);
-        if self.studio.clicks().is_some() {
+        if self.session.clicks().is_some() {
             let clicked = response.clicked();
-            let wish = clicked.then_some(Wish::Clicks(Clicks::At(pixel)));
-            return wish.into_iter().collect();
+            return clicked.then(|| SceneCommand::Clicks(Clicks::At(pixel)).into());
         }
         let left = PointerButton::Primary;
         if response.drag_started_by(left) {
@@ -188,40 +195,40 @@ impl Window {
         });
         if response.drag_stopped_by(left) {
             return match (self.drag.take(), edit) {
-                (Some(_), Some(edit)) => vec![Wish::Commit(edit)],
-                (Some(_), None) => vec![Wish::EndPreview],
-                (None, _) => Vec::new(),
+                (Some(_), Some(edit)) => Some(SceneCommand::Commit(edit).into()),
+                (Some(_), None) => Some(SceneCommand::EndPreview.into()),
+                (None, _) => None,
             };
         }
         if let (true, Some(edit)) = (response.dragged_by(left), edit) {
-            return vec![Wish::Preview(edit)];
+            return Some(SceneCommand::Preview(edit).into());
         }
         if response.clicked_by(left)
-            && let (Some(scene), Some(picture)) = (self.studio.scene(), self.studio.picture())
+            && let (Some(scene), Some(picture)) = (self.session.scene(), self.session.picture())
         {
-            let can_move = |thing: &str| self.studio.placement(thing).is_some();
-            let with_lights = self.look.shows(Overlay::Lights);
+            let can_move = |thing: &str| self.session.placement(thing).is_some();
+            let with_lights = self.state.shows(Overlay::Lights);
             let selected = selected_at(scene, picture, pixel, with_lights, can_move);
-            return vec![Wish::Select(selected)];
+            return Some(WindowCommand::Select(selected).into());
         }
-        Vec::new()
+        None
     }
 
     /// What is selected, with the camera as its anchor sees it.
-    fn target(&self) -> Option<(Target, PosedCamera)> {
-        let (scene, picture) = (self.studio.scene()?, self.studio.picture()?);
-        let (target, anchor) = match self.look.selected.as_ref()? {
+    fn target(&self) -> Option<(GizmoTarget, PosedCamera)> {
+        let (scene, picture) = (self.session.scene()?, self.session.picture()?);
+        let (target, anchor) = match self.state.selected.as_ref()? {
             Selected::Thing(name) => {
                 let mut things = scene.phantoms.iter().chain(&scene.virtuals);
                 let anchor = things.find(|thing| thing.name == *name)?.anchor;
-                let placement = self.studio.placement(name)?;
+                let placement = self.session.placement(name)?;
                 let name = name.clone();
-                (Target::Thing { name, placement }, anchor)
+                (GizmoTarget::Thing { name, placement }, anchor)
             }
             Selected::Light(index) => {
                 let light = *scene.lights.get(*index)?;
                 let index = *index;
-                (Target::Light { index, light }, 0)
+                (GizmoTarget::Light { index, light }, 0)
             }
         };
         let sight = PosedCamera {
@@ -232,8 +239,8 @@ impl Window {
     }
 
     fn say_in_the_middle(&self, ui: &Ui, area: Rect) {
-        let text = match &self.studio.notices.camera {
-            CameraState::Failed(why) => why.clone(),
+        let text = match &self.session.notices.camera {
+            CameraState::Failed(reason) => reason.clone(),
             CameraState::Ended => "The recording has no pictures.".to_owned(),
             _ => "Waiting for the first picture …".to_owned(),
         };
@@ -245,8 +252,8 @@ impl Window {
     }
 
     fn notices(&self, ctx: &Context, area: Rect) {
-        let shown = self.studio.notices.shown(self.studio.now_secs());
-        let [session, video] = self.studio.records();
+        let shown = self.session.notices.shown(self.session.now_secs());
+        let [session, video] = self.session.records();
         if shown.is_empty() && !session && !video {
             return;
         }
@@ -278,7 +285,7 @@ impl Window {
     }
 
     fn list_of_keys(&mut self, ctx: &Context) {
-        let mut open = self.look.keys;
+        let mut open = self.state.keys;
         eframe::egui::Window::new("Keys")
             .open(&mut open)
             .collapsible(false)
@@ -297,7 +304,7 @@ impl Window {
                     });
                 ui.weak("Click a thing in the picture to select it, drag its handles to move it.");
             });
-        self.look.keys = open;
+        self.state.keys = open;
     }
 }
 
@@ -309,26 +316,28 @@ fn boxed(ui: &mut Ui, text: RichText) {
         .show(ui, |ui| ui.label(text));
 }
 
-/// The wishes of the keys that were pressed.
-fn pressed(ctx: &Context) -> Vec<Wish> {
+/// What the keys that were pressed ask for.
+fn pressed(ctx: &Context) -> Commands {
+    let mut commands = Commands::default();
     if ctx.egui_wants_keyboard_input() {
-        return Vec::new();
+        return commands;
     }
-    let wish = |binding: super::keys::Binding| {
-        let pressed = ctx.input_mut(|input| input.consume_key(binding.modifiers, binding.key));
-        pressed.then_some(binding.wish)
-    };
-    bindings().into_iter().filter_map(wish).collect()
+    for binding in bindings() {
+        if ctx.input_mut(|input| input.consume_key(binding.modifiers, binding.key)) {
+            commands.push(binding.command);
+        }
+    }
+    commands
 }
 
-impl eframe::App for Window {
+impl eframe::App for LiveWindow {
     fn logic(&mut self, ctx: &Context, _: &mut eframe::Frame) {
         ctx.request_repaint_after(PULSE);
         if self.shared.stop.load(Ordering::Relaxed) {
             ctx.send_viewport_cmd(ViewportCommand::Close);
         }
-        let shown = self.studio.was_shown(self.shared.pass_end.secs());
-        if let Err(error) = shown.and_then(|()| self.studio.step(&self.look)) {
+        let shown = self.session.was_shown(self.shared.pass_end.secs());
+        if let Err(error) = shown.and_then(|()| self.session.step(&self.state)) {
             self.shared.fail(error);
             ctx.send_viewport_cmd(ViewportCommand::Close);
         }
@@ -336,22 +345,24 @@ impl eframe::App for Window {
 
     fn ui(&mut self, ui: &mut Ui, _: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
-        let mut wishes = pressed(&ctx);
-        if self.look.panel {
-            wishes.extend(self.side_panel(ui));
+        let mut commands = pressed(&ctx);
+        if self.state.panel {
+            commands.append(self.side_panel(ui));
         }
         let area = CentralPanel::default()
             .frame(Frame::NONE)
             .show(ui, |ui| {
-                wishes.extend(self.picture(ui));
+                if let Some(command) = self.picture(ui) {
+                    commands.push(command);
+                }
                 ui.max_rect()
             })
             .inner;
         self.notices(&ctx, area);
-        if self.look.keys {
+        if self.state.keys {
             self.list_of_keys(&ctx);
         }
-        self.fulfil(&ctx, wishes);
+        self.run(&ctx, commands);
     }
 
     fn clear_color(&self, _: &eframe::egui::Visuals) -> [f32; 4] {
@@ -359,19 +370,19 @@ impl eframe::App for Window {
     }
 
     fn on_exit(&mut self) {
-        for said in self.studio.finish() {
+        for said in self.session.finish() {
             match said {
                 Ok(text) => eprintln!("{text}"),
                 Err(error) => self.shared.fail(error.into()),
             }
         }
-        if let CameraState::Failed(why) = &self.studio.notices.camera {
-            self.shared.fail(anyhow::anyhow!("{why}"));
+        if let CameraState::Failed(reason) = &self.session.notices.camera {
+            self.shared.fail(anyhow::anyhow!("{reason}"));
         }
     }
 }
 
-impl Shared {
+impl WindowShared {
     /// The first thing that goes wrong is the one that is told.
     fn fail(&self, error: anyhow::Error) {
         let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);

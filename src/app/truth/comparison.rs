@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context as _, Result};
 use glam::DAffine3;
 
-use super::picture::Picture;
+use super::picture::LinearPicture;
 use super::poses::TruePoses;
 use crate::capture::{Frame, FrameSource};
 use crate::render::{Layers, REAL, Renderer, Shown, VIRTUAL, VIRTUAL_HIDES};
@@ -60,14 +60,14 @@ pub struct ShadowErrors {
     pub iou: f64,
 }
 
-/// What the truth says of one frame.
+/// The true pictures of one frame.
 pub struct Truth {
     /// What the camera would have seen with the virtual things.
-    pub with: Picture,
+    pub with: LinearPicture,
     /// And without.
-    pub without: Picture,
+    pub without: LinearPicture,
     /// With over without in linear light, box-filtered.
-    pub factor: Picture,
+    pub factor: LinearPicture,
     /// Roles.
     pub ids: Vec<u8>,
     /// Bits of the first light's shadow, and [`FACES_AWAY`]; `None` where it is no light of a scene file.
@@ -87,9 +87,9 @@ impl Truth {
             Ok(read.to_luma8().into_raw())
         };
         Ok(Self {
-            with: Picture::open(&file("with"))?,
-            without: Picture::open(&file("without"))?,
-            factor: Picture::open(&file("factor"))?,
+            with: LinearPicture::open(&file("with"))?,
+            without: LinearPicture::open(&file("without"))?,
+            factor: LinearPicture::open(&file("factor"))?,
             ids: grey("ids")?,
             mask: match file("mask_0").is_file() {
                 true => Some(grey("mask_0")?),
@@ -99,7 +99,7 @@ impl Truth {
     }
 }
 
-/// What gnomon makes of one frame.
+/// Gnomon's picture of one frame, with its layers.
 #[derive(Clone)]
 pub struct Drawn {
     /// The composite, RGBA.
@@ -181,8 +181,8 @@ pub fn compare(frame: u32, truth: &Truth, drawn: &Drawn) -> Result<Errors> {
     let role_wrong = (0..count).filter(|&i| seeming[i] != (role[i] == VIRTUAL));
     let role_wrong = role_wrong.count();
 
-    let out = Picture::from_rgba(width, &drawn.out);
-    let bare = Picture::from_rgba(width, &drawn.bare);
+    let out = LinearPicture::from_rgba(width, &drawn.out);
+    let bare = LinearPicture::from_rgba(width, &drawn.bare);
     let change = truth.with.minus(&truth.without);
     let largest = |pixel: &[f64; 3]| {
         pixel
@@ -195,7 +195,7 @@ pub fn compare(frame: u32, truth: &Truth, drawn: &Drawn) -> Result<Errors> {
     let on_real = both(&inner_real, &changed);
     let on_virtual = both(&inner(&seeming, width), &changed);
     let smooth_change = change.blurred();
-    let ratio = |error: &Picture, mask: &[bool]| {
+    let ratio = |error: &LinearPicture, mask: &[bool]| {
         let parts = error.rms(mask).zip(smooth_change.rms(mask));
         let (error, change) =
             parts.with_context(|| format!("frame {frame}: the truth changes nothing"))?;
@@ -207,7 +207,7 @@ pub fn compare(frame: u32, truth: &Truth, drawn: &Drawn) -> Result<Errors> {
     let outline_levels = change_error.rms(&outlines);
     let change_error = change_error.blurred();
 
-    let gain_picture = Picture {
+    let gain_picture = LinearPicture {
         width,
         pixels: gain.iter().map(|gain| gain.map(f64::from)).collect(),
     };

@@ -12,6 +12,6 @@ pub use comparison::{
     Drawn, Errors, FACES_AWAY, ShadowErrors, Truth, around, changed_by, compare, draw, edges,
     key_frames,
 };
-pub use picture::Picture;
+pub use picture::LinearPicture;
 pub use pose_error::{PoseErrors, shifts_px};
 pub use poses::{TruePoses, affine};

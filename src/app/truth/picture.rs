@@ -6,14 +6,14 @@ use anyhow::{Context as _, Result};
 
 /// RGB in levels of 255, rows from the top.
 #[derive(Debug, Clone)]
-pub struct Picture {
+pub struct LinearPicture {
     /// Pixels in a row.
     pub width: usize,
     /// All of them.
     pub pixels: Vec<[f64; 3]>,
 }
 
-impl Picture {
+impl LinearPicture {
     /// Reads a picture: 8 bits in levels, 16 bits as factors, of which 32768 is 1.
     ///
     /// # Errors

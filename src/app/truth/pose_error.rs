@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec2, DVec3};
 
-use crate::app::stats::quantile;
+use crate::app::stages::stats::quantile;
 use crate::geometry::camera::Intrinsics;
 
 /// Places about an anchor where virtual things stand, metres in its frame.

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::scene::Anchor;
 
-/// Where camera and markers were in each frame.
+/// The places of camera and markers in each frame.
 pub struct TruePoses {
     path: String,
     frames: Vec<Value>,
@@ -32,11 +32,6 @@ impl TruePoses {
             path: path.display().to_string(),
             frames,
         })
-    }
-
-    /// How many frames it knows.
-    pub fn frame_count(&self) -> usize {
-        self.frames.len()
     }
 
     /// `camera_from_anchor` of each anchor in a frame: of the world, which is a board, and of lone markers that move.

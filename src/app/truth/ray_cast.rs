@@ -13,7 +13,7 @@ pub const GRAZES: u8 = 8;
 pub const NONE: u8 = 0;
 
 /// The renderer draws nothing nearer, metres.
-const NEAREST_M: f64 = 1e-3;
+pub const NEAREST_M: f64 = 1e-3;
 /// What lies within this of a surface is that surface, of which a mesh may have copies, metres.
 const COINCIDENT_M: f64 = 1e-9;
 /// Part of a point's coordinates that single precision may move it by: of two things that were placed in one plane by
@@ -34,17 +34,6 @@ const NEARER_THAN_THE_LAST: f64 = 1.0 / 262_144.0;
 /// the cameras here.
 const GRAZING: f64 = 1e-3;
 
-/// Corners are snapped to 1/256 px, so an edge may pass a place on the other side that it is nearer to than this.
-const SNAPPING_PX: f64 = 1.0 / 256.0;
-
-/// Where four samples lie about a pixel's centre (the standard places of Vulkan and Direct3D).
-pub const SAMPLES_PX: [[f64; 2]; 4] = [
-    [-0.125, -0.375],
-    [0.375, -0.125],
-    [-0.375, 0.125],
-    [0.125, 0.375],
-];
-
 /// A triangle in the world.
 #[derive(Debug, Clone, Copy)]
 pub struct Triangle {
@@ -58,9 +47,9 @@ pub struct Triangle {
     pub corners: [DVec3; 3],
 }
 
-/// What a ray meets first.
+/// The surface that a ray meets first.
 #[derive(Debug, Clone, Copy)]
-pub struct Surface {
+pub struct SeenSurface {
     /// Of the triangle.
     pub role: u8,
     /// Its index.
@@ -84,12 +73,12 @@ pub struct View {
     pub camera_from_world: DAffine3,
 }
 
-/// What is seen at each pixel's centre, rows from the top.
+/// The surfaces seen at each pixel's centre, rows from the top.
 pub struct Exact {
     /// Width and height.
     pub size_px: [u32; 2],
     /// By pixel.
-    pub surfaces: Vec<Option<Surface>>,
+    pub surfaces: Vec<Option<SeenSurface>>,
     /// For each light and pixel.
     pub bits: Vec<Vec<u8>>,
 }
@@ -99,9 +88,9 @@ pub struct World {
     /// All of them.
     pub triangles: Vec<Triangle>,
     most_nearness: f64,
-    visible: Hierarchy,
-    real_casters: Hierarchy,
-    virtual_casters: Hierarchy,
+    visible: BoxHierarchy,
+    real_casters: BoxHierarchy,
+    virtual_casters: BoxHierarchy,
 }
 
 impl World {
@@ -109,7 +98,7 @@ impl World {
     pub fn new(triangles: Vec<Triangle>) -> Self {
         let where_ = |takes: &dyn Fn(&Triangle) -> bool| {
             let indices = (0..triangles.len()).filter(|&index| takes(&triangles[index]));
-            Hierarchy::new(&triangles, indices.collect())
+            BoxHierarchy::new(&triangles, indices.collect())
         };
         let things = triangles.iter().map(|triangle| triangle.thing + 1).max();
         Self {
@@ -122,7 +111,7 @@ impl World {
     }
 
     /// What a pixel (or a place within one) sees.
-    pub fn look(&self, view: &View, pixel: DVec2) -> Option<Surface> {
+    pub fn look(&self, view: &View, pixel: DVec2) -> Option<SeenSurface> {
         let world_from_camera = view.camera_from_world.inverse();
         let eye = world_from_camera.translation;
         let plane = view.intrinsics.plane_from_pixel(pixel);
@@ -142,7 +131,7 @@ impl World {
         } = self.triangles[triangle];
         let normal = plane_normal(&corners);
         let point = eye + direction * distance;
-        Some(Surface {
+        Some(SeenSurface {
             role,
             triangle,
             thing,
@@ -186,7 +175,7 @@ impl World {
 
     /// Who takes a light from a surface. `lift_m` moves the start of the ray off it along its normal: 0 is the truth;
     /// other renderers lift by some 0.1 mm against self-shadowing.
-    pub fn bits(&self, surface: &Surface, light: &Light, lift_m: f64) -> u8 {
+    pub fn bits(&self, surface: &SeenSurface, light: &Light, lift_m: f64) -> u8 {
         let start = surface.point + surface.normal * lift_m;
         let (to_light, reach) = match *light {
             Light::Point { position_m, .. } => (position_m - surface.point, 1.0),
@@ -208,7 +197,7 @@ impl World {
                     && surface.normal.dot(corners[0] - surface.point).abs() <= surface.tie_m
                 || is_in_plane(light, corners, normal)
         };
-        let hides = |casters: &Hierarchy| casters.is_hit(&self.triangles, &ray, &hides_nothing);
+        let hides = |casters: &BoxHierarchy| casters.is_hit(&self.triangles, &ray, &hides_nothing);
         let bit = |holds: bool, bit: u8| if holds { bit } else { 0 };
         bit(sine < 0.0, FACES_AWAY)
             | bit(sine.abs() < GRAZING, GRAZES)
@@ -218,11 +207,12 @@ impl World {
 
     /// A ray through each pixel's centre, and from what it meets one to each light.
     pub fn cast(&self, lights: &[Light], view: &View, lift_m: f64) -> Exact {
-        let surfaces: Vec<Option<Surface>> = pixels(view.intrinsics.size_px)
+        let surfaces: Vec<Option<SeenSurface>> = pixels(view.intrinsics.size_px)
             .map(|(_, pixel)| self.look(view, pixel))
             .collect();
         let bits_of = |light: &Light| {
-            let bits = |seen: &Option<Surface>| seen.map_or(0, |s| self.bits(&s, light, lift_m));
+            let bits =
+                |seen: &Option<SeenSurface>| seen.map_or(0, |s| self.bits(&s, light, lift_m));
             surfaces.iter().map(bits).collect()
         };
         Exact {
@@ -231,60 +221,6 @@ impl World {
             surfaces,
         }
     }
-
-    /// Whether a triangle's edge, or the shadow of one, passes a place so closely that snapping may put it on the other
-    /// side: triangles, shadows and gaps thinner than that are there for no ray, and may yet be drawn.
-    pub fn is_on_edge(&self, view: &View, place: DVec2, light: &Light) -> bool {
-        let seen = self.look(view, place);
-        let pixel_of = |point: DVec3| {
-            let in_camera = view.camera_from_world.transform_point3(point);
-            let plane = in_camera.truncate() / in_camera.z;
-            (in_camera.z > NEAREST_M).then(|| view.intrinsics.pixel_from_plane(plane))
-        };
-        // Where the shadow of a point falls on the plane of what is seen.
-        let shadow_of = |point: DVec3| {
-            let Surface {
-                point: on, normal, ..
-            } = seen?;
-            let (from, way) = match *light {
-                Light::Point { position_m, .. } => (position_m, point - position_m),
-                Light::Directional { direction, .. } => (point, direction),
-            };
-            let share = normal.dot(on - from) / normal.dot(way);
-            (share > 0.0).then(|| from + way * share)
-        };
-        let is_near = |ends: [Option<DVec2>; 2]| {
-            let [Some(a), Some(b)] = ends else {
-                return false;
-            };
-            let along = ((place - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
-            (a + (b - a) * along).distance(place) < SNAPPING_PX
-        };
-        self.triangles.iter().any(|triangle| {
-            let [a, b, c] = triangle.corners;
-            [[a, b], [b, c], [c, a]].into_iter().any(|ends| {
-                is_near(ends.map(pixel_of))
-                    || triangle.casts && is_near(ends.map(|end| shadow_of(end).and_then(pixel_of)))
-            })
-        })
-    }
-
-    /// Places from which an edge within 1.5 px of a pixel's centre shows, however thin it is where it passes close by.
-    pub fn places_around(pixel: DVec2) -> impl Iterator<Item = DVec2> {
-        (0..10).flat_map(move |ring| {
-            let radius_px = 1.5 * 0.5_f64.powi(ring);
-            (0..32).map(move |step| {
-                let turn = f64::from(step) + 0.37 * f64::from(ring);
-                pixel + DVec2::from_angle(turn * std::f64::consts::TAU / 32.0) * radius_px
-            })
-        })
-    }
-}
-
-/// A pixel's centre, and the places of its samples.
-pub fn sample_places(pixel: DVec2) -> impl Iterator<Item = DVec2> {
-    let samples = SAMPLES_PX.map(|[x, y]| pixel + DVec2::new(x, y));
-    std::iter::once(pixel).chain(samples)
 }
 
 fn plane_normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
@@ -318,16 +254,6 @@ impl Exact {
     }
 }
 
-/// Whether a pixel and the eight around it are all alike.
-pub fn is_uniform(size_px: [u32; 2], index: usize, same: impl Fn(usize, usize) -> bool) -> bool {
-    let [width, height] = size_px.map(|size| size as usize);
-    let (x, y) = (index % width, index / width);
-    let columns = x.saturating_sub(1)..(x + 2).min(width);
-    (y.saturating_sub(1)..(y + 2).min(height))
-        .flat_map(|row| columns.clone().map(move |column| row * width + column))
-        .all(|other| same(index, other))
-}
-
 /// A line from `origin + near · direction` to `origin + reach · direction`.
 pub struct Ray {
     /// Where it comes from, metres.
@@ -359,7 +285,7 @@ impl Triangle {
 }
 
 /// Boxes around triangles, halved at the median of the longest side.
-struct Hierarchy {
+struct BoxHierarchy {
     /// Indices of triangles, in the order of the leaves.
     order: Vec<usize>,
     nodes: Vec<Node>,
@@ -368,10 +294,10 @@ struct Hierarchy {
 struct Node {
     low: DVec3,
     high: DVec3,
-    content: Content,
+    content: NodeContent,
 }
 
-enum Content {
+enum NodeContent {
     /// A range of `order`.
     Leaf(usize, usize),
     /// The other child follows its parent.
@@ -380,7 +306,7 @@ enum Content {
 
 const LEAF: usize = 4;
 
-impl Hierarchy {
+impl BoxHierarchy {
     fn new(triangles: &[Triangle], order: Vec<usize>) -> Self {
         let mut made = Self {
             order,
@@ -404,7 +330,7 @@ impl Hierarchy {
         self.nodes.push(Node {
             low: low - slack,
             high: high + slack,
-            content: Content::Leaf(start, end),
+            content: NodeContent::Leaf(start, end),
         });
         if end - start <= LEAF {
             return;
@@ -414,7 +340,7 @@ impl Hierarchy {
         let middle = (end - start) / 2;
         self.order[start..end].select_nth_unstable_by(middle, |a, b| place(a).total_cmp(&place(b)));
         self.add(triangles, start, start + middle);
-        self.nodes[node].content = Content::SecondChild(self.nodes.len());
+        self.nodes[node].content = NodeContent::SecondChild(self.nodes.len());
         self.add(triangles, start + middle, end);
     }
 
@@ -442,8 +368,8 @@ impl Hierarchy {
                 continue;
             }
             match node.content {
-                Content::SecondChild(second) => open.extend([second, index + 1]),
-                Content::Leaf(start, end) => {
+                NodeContent::SecondChild(second) => open.extend([second, index + 1]),
+                NodeContent::Leaf(start, end) => {
                     for &triangle in &self.order[start..end] {
                         let shortened = triangles[triangle]
                             .hit(&Ray { reach, ..*ray })

@@ -2,7 +2,8 @@
 
 use std::fs;
 
-use gnomon::app::check::{summary, warnings};
+use gnomon::app::jobs::check::summary;
+use gnomon::app::scene_warnings::warnings;
 
 use super::{CUBE, HEAD, load_in, project};
 

@@ -9,7 +9,7 @@ use std::fs;
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
-use gnomon::app::check::summary;
+use gnomon::app::jobs::check::summary;
 use gnomon::geometry::mesh::Mesh;
 use gnomon::light::{Light, Material};
 use gnomon::scene::{

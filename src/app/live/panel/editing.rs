@@ -4,7 +4,7 @@ use eframe::egui::{DragValue, Response, Ui};
 use glam::DVec3;
 
 use crate::app::authoring::Edit;
-use crate::app::live::wish::Wish;
+use crate::app::live::command::{Commands, SceneCommand};
 
 /// An edit that is under way.
 #[derive(Debug, Default)]
@@ -14,22 +14,22 @@ pub struct Editing {
 
 impl Editing {
     /// A field has changed to what `edit` says.
-    pub fn changed(&mut self, ui: &Ui, edit: Edit, wishes: &mut Vec<Wish>) {
+    pub fn changed(&mut self, ui: &Ui, edit: Edit, commands: &mut Commands) {
         if is_held(ui) {
-            wishes.push(Wish::Preview(edit.clone()));
+            commands.push(SceneCommand::Preview(edit.clone()));
             self.dragged = Some(edit);
         } else {
             self.dragged = None;
-            wishes.push(Wish::Commit(edit));
+            commands.push(SceneCommand::Commit(edit));
         }
     }
 
     /// Makes the edit that was let go, at the end of a pass.
-    pub fn settle(&mut self, ui: &Ui, wishes: &mut Vec<Wish>) {
+    pub fn settle(&mut self, ui: &Ui, commands: &mut Commands) {
         if !is_held(ui)
             && let Some(edit) = self.dragged.take()
         {
-            wishes.push(Wish::Commit(edit));
+            commands.push(SceneCommand::Commit(edit));
         }
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use eframe::egui::{ComboBox, DragValue, Ui};
 
 use super::Facts;
-use crate::app::live::wish::Wish;
+use crate::app::live::command::{Commands, SceneCommand};
 
 /// What was answered so far.
 #[derive(Debug)]
@@ -27,15 +27,15 @@ impl Default for FirstUse {
 
 impl FirstUse {
     /// Asks what is not known yet.
-    pub fn show(&mut self, ui: &mut Ui, facts: &Facts<'_>, wishes: &mut Vec<Wish>) {
+    pub fn show(&mut self, ui: &mut Ui, facts: &Facts<'_>, commands: &mut Commands) {
         match facts.scene {
-            None => self.ask_size(ui, facts, wishes),
-            Some(_) if facts.unsaved => self.offer_saving(ui, wishes),
+            None => self.ask_size(ui, facts, commands),
+            Some(_) if facts.unsaved => self.offer_saving(ui, commands),
             Some(_) => {}
         }
     }
 
-    fn ask_size(&mut self, ui: &mut Ui, facts: &Facts<'_>, wishes: &mut Vec<Wish>) {
+    fn ask_size(&mut self, ui: &mut Ui, facts: &Facts<'_>, commands: &mut Commands) {
         ui.heading("First use");
         let seen = facts.picture.map_or(&[][..], |picture| &picture.detections);
         let mut ids: Vec<u32> = seen.iter().map(|detection| detection.id).collect();
@@ -68,12 +68,12 @@ impl FirstUse {
         });
         if ui.button("Put something on it").clicked() {
             let size_m = self.size_mm * 1e-3;
-            wishes.push(Wish::Demonstrate { id, size_m });
+            commands.push(SceneCommand::Demonstrate { id, size_m });
         }
         ui.separator();
     }
 
-    fn offer_saving(&mut self, ui: &mut Ui, wishes: &mut Vec<Wish>) {
+    fn offer_saving(&mut self, ui: &mut Ui, commands: &mut Commands) {
         ui.heading("This scene is not saved");
         ui.horizontal(|ui| {
             let label = ui.label("as");
@@ -86,7 +86,7 @@ impl FirstUse {
                 if path.extension().is_none() {
                     path.set_extension("toml");
                 }
-                wishes.push(Wish::Save(path));
+                commands.push(SceneCommand::Save(path));
             }
         });
         ui.separator();

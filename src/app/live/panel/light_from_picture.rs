@@ -2,7 +2,7 @@
 
 use eframe::egui::{Button, Ui};
 
-use crate::app::live::wish::{Clicks, Wish};
+use crate::app::live::command::{Clicks, Commands, SceneCommand};
 use crate::geometry::light_placing::LightFreedom;
 
 /// Pairs that fix a light at any distance, and one that is infinitely far.
@@ -10,13 +10,13 @@ const POINT_PAIRS: usize = 2;
 const DIRECTIONAL_PAIRS: usize = 1;
 
 /// Shows how far it has come.
-pub fn show(ui: &mut Ui, clicks: Option<(usize, bool)>, wishes: &mut Vec<Wish>) {
+pub fn show(ui: &mut Ui, clicks: Option<(usize, bool)>, commands: &mut Commands) {
     let Some((pairs, shadow_is_next)) = clicks else {
         let button = ui.button("Find the light in the picture");
         let hover =
             "holds the picture; then click corners of real things and the tips of their shadows";
         if button.on_hover_text(hover).clicked() {
-            wishes.push(Wish::Clicks(Clicks::Begin));
+            commands.push(SceneCommand::Clicks(Clicks::Begin));
         }
         return;
     };
@@ -43,7 +43,7 @@ pub fn show(ui: &mut Ui, clicks: Option<(usize, bool)>, wishes: &mut Vec<Wish>) 
             ("Cancel", true, Clicks::Cancel),
         ] {
             if ui.add_enabled(enabled, Button::new(text)).clicked() {
-                wishes.push(Wish::Clicks(step));
+                commands.push(SceneCommand::Clicks(step));
             }
         }
     });

@@ -5,8 +5,8 @@ use glam::DVec3;
 
 use super::editing::{Editing, power, vector};
 use crate::app::authoring::Edit;
-use crate::app::live::look::Look;
-use crate::app::live::wish::{Selected, Wish};
+use crate::app::live::command::{Commands, SceneCommand, Selected, WindowCommand};
+use crate::app::live::window_state::WindowState;
 use crate::light::Light;
 use crate::scene::{Scene, unit_direction};
 
@@ -20,9 +20,9 @@ const NEW_LIGHT: Light = Light::Point {
 pub fn show(
     ui: &mut Ui,
     scene: &Scene,
-    look: &Look,
+    look: &WindowState,
     editing: &mut Editing,
-    wishes: &mut Vec<Wish>,
+    commands: &mut Commands,
 ) {
     for (index, shown) in scene.lights.iter().enumerate() {
         let mut light = *shown;
@@ -36,10 +36,10 @@ pub fn show(
             ui.horizontal(|ui| {
                 let name = format!("light {index} ({kind})");
                 if ui.selectable_label(is_selected, name).clicked() {
-                    wishes.push(Wish::Select((!is_selected).then_some(selected)));
+                    commands.push(WindowCommand::Select((!is_selected).then_some(selected)));
                 }
                 if ui.small_button("remove").clicked() {
-                    wishes.push(Wish::Commit(Edit::RemoveLight(index)));
+                    commands.push(SceneCommand::Commit(Edit::RemoveLight(index)));
                 }
             });
             let changed = match &mut light {
@@ -64,16 +64,18 @@ pub fn show(
             let points_somewhere =
                 !matches!(light, Light::Directional { direction, .. } if direction == DVec3::ZERO);
             if changed && points_somewhere {
-                editing.changed(ui, Edit::Light { index, light }, wishes);
+                editing.changed(ui, Edit::Light { index, light }, commands);
             }
         });
     }
     let mut ambient = scene.ambient_radiance;
     if power(ui, "ambient radiance", &mut ambient) {
-        editing.changed(ui, Edit::Ambient(ambient), wishes);
+        editing.changed(ui, Edit::Ambient(ambient), commands);
     }
     if ui.button("Add a light").clicked() {
-        wishes.push(Wish::Commit(Edit::AddLight(NEW_LIGHT)));
-        wishes.push(Wish::Select(Some(Selected::Light(scene.lights.len()))));
+        commands.push(SceneCommand::Commit(Edit::AddLight(NEW_LIGHT)));
+        commands.push(WindowCommand::Select(Some(Selected::Light(
+            scene.lights.len(),
+        ))));
     }
 }

@@ -1,4 +1,4 @@
-//! The panel beside the picture. It is shown facts and gives back wishes; it changes nothing itself.
+//! The panel beside the picture. It is shown facts and gives back commands; it changes nothing itself.
 
 mod editing;
 mod first_use;
@@ -13,11 +13,11 @@ use std::path::Path;
 
 use eframe::egui::{CollapsingHeader, ScrollArea, Ui};
 
-use super::eye::TrackedPicture;
-use super::look::Look;
+use super::command::{Commands, Overlay, RecordingCommand, SceneCommand, WindowCommand};
+use super::frame_tracker::TrackedPicture;
 use super::meters::Meters;
-use super::views::View;
-use super::wish::{Overlay, Wish};
+use super::views::ViewMode;
+use super::window_state::WindowState;
 use crate::scene::{Placement, Scene, Shortcut, Shortcuts};
 use editing::Editing;
 use first_use::FirstUse;
@@ -63,36 +63,36 @@ pub struct Panel {
 }
 
 impl Panel {
-    /// Shows it: what is wished for.
-    pub fn show(&mut self, ui: &mut Ui, facts: &Facts<'_>, look: &Look) -> Vec<Wish> {
-        let mut wishes = Vec::new();
+    /// Shows it: what is asked for.
+    pub fn show(&mut self, ui: &mut Ui, facts: &Facts<'_>, look: &WindowState) -> Commands {
+        let mut commands = Commands::default();
         ScrollArea::vertical()
             .auto_shrink([false, false])
             .show(ui, |ui| {
-                self.first_use.show(ui, facts, &mut wishes);
-                recording(ui, facts, &mut wishes);
+                self.first_use.show(ui, facts, &mut commands);
+                recording(ui, facts, &mut commands);
                 let editing = &mut self.editing;
                 section(ui, "Tracking", true, |ui| {
-                    tracking::show(ui, facts, editing, &mut wishes);
+                    tracking::show(ui, facts, editing, &mut commands);
                 });
                 if let Some(scene) = facts.scene {
                     section(ui, "Things", true, |ui| {
-                        things::show(ui, (scene, facts.placement), look, editing, &mut wishes);
+                        things::show(ui, (scene, facts.placement), look, editing, &mut commands);
                     });
                     section(ui, "Lights", true, |ui| {
-                        lights::show(ui, scene, look, editing, &mut wishes);
-                        light_from_picture::show(ui, facts.clicks, &mut wishes);
+                        lights::show(ui, scene, look, editing, &mut commands);
+                        light_from_picture::show(ui, facts.clicks, &mut commands);
                     });
                     section(ui, "Shadows", false, |ui| {
-                        shadows::show(ui, scene, editing, &mut wishes);
+                        shadows::show(ui, scene, editing, &mut commands);
                     });
-                    history(ui, facts, &mut wishes);
+                    history(ui, facts, &mut commands);
                 }
-                section(ui, "View", false, |ui| view(ui, look, &mut wishes));
+                section(ui, "View", false, |ui| view(ui, look, &mut commands));
                 section(ui, "Times", true, |ui| times::show(ui, facts));
             });
-        self.editing.settle(ui, &mut wishes);
-        wishes
+        self.editing.settle(ui, &mut commands);
+        commands
     }
 }
 
@@ -102,64 +102,72 @@ fn section(ui: &mut Ui, title: &str, open: bool, contents: impl FnOnce(&mut Ui))
         .show(ui, contents);
 }
 
-fn recording(ui: &mut Ui, facts: &Facts<'_>, wishes: &mut Vec<Wish>) {
+fn recording(ui: &mut Ui, facts: &Facts<'_>, commands: &mut Commands) {
     ui.label(facts.camera);
     let [session, video] = facts.records;
     ui.horizontal_wrapped(|ui| {
-        let mut button = |text: &str, hover: &str, wish| {
+        let mut button = |text: &str, hover: &str, command| {
             if ui.button(text).on_hover_text(hover).clicked() {
-                wishes.push(wish);
+                commands.push(command);
             }
         };
-        button("Picture", "save it as it is shown (S)", Wish::Screenshot);
+        button(
+            "Picture",
+            "save it as it is shown (S)",
+            RecordingCommand::Screenshot,
+        );
         let text = if session {
             "End session"
         } else {
             "Record session"
         };
-        button(text, "the camera, for replay (R)", Wish::ToggleSession);
+        button(
+            text,
+            "the camera, for replay (R)",
+            RecordingCommand::ToggleSession,
+        );
         let text = if video { "End video" } else { "Record video" };
-        button(text, "the composite (V)", Wish::ToggleVideo);
+        button(text, "the composite (V)", RecordingCommand::ToggleVideo);
     });
 }
 
-fn view(ui: &mut Ui, look: &Look, wishes: &mut Vec<Wish>) {
+fn view(ui: &mut Ui, look: &WindowState, commands: &mut Commands) {
     ui.horizontal_wrapped(|ui| {
-        for (name, view) in View::BY_NAME {
+        for (name, view) in ViewMode::BY_NAME {
             if ui.selectable_label(look.view == view, name).clicked() && look.view != view {
-                wishes.push(Wish::Show(view));
+                commands.push(WindowCommand::Show(view));
             }
         }
     });
     for (name, overlay) in Overlay::BY_NAME {
         let mut shown = look.shows(overlay);
         if ui.checkbox(&mut shown, name).changed() {
-            wishes.push(Wish::Toggle(overlay));
+            commands.push(WindowCommand::Toggle(overlay));
         }
     }
     // Where somebody looks for a wrong shadow, and wherever one is off.
     let one_is_off = look.without != Shortcuts::NONE;
-    if matches!(look.view, View::StencilCount | View::Volumes) || one_is_off {
+    if matches!(look.view, ViewMode::StencilCount | ViewMode::Volumes) || one_is_off {
         ui.label("Shortcuts of shadow volumes").on_hover_text(
             "They change no pixel: one that does when it is switched off is what a wrong pixel comes from.",
         );
         for (name, shortcut) in Shortcut::BY_NAME {
             let mut taken = !look.without.has(shortcut);
             if ui.checkbox(&mut taken, name).changed() {
-                wishes.push(Wish::ToggleShortcut(shortcut));
+                commands.push(WindowCommand::ToggleShortcut(shortcut));
             }
         }
     }
 }
 
-fn history(ui: &mut Ui, facts: &Facts<'_>, wishes: &mut Vec<Wish>) {
+fn history(ui: &mut Ui, facts: &Facts<'_>, commands: &mut Commands) {
     if let (Some(path), false) = (facts.path, facts.unsaved) {
         ui.weak(format!("Edits are written into {}.", path.display()));
     }
     ui.horizontal_wrapped(|ui| {
-        for (verb, step, wish) in [
-            ("Undo", facts.history[0], Wish::Undo),
-            ("Redo", facts.history[1], Wish::Redo),
+        for (verb, step, command) in [
+            ("Undo", facts.history[0], SceneCommand::Undo),
+            ("Redo", facts.history[1], SceneCommand::Redo),
         ] {
             let text = match step {
                 Some(step) => format!("{verb}: {step}"),
@@ -167,7 +175,7 @@ fn history(ui: &mut Ui, facts: &Facts<'_>, wishes: &mut Vec<Wish>) {
             };
             let button = eframe::egui::Button::new(text);
             if ui.add_enabled(step.is_some(), button).clicked() {
-                wishes.push(wish);
+                commands.push(command);
             }
         }
     });

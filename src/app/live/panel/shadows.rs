@@ -4,7 +4,7 @@ use eframe::egui::{ComboBox, DragValue, Ui};
 
 use super::editing::{Editing, number};
 use crate::app::authoring::Edit;
-use crate::app::live::wish::Wish;
+use crate::app::live::command::Commands;
 use crate::geometry::outline_scale::LARGEST_MOVE_PX;
 use crate::scene::{
     Counting, Difference, Quality, Scene, ShadowSettings, ShadowTechnique, ShaftSettings, Technique,
@@ -21,7 +21,7 @@ const FIRST_SOURCES: u32 = 50;
 const MAP_SIDES_PX: [u32; 5] = [64, 128, 256, 512, 1024];
 
 /// Shows them.
-pub fn show(ui: &mut Ui, scene: &Scene, editing: &mut Editing, wishes: &mut Vec<Wish>) {
+pub fn show(ui: &mut Ui, scene: &Scene, editing: &mut Editing, commands: &mut Commands) {
     let mut shadows = scene.shadows;
     ui.horizontal(|ui| {
         for (name, quality) in Quality::BY_NAME {
@@ -62,7 +62,7 @@ pub fn show(ui: &mut Ui, scene: &Scene, editing: &mut Editing, wishes: &mut Vec<
         shaft_knobs(ui, &mut shadows.shafts);
     }
     if shadows != scene.shadows {
-        editing.changed(ui, Edit::Shadows(shadows), wishes);
+        editing.changed(ui, Edit::Shadows(shadows), commands);
     }
 }
 

@@ -5,8 +5,8 @@ use eframe::egui::Ui;
 use super::Placements;
 use super::editing::{Editing, vector};
 use crate::app::authoring::Edit;
-use crate::app::live::look::Look;
-use crate::app::live::wish::{Selected, Wish};
+use crate::app::live::command::{Commands, SceneCommand, Selected, WindowCommand};
+use crate::app::live::window_state::WindowState;
 use crate::scene::{Object, Placement, Scene};
 
 /// Metres, degrees and factors per point that a field is dragged.
@@ -18,9 +18,9 @@ const LEAST_SCALE: f64 = 1e-3;
 pub fn show(
     ui: &mut Ui,
     (scene, placement): (&Scene, &Placements<'_>),
-    look: &Look,
+    look: &WindowState,
     editing: &mut Editing,
-    wishes: &mut Vec<Wish>,
+    commands: &mut Commands,
 ) {
     for (kind, things) in [("phantoms", &scene.phantoms), ("virtual", &scene.virtuals)] {
         if things.is_empty() {
@@ -30,10 +30,10 @@ pub fn show(
         for thing in things {
             let placed = placement(&thing.name);
             ui.push_id(&thing.name, |ui| {
-                row(ui, thing, placed.is_some(), look, wishes);
+                row(ui, thing, placed.is_some(), look, commands);
                 let selected = Selected::Thing(thing.name.clone());
                 if let (Some(placement), true) = (placed, look.selected == Some(selected)) {
-                    fields(ui, scene, thing, placement, editing, wishes);
+                    fields(ui, scene, thing, placement, editing, commands);
                 }
             });
         }
@@ -41,7 +41,7 @@ pub fn show(
 }
 
 /// Whether it is there, and its name.
-fn row(ui: &mut Ui, thing: &Object, can_move: bool, look: &Look, wishes: &mut Vec<Wish>) {
+fn row(ui: &mut Ui, thing: &Object, can_move: bool, look: &WindowState, commands: &mut Commands) {
     let selected = Selected::Thing(thing.name.clone());
     let is_selected = look.selected.as_ref() == Some(&selected);
     ui.horizontal(|ui| {
@@ -51,11 +51,11 @@ fn row(ui: &mut Ui, thing: &Object, can_move: bool, look: &Look, wishes: &mut Ve
         let checkbox = ui.add_enabled(can_move, checkbox);
         let name = ui.selectable_label(is_selected, &thing.name);
         if name.clicked() && can_move {
-            wishes.push(Wish::Select((!is_selected).then_some(selected)));
+            commands.push(WindowCommand::Select((!is_selected).then_some(selected)));
         }
         if checkbox.labelled_by(name.id).changed() {
             let thing = thing.name.clone();
-            wishes.push(Wish::Commit(Edit::Show { thing, visible }));
+            commands.push(SceneCommand::Commit(Edit::Show { thing, visible }));
         }
     });
 }
@@ -66,7 +66,7 @@ fn fields(
     thing: &Object,
     mut placement: Placement,
     editing: &mut Editing,
-    wishes: &mut Vec<Wish>,
+    commands: &mut Commands,
 ) {
     if let Some(anchor) = scene.anchors.get(thing.anchor) {
         ui.weak(format!("on {}", anchor.name));
@@ -81,6 +81,6 @@ fn fields(
             *factor = sign * factor.abs().max(LEAST_SCALE);
         }
         let thing = thing.name.clone();
-        editing.changed(ui, Edit::Place { thing, placement }, wishes);
+        editing.changed(ui, Edit::Place { thing, placement }, commands);
     }
 }

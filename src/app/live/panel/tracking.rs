@@ -5,7 +5,7 @@ use eframe::egui::{Color32, Grid, Response, Ui};
 use super::Facts;
 use super::editing::{Editing, field};
 use crate::app::authoring::Edit;
-use crate::app::live::wish::Wish;
+use crate::app::live::command::Commands;
 use crate::scene::Scene;
 use crate::tracking::{AnchorPose, Status};
 
@@ -16,7 +16,7 @@ const MOST_REPROJECTION_PX: f64 = 1.0;
 const SPEED_MM: f64 = 0.02;
 
 /// Shows it.
-pub fn show(ui: &mut Ui, facts: &Facts<'_>, editing: &mut Editing, wishes: &mut Vec<Wish>) {
+pub fn show(ui: &mut Ui, facts: &Facts<'_>, editing: &mut Editing, commands: &mut Commands) {
     let Some(picture) = facts.picture else {
         ui.weak("no picture yet");
         return;
@@ -46,7 +46,7 @@ pub fn show(ui: &mut Ui, facts: &Facts<'_>, editing: &mut Editing, wishes: &mut 
                     Some(_) => ui.label(format!("{:.2} px", pose.reprojection_px)),
                     None => ui.weak("–"),
                 };
-                size(ui, scene, &name, &anchor.name, editing, wishes);
+                size(ui, scene, &name, &anchor.name, editing, commands);
                 ui.end_row();
             }
         });
@@ -66,7 +66,7 @@ fn size(
     label: &Response,
     name: &str,
     editing: &mut Editing,
-    wishes: &mut Vec<Wish>,
+    commands: &mut Commands,
 ) {
     let anchor = scene.anchors.iter().find(|anchor| anchor.name == name);
     let Some(marker) = anchor.and_then(|anchor| anchor.markers.first()) else {
@@ -77,7 +77,7 @@ fn size(
     if field.changed() {
         let size_m = size_mm.clamp(0.1, 1e5) * 1e-3;
         let anchor = name.to_owned();
-        editing.changed(ui, Edit::AnchorSize { anchor, size_m }, wishes);
+        editing.changed(ui, Edit::AnchorSize { anchor, size_m }, commands);
     }
 }
 

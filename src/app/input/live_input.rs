@@ -1,0 +1,49 @@
+//! What a job on a live source opens: what the camera is asked for, and its calibration.
+
+use anyhow::Result;
+
+use crate::capture::live::{LiveOptions, is_live};
+use crate::capture::{FrameSource, load_calibration};
+use crate::geometry::camera::Intrinsics;
+use crate::scene::{CameraSettings, WantedFormat};
+
+/// A camera's settings, read.
+#[derive(Debug, Clone)]
+pub struct LiveInput {
+    /// The one that is named, else what a recording carries.
+    pub calibration: Option<Intrinsics>,
+    wanted: WantedFormat,
+    mirror: bool,
+}
+
+impl LiveInput {
+    /// Reads the calibration; unless the scene asks for another size the camera is asked for the size that it was calibrated at.
+    ///
+    /// # Errors
+    /// A calibration that cannot be read.
+    pub fn of(camera: &CameraSettings) -> Result<Self> {
+        let calibration = match &camera.calibration {
+            Some(path) => Some(load_calibration(path)?),
+            None if is_live(&camera.source) => None,
+            None => FrameSource::open(&camera.source)?.calibration(),
+        };
+        let calibrated_px = calibration.map(|calibration| calibration.size_px);
+        Ok(Self {
+            calibration,
+            wanted: WantedFormat {
+                size_px: camera.wanted.size_px.or(calibrated_px),
+                ..camera.wanted
+            },
+            mirror: camera.mirror,
+        })
+    }
+
+    /// `repeats`: whether a recording begins again at its end.
+    pub fn options(&self, repeats: bool) -> LiveOptions {
+        LiveOptions {
+            wanted: self.wanted,
+            mirror: self.mirror,
+            repeats,
+        }
+    }
+}

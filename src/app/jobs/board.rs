@@ -1,0 +1,231 @@
+//! Board: a recording of markers stuck about a table in, their layout as a scene's `[[board]]` out.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::{Context as _, Result, bail};
+
+use crate::app::files::anchor_block;
+use crate::app::files::job_files::{JobFiles, Replacing};
+use crate::app::files::picture_files::write_text;
+use crate::app::files::result_kind::ResultKind;
+use crate::app::input::source;
+use crate::app::input::usual_tracking::usual_tracking;
+use crate::app::stages::progress::Progress;
+use crate::capture::{FrameSource, Notice};
+use crate::scene::{
+    CameraSettings, DetectorKind, Family, Marker, NAMES, TrackingSettings, is_name,
+};
+use crate::tracking::mapping::{LearntBoard, MapSettings, learn_board};
+use crate::tracking::{Detection, Detector, grey_from_rgba};
+
+/// More frames are not looked at: a long video is sampled.
+const MOST_FRAMES: u32 = 3000;
+
+/// A request to learn a board's layout: what is to be learnt from what.
+#[derive(Debug, Clone)]
+pub struct BoardRequest {
+    /// The recording.
+    pub input: BoardInput,
+    /// Of all markers.
+    pub family: Family,
+    /// Sizes, gauge and tolerance.
+    pub map: MapSettings,
+    /// A known distance, which gives the scale in place of the gauge's size.
+    pub distance: Option<Distance>,
+    /// Name of the board.
+    pub name: String,
+    /// Where to write the `[[board]]` block; `None`: stdout.
+    pub out: Option<PathBuf>,
+    /// What that may take the place of.
+    pub replacing: Replacing,
+}
+
+/// The recording that a board is learnt from.
+#[derive(Debug, Clone)]
+pub enum BoardInput {
+    /// What a scene file plays, with its tracking settings.
+    Scene(PathBuf),
+    /// A recording of its own.
+    Recording {
+        /// Where it is.
+        camera: CameraSettings,
+        /// As in [`TrackingSettings`].
+        decimation: f64,
+    },
+}
+
+/// What was measured between the centres of two markers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Distance {
+    /// Their ids.
+    pub ids: [u32; 2],
+    /// The distance, metres.
+    pub distance_m: f64,
+}
+
+/// Learns the layout and writes it; tells on stderr how sure it is.
+///
+/// # Errors
+/// Anything that keeps a frame from being read or the layout from being learnt; nothing is written then.
+pub fn board(request: &BoardRequest, stop: &AtomicBool) -> Result<()> {
+    let mut files = JobFiles::new(request.replacing);
+    let (camera, settings) = match &request.input {
+        BoardInput::Scene(path) => {
+            let scene = files.reads_scene(path)?;
+            (scene.camera, scene.tracking)
+        }
+        BoardInput::Recording { camera, decimation } => {
+            files.reads_camera(camera);
+            (camera.clone(), usual_tracking(request.family, *decimation))
+        }
+    };
+    if !is_name(&request.name) {
+        bail!("--name \"{}\": not a name; allowed: {NAMES}", request.name);
+    }
+    files.reads_family(request.family);
+    if let Some(out) = &request.out {
+        files.writes("--out", out, ResultKind::LearntBoard);
+    }
+    files.check()?;
+    let (source, intrinsics) = source::open(&camera)?;
+    let (pictures, notices) = detections(source, &settings, request.family, stop)?;
+    let learnt = learn_board(&intrinsics, request.family, &pictures, &request.map)
+        .with_context(|| format!("{} pictures of {}", pictures.len(), camera.source))?;
+    let learnt = match &request.distance {
+        Some(distance) => to_scale(&learnt, distance)?,
+        None => learnt,
+    };
+    eprint!("{}", certainty_text(&learnt));
+    if settings.detector == DetectorKind::Aruco {
+        eprintln!("a scene with this board needs [tracking] detector = \"aruco\"");
+    }
+    let block = board_block(&learnt, &request.name);
+    match &request.out {
+        Some(path) => write_text(path, &block)?,
+        None => print!("{block}"),
+    }
+    if !notices.is_empty() {
+        let notices: Vec<String> = notices.iter().map(ToString::to_string).collect();
+        bail!(
+            "the recording is damaged; the layout was learnt from its good frames: {}",
+            notices.join("; ")
+        );
+    }
+    Ok(())
+}
+
+/// What the detector sees in each frame that is looked at.
+fn detections(
+    mut source: FrameSource,
+    settings: &TrackingSettings,
+    family: Family,
+    stop: &AtomicBool,
+) -> Result<(Vec<Vec<Detection>>, Vec<Notice>)> {
+    let mut detector = Detector::new(settings, &[family])?;
+    let step = source
+        .frame_count()
+        .map_or(1, |count| count.div_ceil(MOST_FRAMES).max(1));
+    let progress = Progress::new(source.frame_count());
+    let (mut grey, mut pictures) = (Vec::new(), Vec::new());
+    while let Some(frame) = source.next_frame()? {
+        progress.advance();
+        if stop.load(Ordering::Relaxed) {
+            progress.finish();
+            bail!("interrupted; nothing was learnt");
+        }
+        if frame.index.is_multiple_of(step) {
+            grey_from_rgba(&frame, &mut grey)?;
+            pictures.push(detector.detect(&grey, frame.size_px)?);
+        }
+    }
+    progress.finish();
+    Ok((pictures, source.notices().to_vec()))
+}
+
+fn to_scale(learnt: &LearntBoard, distance: &Distance) -> Result<LearntBoard> {
+    let center = |id: u32| {
+        let found = learnt.markers.iter().find(|learnt| learnt.marker.id == id);
+        found.map(|learnt| learnt.marker.center_m).with_context(|| {
+            let known: Vec<String> = learnt
+                .markers
+                .iter()
+                .map(|learnt| learnt.marker.id.to_string())
+                .collect();
+            format!(
+                "--distance names marker {id}, which was not learnt; learnt are {}",
+                known.join(", ")
+            )
+        })
+    };
+    let [a, b] = distance.ids;
+    Ok(learnt.scaled(distance.distance_m / center(a)?.distance(center(b)?)))
+}
+
+/// The layout as a scene file takes it.
+pub fn board_block(learnt: &LearntBoard, name: &str) -> String {
+    let markers: Vec<Marker> = learnt.markers.iter().map(|learnt| learnt.marker).collect();
+    anchor_block::board(name, &markers)
+}
+
+/// A row for each marker: where it is, how sure that is, and how well the pictures agree.
+fn certainty_text(learnt: &LearntBoard) -> String {
+    let mut text = format!(
+        "{} markers from {} pictures; corners {:.3} px from where the layout puts them (standard deviation)\n\
+         {:>6} {:>18} {:>18} {:>16} {:>15} {:>8} {:>9} {:>8} {:>8}\n",
+        learnt.markers.len(),
+        learnt.pictures,
+        learnt.noise_px,
+        "marker",
+        "x, mm",
+        "y, mm",
+        "turn, °",
+        "size, mm",
+        "off, mm",
+        "pictures",
+        "dropped",
+        "rms, px"
+    );
+    for learnt in &learnt.markers {
+        let marker = &learnt.marker;
+        let [x_mm, y_mm, size_mm] =
+            [marker.center_m.x, marker.center_m.y, marker.size_m].map(|length_m| length_m * 1e3);
+        let deviation_mm = learnt.center_deviation_m * 1e3;
+        let _ = writeln!(
+            text,
+            "{:>6} {x_mm:>10.2} ± {:<5.3} {y_mm:>10.2} ± {:<5.3} {:>8.2} ± {:<5.3} {size_mm:>7.2} ± {:<5.3} {:>8.2} {:>9} {:>8} {:>8.3}",
+            marker.id,
+            deviation_mm.x,
+            deviation_mm.y,
+            marker.rotation_rad.to_degrees(),
+            learnt.rotation_deviation_rad.to_degrees(),
+            learnt.size_deviation_m * 1e3,
+            learnt.off_plane_m * 1e3,
+            learnt.observations,
+            learnt.dropped,
+            learnt.rms_px
+        );
+    }
+    for learnt in &learnt.markers {
+        // Here and there a pencil covers a marker; one that moved fits in no more than a part of the pictures.
+        if learnt.dropped > learnt.observations / 4 {
+            let _ = writeln!(
+                text,
+                "marker {} did not fit in {} of {} pictures: did it move?",
+                learnt.marker.id,
+                learnt.dropped,
+                learnt.dropped + learnt.observations
+            );
+        }
+    }
+    if !learnt.left_out.is_empty() {
+        let ids: Vec<String> = learnt.left_out.iter().map(u32::to_string).collect();
+        let _ = writeln!(
+            text,
+            "left out, because just one picture shows them with others: {}",
+            ids.join(", ")
+        );
+    }
+    text
+}

@@ -1,0 +1,402 @@
+//! `gnomon check`: what a scene says, for people.
+
+mod budget;
+pub mod first_look;
+mod room;
+
+use std::fmt::Write;
+
+use glam::DVec3;
+
+use crate::app::scene_warnings::warnings;
+use crate::geometry::levels::{Level, levels};
+use crate::geometry::mesh::MeshReport;
+use crate::geometry::outline_scale::largest_scale;
+use crate::light::Light;
+use crate::scene::{Anchor, DetectorKind, Object, Quality, Scene, ShadowSettings};
+use budget::budget_line;
+use room::room_lines;
+
+/// A summary of a scene: aligned plain text that ends with a line break.
+pub fn summary(scene: &Scene) -> String {
+    let mut text = String::new();
+    line(&mut text, "source", &scene.camera.source);
+    let calibration = scene
+        .camera
+        .calibration
+        .as_ref()
+        .map(|path| path.display().to_string());
+    line(
+        &mut text,
+        "calibration",
+        calibration
+            .as_deref()
+            .unwrap_or("what the recording carries"),
+    );
+    let detector = match scene.tracking.detector {
+        DetectorKind::AprilTag => "libapriltag",
+        DetectorKind::Aruco => "OpenCV's ArUco",
+    };
+    line(&mut text, "detector", detector);
+    rows(
+        &mut text,
+        "tracked",
+        scene.anchors.iter().enumerate().map(anchor_row).collect(),
+    );
+    let with_levels = scene.shadows.max_silhouette_error_px > 0.0;
+    rows(
+        &mut text,
+        "phantoms",
+        scene
+            .phantoms
+            .iter()
+            .map(|object| object_row(object, &scene.anchors, with_levels))
+            .collect(),
+    );
+    rows(
+        &mut text,
+        "virtuals",
+        scene
+            .virtuals
+            .iter()
+            .map(|object| object_row(object, &scene.anchors, with_levels))
+            .collect(),
+    );
+    rows(
+        &mut text,
+        "lights",
+        scene.lights.iter().enumerate().map(light_row).collect(),
+    );
+    line(
+        &mut text,
+        "ambient",
+        &format!("radiance {}", vector(scene.ambient_radiance)),
+    );
+    for (label, told) in scene
+        .probe
+        .iter()
+        .flat_map(|probe| room_lines(scene, probe))
+    {
+        line(&mut text, label, &told);
+    }
+    shadow_lines(&mut text, scene);
+    for warning in warnings(scene) {
+        text.push_str(&warning_line(&warning));
+    }
+    text
+}
+
+/// How shadows are made, and by which settings.
+fn shadow_lines(text: &mut String, scene: &Scene) {
+    let (technique, reason) = scene.chosen_technique();
+    line(
+        text,
+        "technique",
+        &format!("{}: {reason}", technique.name()),
+    );
+    if let Some(quality) = scene.shadows.quality {
+        line(text, "quality", &quality_row(quality, &scene.shadows));
+    }
+    if let Some(budget) = budget_line(scene) {
+        line(text, "budget", &budget);
+    }
+    line(
+        text,
+        "samples",
+        &format!("{} per pixel", scene.shadows.samples),
+    );
+    let detail = match scene.shadows.max_silhouette_error_px {
+        0.0 => "all triangles at any distance".to_owned(),
+        error_px => format!("silhouettes within {} px", short(error_px)),
+    };
+    line(text, "detail", &detail);
+}
+
+/// A quality, and what the scene sets otherwise.
+fn quality_row(quality: Quality, shadows: &ShadowSettings) -> String {
+    let meant = quality.shadows();
+    let mut others = Vec::new();
+    if shadows.samples != meant.samples {
+        others.push("samples");
+    }
+    if shadows.max_silhouette_error_px != meant.max_silhouette_error_px {
+        others.push("max_silhouette_error_px");
+    }
+    if shadows.shafts.sources != meant.shafts.sources {
+        others.push("sources");
+    }
+    let name = quality.name();
+    match others.is_empty() {
+        true => format!("{name}: samples, detail and sources are what it means"),
+        false => format!("{name}, but the scene sets {}", others.join(" and ")),
+    }
+}
+
+/// A line of the summary for what more there is to warn of.
+pub fn warning_line(warning: &str) -> String {
+    let mut text = String::new();
+    line(&mut text, "warning", warning);
+    text
+}
+
+fn line(text: &mut String, label: &str, value: &str) {
+    let padded = format!("{label:<12} {value}");
+    text.push_str(padded.trim_end());
+    text.push('\n');
+}
+
+/// A row of a table, and what there is to say about it.
+#[derive(Default)]
+struct TableRow {
+    cells: Vec<String>,
+    /// Empty, or what stands on a line of its own below the row.
+    note: String,
+}
+
+/// Rows of cells in aligned columns, the label before the first; notes stand under the second column.
+fn rows(text: &mut String, label: &str, rows: Vec<TableRow>) {
+    if rows.is_empty() {
+        return line(text, label, "none");
+    }
+    let columns = rows.iter().map(|row| row.cells.len()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns)
+        .map(|column| {
+            let cells = rows.iter().filter_map(|row| row.cells.get(column));
+            cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+        })
+        .collect();
+    for (number, row) in rows.iter().enumerate() {
+        let mut cells = String::new();
+        for (cell, &width) in row.cells.iter().zip(&widths) {
+            // Writing to a text cannot fail.
+            let _ = write!(cells, "{cell:<width$}  ");
+        }
+        line(text, if number == 0 { label } else { "" }, &cells);
+        if !row.note.is_empty() {
+            let indent = widths.first().map_or(0, |width| width + 2);
+            line(text, "", &format!("{:indent$}{}", "", row.note));
+        }
+    }
+}
+
+fn anchor_row((number, anchor): (usize, &Anchor)) -> TableRow {
+    let markers = &anchor.markers;
+    let family = markers
+        .first()
+        .map_or("no family".to_owned(), |marker| marker.family.to_string());
+    let ids: Vec<u32> = markers.iter().map(|marker| marker.id).collect();
+    let mut sizes_mm: Vec<String> = markers
+        .iter()
+        .map(|marker| short(marker.size_m * 1000.0))
+        .collect();
+    sizes_mm.sort();
+    sizes_mm.dedup();
+    let cells = vec![
+        anchor.name.clone(),
+        format!(
+            "{} marker{}",
+            markers.len(),
+            if markers.len() == 1 { "" } else { "s" }
+        ),
+        family,
+        format!("id {}", ranges(&ids)),
+        format!("{} mm", sizes_mm.join(", ")),
+        if number == 0 {
+            "the world".to_owned()
+        } else {
+            String::new()
+        },
+    ];
+    TableRow {
+        cells,
+        ..TableRow::default()
+    }
+}
+
+fn object_row(object: &Object, anchors: &[Anchor], with_levels: bool) -> TableRow {
+    let anchor = anchors
+        .get(object.anchor)
+        .map_or("nothing", |anchor| &anchor.name);
+    let mut notes = mesh_notes(&object.mesh_report);
+    if with_levels {
+        notes.extend(levels_note(object));
+    }
+    if object.anchor_from_object.matrix3.determinant() < 0.0 {
+        notes.push("mirrored".to_owned());
+    }
+    if !object.visible {
+        notes.push("hidden".to_owned());
+    }
+    let casts = if object.casts {
+        "casts"
+    } else {
+        "casts no shadow"
+    };
+    TableRow {
+        cells: vec![
+            object.name.clone(),
+            format!("on {anchor}"),
+            mesh_cell(object),
+            casts.to_owned(),
+        ],
+        note: notes.join(", "),
+    }
+}
+
+/// Size and topology of a mesh, and how it casts.
+fn mesh_cell(object: &Object) -> String {
+    let report = &object.mesh_report;
+    let (topology, method) = if report.closed {
+        ("closed".to_owned(), "silhouettes of one orientation")
+    } else {
+        (
+            counted(report.open_edges, "open edge"),
+            "signed edge multiplicity",
+        )
+    };
+    let size = counted(object.mesh.triangles.len(), "triangle");
+    if object.casts {
+        format!("{size}, {topology}: {method}")
+    } else {
+        format!("{size}, {topology}")
+    }
+}
+
+/// The coarser versions that may stand for an object where no pixel tells, and how far they are measured to be off.
+fn levels_note(object: &Object) -> Option<String> {
+    /// The finest say enough.
+    const SHOWN: usize = 4;
+    let stretch = largest_scale(&object.anchor_from_object);
+    let levels = levels(&object.mesh);
+    let level = |level: &Level| {
+        let [most, mean] =
+            [level.max_error_m, level.mean_error_m].map(|error_m| error_m * stretch * 1000.0);
+        let triangles = level.mesh.triangles.len();
+        format!("{triangles} at {most:.3}/{mean:.3}")
+    };
+    let mut shown: Vec<String> = levels.iter().take(SHOWN).map(level).collect();
+    if levels.len() > SHOWN {
+        shown.push(format!("{} more", levels.len() - SHOWN));
+    }
+    let list = shown.join(", ");
+    (!levels.is_empty()).then(|| format!("from afar at largest/mean error in mm: {list}"))
+}
+
+/// What was found in a mesh and done to it.
+fn mesh_notes(report: &MeshReport) -> Vec<String> {
+    let turned = counted(report.turned_triangles, "triangle");
+    let counts = [
+        (report.components, 1, format!("{} parts", report.components)),
+        (
+            report.crowded_edges,
+            0,
+            counted(report.crowded_edges, "edge") + " of more than two triangles",
+        ),
+        (
+            report.merged_vertices,
+            0,
+            format!("merged {}", counted(report.merged_vertices, "vertex")),
+        ),
+        (
+            report.dropped_without_area,
+            0,
+            format!("dropped {} without area", report.dropped_without_area),
+        ),
+        (
+            report.dropped_duplicates,
+            0,
+            format!(
+                "dropped {}",
+                counted(report.dropped_duplicates, "duplicate")
+            ),
+        ),
+        (
+            report.splits,
+            0,
+            counted(report.splits, "cut") + " at vertices on edges",
+        ),
+        (report.turned_triangles, 0, format!("turned {turned}")),
+    ];
+    counts
+        .into_iter()
+        .filter(|(count, usual, _)| count > usual)
+        .map(|(_, _, note)| note)
+        .collect()
+}
+
+/// `1 edge`, `2 edges`.
+fn counted(count: usize, noun: &str) -> String {
+    let nouns = match noun {
+        "vertex" => "vertices".to_owned(),
+        _ => format!("{noun}s"),
+    };
+    format!("{count} {}", if count == 1 { noun } else { &nouns })
+}
+
+fn light_row((number, light): (usize, &Light)) -> TableRow {
+    let (kind, place, power) = match light {
+        Light::Point {
+            position_m,
+            intensity,
+        } => (
+            "point",
+            format!("at {} m", vector(*position_m)),
+            format!("intensity {}", vector(*intensity)),
+        ),
+        Light::Directional {
+            direction,
+            irradiance,
+        } => (
+            "directional",
+            format!("towards {}", vector(*direction)),
+            format!("irradiance {}", vector(*irradiance)),
+        ),
+    };
+    TableRow {
+        cells: vec![number.to_string(), kind.to_owned(), place, power],
+        ..TableRow::default()
+    }
+}
+
+fn vector(vector: DVec3) -> String {
+    format!("[{}]", vector.to_array().map(short).join(", "))
+}
+
+/// A number with up to four digits after its point.
+fn short(number: f64) -> String {
+    let rounded = format!("{number:.4}");
+    let trimmed = rounded.trim_end_matches('0').trim_end_matches('.');
+    if trimmed == "-0" {
+        "0".to_owned()
+    } else {
+        trimmed.to_owned()
+    }
+}
+
+/// `0-5, 17` of 0 1 2 3 4 5 17.
+fn ranges(ids: &[u32]) -> String {
+    let mut ids = ids.to_vec();
+    ids.sort_unstable();
+    let runs = ids.chunk_by(|a, b| b.checked_sub(1) == Some(*a));
+    let shown = runs.map(|run| match run {
+        [only] => only.to_string(),
+        [first, .., last] => format!("{first}-{last}"),
+        [] => String::new(),
+    });
+    shown.collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_and_ids_are_short() {
+        assert_eq!(
+            [1.0, -0.26, 1e-9, -1e-9, 45.0, 100.0].map(short),
+            ["1", "-0.26", "0", "0", "45", "100"]
+        );
+        assert_eq!(ranges(&[3, 0, 1, 2, 17, 4294967295]), "0-3, 17, 4294967295");
+        assert_eq!(ranges(&[]), "");
+    }
+}

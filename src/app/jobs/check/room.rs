@@ -1,0 +1,71 @@
+//! What `gnomon check` says of a room that shafts take their light from.
+
+use crate::app::room_transport_cache;
+use crate::app::scene_warnings::counted;
+use crate::app::stopwatch::Stopwatch;
+use crate::scene::{ProbeScene, Scene, ShadowTechnique};
+
+/// Labels and what stands behind them. Works the room out where that has not been done yet.
+pub fn room_lines(scene: &Scene, probe: &ProbeScene) -> Vec<(&'static str, String)> {
+    let [width, height] = probe.probe.size_px();
+    let room = scene.room(probe);
+    let mut lines = vec![
+        (
+            "probe",
+            format!(
+                "{}  {width} x {height}, exposure {}",
+                probe.image.display(),
+                probe.exposure
+            ),
+        ),
+        (
+            "room",
+            format!(
+                "{}  {} triangles with the table and the phantoms",
+                match probe.is_far {
+                    true => "none, light from afar".to_owned(),
+                    false => counted(probe.room.len(), "part"),
+                },
+                room.triangles.len()
+            ),
+        ),
+    ];
+    if scene.chosen_technique().0 != ShadowTechnique::Shafts {
+        return lines;
+    }
+    let folder = room_transport_cache::folder();
+    let (ready, took_ms) =
+        Stopwatch::time(|| room_transport_cache::ready(&room, folder.as_deref()));
+    let transport = &ready.transport;
+    lines.push((
+        "patches",
+        format!(
+            "{}  {} corners, {} of them send light",
+            transport.patches.patches.len(),
+            transport.patches.vertices.len(),
+            transport.sources.patches.len()
+        ),
+    ));
+    lines.push((
+        "shafts",
+        format!(
+            "{} leaves  {:.1} MB, {}",
+            transport.hierarchy.leaf_count(),
+            transport.hierarchy.bytes() as f64 / 1e6,
+            match ready.read_from {
+                Some(path) => format!("kept in {}", path.display()),
+                None => format!("worked out in {:.1} s", took_ms / 1e3),
+            }
+        ),
+    ));
+    let settings = &scene.shadows.shafts;
+    let count = settings.sources.map_or("all".to_owned(), |n| n.to_string());
+    lines.push((
+        "sources",
+        format!(
+            "{count} at most cast a shadow, seen in {} px",
+            settings.map_px
+        ),
+    ));
+    lines
+}

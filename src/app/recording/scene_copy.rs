@@ -1,0 +1,305 @@
+//! A scene that goes with a recording: it plays the recording's own folder, and all that it names lies there too.
+//!
+//! What a scene or a mesh names may be somebody else's doing, so no name of theirs is ever written to: copies have names
+//! of our own, and what named the originals names the copies.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result};
+use toml_edit::{DocumentMut, Item, Table, Value};
+
+use crate::app::files::new_file::sync_folder;
+use crate::scene::material_libraries::with_libraries_named;
+use crate::scene::{FileKind, NamedFile, Scene};
+
+/// The name of the scene in its folder.
+pub const SCENE_NAME: &str = "scene.toml";
+/// Folders in a session's folder for what its scene names.
+pub const COPY_FOLDERS: [&str; 4] = ["models", "room", "probe", "markers"];
+/// The session carries the calibration itself, and its frames come as they were turned and chosen.
+const CAMERA_S_OWN: [&str; 5] = ["calibration", "mirror", "size_px", "fps", "format"];
+
+/// Copies a scene file into a session's folder with all that it names, and reads the copy again.
+///
+/// # Errors
+/// A file that cannot be read or written, or is there already; a scene that cannot be read, before or after.
+pub fn copy_scene(scene: &Path, session: &Path) -> Result<()> {
+    let text = Scene::read_text(scene)?;
+    let reading = Scene::read(scene, &text);
+    reading.scene?;
+    let mut copies = Copies {
+        session,
+        known: BTreeMap::new(),
+    };
+    let mut copied = text.clone();
+    // From the end, so that the places before stay where they are.
+    for named in reading.named.iter().rev() {
+        if let Some(name) = copies.name_of(named)? {
+            copied.replace_range(named.span.clone(), &Value::from(name).to_string());
+        }
+    }
+    let mut document: DocumentMut = copied
+        .parse()
+        .with_context(|| format!("{}: not TOML", scene.display()))?;
+    play_own_folder(&mut document);
+    let path = session.join(SCENE_NAME);
+    write_new(&path, document.to_string().as_bytes())?;
+    Scene::load(&path).context("the scene's copy is not what the scene was")?;
+    Ok(())
+}
+
+/// Lets the scene play the folder that it lies in. Comments of settings that go stay.
+fn play_own_folder(document: &mut DocumentMut) {
+    let Some(camera) = document.get_mut("camera") else {
+        return;
+    };
+    if let Some(source) = camera.get_mut("source").and_then(Item::as_value_mut) {
+        let decor = source.decor().clone();
+        *source = Value::from(".");
+        *source.decor_mut() = decor;
+    }
+    let comments: Vec<String> = CAMERA_S_OWN
+        .iter()
+        .filter_map(|key| comments_of(camera.as_table()?, key))
+        .collect();
+    if let Some(camera) = camera.as_table_like_mut() {
+        for key in CAMERA_S_OWN {
+            camera.remove(key);
+        }
+        if let Some(mut source) = camera.key_mut("source")
+            && !comments.is_empty()
+        {
+            let decor = source.leaf_decor_mut();
+            let before = decor.prefix().and_then(|prefix| prefix.as_str());
+            let before = before.unwrap_or_default().to_owned();
+            decor.set_prefix(comments.concat() + &before);
+        }
+    }
+}
+
+/// The comments above a key and behind its value, as lines of their own.
+fn comments_of(table: &Table, key: &str) -> Option<String> {
+    let above = table.key(key)?.leaf_decor().prefix()?.as_str()?;
+    let behind = table.get(key)?.as_value()?.decor().suffix();
+    let behind = behind
+        .and_then(|suffix| suffix.as_str())
+        .unwrap_or_default();
+    let comments = above.lines().chain(behind.lines());
+    let comments: String = comments
+        .map(str::trim)
+        .filter(|line| !line.is_empty())
+        .map(|line| format!("{line}\n"))
+        .collect();
+    (!comments.is_empty()).then_some(comments)
+}
+
+/// The files that were copied, and what they are called now.
+struct Copies<'a> {
+    session: &'a Path,
+    known: BTreeMap<(FileKind, PathBuf), String>,
+}
+
+impl Copies<'_> {
+    /// Copies a file unless that is done already; its name from the session's folder on. `None` for what holds for the
+    /// camera alone.
+    fn name_of(&mut self, named: &NamedFile) -> Result<Option<String>> {
+        let file = named.path.canonicalize();
+        let file = file.with_context(|| named.path.display().to_string())?;
+        let key = (named.kind, file);
+        if let Some(name) = self.known.get(&key) {
+            return Ok(Some(name.clone()));
+        }
+        let of_kind = self.known.keys().filter(|(kind, _)| *kind == named.kind);
+        let number = of_kind.count() + 1;
+        let name = match named.kind {
+            FileKind::Recording | FileKind::Calibration => return Ok(None),
+            FileKind::Mesh => self.copy_mesh(&named.path, &format!("models/{number}"))?,
+            FileKind::RoomMesh => self.copy_mesh(&named.path, &format!("room/{number}"))?,
+            FileKind::Probe => {
+                let bytes = read(&named.path)?;
+                // Whoever reads it goes by its content.
+                let extension = if bytes.starts_with(b"#?") {
+                    "hdr"
+                } else {
+                    "exr"
+                };
+                self.put(format!("probe/{number}.{extension}"), &bytes)?
+            }
+            FileKind::Dictionary => {
+                self.put(format!("markers/{number}.yml"), &read(&named.path)?)?
+            }
+        };
+        self.known.insert(key, name.clone());
+        Ok(Some(name))
+    }
+
+    /// Copies a mesh with its materials into a folder of its own.
+    fn copy_mesh(&self, mesh: &Path, folder: &str) -> Result<String> {
+        let mut libraries: Vec<PathBuf> = Vec::new();
+        let with_own_names = with_libraries_named(mesh, &read(mesh)?, |library| {
+            let known = libraries.iter().position(|known| known == library);
+            let number = known.unwrap_or(libraries.len()) + 1;
+            let name = format!("material-{number}.mtl");
+            if known.is_none() {
+                libraries.push(library.to_owned());
+                self.put(format!("{folder}/{name}"), &read(library)?)?;
+            }
+            Ok::<_, anyhow::Error>(name)
+        })?;
+        self.put(format!("{folder}/mesh.obj"), &with_own_names)
+    }
+
+    fn put(&self, name: String, bytes: &[u8]) -> Result<String> {
+        write_new(&self.session.join(&name), bytes)?;
+        Ok(name)
+    }
+}
+
+fn read(path: &Path) -> Result<Vec<u8>> {
+    fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))
+}
+
+/// Writes a file that must not be there: a session's folder is a new one.
+fn write_new(path: &Path, bytes: &[u8]) -> Result<()> {
+    let failed = || format!("{}: cannot be written", path.display());
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).with_context(failed)?;
+    }
+    let mut file = File::create_new(path).with_context(failed)?;
+    file.write_all(bytes).with_context(failed)?;
+    file.sync_all().with_context(failed)?;
+    sync_folder(path.parent());
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn config(name: &str) -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("config")
+            .join(name)
+    }
+
+    #[test]
+    fn a_copied_scene_is_the_same_but_for_its_camera() {
+        // The second one has a probe and a room.
+        for (name, comment) in [("lamp.toml", "# the mean of its wood"), ("room.toml", "#")] {
+            let folder = tempfile::tempdir().unwrap();
+            let original = config(name);
+            copy_scene(&original, folder.path()).unwrap();
+            let (copy, original) = (
+                Scene::load(&folder.path().join(SCENE_NAME)).unwrap(),
+                Scene::load(&original).unwrap(),
+            );
+            let source = Path::new(&copy.camera.source).canonicalize().unwrap();
+            assert_eq!(source, folder.path().canonicalize().unwrap());
+            assert!(!copy.phantoms.is_empty() && !copy.virtuals.is_empty());
+            let same = |what: &str, copy: String, original: String| {
+                assert!(copy == original, "{name}: {what}");
+            };
+            let debug = |value: &dyn std::fmt::Debug| format!("{value:?}");
+            same("phantoms", debug(&copy.phantoms), debug(&original.phantoms));
+            same("virtuals", debug(&copy.virtuals), debug(&original.virtuals));
+            same("anchors", debug(&copy.anchors), debug(&original.anchors));
+            let light = |scene: &Scene| {
+                let probe = scene.probe.as_ref();
+                probe.map(|it| format!("{:?} {:?}", it.probe, it.room))
+            };
+            assert!(light(&copy) == light(&original), "{name}: the probe");
+            let text = fs::read_to_string(folder.path().join(SCENE_NAME)).unwrap();
+            assert!(text.contains(comment), "comments stay");
+        }
+    }
+
+    #[test]
+    fn what_holds_for_the_camera_alone_is_left_out_but_for_its_comments() {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = folder.path().join("a.toml");
+        let text = "[camera]\n# the desk's\nsource = \"webcam:0\"  # on the arm\n# left for right\nmirror = true  # yes\n\
+                    size_px = [640, 480]\nfps = 30\nformat = \"YUYV\"\n# the card\n[[marker]]\nname = \"m\"\nid = 1\nsize_m = 0.04\n";
+        fs::write(&scene, text).unwrap();
+        let session = tempfile::tempdir().unwrap();
+        copy_scene(&scene, session.path()).unwrap();
+        let path = session.path().join(SCENE_NAME);
+        let copy = Scene::load(&path).unwrap();
+        assert!(!copy.camera.mirror);
+        assert_eq!(copy.camera.wanted, crate::scene::WantedFormat::default());
+        let written = fs::read_to_string(path).unwrap();
+        for comment in [
+            "# the desk's",
+            "# on the arm",
+            "# left for right",
+            "# yes",
+            "# the card",
+        ] {
+            assert!(written.contains(comment), "{comment}: {written}");
+        }
+    }
+
+    #[test]
+    fn nothing_is_written_where_a_scene_or_a_mesh_says() {
+        let folder = tempfile::tempdir().unwrap();
+        let home = folder.path().join("home");
+        let models = home.join("deep/models");
+        fs::create_dir_all(&models).unwrap();
+        let profile = home.join(".profile");
+        fs::write(&profile, "newmtl a\nKd .1 .2 .3\n").unwrap();
+        fs::write(models.join("b.mtl"), "newmtl b\nKd .4 .5 .6\n").unwrap();
+        let mesh = format!(
+            "# mine\nmtllib ../../.profile b.mtl\nmtllib {}\nmtllib none.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n\
+             usemtl a\nf 1 2 3\nusemtl b\nf 1 4 2\n",
+            profile.display()
+        );
+        fs::write(models.join("odd.name"), mesh).unwrap();
+        let scene = home.join("scene.toml");
+        let text = "camera = { source = \"webcam:0\", mirror = true }\nmarker = [{ name = \"m\", id = 1, size_m = 0.04 }]\n\
+                    [[virtual]]\nname = \"t\"\nmesh = 'deep/models/odd.name'  # a tetrahedron\n\
+                    [[virtual]]\nname = \"u\"\nmesh = \"deep/../deep/models/odd.name\"\n";
+        fs::write(&scene, text).unwrap();
+        let session = folder.path().join("outer/session");
+        fs::create_dir_all(&session).unwrap();
+        copy_scene(&scene, &session).unwrap();
+
+        let mut found = Vec::new();
+        let mut waiting = vec![folder.path().to_owned()];
+        while let Some(next) = waiting.pop() {
+            for entry in fs::read_dir(next).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_dir() {
+                    waiting.push(path);
+                } else {
+                    let name = path.strip_prefix(folder.path()).unwrap();
+                    found.push(name.to_str().unwrap().to_owned());
+                }
+            }
+        }
+        found.sort();
+        let expected = [
+            "home/.profile",
+            "home/deep/models/b.mtl",
+            "home/deep/models/odd.name",
+            "home/scene.toml",
+            "outer/session/models/1/material-1.mtl",
+            "outer/session/models/1/material-2.mtl",
+            "outer/session/models/1/material-3.mtl",
+            "outer/session/models/1/mesh.obj",
+            "outer/session/scene.toml",
+        ];
+        assert_eq!(found, expected, "one copy of a mesh");
+        assert!(fs::read_to_string(&profile).unwrap().contains(".1 .2 .3"));
+        // The originals are not asked for again.
+        fs::remove_dir_all(&home).unwrap();
+        let copy = Scene::load(&session.join(SCENE_NAME)).unwrap();
+        let albedos: Vec<f64> = (copy.virtuals[0].materials.iter())
+            .map(|material| material.albedo.x)
+            .collect();
+        assert_eq!(albedos, [0.1, 0.4].map(|kd: f32| f64::from(kd)));
+        let text = fs::read_to_string(session.join(SCENE_NAME)).unwrap();
+        assert!(text.contains("# a tetrahedron") && !text.contains("odd.name"));
+    }
+}

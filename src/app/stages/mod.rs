@@ -1,0 +1,8 @@
+//! The stages of a job on a recording, and what is counted and told of them.
+
+pub(crate) mod budget_words;
+pub(crate) mod progress;
+pub mod report;
+pub mod stats;
+pub(crate) mod tally;
+pub(crate) mod tracked;

@@ -1,0 +1,52 @@
+//! Progress bars with what is done and time left; shown only where stderr is a terminal.
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// A progress bar that counts frames, or measurements.
+pub struct Progress(ProgressBar);
+
+impl Progress {
+    /// `expected`: frames to come, where that is known.
+    pub fn new(expected: Option<u32>) -> Self {
+        let (bar, template) = match expected {
+            Some(count) => (
+                ProgressBar::new(count.into()),
+                "{bar:40} {pos}/{len} frames  {per_sec}  {eta} left",
+            ),
+            None => (
+                ProgressBar::new_spinner(),
+                "{spinner} {pos} frames  {per_sec}",
+            ),
+        };
+        Self::styled(bar, template)
+    }
+
+    /// Counts the measurements of charts, of which there are `count`.
+    pub fn of_measurements(count: usize) -> Self {
+        let bar = ProgressBar::new(count as u64);
+        Self::styled(bar, "{bar:40} {pos}/{len}  {msg}  {elapsed} so far")
+    }
+
+    fn styled(bar: ProgressBar, template: &str) -> Self {
+        // A template that cannot be read falls back to the library's own.
+        Self(match ProgressStyle::with_template(template) {
+            Ok(style) => bar.with_style(style),
+            Err(_) => bar,
+        })
+    }
+
+    /// Says what is being done.
+    pub fn tell(&self, what: &str) {
+        self.0.set_message(what.to_owned());
+    }
+
+    /// One more is done.
+    pub fn advance(&self) {
+        self.0.inc(1);
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        self.0.finish_and_clear();
+    }
+}
