@@ -20,6 +20,19 @@ pub enum FileKind {
     Dictionary,
 }
 
+impl FileKind {
+    /// What is expected, in words.
+    pub fn told(self) -> &'static str {
+        match self {
+            Self::Recording => "a session, a video or a folder of pictures",
+            Self::Calibration => "a calibration's file",
+            Self::Mesh | Self::RoomMesh => "an OBJ file",
+            Self::Probe => "a picture in linear radiance, .hdr or .exr",
+            Self::Dictionary => "a dictionary of markers, .yml",
+        }
+    }
+}
+
 /// A file that a scene names, and that is there.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NamedFile {

@@ -18,15 +18,16 @@ const MOST_COLUMNS: usize = 4096;
 /// Pixels of the largest picture that is read: 32768 x 16384 would take 6 GiB.
 const MOST_PIXELS: usize = 16384 * 8192;
 
-/// What a picture of all directions can be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum ProbeKind {
-    /// As [`Probe`] keeps it: row 0 looks up (+z), u = (atan2(y, x) + π) / 2π.
-    LatitudeLongitude,
-    /// Debevec's angular map: the distance from the middle is proportional to the angle from the direction looked along.
-    Angular,
-    /// A mirror ball that fills the picture, photographed from afar.
-    Ball,
+choices! {
+    /// What a picture of all directions can be.
+    pub enum ProbeKind, "kind of probe" {
+        /// As [`Probe`] keeps it: row 0 looks up (+z), u = (atan2(y, x) + π) / 2π.
+        LatitudeLongitude = "latitude-longitude",
+        /// Debevec's angular map: the distance from the middle is proportional to the angle from the direction looked along.
+        Angular = "angular",
+        /// A mirror ball that fills the picture, photographed from afar.
+        Ball = "ball",
+    }
 }
 
 /// Reads a probe of any kind. Angular maps and balls are resampled; their middle looks along +y (a ball's camera did), with
