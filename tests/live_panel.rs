@@ -136,9 +136,10 @@ fn the_knobs_of_the_technique_are_edits() {
     let mut harness = desk(Some(lamp()), None);
     assert_eq!(clicked(&mut harness, "Shadows"), []);
     let wishes = clicked(&mut harness, "1");
-    let [Wish::Commit(Edit::Shadows(shadows))] = wishes[..] else {
+    let [Wish::Commit(Edit::Shadows(change))] = wishes[..] else {
         panic!("{wishes:?}");
     };
+    let shadows = change.made_in(lamp().shadows);
     assert_eq!(shadows.samples, 1);
     assert_eq!(shadows.technique, lamp().shadows.technique);
 }

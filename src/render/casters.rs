@@ -95,7 +95,7 @@ impl Casters {
                 }],
             }),
             lights,
-            depth_pass: shadows.counting == scene::Counting::Auto
+            depth_pass: shadows.counting == scene::VolumeCounting::Auto
                 && !shadows.without.has(Shortcut::DepthPass),
             forgets: shadows.without.has(Shortcut::Kept),
         }

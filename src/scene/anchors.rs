@@ -10,7 +10,7 @@ use super::placement::ANGLE;
 use super::ranges::{Digits, Numbers, Whole};
 use super::reader::{Table, Value};
 use super::schema::key::Missing::{Is, Means};
-use super::schema::section::{Section, Shown, Times};
+use super::schema::section::{Example, Section, Times};
 use super::schema::values::{InWords, Written};
 use super::{Anchor, DetectorKind, Family, Marker};
 
@@ -89,11 +89,11 @@ pub static BOARD_SECTION: Section = Section {
     times: Times::Any,
     groups: &[AnchorNameKeys::ALL, PrintedKeys::ALL, BoardKeys::ALL],
     shown: &[
-        ("name", Shown::Live("\"table\"")),
-        ("family", Shown::Live("\"tag36h11\"")),
+        ("name", Example::Live("\"table\"")),
+        ("family", Example::Live("\"tag36h11\"")),
         (
             "markers",
-            Shown::Live(
+            Example::Live(
                 "[\n    { id = 0, size_m = 0.045, center_m = [-0.175, 0.115], rotation_deg = 0 },\n    \
                  { id = 1, size_m = 0.045, center_m = [0.175, 0.115] },\n    \
                  { id = 2, size_m = 0.045, center_m = [-0.175, -0.115] },\n    \
@@ -111,10 +111,10 @@ pub static MARKER_SECTION: Section = Section {
     times: Times::Any,
     groups: &[AnchorNameKeys::ALL, PrintedKeys::ALL, MarkerKeys::ALL],
     shown: &[
-        ("name", Shown::Live("\"card\"")),
-        ("family", Shown::Live("\"tag36h11\"")),
-        ("id", Shown::Live("17")),
-        ("size_m", Shown::Live("0.036")),
+        ("name", Example::Live("\"card\"")),
+        ("family", Example::Live("\"tag36h11\"")),
+        ("id", Example::Live("17")),
+        ("size_m", Example::Live("0.036")),
     ],
     is_aside: false,
 };

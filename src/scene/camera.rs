@@ -7,7 +7,7 @@ use super::named_files::FileKind;
 use super::ranges::Whole;
 use super::reader::{Table, Value};
 use super::schema::key::Missing::{Is, Means};
-use super::schema::section::{Section, Shown, Times};
+use super::schema::section::{Example, Section, Times};
 use super::schema::values::{InWords, Written};
 
 choices! {
@@ -56,11 +56,11 @@ pub static CAMERA_SECTION: Section = Section {
     times: Times::Once,
     groups: &[CameraKeys::ALL],
     shown: &[
-        ("source", Shown::Live("\"webcam:0\"")),
-        ("calibration", Shown::Aside("\"camera.toml\"")),
-        ("size_px", Shown::Aside("[1280, 720]")),
-        ("fps", Shown::Aside("30")),
-        ("format", Shown::Aside("\"YUYV\"")),
+        ("source", Example::Live("\"webcam:0\"")),
+        ("calibration", Example::Aside("\"camera.toml\"")),
+        ("size_px", Example::Aside("[1280, 720]")),
+        ("fps", Example::Aside("30")),
+        ("format", Example::Aside("\"YUYV\"")),
     ],
     is_aside: false,
 };

@@ -15,8 +15,9 @@ pub use super::objects::{
     MATERIAL, MATERIAL_SECTION, PHANTOM_SECTION, RECTANGLE, SHAPE, STANDING, TABLE, TABLE_SECTION,
     THING, THING_NAME, VIRTUAL, VIRTUAL_SECTION,
 };
-pub use super::placement::PLACEMENT;
+pub use super::placement::{PLACEMENT, PlacementKeys};
 pub use super::probe::{PROBE, PROBE_SECTION, ROOM, ROOM_SECTION, ROOM_SURFACE};
+pub use super::schema::section::AnyKey;
 pub use super::shadows::{DIFFERENCE, SHADOWS, SHADOWS_SECTION, SHAFTS};
 pub use super::tracking::{TRACKING, TRACKING_SECTION};
 

@@ -7,7 +7,7 @@ use super::placement::POSITION;
 use super::ranges::{Digits, Numbers};
 use super::reader::Table;
 use super::schema::key::Missing::Is;
-use super::schema::section::{Section, Shown, Times};
+use super::schema::section::{Example, Section, Times};
 use super::schema::values::Vectors;
 use crate::light::Light;
 
@@ -69,7 +69,7 @@ keys! {
 /// `[[light]]` of either kind, as it may be before its kind is known.
 pub static LIGHT_SECTION: Section = Section {
     name: "light",
-    says: "Lights, up to 16.",
+    says: "Lights, up to 16 in all.",
     times: Times::Any,
     groups: &[
         LightKeys::ALL,
@@ -83,13 +83,13 @@ pub static LIGHT_SECTION: Section = Section {
 /// `[[light]]`, a point.
 pub static POINT_LIGHT_SECTION: Section = Section {
     name: "light",
-    says: "Lights, up to 16; default none.",
+    says: "Light from a point; up to 16 lights in all, default none.",
     times: Times::Any,
     groups: &[LightKeys::ALL, PointLightKeys::ALL],
     shown: &[
-        ("kind", Shown::Live("\"point\"")),
-        ("position_m", Shown::Live("[-0.26, 0.24, 0.46]")),
-        ("intensity", Shown::Live("[1.15, 1.06, 0.9]")),
+        ("kind", Example::Live("\"point\"")),
+        ("position_m", Example::Live("[-0.26, 0.24, 0.46]")),
+        ("intensity", Example::Live("[1.15, 1.06, 0.9]")),
     ],
     is_aside: false,
 };
@@ -101,9 +101,9 @@ pub static DIRECTIONAL_LIGHT_SECTION: Section = Section {
     times: Times::Any,
     groups: &[LightKeys::ALL, DirectionalLightKeys::ALL],
     shown: &[
-        ("kind", Shown::Live("\"directional\"")),
-        ("direction", Shown::Live("[0.3, -0.2, -1.0]")),
-        ("irradiance", Shown::Live("0.4")),
+        ("kind", Example::Live("\"directional\"")),
+        ("direction", Example::Live("[0.3, -0.2, -1.0]")),
+        ("irradiance", Example::Live("0.4")),
     ],
     is_aside: false,
 };
@@ -114,7 +114,7 @@ pub static AMBIENT_SECTION: Section = Section {
     says: "Light from all around.",
     times: Times::UpToOnce,
     groups: &[AmbientKeys::ALL],
-    shown: &[("radiance", Shown::Live("[0.1, 0.11, 0.13]"))],
+    shown: &[("radiance", Example::Live("[0.1, 0.11, 0.13]"))],
     is_aside: false,
 };
 

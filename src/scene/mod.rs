@@ -31,13 +31,14 @@ pub mod probe_file;
 mod quality;
 mod ranges;
 mod reader;
+mod reference;
 mod shadows;
 mod shortcuts;
 mod tracking;
 
 pub use camera::{CameraSettings, PixelFormat, WantedFormat};
 pub use dictionary::Dictionary;
-pub use error::{Place, SceneError};
+pub use error::{SceneError, TextPlace};
 pub use family::{Codes, Family};
 pub use lights::unit_direction;
 pub use load::Reading;
@@ -45,9 +46,12 @@ pub use named_files::{FileKind, NamedFile};
 pub use placement::Placement;
 pub use quality::Quality;
 pub use ranges::{Digits, Numbers, Whole};
-pub use shadows::{Counting, Difference, ShadowChange, ShadowSettings, ShaftSettings, Technique};
+pub use reference::reference;
+pub use shadows::{
+    Difference, ShadowChange, ShadowSettings, ShaftSettings, Technique, VolumeCounting,
+};
 pub use shortcuts::{Shortcut, Shortcuts};
-pub use tracking::{ArucoRefinement, DetectorKind, Search, TrackingSettings};
+pub use tracking::{ArucoRefinement, DetectorKind, SearchArea, TrackingSettings};
 
 /// What one scene file says, checked.
 #[derive(Debug, Clone, Default)]

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 /// What a file is that a scene names.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FileKind {
     /// What is played: a session, a video, a folder of pictures.
     Recording,
@@ -21,6 +21,16 @@ pub enum FileKind {
 }
 
 impl FileKind {
+    /// All of them.
+    pub const ALL: [Self; 6] = [
+        Self::Recording,
+        Self::Calibration,
+        Self::Mesh,
+        Self::RoomMesh,
+        Self::Probe,
+        Self::Dictionary,
+    ];
+
     /// What is expected, in words.
     pub fn told(self) -> &'static str {
         match self {

@@ -13,7 +13,7 @@ use super::placement::{POSITION, PlacementKeys, placement};
 use super::ranges::Numbers;
 use super::reader::{Table, Value};
 use super::schema::key::Missing::{Is, Means};
-use super::schema::section::{Section, Shown, Times};
+use super::schema::section::{Example, Section, Times};
 use super::schema::values::{InWords, Vectors, Written};
 use super::{Anchor, Object};
 use crate::geometry::mesh::{Mesh, RawTriangle};
@@ -35,10 +35,10 @@ keys! {
     /// The shape of a thing.
     pub static SHAPE: ShapeKeys;
 
-    /// Required, or rect_m of a phantom. Counter-clockwise seen from outside; materials from its MTL file (Kd is taken
+    /// Its shape. Counter-clockwise seen from outside; materials from its MTL file (Kd is taken
     /// as linear reflectance, Ns or Pr as roughness), textures are not read, polygons should be convex. A phantom is
     /// always flat: normals in the file are passed over.
-    mesh: Option<PathBuf>, FileKind::Mesh => Means(None, "rect_m");
+    mesh: Option<PathBuf>, FileKind::Mesh => Means(None, "none: a phantom may have rect_m");
 }
 
 keys! {
@@ -46,7 +46,7 @@ keys! {
     pub static RECTANGLE: RectangleKeys;
 
     /// Instead of a mesh: a flat rectangle x0, y0, x1, y1 that faces +z.
-    rect_m: Written, InWords::new("[x0, y0, x1, y1] in metres") => Means(Written, "mesh");
+    rect_m: Written, InWords::new("[x0, y0, x1, y1] in metres") => Means(Written, "none: it has a mesh");
 }
 
 keys! {
@@ -118,7 +118,10 @@ pub static TABLE_SECTION: Section = Section {
     says: "The table's top, a phantom by the name of \"table\" that casts no shadow.",
     times: Times::UpToOnce,
     groups: &[TableKeys::ALL],
-    shown: &[("rect_m", Shown::Live("[-0.6, -0.5, 0.6, 0.5]"))],
+    shown: &[
+        ("rect_m", Example::Live("[-0.6, -0.5, 0.6, 0.5]")),
+        ("albedo", Example::Live("0.5")),
+    ],
     is_aside: false,
 };
 
@@ -137,13 +140,14 @@ pub static PHANTOM_SECTION: Section = Section {
         ThingKeys::ALL,
     ],
     shown: &[
-        ("name", Shown::Live("\"house\"")),
-        ("mesh", Shown::Live("\"models/house.obj\"")),
-        ("rect_m", Shown::Aside("[-0.21, -0.1485, 0.21, 0.1485]")),
-        ("on", Shown::Live("\"table\"")),
-        ("position_m", Shown::Live("[-0.055, 0.035, 0.0]")),
-        ("rotation_deg", Shown::Live("[0, 0, 20]")),
-        ("material", Shown::Live("{ albedo = [0.62, 0.55, 0.42] }")),
+        ("name", Example::Live("\"house\"")),
+        ("mesh", Example::Live("\"models/house.obj\"")),
+        ("rect_m", Example::Aside("[-0.21, -0.1485, 0.21, 0.1485]")),
+        ("on", Example::Live("\"table\"")),
+        ("position_m", Example::Live("[-0.055, 0.035, 0.0]")),
+        ("rotation_deg", Example::Live("[0, 0, 20]")),
+        ("scale", Example::Live("1")),
+        ("material", Example::Live("{ albedo = [0.62, 0.55, 0.42] }")),
     ],
     is_aside: false,
 };
@@ -162,15 +166,15 @@ pub static VIRTUAL_SECTION: Section = Section {
         VirtualKeys::ALL,
     ],
     shown: &[
-        ("name", Shown::Live("\"torus\"")),
-        ("mesh", Shown::Live("\"models/torus.obj\"")),
-        ("on", Shown::Live("\"table\"")),
-        ("position_m", Shown::Live("[0.022, 0.0, 0.036]")),
-        ("rotation_deg", Shown::Live("[70, 0, 35]")),
-        ("scale", Shown::Live("[1, 1, 1]")),
+        ("name", Example::Live("\"torus\"")),
+        ("mesh", Example::Live("\"models/torus.obj\"")),
+        ("on", Example::Live("\"table\"")),
+        ("position_m", Example::Live("[0.022, 0.0, 0.036]")),
+        ("rotation_deg", Example::Live("[70, 0, 35]")),
+        ("scale", Example::Live("[1, 1, 1]")),
         (
             "material",
-            Shown::Live("{ albedo = [0.75, 0.16, 0.12], roughness = 0.4 }"),
+            Example::Live("{ albedo = [0.75, 0.16, 0.12], roughness = 0.4 }"),
         ),
     ],
     is_aside: false,

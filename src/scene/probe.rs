@@ -15,7 +15,7 @@ use super::probe_file::{ProbeKind, read};
 use super::ranges::Numbers;
 use super::reader::{Table, Value};
 use super::schema::key::Missing::{Is, Means};
-use super::schema::section::{Section, Shown, Times};
+use super::schema::section::{Example, Section, Times};
 use super::schema::values::{InWords, Vectors, Written};
 use super::{ProbeScene, RoomPiece};
 use crate::geometry::winding::winding_number;
@@ -48,11 +48,11 @@ keys! {
     /// Its name, if it has one.
     name: Option<String> => Means(None, "none");
     /// Its shape: one of mesh, box_m and corners_m.
-    mesh: Option<PathBuf>, FileKind::RoomMesh => Means(None, "box_m or corners_m");
+    mesh: Option<PathBuf>, FileKind::RoomMesh => Means(None, "none: it has one of the others");
     /// x0, y0, z0, x1, y1, z1; lit from within where the probe was taken within, else from outside.
-    box_m: Option<[f64; 6]>, POSITION => Means(None, "mesh or corners_m");
+    box_m: Option<[f64; 6]>, POSITION => Means(None, "none: it has one of the others");
     /// Three or four corners of a flat polygon, lit from where the probe was taken.
-    corners_m: Written, InWords::new("[[x, y, z], …] in metres") => Means(Written, "mesh or box_m");
+    corners_m: Written, InWords::new("[[x, y, z], …] in metres") => Means(Written, "none: it has one of the others");
 }
 
 keys! {
@@ -71,9 +71,9 @@ pub static PROBE_SECTION: Section = Section {
     times: Times::UpToOnce,
     groups: &[ProbeKeys::ALL],
     shown: &[
-        ("image", Shown::Live("\"probe.hdr\"")),
-        ("position_m", Shown::Live("[0, 0, 0.06]")),
-        ("room", Shown::Live("\"room.obj\"")),
+        ("image", Example::Live("\"probe.hdr\"")),
+        ("position_m", Example::Live("[0, 0, 0.06]")),
+        ("room", Example::Live("\"room.obj\"")),
     ],
     is_aside: true,
 };
@@ -85,14 +85,14 @@ pub static ROOM_SECTION: Section = Section {
     times: Times::Any,
     groups: &[RoomKeys::ALL, PlacementKeys::ALL, RoomSurfaceKeys::ALL],
     shown: &[
-        ("name", Shown::Live("\"walls\"")),
-        ("mesh", Shown::Live("\"shelf.obj\"")),
-        ("box_m", Shown::Live("[-2, -1.7, -0.75, 2, 1.7, 1.75]")),
+        ("name", Example::Live("\"walls\"")),
+        ("mesh", Example::Live("\"shelf.obj\"")),
+        ("box_m", Example::Live("[-2, -1.7, -0.75, 2, 1.7, 1.75]")),
         (
             "corners_m",
-            Shown::Live("[[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]"),
+            Example::Live("[[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]"),
         ),
-        ("albedo", Shown::Live("0.7")),
+        ("albedo", Example::Live("0.7")),
     ],
     is_aside: true,
 };

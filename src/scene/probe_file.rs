@@ -21,7 +21,7 @@ const MOST_PIXELS: usize = 16384 * 8192;
 choices! {
     /// What a picture of all directions can be.
     pub enum ProbeKind, "kind of probe" {
-        /// As [`Probe`] keeps it: row 0 looks up (+z), u = (atan2(y, x) + π) / 2π.
+        /// Twice as wide as high: row 0 looks up (+z), u = (atan2(y, x) + π) / 2π.
         LatitudeLongitude = "latitude-longitude",
         /// Debevec's angular map: the distance from the middle is proportional to the angle from the direction looked along.
         Angular = "angular",

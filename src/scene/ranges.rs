@@ -83,6 +83,16 @@ impl Numbers {
         Self { digits, ..self }
     }
 
+    /// The same in another unit, of which `factor` make one of theirs.
+    pub const fn scaled(self, factor: f64, unit: &'static str) -> Self {
+        Self {
+            least: self.least * factor,
+            most: self.most * factor,
+            unit,
+            ..self
+        }
+    }
+
     /// The number where it is one of them.
     ///
     /// # Errors

@@ -10,7 +10,7 @@ use glam::DVec3;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{Place, SceneError, suggestion};
+use super::error::{SceneError, TextPlace, suggestion};
 use super::named_files::{FileKind, NamedFile};
 use super::ranges::{Numbers, Whole};
 
@@ -184,7 +184,7 @@ impl<'a> Value<'a> {
 
     /// `file:line:column`.
     pub fn location(&self) -> String {
-        let place = Place::of_span(self.document.text, self.value.span());
+        let place = TextPlace::of_span(self.document.text, self.value.span());
         format!(
             "{}:{}:{}",
             self.document.path.display(),

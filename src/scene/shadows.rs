@@ -5,7 +5,7 @@ use super::quality::Quality;
 use super::ranges::{Numbers, Whole};
 use super::reader::Table;
 use super::schema::key::Missing::{ByQuality, Is, Means};
-use super::schema::section::{Section, Shown, Times};
+use super::schema::section::{Example, Section, Times};
 use super::schema::settings::{KeyChange, Settings as _};
 use super::shortcuts::Shortcuts;
 use super::{ProbeScene, Scene};
@@ -25,7 +25,7 @@ choices! {
 
 choices! {
     /// How shadow volumes are counted.
-    pub enum Counting, "way of counting" {
+    pub enum VolumeCounting, "way of counting" {
         /// Depth-pass where it is known to be right, depth-fail elsewhere: the same picture for less.
         Auto = "auto",
         /// Depth-fail everywhere.
@@ -45,11 +45,11 @@ choices! {
 
 choices! {
     /// In which numbers light is taken out of the video.
-    pub enum Compositing, "way to composite" {
+    pub enum CompositingSpace, "way to composite" {
         /// In linear light, as `difference` says.
-        Float = "float",
+        Linear = "float",
         /// In encoded levels, as Gibson et al. 2003 had to; it takes no `difference`.
-        Levels = "ldr",
+        Encoded = "ldr",
     }
 }
 
@@ -78,7 +78,7 @@ settings! {
     /// Samples per pixel.
     samples: u32, Whole::one_of("number of samples", &[1, 4]) => ByQuality { fast: 1, balanced: 4, accurate: 4 };
     /// How volumes are counted.
-    counting: Counting => Is(Counting::Auto);
+    counting: VolumeCounting => Is(VolumeCounting::Auto);
     /// By less than this many pixels a coarser version of a thing may move its silhouette, as the camera and the lights
     /// see it; 0: things are never made coarser.
     max_silhouette_error_px: f64, Numbers::between(0.0, LARGEST_MOVE_PX).unit("px")
@@ -125,7 +125,7 @@ keys! {
     /// Shafts: how what is hidden is taken out of the video.
     difference: LinearDifference => Is(LinearDifference::Ratio);
     /// Shafts: in which numbers that is done.
-    compositing: Compositing => Is(Compositing::Float);
+    compositing: CompositingSpace => Is(CompositingSpace::Linear);
 }
 
 /// `[shadows]`.
@@ -135,8 +135,8 @@ pub static SHADOWS_SECTION: Section = Section {
     times: Times::UpToOnce,
     groups: &[ShadowKeys::ALL, ShaftKeys::ALL, DifferenceKeys::ALL],
     shown: &[
-        ("quality", Shown::Aside("\"balanced\"")),
-        ("frame_budget_ms", Shown::Aside("16.0")),
+        ("quality", Example::Aside("\"balanced\"")),
+        ("frame_budget_ms", Example::Aside("16.0")),
     ],
     is_aside: false,
 };
@@ -252,11 +252,11 @@ fn difference(table: &Table) -> Result<Difference, SceneError> {
     let difference = DIFFERENCE.difference.read(table)?;
     let compositing = DIFFERENCE.compositing.read(table)?;
     match (compositing, DIFFERENCE.difference.value(table)) {
-        (Compositing::Levels, Some(named)) => Err(DIFFERENCE.compositing.value(table).unwrap_or(named).error(
+        (CompositingSpace::Encoded, Some(named)) => Err(DIFFERENCE.compositing.value(table).unwrap_or(named).error(
             "difference is of float compositing; ldr always takes encoded levels away: leave one of the two out",
         )),
-        (Compositing::Levels, None) => Ok(Difference::Encoded),
-        (Compositing::Float, _) => Ok(match difference {
+        (CompositingSpace::Encoded, None) => Ok(Difference::Encoded),
+        (CompositingSpace::Linear, _) => Ok(match difference {
             LinearDifference::Ratio => Difference::Ratio,
             LinearDifference::Subtract => Difference::Subtract,
         }),
@@ -266,9 +266,9 @@ fn difference(table: &Table) -> Result<Difference, SceneError> {
 /// What becomes of the two keys.
 fn difference_keys(difference: Difference) -> [KeyChange; 2] {
     let (linear, compositing) = match difference {
-        Difference::Ratio => (LinearDifference::Ratio, Compositing::Float),
-        Difference::Subtract => (LinearDifference::Subtract, Compositing::Float),
-        Difference::Encoded => (LinearDifference::Ratio, Compositing::Levels),
+        Difference::Ratio => (LinearDifference::Ratio, CompositingSpace::Linear),
+        Difference::Subtract => (LinearDifference::Subtract, CompositingSpace::Linear),
+        Difference::Encoded => (LinearDifference::Ratio, CompositingSpace::Encoded),
     };
     let DifferenceKeys {
         difference: key,

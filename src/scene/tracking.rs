@@ -33,7 +33,7 @@ choices! {
 
 choices! {
     /// Where markers are looked for.
-    pub enum Search, "search" {
+    pub enum SearchArea, "search" {
         /// Where they must be by now; in the whole picture now and then, and whenever an anchor is missing.
         Near = "near",
         /// In the whole picture of every frame, and no better than `decimation` allows.
@@ -66,7 +66,7 @@ settings! {
     /// libapriltag: threads of the search.
     threads: u32, Whole::between(1, 64) => Is(1);
     /// Where markers are looked for.
-    search: Search => Is(Search::Near);
+    search: SearchArea => Is(SearchArea::Near);
     /// Poses from all pixels around the markers' edges, not from a detector's corners alone.
     pose_from_pixels: bool => Is(true);
     /// Smooth poses over time: what rests stays where it is to the bit, what moves is not held back.

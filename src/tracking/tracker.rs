@@ -10,7 +10,7 @@ use super::pixel_pose::{PixelPose, project};
 use super::{AnchorPose, Detection, Detector, TrackingError, Why};
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
-use crate::scene::{Anchor, Search, TrackingSettings};
+use crate::scene::{Anchor, SearchArea, TrackingSettings};
 
 /// The whole picture is searched again after this, even when nothing is missing, seconds.
 const SEARCH_AGAIN_SECS: f64 = 2.0;
@@ -59,7 +59,7 @@ impl Tracker {
             anchors: followed.collect::<Result<_, TrackingError>>()?,
             missing_since_secs: vec![None; anchors.len()],
             intrinsics,
-            follows: settings.search == Search::Near && settings.pose_from_pixels,
+            follows: settings.search == SearchArea::Near && settings.pose_from_pixels,
             fits_pixels: settings.pose_from_pixels,
             grey: Vec::new(),
             detections: Vec::new(),

@@ -16,7 +16,7 @@ pub struct Section {
     /// Its keys, in groups that other tables may have as well.
     pub groups: &'static [&'static [&'static dyn AnyKey]],
     /// What the reference shows for keys: their defaults without this.
-    pub shown: &'static [(&'static str, Shown)],
+    pub shown: &'static [(&'static str, Example)],
     /// Whether the reference has it in a comment alone, since a scene needs more with it than others have.
     pub is_aside: bool,
 }
@@ -36,7 +36,7 @@ pub enum Times {
 
 /// What the reference shows for a key.
 #[derive(Debug, Clone, Copy)]
-pub enum Shown {
+pub enum Example {
     /// A value, as TOML.
     Live(&'static str),
     /// A value in a comment: the default is another one.
@@ -47,6 +47,14 @@ impl Section {
     /// Its keys.
     pub fn keys(&self) -> impl Iterator<Item = &'static dyn AnyKey> {
         self.groups.iter().flat_map(|group| group.iter().copied())
+    }
+
+    /// The line that it begins with.
+    pub fn head(&self) -> String {
+        match self.times {
+            Times::Any => format!("[[{}]]", self.name),
+            Times::Once | Times::UpToOnce | Times::InBraces => format!("[{}]", self.name),
+        }
     }
 
     /// The names of its keys.

@@ -207,10 +207,7 @@ impl Described for DVec3 {
 
     fn text(&self, takes: &Vectors) -> Option<String> {
         let digits = takes.numbers.digits;
-        match takes.is_one_enough && *self == Self::splat(self.x) {
-            true => Some(digits.text(self.x)),
-            false => Some(bracketed(self.to_array().map(|part| digits.text(part)))),
-        }
+        Some(bracketed(self.to_array().map(|part| digits.text(part))))
     }
 
     fn told(takes: &Vectors) -> String {
