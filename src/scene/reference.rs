@@ -83,8 +83,7 @@ fn show_key(text: &mut String, section: &Section, key: &dyn AnyKey) {
 
 /// All of it: what a key is, what it takes, and what holds without it.
 fn sentence(key: &dyn AnyKey) -> String {
-    let says = key.says();
-    format!("{}. {}", says.trim_end_matches('.'), limits(key))
+    format!("{}. {}", key.says(), limits(key))
 }
 
 /// What a key takes, and what holds without it.

@@ -175,7 +175,8 @@ impl<T: Described, M: Absent<T>> AnyKey for Key<T, M> {
     }
 
     fn says(&self) -> String {
-        self.says.split_whitespace().collect::<Vec<_>>().join(" ")
+        let words: Vec<&str> = self.says.split_whitespace().collect();
+        words.join(" ").trim_end_matches('.').to_owned()
     }
 
     fn told(&self) -> String {

@@ -1,4 +1,5 @@
-//! How the scene's format is described: a [`Key`] says all that is known of one key, a [`Section`] has a table's keys.
+//! How the scene's format is described: a [`key::Key`] says all that is known of one key, a [`section::Section`] has a
+//! table's keys.
 //!
 //! The entries stand beside what they become: `camera.rs`, `tracking.rs`, `shadows.rs`, `anchors.rs`, `objects.rs`,
 //! `lights.rs`, `probe.rs`; `format.rs` lists the sections. From an entry come the reader and its messages, the reference

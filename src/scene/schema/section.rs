@@ -84,7 +84,7 @@ pub trait AnyKey: Sync {
     /// Its name.
     fn name(&self) -> &'static str;
 
-    /// What it is.
+    /// What it is, without a full stop.
     fn says(&self) -> String;
 
     /// What it takes, in words.
@@ -112,7 +112,6 @@ pub trait AnyKey: Sync {
     fn help(&self) -> String {
         let default = self.default_told();
         let default = default.map_or(String::new(), |told| format!("; default {told}"));
-        let says = self.says();
-        format!("{} ({}{default})", says.trim_end_matches('.'), self.told())
+        format!("{} ({}{default})", self.says(), self.told())
     }
 }
