@@ -12,7 +12,8 @@ use gnomon::app::jobs::board::Distance;
 use gnomon::app::jobs::probe::exposure_of;
 use gnomon::calibration::{Target, TargetMarkers};
 use gnomon::light::probe_maps::Circle;
-use gnomon::scene::{Family, PixelFormat, Shortcut, TrackingSettings, WantedFormat};
+use gnomon::scene::format::{ANCHOR_NAME, AnyKey as _, CAMERA, PRINTED, TRACKING};
+use gnomon::scene::{Family, PixelFormat, Shortcut, WantedFormat};
 
 /// Virtual things on a real table, lit and shadowed as if they stood there.
 #[derive(Parser)]
@@ -234,7 +235,7 @@ pub struct BoardArgs {
     #[command(flatten)]
     pub family: FamilyArgs,
     /// Name of the board
-    #[arg(long, value_name = "NAME", default_value = "table")]
+    #[arg(long, value_name = "NAME", default_value = "table", value_parser = |text: &str| ANCHOR_NAME.name.of_option(text))]
     pub name: String,
     /// Write the [[board]] to a file rather than to stdout
     #[arg(long, value_name = "FILE")]
@@ -258,8 +259,7 @@ pub struct CalibrateArgs {
     /// Write a picture of where the corners lie, how far they are off, and where there are none (PNG)
     #[arg(long, value_name = "FILE")]
     pub coverage: Option<PathBuf>,
-    /// The camera mirrors its pictures: turn them back first
-    #[arg(long)]
+    #[arg(long, help = CAMERA.mirror.says())]
     pub mirror: bool,
     /// Play a video in the window as if it were a camera
     #[arg(long)]
@@ -317,7 +317,7 @@ pub struct MarkersArgs {
     #[arg(long, value_name = "ID", default_value = "0")]
     pub first_id: u32,
     /// Name of the board
-    #[arg(long, value_name = "NAME", default_value = "table")]
+    #[arg(long, value_name = "NAME", default_value = "table", value_parser = |text: &str| ANCHOR_NAME.name.of_option(text))]
     pub name: String,
     #[command(flatten)]
     pub family: FamilyArgs,
@@ -373,14 +373,11 @@ pub struct RecordArgs {
 /// A recording or a camera that no scene describes.
 #[derive(Args)]
 pub struct RecordingArgs {
-    /// Calibration of the camera; without it the one that the recording carries
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help = CAMERA.calibration.help())]
     pub calibration: Option<PathBuf>,
-    /// The camera mirrors its pictures: turn them back first
-    #[arg(long)]
+    #[arg(long, help = CAMERA.mirror.says())]
     pub mirror: bool,
-    /// libapriltag searches pictures shrunk by this: 2 without it, 1 finds smaller markers
-    #[arg(long, value_name = "FACTOR")]
+    #[arg(long, value_name = "FACTOR", help = TRACKING.decimation.help(), value_parser = |text: &str| TRACKING.decimation.of_option(text))]
     pub decimation: Option<f64>,
     #[command(flatten)]
     pub wanted: WantedArgs,
@@ -389,14 +386,11 @@ pub struct RecordingArgs {
 /// What a webcam is asked for.
 #[derive(Args)]
 pub struct WantedArgs {
-    /// Ask a webcam for pictures of this size; without it the calibration's
-    #[arg(long, value_name = "WxH", value_parser = size_of)]
+    #[arg(long, value_name = "WxH", help = CAMERA.size_px.help(), value_parser = |text: &str| CAMERA.size_px.of_option(text))]
     pub size: Option<[u32; 2]>,
-    /// Ask a webcam for this rate
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(long, value_name = "N", help = CAMERA.fps.help(), value_parser = |text: &str| CAMERA.fps.of_option(text))]
     pub fps: Option<u32>,
-    /// Ask a webcam for this format: MJPEG, YUYV, NV12, GREY, RGB, BGR
-    #[arg(long, value_name = "NAME", value_parser = pixel_format_of)]
+    #[arg(long, value_name = "NAME", help = CAMERA.format.help(), value_parser = |text: &str| CAMERA.format.of_option(text))]
     pub format: Option<PixelFormat>,
 }
 
@@ -489,8 +483,11 @@ pub struct FamilyArgs {
     /// Family of the markers: tag16h5, tag25h9, tag36h10, tag36h11, DICT_4X4_50, …, or a dictionary's file (.yml)
     #[arg(long, value_name = "NAME", default_value = "tag36h11", value_parser = family_of, requires = "size_mm")]
     pub family: Family,
-    /// Width of the markers' black border, cells: 1, or 2 as on Kalibr's AprilGrids
-    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=2), requires = "size_mm")]
+    #[arg(
+        long, value_name = "N", default_value_t = *PRINTED.border_cells.default(), requires = "size_mm",
+        help = PRINTED.border_cells.help(), hide_default_value = true,
+        value_parser = |text: &str| PRINTED.border_cells.of_option(text)
+    )]
     pub border_cells: u32,
 }
 
@@ -600,8 +597,7 @@ fn seconds_of(written: &str) -> Result<f64, String> {
 
 impl RecordingArgs {
     pub fn decimation(&self) -> f64 {
-        self.decimation
-            .unwrap_or(TrackingSettings::default().decimation)
+        self.decimation.unwrap_or(*TRACKING.decimation.default())
     }
 
     /// A scene says all of this itself.
@@ -638,19 +634,83 @@ fn family_of(name: &str) -> Result<Family, String> {
     })
 }
 
-fn size_of(written: &str) -> Result<[u32; 2], String> {
-    let side = |side: &str| side.parse().ok().filter(|side| (1..=32768).contains(side));
-    written
-        .split_once('x')
-        .and_then(|(width, height)| Some([side(width)?, side(height)?]))
-        .ok_or_else(|| "not a size; write WIDTHxHEIGHT, as 1280x720".to_owned())
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
 
-fn pixel_format_of(name: &str) -> Result<PixelFormat, String> {
-    let mut known = PixelFormat::BY_NAME.into_iter();
-    let found = known.find(|(known, _)| known.eq_ignore_ascii_case(name));
-    found.map(|(_, format)| format).ok_or_else(|| {
-        let allowed: Vec<&str> = PixelFormat::BY_NAME.iter().map(|(name, _)| *name).collect();
-        format!("unknown format; allowed: {}", allowed.join(", "))
-    })
+    use clap::CommandFactory as _;
+    use gnomon::scene::format::SECTIONS;
+
+    /// What is refused in a scene's file is refused here.
+    #[test]
+    fn options_take_what_the_keys_of_their_names_take() {
+        let track = "track a.mp4 --size-mm 40 --poses p.csv";
+        let record = "record webcam:0 --out s";
+        for (command, refused, allowed) in [
+            (track, "--decimation 12", "1 to 8"),
+            (track, "--decimation 0.5", "1 to 8"),
+            (track, "--decimation nan", "1 to 8"),
+            (track, "--border-cells 3", "1 to 2"),
+            (record, "--fps 0", "1 to 1000"),
+            (record, "--fps 1001", "1 to 1000"),
+            (record, "--size 40000x480", "1 to 32768"),
+            (record, "--size 640", "WIDTHxHEIGHT"),
+            (record, "--format YUV", "MJPEG, YUYV"),
+            (
+                "board --from a --size-mm 40",
+                "--name a,b",
+                "without commas",
+            ),
+            (
+                "markers --ids 1 --size-mm 40 --out a.pdf",
+                "--name a;b",
+                "without commas",
+            ),
+        ] {
+            let parsed = |more: &str| {
+                let words = format!("gnomon {command} {more}");
+                Cli::try_parse_from(words.split_whitespace()).map(|_| ())
+            };
+            assert!(parsed("").is_ok(), "{command}");
+            let message = parsed(refused).unwrap_err().to_string();
+            assert!(message.contains(allowed), "{refused}: {message}");
+        }
+        let words =
+            "gnomon record webcam:0 --out s --decimation 8 --fps 30 --size 640x480 --format yuyv";
+        assert!(Cli::try_parse_from(words.split_whitespace()).is_ok());
+    }
+
+    /// An option that gets the name of a key belongs above.
+    #[test]
+    fn these_options_have_the_names_of_keys() {
+        let keys: BTreeSet<String> = SECTIONS
+            .iter()
+            .flat_map(|section| section.names())
+            .map(|name| name.replace('_', "-"))
+            .collect();
+        let command = Cli::command();
+        let options = command
+            .get_subcommands()
+            .flat_map(clap::Command::get_arguments);
+        let shared: BTreeSet<&str> = options
+            .filter_map(|option| option.get_long())
+            .filter(|name| keys.contains(*name))
+            .collect();
+        let expected = [
+            "border-cells",
+            "calibration",
+            "decimation",
+            "family",
+            "format",
+            "fps",
+            // Of the pictures that a probe is made from, not of the probe.
+            "kind",
+            // A file to write.
+            "markers",
+            "mirror",
+            "name",
+        ];
+        assert_eq!(shared, BTreeSet::from(expected));
+    }
 }

@@ -26,6 +26,7 @@ use gnomon::app::jobs::track::{self, is_scene, track};
 use gnomon::app::live;
 use gnomon::app::stages::report::Report;
 use gnomon::capture::live::is_live;
+use gnomon::scene::format::MARKER;
 use gnomon::scene::{CameraSettings, Scene};
 use gnomon::tracking::mapping::MapSettings;
 
@@ -342,10 +343,11 @@ fn camera_of(source: &Path, args: &RecordingArgs) -> Result<CameraSettings> {
 }
 
 fn size_m(size_mm: f64) -> Result<f64> {
-    if !(0.1..=1e5).contains(&size_mm) {
-        bail!("--size-mm {size_mm}: out of range; allowed: 0.1 to 100000 mm");
+    let millimetres = MARKER.size_m.takes.scaled(1e3, "mm");
+    match millimetres.check(size_mm) {
+        Ok(size_mm) => Ok(size_mm * 1e-3),
+        Err(refusal) => bail!("--size-mm {size_mm}: {refusal}"),
     }
-    Ok(size_mm * 1e-3)
 }
 
 /// What an interrupt sets. A second one does not wait for a job that cannot end, as one that writes to a pipe which nobody

@@ -89,7 +89,7 @@ impl Casters {
             shadows: (0..light_count).map(of_light).collect(),
             light_group: gpu.bind_group(&LIGHT_GROUP, [lights.binding()]),
             lights,
-            depth_pass: shadows.counting == scene::Counting::Auto
+            depth_pass: shadows.counting == scene::VolumeCounting::Auto
                 && !shadows.without.has(Shortcut::DepthPass),
             forgets: shadows.without.has(Shortcut::Kept),
         }

@@ -6,14 +6,118 @@ use glam::DVec2;
 
 use super::error::{SceneError, suggestion};
 use super::named_files::FileKind;
-use super::reader::{Numbers, Table, Value};
+use super::placement::ANGLE;
+use super::ranges::{Digits, Numbers, Whole};
+use super::reader::{Table, Value};
+use super::schema::key::Missing::{Is, Means};
+use super::schema::section::{Example, Section, Times};
+use super::schema::values::{InWords, Written};
 use super::{Anchor, DetectorKind, Family, Marker};
 
+/// A print is measured with a caliper, to 0.01 mm.
+const PRINT: Digits = Digits::Decimals(5);
 /// Side of a marker: below a tenth of a millimetre nothing is seen.
-const SIZE: Numbers = Numbers::between(1e-4, 100.0, "m");
-const CENTER: Numbers = Numbers::between(-100.0, 100.0, "m");
-/// Angles of any number of turns.
-pub const ANGLE: Numbers = Numbers::between(-1e6, 1e6, "degrees");
+const SIZE: Numbers = Numbers::between(1e-4, 100.0).unit("m").digits(PRINT);
+const CENTER: Numbers = Numbers::between(-100.0, 100.0).unit("m").digits(PRINT);
+
+keys! {
+    /// The name of a board or a lone marker.
+    pub static ANCHOR_NAME: AnchorNameKeys;
+    required {
+        /// No other board or marker may have it.
+        name: String => "a name in quotes is expected";
+    }
+}
+
+keys! {
+    /// How markers are printed.
+    pub static PRINTED: PrintedKeys;
+
+    /// AprilTag: "tag16h5", "tag25h9", "tag36h10", "tag36h11". ArUco: "DICT_4X4_50" … "DICT_7X7_1000" (4 to 7 cells; 50,
+    /// 100, 250 or 1000 markers) and "DICT_ARUCO_ORIGINAL". Or a dictionary's file, as OpenCV's writeDictionary writes it.
+    family: Written, InWords::file("a family, or a file (.yml)", FileKind::Dictionary) => Means(Written, "\"tag36h11\"");
+    /// Width of the black border: 2 as on Kalibr's AprilGrids. A marker of another border is another marker.
+    border_cells: u32, Whole::between(*Family::BORDERS.start(), *Family::BORDERS.end()).unit("cells") => Is(1);
+}
+
+keys! {
+    /// A marker.
+    pub static MARKER: MarkerKeys;
+    required {
+        /// Its number in the family; a marker belongs to one board or stands alone, not both.
+        id: Written, InWords::new("a number of the family") => "the marker's number in its family is expected";
+        /// Side of its black square.
+        size_m: f64, SIZE => "the side of the black square in metres is expected";
+    }
+}
+
+keys! {
+    /// A marker's place on its board.
+    pub static ON_BOARD: OnBoardKeys;
+    required {
+        /// In the board's frame.
+        center_m: [f64; 2], CENTER => "two numbers in metres are expected";
+    }
+    /// Turn in the board's plane, counter-clockwise.
+    rotation_deg: f64, ANGLE => Is(0.0);
+}
+
+keys! {
+    /// The markers of a board.
+    pub static BOARD: BoardKeys;
+    required {
+        /// Its markers, at least one.
+        markers: Written, InWords::parts("a list of tables", &BOARD_MARKER_SECTION)
+            => "a list of { id, size_m, center_m, rotation_deg = 0 } is expected";
+    }
+}
+
+/// An entry of a board's `markers`.
+pub static BOARD_MARKER_SECTION: Section = Section {
+    name: "markers",
+    says: "A marker of a board.",
+    times: Times::InBraces,
+    groups: &[MarkerKeys::ALL, OnBoardKeys::ALL],
+    shown: &[],
+    is_aside: false,
+};
+
+/// `[[board]]`.
+pub static BOARD_SECTION: Section = Section {
+    name: "board",
+    says: "Rigid boards of markers; the first is the world. A scene needs at least one board or marker.",
+    times: Times::Any,
+    groups: &[AnchorNameKeys::ALL, PrintedKeys::ALL, BoardKeys::ALL],
+    shown: &[
+        ("name", Example::Live("\"table\"")),
+        ("family", Example::Live("\"tag36h11\"")),
+        (
+            "markers",
+            Example::Live(
+                "[\n    { id = 0, size_m = 0.045, center_m = [-0.175, 0.115], rotation_deg = 0 },\n    \
+                 { id = 1, size_m = 0.045, center_m = [0.175, 0.115] },\n    \
+                 { id = 2, size_m = 0.045, center_m = [-0.175, -0.115] },\n    \
+                 { id = 3, size_m = 0.045, center_m = [0.175, -0.115] },\n]",
+            ),
+        ),
+    ],
+    is_aside: false,
+};
+
+/// `[[marker]]`.
+pub static MARKER_SECTION: Section = Section {
+    name: "marker",
+    says: "Lone markers, each with a frame of its own at its centre.",
+    times: Times::Any,
+    groups: &[AnchorNameKeys::ALL, PrintedKeys::ALL, MarkerKeys::ALL],
+    shown: &[
+        ("name", Example::Live("\"card\"")),
+        ("family", Example::Live("\"tag36h11\"")),
+        ("id", Example::Live("17")),
+        ("size_m", Example::Live("0.036")),
+    ],
+    is_aside: false,
+};
 
 /// The anchors, boards first.
 pub fn anchors(root: &Table, detector: DetectorKind) -> Result<Vec<Anchor>, SceneError> {
@@ -23,13 +127,10 @@ pub fn anchors(root: &Table, detector: DetectorKind) -> Result<Vec<Anchor>, Scen
         owners: HashMap::new(),
     };
     let mut anchors = Vec::new();
-    for board in root.tables("board", &["name", "family", "border_cells", "markers"])? {
+    for board in BOARD_SECTION.tables(root)? {
         anchors.push(reader.board(&board)?);
     }
-    for marker in root.tables(
-        "marker",
-        &["name", "family", "border_cells", "id", "size_m"],
-    )? {
+    for marker in MARKER_SECTION.tables(root)? {
         anchors.push(reader.lone_marker(&marker)?);
     }
     if anchors.is_empty() {
@@ -49,18 +150,16 @@ impl AnchorReader {
     fn board(&mut self, board: &Table) -> Result<Anchor, SceneError> {
         let name = self.name(board)?;
         let family = self.family(board)?;
-        let what = "a list of { id, size_m, center_m, rotation_deg = 0 } is expected";
-        let listed = board.required("markers", what)?;
+        let listed = BOARD.markers.require(board)?;
         let mut markers = Vec::new();
         for entry in listed.array("tables")? {
-            let entry = entry.table(&["id", "size_m", "center_m", "rotation_deg"])?;
-            let center = entry.required("center_m", "two numbers in metres are expected")?;
+            let entry = BOARD_MARKER_SECTION.table_of(&entry)?;
             markers.push(Marker {
                 family,
                 id: self.id(&entry, family, &name)?,
-                size_m: size(&entry)?,
-                center_m: DVec2::from_array(center.numbers(&CENTER)?),
-                rotation_rad: entry.number_or("rotation_deg", 0.0, &ANGLE)?.to_radians(),
+                size_m: MARKER.size_m.read(&entry)?,
+                center_m: DVec2::from_array(ON_BOARD.center_m.read(&entry)?),
+                rotation_rad: ON_BOARD.rotation_deg.read(&entry)?.to_radians(),
             });
         }
         if markers.is_empty() {
@@ -73,26 +172,23 @@ impl AnchorReader {
         let name = self.name(marker)?;
         let family = self.family(marker)?;
         let id = self.id(marker, family, &name)?;
-        let size_m = size(marker)?;
+        let size_m = MARKER.size_m.read(marker)?;
         Ok(Anchor::lone(name, family, id, size_m))
     }
 
     fn name(&mut self, table: &Table) -> Result<String, SceneError> {
-        unique_name(table, &mut self.name_lines)
+        unique_name(&ANCHOR_NAME.name.require(table)?, &mut self.name_lines)
     }
 
     fn family(&self, table: &Table) -> Result<Family, SceneError> {
-        let family = match table.optional("family") {
+        let family = match PRINTED.family.value(table) {
             Some(written) => self.named_family(&written)?,
             None => Family::TAG36H11,
         };
-        let Some(border) = table.optional("border_cells") else {
-            return Ok(family);
-        };
-        let border_cells = border.integer(Family::BORDERS)?;
+        let border_cells = PRINTED.border_cells.read(table)?;
         family
             .with_border(border_cells)
-            .ok_or_else(|| border.error("no marker is printed so"))
+            .ok_or_else(|| table.error("no marker is printed so"))
     }
 
     fn named_family(&self, value: &Value) -> Result<Family, SceneError> {
@@ -116,12 +212,14 @@ impl AnchorReader {
     }
 
     fn id(&mut self, table: &Table, family: Family, anchor: &str) -> Result<u32, SceneError> {
-        let value = table.required("id", "the marker's number in its family is expected")?;
+        let value = MARKER.id.require(table)?;
         let last = family.id_count() - 1;
-        let id = value.integer(0..=last).map_err(|mut error| {
-            error.message += &format!(" (the ids of {})", family.name());
-            error
-        })?;
+        let id = value
+            .integer(&Whole::between(0, last))
+            .map_err(|mut error| {
+                error.message += &format!(" (the ids of {})", family.name());
+                error
+            })?;
         match self.owners.insert((family, id), (anchor.to_owned(), value.line())) {
             Some((owner, line)) => Err(value.error(format!(
                 "marker {id} of {family} is taken by \"{owner}\" on line {line}; allowed: each marker once"
@@ -133,10 +231,9 @@ impl AnchorReader {
 
 /// A name that no other of its kind has.
 pub fn unique_name(
-    table: &Table,
+    value: &Value,
     lines: &mut HashMap<String, usize>,
 ) -> Result<String, SceneError> {
-    let value: Value = table.required("name", "a name in quotes is expected")?;
     let name = value.name()?;
     match lines.insert(name.clone(), value.line()) {
         Some(line) => Err(value.error(format!(
@@ -144,13 +241,4 @@ pub fn unique_name(
         ))),
         None => Ok(name),
     }
-}
-
-fn size(table: &Table) -> Result<f64, SceneError> {
-    table
-        .required(
-            "size_m",
-            "the side of the black square in metres is expected",
-        )?
-        .number(&SIZE)
 }

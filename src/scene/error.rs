@@ -16,14 +16,14 @@ pub struct SceneError {
     /// The file with the mistake: the scene's, or a mesh's.
     pub file: PathBuf,
     /// `None` where the mistake has no place, such as a file that cannot be read.
-    pub place: Option<Place>,
+    pub place: Option<TextPlace>,
     /// What is wrong and what is allowed, on one line.
     pub message: String,
 }
 
 /// A place in a text file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Place {
+pub struct TextPlace {
     /// From 1.
     pub line: usize,
     /// In characters, from 1.
@@ -56,7 +56,7 @@ impl SceneError {
     ) -> Self {
         Self {
             file: file.into(),
-            place: Some(Place::of_span(text, span)),
+            place: Some(TextPlace::of_span(text, span)),
             message: one_line(&message.into()),
         }
     }
@@ -64,7 +64,7 @@ impl SceneError {
 
 impl fmt::Display for SceneError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Some(Place {
+        let Some(TextPlace {
             line,
             column,
             width,
@@ -97,7 +97,7 @@ impl fmt::Display for SceneError {
     }
 }
 
-impl Place {
+impl TextPlace {
     /// Finds a span of bytes in a text; a span beyond it is at its end.
     pub fn of_span(text: &str, span: Range<usize>) -> Self {
         let start = floor_char_boundary(text, span.start);
@@ -153,14 +153,14 @@ mod tests {
     #[test]
     fn places_count_characters_and_survive_odd_spans() {
         let text = "a = 1\r\nnäme = \"x\"\n";
-        let place = Place::of_span(text, 15..18);
+        let place = TextPlace::of_span(text, 15..18);
         assert_eq!(
             (place.line, place.column, place.width, place.text.as_str()),
             (2, 8, 3, "näme = \"x\"")
         );
-        assert_eq!(Place::of_span(text, 900..901).line, 3);
-        assert_eq!(Place::of_span("", 0..0).column, 1);
-        assert_eq!(Place::of_span("ab\ncd", 1..5).width, 1);
+        assert_eq!(TextPlace::of_span(text, 900..901).line, 3);
+        assert_eq!(TextPlace::of_span("", 0..0).column, 1);
+        assert_eq!(TextPlace::of_span("ab\ncd", 1..5).width, 1);
     }
 
     #[test]

@@ -7,13 +7,7 @@ use toml::de::DeTable;
 use super::error::SceneError;
 use super::named_files::NamedFile;
 use super::reader::{Document, Table};
-use super::{Scene, anchors, lights, objects, probe, settings};
-
-/// What may stand at the outermost level.
-const TABLES: [&str; 12] = [
-    "camera", "tracking", "board", "marker", "phantom", "virtual", "light", "ambient", "table",
-    "shadows", "probe", "room",
-];
+use super::{Scene, anchors, camera, format, lights, objects, probe, shadows, tracking};
 
 /// What reading a scene's text gave.
 #[derive(Debug)]
@@ -73,14 +67,14 @@ impl Scene {
             let span = error.span().unwrap_or(text.len()..text.len());
             document.error(span, format!("not TOML: {}", error.message()))
         })?;
-        let root = Table::root(document, &tree, &TABLES)?;
-        let camera = settings::camera(&root)?;
-        let tracking = settings::tracking(&root)?;
+        let root = Table::root(document, &tree, &format::section_names())?;
+        let camera = camera::camera(&root)?;
+        let tracking = tracking::tracking(&root)?;
         let anchors = anchors::anchors(&root, tracking.detector)?;
         let lights = lights::lights(&root)?;
         let ambient_radiance = lights::ambient_radiance(&root)?;
         let probe = probe::probe(&root)?;
-        let shadows = settings::shadows(&root, probe.as_ref())?;
+        let shadows = shadows::shadows(&root, probe.as_ref())?;
         let (phantoms, virtuals) = objects::objects(&root, &anchors)?;
         Ok(Self {
             camera,

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 /// What a file is that a scene names.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FileKind {
     /// What is played: a session, a video, a folder of pictures.
     Recording,
@@ -18,6 +18,29 @@ pub enum FileKind {
     Probe,
     /// A dictionary of markers (YAML).
     Dictionary,
+}
+
+impl FileKind {
+    /// All of them.
+    pub const ALL: [Self; 6] = [
+        Self::Recording,
+        Self::Calibration,
+        Self::Mesh,
+        Self::RoomMesh,
+        Self::Probe,
+        Self::Dictionary,
+    ];
+
+    /// What is expected, in words.
+    pub fn told(self) -> &'static str {
+        match self {
+            Self::Recording => "a session, a video or a folder of pictures",
+            Self::Calibration => "a calibration's file",
+            Self::Mesh | Self::RoomMesh => "an OBJ file",
+            Self::Probe => "a picture in linear radiance, .hdr or .exr",
+            Self::Dictionary => "a dictionary of markers, .yml",
+        }
+    }
 }
 
 /// A file that a scene names, and that is there.

@@ -26,7 +26,7 @@ pub struct ScannedObj {
 /// Checks an OBJ file's records.
 pub fn scan_obj(text: &str) -> Result<ScannedObj, ScanError> {
     let mut scanned = ScannedObj::default();
-    let mut places: Vec<Place> = Vec::new();
+    let mut places: Vec<CornerPlace> = Vec::new();
     let mut normals = 0_usize;
     let mut polygons = Polygons::default();
     for line in text.lines() {
@@ -57,7 +57,7 @@ pub fn scan_obj(text: &str) -> Result<ScannedObj, ScanError> {
             Some("f") => {
                 let mut corners = words
                     .map(|corner| record.corner(corner, places.len(), normals))
-                    .collect::<Result<Vec<Corner>, ScanError>>()?;
+                    .collect::<Result<Vec<FaceCorner>, ScanError>>()?;
                 if corners.len() < 3 {
                     return Err(record.error(
                         line.trim(),
@@ -128,7 +128,7 @@ pub fn scan_mtl(text: &str) -> Result<(), ScanError> {
 }
 
 /// A face's corner.
-struct Corner<'a> {
+struct FaceCorner<'a> {
     written: &'a str,
     /// Index of its vertex, from 0.
     vertex: usize,
@@ -136,22 +136,23 @@ struct Corner<'a> {
 }
 
 /// A vertex's coordinates, bit by bit.
-type Place = [u32; 3];
+type CornerPlace = [u32; 3];
 
 /// Polygons by the places of their vertices. A fan starts at the first vertex, so the same polygon twice, or once from
 /// each side, could be cut along different diagonals; here copies start where the first one does.
 #[derive(Default)]
 struct Polygons {
-    start_of: HashMap<Vec<Place>, Place>,
+    start_of: HashMap<Vec<CornerPlace>, CornerPlace>,
 }
 
 impl Polygons {
-    fn start_alike(&mut self, corners: &mut [Corner], places: &[Place]) {
+    fn start_alike(&mut self, corners: &mut [FaceCorner], places: &[CornerPlace]) {
         // A triangle has no diagonal.
         if corners.len() == 3 {
             return;
         }
-        let mut key: Vec<Place> = corners.iter().map(|corner| places[corner.vertex]).collect();
+        let mut key: Vec<CornerPlace> =
+            corners.iter().map(|corner| places[corner.vertex]).collect();
         let first = key[0];
         key.sort_unstable();
         let start = *self.start_of.entry(key).or_insert(first);
@@ -198,7 +199,7 @@ impl Record<'_> {
         corner: &'b str,
         vertices: usize,
         normals: usize,
-    ) -> Result<Corner<'b>, ScanError> {
+    ) -> Result<FaceCorner<'b>, ScanError> {
         let mut parts = corner.split('/');
         let vertex = parts.next().unwrap_or_default();
         let vertex = self.index(corner, vertex, vertices, "vertex", "vertices")?;
@@ -214,7 +215,7 @@ impl Record<'_> {
         if let Some(normal) = normal {
             self.index(corner, normal, normals, "normal", "normals")?;
         }
-        Ok(Corner {
+        Ok(FaceCorner {
             written: corner,
             vertex,
             has_normal: normal.is_some(),

@@ -1,76 +1,223 @@
-//! Reads `[[phantom]]`, `[[virtual]]` and `[table]`.
+//! `[[phantom]]`, `[[virtual]]` and `[table]`: the things.
 
 use std::collections::HashMap;
+use std::path::PathBuf;
 
 use glam::{DAffine3, DVec3, Vec3};
 
-use super::anchors::{ANGLE, unique_name};
+use super::anchors::unique_name;
 use super::error::{SceneError, suggestion};
-use super::lights::POSITION;
 use super::mesh_file::{self, DEFAULT_ALBEDO, LoadedMesh};
 use super::named_files::FileKind;
-use super::reader::{Numbers, Table, Value};
-use super::{Anchor, Object, Placement};
+use super::placement::{POSITION, PlacementKeys, placement};
+use super::ranges::Numbers;
+use super::reader::{Table, Value};
+use super::schema::key::Missing::{Is, Means};
+use super::schema::section::{Example, Section, Times};
+use super::schema::values::{InWords, Vectors, Written};
+use super::{Anchor, Object};
 use crate::geometry::mesh::{Mesh, RawTriangle};
 use crate::light::Material;
 
-pub const ALBEDO: Numbers = Numbers::between(0.0, 1.0, "");
-const ROUGHNESS: Numbers = Numbers::above(0.0, 1.0, "");
-const CREASE: Numbers = Numbers::between(0.0, 180.0, "degrees");
-const DEFAULT_CREASE_DEG: f64 = 30.0;
-/// Size of a scale's number; its sign is free.
-const SCALE: Numbers = Numbers::between(1e-6, 1e6, "in size; a negative one mirrors");
+/// Diffuse reflectance.
+pub const ALBEDO: Vectors = Vectors::one_or_three(Numbers::between(0.0, 1.0));
+
+keys! {
+    /// The name of a thing.
+    pub static THING_NAME: ThingNameKeys;
+    required {
+        /// No other phantom or virtual thing may have it.
+        name: String => "a name in quotes is expected";
+    }
+}
+
+keys! {
+    /// The shape of a thing.
+    pub static SHAPE: ShapeKeys;
+
+    /// Its shape. Counter-clockwise seen from outside; materials from its MTL file (Kd is taken
+    /// as linear reflectance, Ns or Pr as roughness), textures are not read, polygons should be convex. A phantom is
+    /// always flat: normals in the file are passed over.
+    mesh: Option<PathBuf>, FileKind::Mesh => Means(None, "none: a phantom may have rect_m");
+}
+
+keys! {
+    /// The other shape, of phantoms.
+    pub static RECTANGLE: RectangleKeys;
+
+    /// Instead of a mesh: a flat rectangle x0, y0, x1, y1 that faces +z.
+    rect_m: Written, InWords::new("[x0, y0, x1, y1] in metres") => Means(Written, "none: it has a mesh");
+}
+
+keys! {
+    /// What a thing stands on.
+    pub static STANDING: StandingKeys;
+
+    /// The board or marker that it stands on.
+    on: Written, InWords::new("a board's or a marker's name") => Means(Written, "the world");
+}
+
+keys! {
+    /// How a thing looks and whether it is there.
+    pub static THING: ThingKeys;
+
+    /// Each key of it that is given replaces that of every material of the mesh.
+    material: Written, InWords::parts("a table", &MATERIAL_SECTION) => Means(Written, "what the MTL file says");
+    /// It takes light away from others.
+    casts: bool => Is(true);
+    /// It is there; what is not neither shows, nor casts, nor catches shadows.
+    visible: bool => Is(true);
+}
+
+keys! {
+    /// What only virtual things have.
+    pub static VIRTUAL: VirtualKeys;
+
+    /// Where the file has no normals, faces that meet at up to this angle look like one smooth surface; 0 is flat.
+    smooth_deg: f64, Numbers::between(0.0, 180.0).unit("degrees") => Is(30.0);
+}
+
+keys! {
+    /// What a surface is made of.
+    pub static MATERIAL: MaterialKeys;
+
+    /// Diffuse reflectance, linear RGB.
+    albedo: Option<DVec3>, ALBEDO => Means(None, "what the MTL file says, else 0.5");
+    /// Of a GGX layer over it.
+    roughness: Option<f64>, Numbers::above(0.0, 1.0) => Means(None, "what the MTL file says, else none: the surface is matt");
+}
+
+keys! {
+    /// Keys of `[table]`.
+    pub static TABLE: TableKeys;
+    required {
+        /// x0, y0, x1, y1 in the world.
+        rect_m: Written, InWords::new("[x0, y0, x1, y1] in metres") => "[x0, y0, x1, y1] in metres is expected";
+    }
+    /// Its z in the world.
+    height_m: f64, POSITION => Is(0.0);
+    /// Diffuse reflectance, linear RGB.
+    albedo: DVec3, ALBEDO => Is(DVec3::splat(DEFAULT_ALBEDO));
+    /// It is there; what is not neither shows, nor catches shadows.
+    visible: bool => Is(true);
+}
+
+/// A thing's `material`.
+pub static MATERIAL_SECTION: Section = Section {
+    name: "material",
+    says: "What a surface is made of.",
+    times: Times::InBraces,
+    groups: &[MaterialKeys::ALL],
+    shown: &[],
+    is_aside: false,
+};
+
+/// `[table]`.
+pub static TABLE_SECTION: Section = Section {
+    name: "table",
+    says: "The table's top, a phantom by the name of \"table\" that casts no shadow.",
+    times: Times::UpToOnce,
+    groups: &[TableKeys::ALL],
+    shown: &[
+        ("rect_m", Example::Live("[-0.6, -0.5, 0.6, 0.5]")),
+        ("albedo", Example::Live("0.5")),
+    ],
+    is_aside: false,
+};
+
+/// `[[phantom]]`.
+pub static PHANTOM_SECTION: Section = Section {
+    name: "phantom",
+    says: "Coarse models of real things. Never drawn; they hide virtual things, catch their shadows and cast their own on \
+           them.",
+    times: Times::Any,
+    groups: &[
+        ThingNameKeys::ALL,
+        ShapeKeys::ALL,
+        RectangleKeys::ALL,
+        StandingKeys::ALL,
+        PlacementKeys::ALL,
+        ThingKeys::ALL,
+    ],
+    shown: &[
+        ("name", Example::Live("\"house\"")),
+        ("mesh", Example::Live("\"models/house.obj\"")),
+        ("rect_m", Example::Aside("[-0.21, -0.1485, 0.21, 0.1485]")),
+        ("on", Example::Live("\"table\"")),
+        ("position_m", Example::Live("[-0.055, 0.035, 0.0]")),
+        ("rotation_deg", Example::Live("[0, 0, 20]")),
+        ("scale", Example::Live("1")),
+        ("material", Example::Live("{ albedo = [0.62, 0.55, 0.42] }")),
+    ],
+    is_aside: false,
+};
+
+/// `[[virtual]]`.
+pub static VIRTUAL_SECTION: Section = Section {
+    name: "virtual",
+    says: "What only the picture shows.",
+    times: Times::Any,
+    groups: &[
+        ThingNameKeys::ALL,
+        ShapeKeys::ALL,
+        StandingKeys::ALL,
+        PlacementKeys::ALL,
+        ThingKeys::ALL,
+        VirtualKeys::ALL,
+    ],
+    shown: &[
+        ("name", Example::Live("\"torus\"")),
+        ("mesh", Example::Live("\"models/torus.obj\"")),
+        ("on", Example::Live("\"table\"")),
+        ("position_m", Example::Live("[0.022, 0.0, 0.036]")),
+        ("rotation_deg", Example::Live("[70, 0, 35]")),
+        ("scale", Example::Live("[1, 1, 1]")),
+        (
+            "material",
+            Example::Live("{ albedo = [0.75, 0.16, 0.12], roughness = 0.4 }"),
+        ),
+    ],
+    is_aside: false,
+};
 
 #[derive(Clone, Copy, PartialEq)]
-enum Kind {
+enum ThingKind {
     Phantom,
     Virtual,
 }
 
 /// The phantoms, the table top first, and the virtual things.
 pub fn objects(root: &Table, anchors: &[Anchor]) -> Result<(Vec<Object>, Vec<Object>), SceneError> {
-    const KEYS: [&str; 11] = [
-        "name",
-        "mesh",
-        "rect_m",
-        "on",
-        "position_m",
-        "rotation_deg",
-        "scale",
-        "material",
-        "casts",
-        "visible",
-        "smooth_deg",
-    ];
-    let shape_keys = |without: &str| {
-        KEYS.into_iter()
-            .filter(|key| *key != without)
-            .collect::<Vec<_>>()
-    };
     let mut name_lines = HashMap::new();
     let mut phantoms = Vec::new();
-    if let Some(table) = root.optional("table") {
-        name_lines.insert("table".to_owned(), table.line());
-        phantoms.push(table_top(&table)?);
+    if let Some(table) = root.optional(TABLE_SECTION.name) {
+        name_lines.insert(TABLE_SECTION.name.to_owned(), table.line());
+        phantoms.push(table_top(&TABLE_SECTION.table_of(&table)?)?);
     }
-    for table in root.tables("phantom", &shape_keys("smooth_deg"))? {
-        phantoms.push(object(&table, Kind::Phantom, anchors, &mut name_lines)?);
+    for table in PHANTOM_SECTION.tables(root)? {
+        phantoms.push(object(
+            &table,
+            ThingKind::Phantom,
+            anchors,
+            &mut name_lines,
+        )?);
     }
     let mut virtuals = Vec::new();
-    for table in root.tables("virtual", &shape_keys("rect_m"))? {
-        virtuals.push(object(&table, Kind::Virtual, anchors, &mut name_lines)?);
+    for table in VIRTUAL_SECTION.tables(root)? {
+        virtuals.push(object(
+            &table,
+            ThingKind::Virtual,
+            anchors,
+            &mut name_lines,
+        )?);
     }
     Ok((phantoms, virtuals))
 }
 
-fn table_top(value: &Value) -> Result<Object, SceneError> {
-    let table = value.table(&["rect_m", "height_m", "albedo", "visible"])?;
-    let rect = table.required("rect_m", "[x0, y0, x1, y1] in metres is expected")?;
-    let albedo = table
-        .optional("albedo")
-        .map(|value| value.splat_or_vector(&ALBEDO))
-        .transpose()?;
-    let height_m = table.number_or("height_m", 0.0, &POSITION)?;
+fn table_top(table: &Table) -> Result<Object, SceneError> {
+    let rect = TABLE.rect_m.require(table)?;
+    let albedo = TABLE.albedo.read(table)?;
+    let height_m = TABLE.height_m.read(table)?;
     let LoadedMesh {
         mesh,
         report,
@@ -78,51 +225,51 @@ fn table_top(value: &Value) -> Result<Object, SceneError> {
         ..
     } = rectangle(&rect, albedo)?;
     Ok(Object {
-        name: "table".to_owned(),
+        name: TABLE_SECTION.name.to_owned(),
         mesh,
         mesh_report: report,
         materials,
         anchor: 0,
         anchor_from_object: DAffine3::from_translation(DVec3::Z * height_m),
         casts: false,
-        visible: table.flag_or("visible", true)?,
+        visible: TABLE.visible.read(table)?,
     })
 }
 
 fn object(
     table: &Table,
-    kind: Kind,
+    kind: ThingKind,
     anchors: &[Anchor],
     name_lines: &mut HashMap<String, usize>,
 ) -> Result<Object, SceneError> {
-    let name = unique_name(table, name_lines)?;
-    let anchor = table
-        .optional("on")
+    let name = unique_name(&THING_NAME.name.require(table)?, name_lines)?;
+    let anchor = STANDING
+        .on
+        .value(table)
         .map_or(Ok(0), |on| anchor_index(&on, anchors))?;
     let anchor_from_object = placement(table)?.anchor_from_object();
-    let casts = table.flag_or("casts", true)?;
-    let visible = table.flag_or("visible", true)?;
-    let crease_deg = table.number_or("smooth_deg", DEFAULT_CREASE_DEG, &CREASE)?;
+    let casts = THING.casts.read(table)?;
+    let visible = THING.visible.read(table)?;
     let normals = match kind {
         // What a phantom's triangles catch and cast has to agree with how they face, so they are flat.
-        Kind::Phantom => mesh_file::Normals::Flat,
-        Kind::Virtual => mesh_file::Normals::GivenOrMade {
-            crease_rad: crease_deg.to_radians(),
+        ThingKind::Phantom => mesh_file::Normals::Flat,
+        ThingKind::Virtual => mesh_file::Normals::GivenOrMade {
+            crease_rad: VIRTUAL.smooth_deg.read(table)?.to_radians(),
         },
     };
-    let loaded = match (table.optional("mesh"), table.optional("rect_m")) {
+    let loaded = match (SHAPE.mesh.value(table), RECTANGLE.rect_m.value(table)) {
         (Some(_), Some(rect)) => {
             return Err(rect.error("the thing has a mesh; allowed: mesh or rect_m, not both"));
         }
-        (Some(mesh), None) => mesh_file::load(&mesh, FileKind::Mesh, normals)?,
-        (None, Some(rect)) => rectangle(&rect, None)?,
-        (None, None) if kind == Kind::Phantom => {
+        (Some(mesh), None) => mesh_file::load(&mesh, SHAPE.mesh.takes, normals)?,
+        (None, Some(rect)) => rectangle(&rect, DVec3::splat(DEFAULT_ALBEDO))?,
+        (None, None) if kind == ThingKind::Phantom => {
             return Err(table.error(format!("\"{name}\": no shape; mesh or rect_m is expected")));
         }
         (None, None) => return Err(table.error(format!("\"{name}\": no shape; mesh is expected"))),
     };
     let mut materials = loaded.materials;
-    if let Some(material) = table.table("material", &["albedo", "roughness"])? {
+    if let Some(material) = MATERIAL_SECTION.table(table)? {
         override_materials(&mut materials, &material)?;
     }
     // A mirror turns each triangle's winding; turning it back keeps the outside outside.
@@ -158,36 +305,14 @@ fn anchor_index(on: &Value, anchors: &[Anchor]) -> Result<usize, SceneError> {
         })
 }
 
-/// Where a thing stands.
-pub fn placement(table: &Table) -> Result<Placement, SceneError> {
-    let default = Placement::default();
-    Ok(Placement {
-        position_m: table.vector_or("position_m", default.position_m, &POSITION)?,
-        rotation_deg: table.vector_or("rotation_deg", default.rotation_deg, &ANGLE)?,
-        scale: table
-            .optional("scale")
-            .map_or(Ok(default.scale), |value| scale(&value))?,
-    })
-}
-
-fn scale(value: &Value) -> Result<DVec3, SceneError> {
-    let written = value.splat_or_vector(&Numbers::between(-SCALE.most, SCALE.most, ""))?;
-    if written.abs().min_element() < SCALE.least {
-        return Err(value.error(format!("out of range; allowed: {SCALE}")));
-    }
-    Ok(written)
-}
-
 /// Each key that the scene gives replaces that of every material of the mesh.
 fn override_materials(materials: &mut [Material], table: &Table) -> Result<(), SceneError> {
-    if let Some(value) = table.optional("albedo") {
-        let albedo = value.splat_or_vector(&ALBEDO)?;
+    if let Some(albedo) = MATERIAL.albedo.read(table)? {
         materials
             .iter_mut()
             .for_each(|material| material.albedo = albedo);
     }
-    if let Some(value) = table.optional("roughness") {
-        let roughness = value.number(&ROUGHNESS)?;
+    if let Some(roughness) = MATERIAL.roughness.read(table)? {
         materials
             .iter_mut()
             .for_each(|material| material.roughness = Some(roughness));
@@ -196,7 +321,7 @@ fn override_materials(materials: &mut [Material], table: &Table) -> Result<(), S
 }
 
 /// A flat rectangle in the plane z = 0 that faces +z.
-fn rectangle(value: &Value, albedo: Option<DVec3>) -> Result<LoadedMesh, SceneError> {
+fn rectangle(value: &Value, albedo: DVec3) -> Result<LoadedMesh, SceneError> {
     let [x0, y0, x1, y1] = value
         .numbers::<4>(&POSITION)?
         .map(|coordinate| coordinate as f32);
@@ -215,7 +340,6 @@ fn rectangle(value: &Value, albedo: Option<DVec3>) -> Result<LoadedMesh, SceneEr
             "too thin to have an area; allowed: [x0, y0, x1, y1] with x0 < x1 and y0 < y1",
         ));
     }
-    let albedo = albedo.unwrap_or(DVec3::splat(DEFAULT_ALBEDO));
     Ok(LoadedMesh {
         mesh,
         report,

@@ -1,16 +1,22 @@
-//! Reads `[probe]` and `[[room]]`: the light that a probe saw, and the room that sent it.
+//! `[probe]` and `[[room]]`: the light that a probe saw, and the room that sent it.
 
 use std::collections::HashMap;
+use std::path::PathBuf;
 
 use glam::{DVec3, Vec3};
 
+use super::anchors::unique_name;
 use super::error::SceneError;
-use super::lights::POSITION;
 use super::mesh_file::{self, Normals};
 use super::named_files::FileKind;
-use super::objects::{ALBEDO, placement};
-use super::probe_file::{ProbeFile, ProbeKind, read};
-use super::reader::{Numbers, Table, Value};
+use super::objects::ALBEDO;
+use super::placement::{POSITION, PlacementKeys, placement};
+use super::probe_file::{ProbeFile, ProbeKind, ProbeReading, read};
+use super::ranges::Numbers;
+use super::reader::{Table, Value};
+use super::schema::key::Missing::{Is, Means};
+use super::schema::section::{Example, Section, Times};
+use super::schema::values::{InWords, Vectors, Written};
 use super::{ProbeScene, RoomPiece};
 use crate::geometry::winding::winding_number;
 
@@ -18,22 +24,87 @@ use crate::geometry::winding::winding_number;
 /// direction everywhere.
 const FAR_M: f32 = 20.0;
 
-const PROBE_KEYS: [&str; 5] = ["image", "kind", "position_m", "exposure", "room"];
-const ROOM_KEYS: [&str; 8] = [
-    "name",
-    "mesh",
-    "box_m",
-    "corners_m",
-    "position_m",
-    "rotation_deg",
-    "scale",
-    "albedo",
-];
+keys! {
+    /// Keys of `[probe]`.
+    pub static PROBE: ProbeKeys;
+    required {
+        /// What it saw, in linear radiance.
+        image: PathBuf, FileKind::Probe => "a picture in linear radiance (.hdr or .exr) is expected";
+    }
+    /// What the picture is.
+    kind: ProbeKind => Is(ProbeKind::LatitudeLongitude);
+    /// Which layer of an OpenEXR file, by its name or the part of its channels' names before the last dot.
+    layer: Option<String> => Means(None, "the only one, or the one that is called combined");
+    /// By how much all of it is turned to the left, seen from above.
+    turn_deg: f64, Numbers::between(-3600.0, 3600.0) => Is(0.0);
+    /// Where it was taken, in the world.
+    position_m: DVec3, Vectors::three(POSITION) => Is(DVec3::ZERO);
+    /// Display white over the probe's unit of radiance.
+    exposure: f64, Numbers::above(0.0, 1e9) => Is(1.0);
+    /// The room around it, in the world; its MTL's Kd is reflectance, else that is estimated from the probe.
+    room: Written, InWords::file("an OBJ file or a list of them", FileKind::RoomMesh) => Means(Written, "what [[room]] says");
+}
+
+keys! {
+    /// A part of the room.
+    pub static ROOM: RoomKeys;
+
+    /// Its name, if it has one.
+    name: Option<String> => Means(None, "none");
+    /// Its shape: one of mesh, box_m and corners_m.
+    mesh: Option<PathBuf>, FileKind::RoomMesh => Means(None, "none: it has one of the others");
+    /// x0, y0, z0, x1, y1, z1; lit from within where the probe was taken within, else from outside.
+    box_m: Option<[f64; 6]>, POSITION => Means(None, "none: it has one of the others");
+    /// Three or four corners of a flat polygon, lit from where the probe was taken.
+    corners_m: Written, InWords::new("[[x, y, z], …] in metres") => Means(Written, "none: it has one of the others");
+}
+
+keys! {
+    /// What a part of the room is made of.
+    pub static ROOM_SURFACE: RoomSurfaceKeys;
+
+    /// Diffuse reflectance, linear RGB.
+    albedo: Option<DVec3>, ALBEDO => Means(None, "what an MTL file says, else estimated from the probe");
+}
+
+/// `[probe]`.
+pub static PROBE_SECTION: Section = Section {
+    name: "probe",
+    says: "The light of a room, seen by a light probe (gnomon probe makes one); then technique \"shafts\" is there. Without \
+           a [[room]] all light comes from far away.",
+    times: Times::UpToOnce,
+    groups: &[ProbeKeys::ALL],
+    shown: &[
+        ("image", Example::Live("\"probe.hdr\"")),
+        ("position_m", Example::Live("[0, 0, 0.06]")),
+        ("room", Example::Live("\"room.obj\"")),
+    ],
+    is_aside: true,
+};
+
+/// `[[room]]`.
+pub static ROOM_SECTION: Section = Section {
+    name: "room",
+    says: "Parts of the room beside or instead of the probe's files.",
+    times: Times::Any,
+    groups: &[RoomKeys::ALL, PlacementKeys::ALL, RoomSurfaceKeys::ALL],
+    shown: &[
+        ("name", Example::Live("\"walls\"")),
+        ("mesh", Example::Live("\"shelf.obj\"")),
+        ("box_m", Example::Live("[-2, -1.7, -0.75, 2, 1.7, 1.75]")),
+        (
+            "corners_m",
+            Example::Live("[[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]"),
+        ),
+        ("albedo", Example::Live("0.7")),
+    ],
+    is_aside: true,
+};
 
 /// The probe and its room; `None` without `[probe]`.
 pub fn probe(root: &Table) -> Result<Option<ProbeScene>, SceneError> {
-    let rooms = root.tables("room", &ROOM_KEYS)?;
-    let Some(table) = root.table("probe", &PROBE_KEYS)? else {
+    let rooms = ROOM_SECTION.tables(root)?;
+    let Some(table) = PROBE_SECTION.table(root)? else {
         return match rooms.first() {
             Some(room) => Err(room.error(
                 "room: it is lit by a [probe], and there is none; allowed: no [[room]], or one with a [probe]",
@@ -41,27 +112,20 @@ pub fn probe(root: &Table) -> Result<Option<ProbeScene>, SceneError> {
             None => Ok(None),
         };
     };
-    let kinds = [
-        ("latitude-longitude", ProbeKind::LatitudeLongitude),
-        ("panorama", ProbeKind::Panorama),
-        ("angular", ProbeKind::Angular),
-        ("ball", ProbeKind::Ball),
-    ];
-    let kind = table
-        .optional("kind")
-        .map(|value| value.one_of("kind of probe", &kinds))
-        .transpose()?
-        .unwrap_or(ProbeKind::LatitudeLongitude);
-    let image = table.required(
-        "image",
-        "a picture in linear radiance (.hdr or .exr) is expected",
-    )?;
-    let path = image.existing_path(FileKind::Probe)?;
-    let ProbeFile { probe, notes } = read(&path, kind).map_err(|message| image.error(message))?;
-    let position_m = table.vector_or("position_m", DVec3::ZERO, &POSITION)?;
-    let exposure = table.number_or("exposure", 1.0, &Numbers::above(0.0, 1e9, ""))?;
+    let path = PROBE.image.read(&table)?;
+    let image = PROBE.image.require(&table)?;
+    let layer = PROBE.layer.read(&table)?;
+    let reading = ProbeReading {
+        kind: PROBE.kind.read(&table)?,
+        turn: PROBE.turn_deg.read(&table)?.to_radians(),
+        layer: layer.as_deref(),
+    };
+    let ProbeFile { probe, notes } =
+        read(&path, reading).map_err(|message| image.error(message))?;
+    let position_m = PROBE.position_m.read(&table)?;
+    let exposure = PROBE.exposure.read(&table)?;
     let mut room = Vec::new();
-    if let Some(files) = table.optional("room") {
+    if let Some(files) = PROBE.room.value(&table) {
         let files = match files.text() {
             Ok(_) => vec![files],
             Err(_) => files.array("an OBJ file or a list of them is expected")?,
@@ -95,14 +159,15 @@ pub fn probe(root: &Table) -> Result<Option<ProbeScene>, SceneError> {
 }
 
 fn piece(table: &Table, name_lines: &mut HashMap<String, usize>) -> Result<RoomPiece, SceneError> {
-    if table.optional("name").is_some() {
-        super::anchors::unique_name(table, name_lines)?;
+    if let Some(name) = ROOM.name.value(table) {
+        unique_name(&name, name_lines)?;
     }
-    let albedo = table
-        .optional("albedo")
-        .map(|value| value.splat_or_vector(&ALBEDO))
-        .transpose()?;
-    let shapes = ["mesh", "box_m", "corners_m"].map(|key| table.optional(key));
+    let albedo = ROOM_SURFACE.albedo.read(table)?;
+    let shapes = [
+        ROOM.mesh.value(table),
+        ROOM.box_m.value(table),
+        ROOM.corners_m.value(table),
+    ];
     let mut given = shapes.iter().flatten();
     let (Some(_), None) = (given.next(), given.next()) else {
         return Err(table.error("room: one shape is expected; allowed: mesh, box_m or corners_m"));

@@ -12,18 +12,19 @@ use crate::light::radiance_picture::{Flaw, Flaws, RadiancePicture};
 
 /// Columns of a probe made of an angular map or a ball.
 const MOST_COLUMNS: usize = 4096;
-/// What a picture of all directions can be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum ProbeKind {
-    /// As [`Probe`] keeps it: row 0 looks up (+z), u = (atan2(y, x) + π) / 2π.
-    LatitudeLongitude,
-    /// As one sees it from inside, twice as wide as high: its middle column looks along +y, columns to the right of it
-    /// farther to the right.
-    Panorama,
-    /// Debevec's angular map: the distance from the middle is proportional to the angle from the direction looked along.
-    Angular,
-    /// A mirror ball that fills the picture, photographed from afar.
-    Ball,
+choices! {
+    /// What a picture of all directions can be.
+    pub enum ProbeKind, "kind of probe" {
+        /// Twice as wide as high: row 0 looks up (+z), u = (atan2(y, x) + π) / 2π.
+        LatitudeLongitude = "latitude-longitude",
+        /// Twice as wide as high, as one sees it from inside: its middle looks along +y, columns to the right of it farther
+        /// to the right.
+        Panorama = "panorama",
+        /// Debevec's angular map: the distance from the middle is proportional to the angle from the direction looked along.
+        Angular = "angular",
+        /// A mirror ball that fills the picture, photographed from afar.
+        Ball = "ball",
+    }
 }
 
 /// A probe as its file has it.

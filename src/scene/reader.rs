@@ -3,15 +3,16 @@
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::fmt::Display;
-use std::ops::{Range, RangeInclusive};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{Place, SceneError, suggestion};
+use super::error::{SceneError, TextPlace, suggestion};
 use super::named_files::{FileKind, NamedFile};
+use super::ranges::{Numbers, Whole};
 
 /// A TOML file's text and where it came from.
 pub struct Document<'a> {
@@ -134,37 +135,6 @@ impl<'a> Table<'a> {
             .collect()
     }
 
-    pub fn number_or(&self, key: &str, default: f64, allowed: &Numbers) -> Result<f64, SceneError> {
-        self.optional(key)
-            .map_or(Ok(default), |value| value.number(allowed))
-    }
-
-    pub fn integer_or(
-        &self,
-        key: &str,
-        default: u32,
-        allowed: RangeInclusive<u32>,
-    ) -> Result<u32, SceneError> {
-        self.optional(key)
-            .map_or(Ok(default), |value| value.integer(allowed))
-    }
-
-    pub fn flag_or(&self, key: &str, default: bool) -> Result<bool, SceneError> {
-        self.optional(key).map_or(Ok(default), |value| value.flag())
-    }
-
-    /// Three numbers.
-    pub fn vector_or(
-        &self,
-        key: &str,
-        default: DVec3,
-        allowed: &Numbers,
-    ) -> Result<DVec3, SceneError> {
-        self.optional(key).map_or(Ok(default), |value| {
-            value.numbers(allowed).map(DVec3::from_array)
-        })
-    }
-
     /// A mistake of the table as a whole, at its head.
     pub fn error(&self, message: impl Into<String>) -> SceneError {
         self.document.error(self.span.clone(), message)
@@ -186,59 +156,6 @@ pub const NAMES: &str =
 pub fn is_name(text: &str) -> bool {
     let unfit = |c: char| c.is_control() || matches!(c, ',' | ';' | '"');
     !text.is_empty() && text.trim() == text && !text.contains(unfit)
-}
-
-/// Which numbers a key takes.
-pub struct Numbers {
-    pub least: f64,
-    pub most: f64,
-    /// Whether `least` itself is refused.
-    pub above: bool,
-    pub unit: &'static str,
-}
-
-impl Numbers {
-    pub const fn between(least: f64, most: f64, unit: &'static str) -> Self {
-        Self {
-            least,
-            most,
-            above: false,
-            unit,
-        }
-    }
-
-    pub const fn above(least: f64, most: f64, unit: &'static str) -> Self {
-        Self {
-            least,
-            most,
-            above: true,
-            unit,
-        }
-    }
-
-    fn has(&self, number: f64) -> bool {
-        number <= self.most
-            && if self.above {
-                number > self.least
-            } else {
-                number >= self.least
-            }
-    }
-}
-
-impl Display for Numbers {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self {
-            least, most, unit, ..
-        } = self;
-        let space = if unit.is_empty() { "" } else { " " };
-        match (self.above, most.is_finite()) {
-            (true, true) => write!(f, "above {least}, up to {most}{space}{unit}"),
-            (true, false) => write!(f, "above {least}{space}{unit}"),
-            (false, true) => write!(f, "{least} to {most}{space}{unit}"),
-            (false, false) => write!(f, "{least} or more{space}{unit}"),
-        }
-    }
 }
 
 impl<'a> Value<'a> {
@@ -267,7 +184,7 @@ impl<'a> Value<'a> {
 
     /// `file:line:column`.
     pub fn location(&self) -> String {
-        let place = Place::of_span(self.document.text, self.value.span());
+        let place = TextPlace::of_span(self.document.text, self.value.span());
         format!(
             "{}:{}:{}",
             self.document.path.display(),
@@ -343,23 +260,20 @@ impl<'a> Value<'a> {
             .ok_or_else(|| self.wrong_type("true or false"))
     }
 
-    pub fn integer(&self, allowed: RangeInclusive<u32>) -> Result<u32, SceneError> {
-        let integer = self
-            .value
-            .get_ref()
-            .as_integer()
-            .ok_or_else(|| self.wrong_type("a whole number"))?;
+    pub fn integer(&self, allowed: &Whole) -> Result<u32, SceneError> {
+        let integer = match self.value.get_ref() {
+            DeValue::Integer(integer) => integer,
+            DeValue::String(_) if allowed.no_limit.is_some() => {
+                return Err(self.error(allowed.refusal()));
+            }
+            _ => return Err(self.wrong_type("a whole number")),
+        };
         // Too large for the type is out of the range as well.
-        let parsed = u32::from_str_radix(integer.as_str(), integer.radix()).ok();
-        parsed
-            .filter(|number| allowed.contains(number))
-            .ok_or_else(|| {
-                self.error(format!(
-                    "out of range; allowed: {} to {}",
-                    allowed.start(),
-                    allowed.end()
-                ))
-            })
+        let parsed = u32::from_str_radix(integer.as_str(), integer.radix());
+        let checked = parsed.map_err(|_| allowed.refusal());
+        checked
+            .and_then(|number| allowed.check(number))
+            .map_err(|refusal| self.error(refusal))
     }
 
     pub fn number(&self, allowed: &Numbers) -> Result<f64, SceneError> {
@@ -370,13 +284,9 @@ impl<'a> Value<'a> {
             DeValue::Float(float) => float.as_str().parse().ok(),
             _ => return Err(self.wrong_type("a number")),
         };
-        let Some(number) = parsed.filter(|number: &f64| number.is_finite()) else {
-            return Err(self.error(format!("not a finite number; allowed: {allowed}")));
-        };
-        if !allowed.has(number) {
-            return Err(self.error(format!("out of range; allowed: {allowed}")));
-        }
-        Ok(number)
+        allowed
+            .check(parsed.unwrap_or(f64::NAN))
+            .map_err(|refusal| self.error(refusal))
     }
 
     /// Just `N` numbers in brackets.

@@ -22,11 +22,6 @@ pub enum Difference {
     Encoded,
 }
 
-impl Difference {
-    /// The two in linear light, by the names that files use for `difference`.
-    pub const BY_NAME: [(&str, Self); 2] = [("ratio", Self::Ratio), ("subtract", Self::Subtract)];
-}
-
 /// Some vertices' light, and what each of some sources gives to it: rows of as many as there are sources.
 pub struct Given {
     /// For each vertex.

@@ -43,7 +43,7 @@ impl AprilTagDetector {
             return Err(TrackingError::Setting {
                 name: "corrected_bits",
                 value: settings.corrected_bits.to_string(),
-                allowed: "0 to 3 with libapriltag",
+                allowed: "0 to 3 with libapriltag".to_owned(),
             });
         }
         let mut searches = Vec::new();

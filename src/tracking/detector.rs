@@ -10,6 +10,7 @@ use super::apriltag::AprilTagDetector;
 use super::aruco::ArucoDetector;
 use super::light::Grey;
 use super::refine::refined;
+use crate::scene::format::{AnyKey, TRACKING};
 use crate::scene::{ArucoRefinement, DetectorKind, Family, TrackingSettings};
 
 /// A marker seen in a picture.
@@ -240,26 +241,31 @@ fn holds_markers(grey: &[u8], size_px: [u32; 2]) -> Result<bool, TrackingError> 
     Ok(width >= MIN_SIDE_PX && height >= MIN_SIDE_PX)
 }
 
-/// What the types do not rule out; the scene refuses the same with file and line.
+/// What the types do not rule out; a scene's reader refuses the same with file and line.
 fn check(settings: &TrackingSettings) -> Result<(), TrackingError> {
-    let wrong = |name, value: String, allowed| {
-        Err(TrackingError::Setting {
-            name,
-            value,
-            allowed,
-        })
-    };
-    if !(1.0..=16.0).contains(&settings.decimation) {
-        return wrong("decimation", settings.decimation.to_string(), "1 to 16");
+    for (key, number) in [
+        (&TRACKING.decimation, settings.decimation),
+        (&TRACKING.blur_px, settings.blur_px),
+        (&TRACKING.min_margin, settings.min_margin),
+    ] {
+        wrong(key, number.to_string(), key.takes.check(number).is_err())?;
     }
-    if !(0.0..=10.0).contains(&settings.blur_px) {
-        return wrong("blur_px", settings.blur_px.to_string(), "0 to 10");
-    }
-    if !(settings.min_margin.is_finite() && settings.min_margin >= 0.0) {
-        return wrong("min_margin", settings.min_margin.to_string(), "0 or more");
-    }
-    if !(1..=256).contains(&settings.threads) {
-        return wrong("threads", settings.threads.to_string(), "1 to 256");
+    for (key, number) in [
+        (&TRACKING.corrected_bits, settings.corrected_bits),
+        (&TRACKING.threads, settings.threads),
+    ] {
+        wrong(key, number.to_string(), key.takes.check(number).is_err())?;
     }
     Ok(())
+}
+
+fn wrong(key: &dyn AnyKey, value: String, is_wrong: bool) -> Result<(), TrackingError> {
+    match is_wrong {
+        true => Err(TrackingError::Setting {
+            name: key.name(),
+            value,
+            allowed: key.told(),
+        }),
+        false => Ok(()),
+    }
 }

@@ -140,7 +140,7 @@ pub enum TrackingError {
         /// What it was.
         value: String,
         /// What it may be.
-        allowed: &'static str,
+        allowed: String,
     },
     /// The frame is not of the size that the camera was calibrated for.
     #[error(

@@ -10,7 +10,7 @@ use super::tracked_anchor::TrackedAnchor;
 use super::{AnchorPose, Detection, Detector, LossReason, TrackingError};
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
-use crate::scene::{Anchor, Search, TrackingSettings};
+use crate::scene::{Anchor, SearchArea, TrackingSettings};
 
 /// The whole picture is searched again after this, even when nothing is missing, seconds.
 const SEARCH_AGAIN_SECS: f64 = 2.0;
@@ -60,7 +60,7 @@ impl Tracker {
             anchors: tracked.collect::<Result<_, TrackingError>>()?,
             missing_since_secs: vec![None; anchors.len()],
             intrinsics,
-            tracks_near: settings.search == Search::Near && settings.pose_from_pixels,
+            tracks_near: settings.search == SearchArea::Near && settings.pose_from_pixels,
             fits_pixels: settings.pose_from_pixels,
             grey: Vec::new(),
             detections: Vec::new(),

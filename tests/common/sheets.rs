@@ -5,7 +5,7 @@ use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 pub use gnomon::app::truth::sheets::{Light, camera_above, photograph, with_noise};
 use gnomon::capture::Frame;
 use gnomon::geometry::camera::Intrinsics;
-use gnomon::scene::{Anchor, DetectorKind, Family, Marker, Search, TrackingSettings};
+use gnomon::scene::{Anchor, DetectorKind, Family, Marker, SearchArea, TrackingSettings};
 use gnomon::tracking::{AnchorPose, Tracker};
 
 pub const CAMERA: Intrinsics = Intrinsics {
@@ -61,7 +61,7 @@ pub fn settings(detector: DetectorKind) -> TrackingSettings {
 /// them.
 pub fn detector_alone(detector: DetectorKind) -> TrackingSettings {
     TrackingSettings {
-        search: Search::Full,
+        search: SearchArea::Full,
         pose_from_pixels: false,
         filter: false,
         ..settings(detector)

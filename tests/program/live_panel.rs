@@ -154,9 +154,10 @@ fn the_knobs_of_the_technique_are_edits() {
     let mut harness = desk(Some(lamp()), None);
     assert_eq!(clicked(&mut harness, "Shadows"), []);
     let commands = clicked(&mut harness, "1");
-    let [LiveCommand::Scene(SceneCommand::Commit(Edit::Shadows(shadows)))] = commands[..] else {
+    let [LiveCommand::Scene(SceneCommand::Commit(Edit::Shadows(change)))] = commands[..] else {
         panic!("{commands:?}");
     };
+    let shadows = change.made_in(lamp().shadows);
     assert_eq!(shadows.samples, 1);
     assert_eq!(shadows.technique, lamp().shadows.technique);
 }

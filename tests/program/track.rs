@@ -236,7 +236,7 @@ fn mistakes_are_told_and_leave_nothing() {
             "--poses",
             "p",
         ],
-        &["1..=2"],
+        &["--border-cells", "1 to 2"],
     );
     refused(
         &[
@@ -249,7 +249,7 @@ fn mistakes_are_told_and_leave_nothing() {
             "--poses",
             "p",
         ],
-        &["decimation = 0", "1 to 16"],
+        &["--decimation", "1 to 8"],
     );
     refused(
         &["track", scene, "--decimation", "1", "--poses", "p.csv"],

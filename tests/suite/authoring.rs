@@ -13,8 +13,8 @@ use gnomon::app::truth::{draw, key_frames};
 use gnomon::light::Light;
 use gnomon::render::Renderer;
 use gnomon::scene::{
-    Counting, Difference, Placement, Quality, Scene, ShadowSettings, ShaftSettings, Shortcuts,
-    Technique,
+    Difference, Placement, Quality, Scene, ShadowChange, ShadowSettings, ShaftSettings, Shortcuts,
+    Technique, VolumeCounting,
 };
 
 /// What is promised for the time from a saved file to its scene.
@@ -148,13 +148,16 @@ mod edits {
         );
         let settings = ShadowSettings {
             samples: 1,
-            counting: Counting::DepthFail,
+            counting: VolumeCounting::DepthFail,
             frame_budget_ms: Some(16.0),
             ..ShadowSettings::default()
         };
         let end = "radiance = [0.1, 0.11, 0.13]\n";
         changed_to(
-            &Edit::Shadows(settings),
+            &Edit::Shadows(ShadowChange {
+                from: ShadowSettings::default(),
+                to: settings,
+            }),
             end,
             &format!(
                 "{end}\n[shadows]\nsamples = 1\ncounting = \"depth-fail\"\nframe_budget_ms = 16.0\n"
@@ -374,32 +377,35 @@ mod edits {
                 thing: thing(random),
                 visible: random.chance(0.5),
             },
-            5 => Edit::Shadows(ShadowSettings {
-                without: Shortcuts::NONE,
-                technique: if random.chance(0.5) {
-                    Technique::Auto
-                } else {
-                    Technique::Volumes
-                },
-                samples: if random.chance(0.5) { 1 } else { 4 },
-                counting: if random.chance(0.5) {
-                    Counting::Auto
-                } else {
-                    Counting::DepthFail
-                },
-                max_silhouette_error_px: random.below(100) as f64 / 4.0,
-                frame_budget_ms: random.chance(0.5).then_some(12.5),
-                quality: match random.below(4) {
-                    grade @ 0..3 => Some(Quality::BY_NAME[grade].1),
-                    _ => None,
-                },
-                shafts: ShaftSettings {
-                    sources: random.chance(0.5).then(|| 1 + random.below(99) as u32),
-                    patches: 100 + random.below(900) as u32,
-                    map_px: 64 << random.below(3),
-                    difference: [Difference::Ratio, Difference::Subtract, Difference::Encoded]
-                        [random.below(3)],
-                    ..ShaftSettings::default()
+            5 => Edit::Shadows(ShadowChange {
+                from: scene.shadows,
+                to: ShadowSettings {
+                    without: Shortcuts::NONE,
+                    technique: if random.chance(0.5) {
+                        Technique::Auto
+                    } else {
+                        Technique::Volumes
+                    },
+                    samples: if random.chance(0.5) { 1 } else { 4 },
+                    counting: if random.chance(0.5) {
+                        VolumeCounting::Auto
+                    } else {
+                        VolumeCounting::DepthFail
+                    },
+                    max_silhouette_error_px: random.below(100) as f64 / 4.0,
+                    frame_budget_ms: random.chance(0.5).then_some(12.5),
+                    quality: match random.below(4) {
+                        grade @ 0..3 => Some(Quality::BY_NAME[grade].1),
+                        _ => None,
+                    },
+                    shafts: ShaftSettings {
+                        sources: random.chance(0.5).then(|| 1 + random.below(99) as u32),
+                        patches: 100 + random.below(900) as u32,
+                        map_px: 64 << random.below(3),
+                        difference: [Difference::Ratio, Difference::Subtract, Difference::Encoded]
+                            [random.below(3)],
+                        ..ShaftSettings::default()
+                    },
                 },
             }),
             6 => Edit::AnchorSize {
@@ -474,9 +480,9 @@ mod edits {
                     let removes = matches!(edit, Edit::RemoveLight(_) | Edit::RemoveVirtual(_));
                     // A budget that is taken back, and what another quality says itself: with their keys go their comments.
                     let drops_key = match &edit {
-                        Edit::Shadows(settings) => {
-                            settings.frame_budget_ms.is_none()
-                                || settings.quality != before.shadows.quality
+                        Edit::Shadows(change) => {
+                            change.to.frame_budget_ms.is_none()
+                                || change.to.quality != before.shadows.quality
                         }
                         _ => false,
                     };
@@ -585,6 +591,54 @@ mod history {
         assert_eq!(project.text(), "[camera");
         assert!(document.undo().is_err());
         assert_eq!(document.text(), both);
+    }
+
+    /// Settings of shadows are many keys of one table: an edit of one leaves the others to whoever changed them.
+    #[test]
+    fn an_edit_of_shadows_leaves_the_keys_that_changed_outside() {
+        let project = Project::with(|text| text + "\n[shadows]\nsamples = 4 # two by two\n");
+        let before = project.text();
+        let here = project.open().scene().shadows;
+        let to = ShadowSettings { samples: 1, ..here };
+        let edit = Edit::Shadows(ShadowChange { from: here, to });
+        for outside in [
+            "sources = 7",
+            "map_px = 64",
+            "quality = \"fast\"",
+            "patches = 900",
+            "source_power = 0.5",
+            "receivers_per_leaf = 3",
+            "least_part = 0.5",
+            "difference = \"subtract\"",
+            "compositing = \"ldr\"",
+            "technique = \"volumes\"",
+            "counting = \"depth-fail\"",
+            "max_silhouette_error_px = 3.0",
+            "frame_budget_ms = 12.0",
+        ] {
+            fs::write(project.file(), &before).unwrap();
+            let mut document = project.open();
+            let changed = format!("{before}{outside} # theirs\n");
+            fs::write(project.file(), &changed).unwrap();
+            document.commit(&edit).unwrap();
+            assert_eq!(
+                project.text(),
+                changed.replace("samples = 4 # two", "samples = 1 # two"),
+                "{outside}"
+            );
+        }
+        // The same key: theirs stays.
+        let changed = before.replace("samples = 4", "samples = 1");
+        fs::write(project.file(), &before).unwrap();
+        let mut document = project.open();
+        let quality = ShadowChange {
+            from: here,
+            to: here.with_quality(Quality::Fast),
+        };
+        fs::write(project.file(), &changed).unwrap();
+        let error = document.commit(&Edit::Shadows(quality)).unwrap_err();
+        assert!(matches!(error, EditError::ChangedOutside { .. }), "{error}");
+        assert_eq!(project.text(), changed);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use crate::common::{
 use glam::{DAffine3, DVec2, DVec3, Vec3};
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::light::Light;
-use gnomon::scene::Counting;
+use gnomon::scene::VolumeCounting;
 
 const CAMERA: Intrinsics = Intrinsics {
     size_px: [320, 240],
@@ -19,13 +19,16 @@ const CAMERA: Intrinsics = Intrinsics {
 
 /// Holds what both ways draw against each other, camera by camera.
 fn hold(name: &str, stage: &mut Stage, intrinsics: Intrinsics, cameras: &[DAffine3]) {
-    let mut shoot = |counting: Counting| -> Vec<_> {
+    let mut shoot = |counting: VolumeCounting| -> Vec<_> {
         stage.scene.shadows.counting = counting;
         let mut renderer = stage.renderer(intrinsics);
         let shot = |camera: &DAffine3| stage.shoot(&mut renderer, *camera);
         cameras.iter().map(shot).collect()
     };
-    let (chosen, depth_fail) = (shoot(Counting::Auto), shoot(Counting::DepthFail));
+    let (chosen, depth_fail) = (
+        shoot(VolumeCounting::Auto),
+        shoot(VolumeCounting::DepthFail),
+    );
     for (camera, (ours, theirs)) in chosen.iter().zip(&depth_fail).enumerate() {
         let differing = |of: usize, a: &[u8], b: &[u8]| {
             let pairs = a.chunks(of).zip(b.chunks(of));

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::edit::Edit;
-use super::history::{History, Step};
-use super::watch::{Known, OutsideChange, SceneWatch};
+use super::history::{EditStep, History};
+use super::watch::{KnownText, OutsideChange, SceneWatch};
 use super::written::{Unfit, placement_of, touched_by, with_edit};
 use crate::app::files::output_error::OutputError;
 use crate::app::files::picture_files::write_text;
@@ -23,7 +23,7 @@ pub struct SceneDocument {
     shown: Option<Scene>,
     files: Vec<PathBuf>,
     history: History,
-    known: Known,
+    known: KnownText,
 }
 
 /// Why an edit was not made; the scene and its file are as they were, but for what [`EditError::ChangedOutside`] says.
@@ -139,7 +139,7 @@ impl SceneDocument {
         }
         let before = self.text.clone();
         self.put(after.clone())?;
-        self.history.push(Step {
+        self.history.push(EditStep {
             label: edit.label(),
             before,
             after,
@@ -162,7 +162,7 @@ impl SceneDocument {
     /// # Errors
     /// The file was changed from outside, or the step cannot be taken back.
     pub fn undo(&mut self) -> Result<(), EditError> {
-        let Some(Step { label, before, .. }) = self.history.next_undo().cloned() else {
+        let Some(EditStep { label, before, .. }) = self.history.next_undo().cloned() else {
             return Ok(());
         };
         self.step_to(before, format!("undo {label}"))?;
@@ -175,7 +175,7 @@ impl SceneDocument {
     /// # Errors
     /// The file was changed from outside, or the step cannot be taken.
     pub fn redo(&mut self) -> Result<(), EditError> {
-        let Some(Step { label, after, .. }) = self.history.next_redo().cloned() else {
+        let Some(EditStep { label, after, .. }) = self.history.next_redo().cloned() else {
             return Ok(());
         };
         self.step_to(after, format!("redo {label}"))?;
@@ -196,7 +196,7 @@ impl SceneDocument {
     fn accept(&mut self, change: OutsideChange) {
         self.shown = None;
         if change.text != self.text {
-            self.history.push(Step {
+            self.history.push(EditStep {
                 label: OUTSIDE.to_owned(),
                 before: std::mem::replace(&mut self.text, change.text.clone()),
                 after: change.text,

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::light::Light;
-use crate::scene::{Object, Placement, Scene, ShadowSettings};
+use crate::scene::{Object, Placement, Scene, ShadowChange};
 
 /// One change of a scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,7 +36,7 @@ pub enum Edit {
         visible: bool,
     },
     /// How shadows are made.
-    Shadows(ShadowSettings),
+    Shadows(ShadowChange),
     /// A marker printed larger or smaller than the scene says; a board is stretched as a whole.
     AnchorSize {
         /// Its name.
@@ -103,7 +103,7 @@ impl Edit {
                 Some(object) => object.visible = *visible,
                 None => return false,
             },
-            Self::Shadows(settings) => scene.shadows = *settings,
+            Self::Shadows(change) => scene.shadows = change.made_in(scene.shadows),
             Self::AnchorSize { anchor, size_m } => {
                 let found = scene.anchors.iter_mut().find(|found| found.name == *anchor);
                 let Some(markers) = found.map(|found| &mut found.markers) else {

@@ -5,7 +5,7 @@ const MOST_STEPS: usize = 500;
 
 /// What was done, and the text before and after.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Step {
+pub struct EditStep {
     pub label: String,
     pub before: String,
     pub after: String,
@@ -14,13 +14,13 @@ pub struct Step {
 /// Steps that were taken, and those that were taken back.
 #[derive(Debug, Default)]
 pub struct History {
-    done: Vec<Step>,
-    undone: Vec<Step>,
+    done: Vec<EditStep>,
+    undone: Vec<EditStep>,
 }
 
 impl History {
     /// A step was taken; what was taken back before is given up.
-    pub fn push(&mut self, step: Step) {
+    pub fn push(&mut self, step: EditStep) {
         self.undone.clear();
         self.done.push(step);
         if self.done.len() > MOST_STEPS {
@@ -29,12 +29,12 @@ impl History {
     }
 
     /// What would be taken back next.
-    pub fn next_undo(&self) -> Option<&Step> {
+    pub fn next_undo(&self) -> Option<&EditStep> {
         self.done.last()
     }
 
     /// What would be taken again next.
-    pub fn next_redo(&self) -> Option<&Step> {
+    pub fn next_redo(&self) -> Option<&EditStep> {
         self.undone.last()
     }
 
@@ -53,8 +53,8 @@ impl History {
 mod tests {
     use super::*;
 
-    fn step(number: usize) -> Step {
-        Step {
+    fn step(number: usize) -> EditStep {
+        EditStep {
             label: number.to_string(),
             before: format!("{number}"),
             after: format!("{}", number + 1),

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use toml_edit::{Document, InlineTable, Item, Key, Table, TableLike, Value};
 
-use super::numbers::{self, Digits};
+use super::numbers;
+use crate::scene::Digits;
 
 /// Changes of a text, gathered to be made at once.
 pub struct Spliced<'a> {
@@ -148,7 +149,7 @@ impl<'a> Spliced<'a> {
             None if wanted.iter().all(|&number| Some(number) == default) => {}
             None => {
                 let new = match wanted {
-                    [single] => numbers::new_number(*single, digits),
+                    [single] => digits.text(*single),
                     _ => numbers::new_array(wanted, digits),
                 };
                 self.insert_key(body, key, &new);
@@ -445,7 +446,7 @@ mod tests {
         let changed = spliced(text, |document, spliced| {
             let body = bodies(document.as_table().get("h"))[0];
             spliced.remove_key(body, "x");
-            spliced.set_numbers(body, "p", &[0.5, 1.0], numbers::POSITION, None);
+            spliced.set_numbers(body, "p", &[0.5, 1.0], Digits::Decimals(4), None);
         });
         assert_eq!(changed, "[h]\ny = 2\np = [0.5, 1.0]");
     }

@@ -14,7 +14,7 @@ use crate::app::stopwatch::Stopwatch;
 use crate::scene::{Reading, Scene, SceneError};
 
 /// The text that the program itself knows the file to have.
-pub(super) type Known = Arc<Mutex<String>>;
+pub(super) type KnownText = Arc<Mutex<String>>;
 
 const PERIOD: Duration = Duration::from_millis(50);
 /// Files that have not changed for so long are read.
@@ -53,7 +53,7 @@ impl SceneWatch {
     pub(super) fn start(
         path: PathBuf,
         files: Vec<PathBuf>,
-        known: Known,
+        known: KnownText,
         on_news: impl Fn() + Send + 'static,
     ) -> Self {
         let (sender, news) = channel();
@@ -89,7 +89,7 @@ impl Drop for SceneWatch {
 
 fn run(
     watched: &mut Watched,
-    known: &Known,
+    known: &KnownText,
     stop: &AtomicBool,
     sender: &Sender<SceneNews>,
     on_news: &impl Fn(),
@@ -164,7 +164,7 @@ impl Watched {
     }
 
     /// Looks at the files.
-    fn look(&mut self, now_secs: f64, known: &Known) -> Option<SceneNews> {
+    fn look(&mut self, now_secs: f64, known: &KnownText) -> Option<SceneNews> {
         let now = stamps(&self.path, &self.files);
         if now != self.seen {
             self.see(now, now_secs);

@@ -4,13 +4,19 @@ use glam::DVec3;
 use toml_edit::{Document, Item, Value};
 
 use super::edit::{Edit, NewVirtual};
-use super::numbers::{ANGLE, DIRECTION, POSITION, PRINT, RATIO, number_of};
+use super::numbers::number_of;
 use super::spliced::{Body, Spliced, bodies, parsed};
 use crate::light::Light;
-use crate::scene::{
-    Counting, Difference, Placement, Quality, Scene, ShadowSettings, ShaftSettings, Technique,
-    unit_direction,
+use crate::scene::format::{
+    AMBIENT, AMBIENT_SECTION, BOARD, BOARD_SECTION, DIRECTIONAL_LIGHT, LIGHT, LIGHT_SECTION,
+    LightKind, MARKER, MARKER_SECTION, ON_BOARD, PHANTOM_SECTION, PLACEMENT, POINT_LIGHT,
+    PlacementKeys, SHADOWS_SECTION, SHAPE, STANDING, TABLE, TABLE_SECTION, THING, THING_NAME,
+    VIRTUAL_SECTION,
 };
+use crate::scene::schema::key::{Absent, Key};
+use crate::scene::schema::section::Section;
+use crate::scene::schema::values::{Described, quoted};
+use crate::scene::{Placement, Scene, ShadowChange, unit_direction};
 
 /// Why an edit does not fit a text.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -26,15 +32,17 @@ pub enum Unfit {
     NotToml,
 }
 
+/// A key with its value, as the file is to have it.
+type NewKey = (&'static str, String);
+
 /// The text with an edit made in it; `scene` is what the text says.
 pub fn with_edit(text: &str, scene: &Scene, edit: &Edit) -> Result<String, Unfit> {
     let document = parsed(text).ok_or(Unfit::NotToml)?;
     let mut spliced = Spliced::new(text);
-    let tables = |key: &str| bodies(document.as_table().get(key));
     match edit {
         Edit::Light { index, light } => {
             let written = (
-                tables("light").get(*index).copied(),
+                tables(&document, &LIGHT_SECTION).get(*index).copied(),
                 scene.lights.get(*index),
             );
             let (Some(body), Some(old)) = written else {
@@ -43,80 +51,44 @@ pub fn with_edit(text: &str, scene: &Scene, edit: &Edit) -> Result<String, Unfit
             set_light(&mut spliced, body, old, light);
         }
         Edit::AddLight(light) => {
-            spliced.add_table(
-                "[[light]]",
-                document.as_table().get("light"),
-                &light_keys(light),
-            );
+            add_table(&mut spliced, &document, &LIGHT_SECTION, &light_keys(light));
         }
         Edit::RemoveLight(index) => {
-            let lights = tables("light");
+            let lights = tables(&document, &LIGHT_SECTION);
             if *index >= lights.len() {
                 return Err(no_light(*index));
             }
             spliced.remove_table(&lights, *index);
         }
-        Edit::Ambient(radiance) => match tables("ambient").first() {
-            Some(&body) => {
-                spliced.set_numbers(body, "radiance", &radiance.to_array(), RATIO, Some(0.0));
-            }
+        Edit::Ambient(radiance) => match tables(&document, &AMBIENT_SECTION).first() {
+            Some(&body) => set_vector(&mut spliced, body, &AMBIENT.radiance, *radiance),
             None => {
-                let text = super::numbers::new_array(&radiance.to_array(), RATIO);
-                spliced.add_table("[ambient]", None, &[("radiance", text)]);
+                let keys = [new_key(&AMBIENT.radiance, radiance)];
+                add_table(&mut spliced, &document, &AMBIENT_SECTION, &keys);
             }
         },
-        Edit::Place { thing, placement } => match thing_of(&document, thing)? {
-            Thing::Object(body) => set_placement(&mut spliced, body, placement),
-            Thing::TableTop(body) => {
-                let lifted = Placement {
-                    position_m: DVec3::Z * placement.position_m.z,
-                    ..Placement::default()
-                };
-                if *placement != lifted {
-                    return Err(Unfit::TableTop);
-                }
-                let height_m = [placement.position_m.z];
-                spliced.set_numbers(body, "height_m", &height_m, POSITION, Some(0.0));
-            }
-        },
+        Edit::Place { thing, placement } => {
+            set_placement(&mut spliced, thing_of(&document, thing)?, placement)?;
+        }
         Edit::Show { thing, visible } => {
-            let (Thing::Object(body) | Thing::TableTop(body)) = thing_of(&document, thing)?;
-            let written = body.value("visible").and_then(Value::as_bool);
-            if written.unwrap_or(true) != *visible {
-                spliced.set(body, "visible", visible.to_string());
+            let (WrittenThing::Object(body) | WrittenThing::TableTop(body)) =
+                thing_of(&document, thing)?;
+            let key = &THING.visible;
+            let written = body.value(key.name).and_then(Value::as_bool);
+            if written.unwrap_or(*key.default()) != *visible {
+                spliced.set(body, key.name, visible.to_string());
             }
         }
-        Edit::Shadows(settings) => {
-            let keys = shadow_keys(&scene.shadows, settings);
-            match tables("shadows").first() {
-                Some(&body) => {
-                    for (key, text) in keys {
-                        match text {
-                            Some(text) => spliced.set(body, key, text),
-                            None => spliced.remove_key(body, key),
-                        }
-                    }
-                }
-                None => {
-                    let keys: Vec<(&str, String)> = keys
-                        .into_iter()
-                        .filter_map(|(key, text)| Some((key, text?)))
-                        .collect();
-                    if !keys.is_empty() {
-                        spliced.add_table("[shadows]", None, &keys);
-                    }
-                }
-            }
-        }
+        Edit::Shadows(change) => set_shadows(&mut spliced, &document, scene, change),
         Edit::AnchorSize { anchor, size_m } => {
             resize(&mut spliced, &document, scene, anchor, *size_m)?;
         }
         Edit::AddVirtual(new) => {
             let keys = virtual_keys(new, scene);
-            spliced.add_table("[[virtual]]", document.as_table().get("virtual"), &keys);
+            add_table(&mut spliced, &document, &VIRTUAL_SECTION, &keys);
         }
         Edit::RemoveVirtual(name) => {
-            let virtuals = tables("virtual");
+            let virtuals = tables(&document, &VIRTUAL_SECTION);
             let index = virtuals.iter().position(|body| body.has_name(name));
             spliced.remove_table(&virtuals, index.ok_or_else(|| no_thing(name))?);
         }
@@ -127,7 +99,6 @@ pub fn with_edit(text: &str, scene: &Scene, edit: &Edit) -> Result<String, Unfit
 /// What a text says of that which an edit changes: where two texts agree in it, the edit means the same in both.
 pub fn touched_by(text: &str, edit: &Edit) -> Option<String> {
     let document = parsed(text)?;
-    let root = document.as_table();
     let said = |bodies: &[Body], keys: &[&str]| -> String {
         let values = bodies
             .iter()
@@ -137,61 +108,64 @@ pub fn touched_by(text: &str, edit: &Edit) -> Option<String> {
         texts.collect::<Vec<_>>().join("\n")
     };
     let thing = |name: &str, keys: &[&str]| {
-        let (Thing::Object(body) | Thing::TableTop(body)) = thing_of(&document, name).ok()?;
+        let (WrittenThing::Object(body) | WrittenThing::TableTop(body)) =
+            thing_of(&document, name).ok()?;
         Some(said(&[body], keys))
     };
+    let all_of = |section: &Section| said(&tables(&document, section), &section.names());
     match edit {
-        Edit::Light { .. } | Edit::RemoveLight(_) => Some(said(
-            &bodies(root.get("light")),
-            &["kind", "position_m", "intensity", "direction", "irradiance"],
-        )),
-        Edit::Ambient(_) => Some(said(&bodies(root.get("ambient")), &["radiance"])),
-        Edit::Place { thing: name, .. } => thing(
-            name,
-            &[
-                "position_m",
-                "rotation_deg",
-                "scale",
-                "height_m",
-                "on",
-                "mesh",
-            ],
-        ),
-        Edit::Show { thing: name, .. } => thing(name, &["visible"]),
-        Edit::RemoveVirtual(name) => thing(
-            name,
-            &[
-                "mesh",
-                "on",
-                "position_m",
-                "rotation_deg",
-                "scale",
-                "material",
-                "casts",
-                "visible",
-                "smooth_deg",
-            ],
-        ),
-        Edit::Shadows(_) => Some(said(
-            &bodies(root.get("shadows")),
-            &[
-                "technique",
-                "samples",
-                "counting",
-                "max_silhouette_error_px",
-                "frame_budget_ms",
-            ],
-        )),
+        Edit::Light { .. } | Edit::RemoveLight(_) => Some(all_of(&LIGHT_SECTION)),
+        Edit::Ambient(_) => Some(all_of(&AMBIENT_SECTION)),
+        Edit::Place { thing: name, .. } => {
+            let mut keys = vec![TABLE.height_m.name, STANDING.on.name, SHAPE.mesh.name];
+            keys.extend(PlacementKeys::ALL.iter().map(|key| key.name()));
+            thing(name, &keys)
+        }
+        Edit::Show { thing: name, .. } => thing(name, &[THING.visible.name]),
+        Edit::RemoveVirtual(name) => thing(name, &VIRTUAL_SECTION.names()),
+        Edit::Shadows(change) => {
+            let keys: Vec<&str> = change.keys().iter().map(|change| change.key).collect();
+            Some(said(&tables(&document, &SHADOWS_SECTION), &keys))
+        }
         Edit::AnchorSize { anchor, .. } => {
-            let anchors = [bodies(root.get("board")), bodies(root.get("marker"))].concat();
-            let named: Vec<Body> = anchors
-                .into_iter()
+            let anchors = [
+                tables(&document, &BOARD_SECTION),
+                tables(&document, &MARKER_SECTION),
+            ];
+            let named: Vec<Body> = (anchors.concat().into_iter())
                 .filter(|body| body.has_name(anchor))
                 .collect();
-            Some(said(&named, &["markers", "size_m"]))
+            Some(said(&named, &[BOARD.markers.name, MARKER.size_m.name]))
         }
         Edit::AddLight(_) | Edit::AddVirtual(_) => Some(String::new()),
     }
+}
+
+/// The tables of a section that a text has.
+fn tables<'a>(document: &'a Document<&str>, section: &Section) -> Vec<Body<'a>> {
+    bodies(document.as_table().get(section.name))
+}
+
+fn add_table(spliced: &mut Spliced, document: &Document<&str>, section: &Section, keys: &[NewKey]) {
+    let siblings = document.as_table().get(section.name);
+    spliced.add_table(&section.head(), siblings, keys);
+}
+
+/// A key where there is none yet.
+fn new_key<T: Described, M>(key: &Key<T, M>, value: &T) -> NewKey {
+    (key.name, key.text(value).unwrap_or_default())
+}
+
+/// Writes three numbers, or one that stands for them where one is written.
+fn set_vector<M: Absent<DVec3>>(
+    spliced: &mut Spliced,
+    body: Body,
+    key: &Key<DVec3, M>,
+    wanted: DVec3,
+) {
+    let default = M::value(key).map(|default| default.x);
+    let digits = key.takes.numbers.digits;
+    spliced.set_numbers(body, key.name, &wanted.to_array(), digits, default);
 }
 
 /// Where a thing stands, as a text says it; `None` where the text has no such thing.
@@ -207,36 +181,41 @@ pub fn placement_of(text: &str, name: &str) -> Option<Placement> {
     };
     let default = Placement::default();
     Some(match thing_of(&document, name).ok()? {
-        Thing::Object(body) => Placement {
-            position_m: vector(body, "position_m", default.position_m),
-            rotation_deg: vector(body, "rotation_deg", default.rotation_deg),
-            scale: vector(body, "scale", default.scale),
+        WrittenThing::Object(body) => Placement {
+            position_m: vector(body, PLACEMENT.position_m.name, default.position_m),
+            rotation_deg: vector(body, PLACEMENT.rotation_deg.name, default.rotation_deg),
+            scale: vector(body, PLACEMENT.scale.name, default.scale),
         },
-        Thing::TableTop(body) => {
-            let height_m = body.value("height_m").and_then(number_of);
+        WrittenThing::TableTop(body) => {
+            let key = &TABLE.height_m;
+            let height_m = body.value(key.name).and_then(number_of);
             Placement {
-                position_m: DVec3::Z * height_m.unwrap_or(0.0),
+                position_m: DVec3::Z * height_m.unwrap_or(*key.default()),
                 ..default
             }
         }
     })
 }
 
-enum Thing<'a> {
+enum WrittenThing<'a> {
     Object(Body<'a>),
     TableTop(Body<'a>),
 }
 
-fn thing_of<'a>(document: &'a Document<&str>, name: &str) -> Result<Thing<'a>, Unfit> {
-    let root = document.as_table();
-    let things = [bodies(root.get("phantom")), bodies(root.get("virtual"))].concat();
-    let named = things.into_iter().find(|body| body.has_name(name));
+fn thing_of<'a>(document: &'a Document<&str>, name: &str) -> Result<WrittenThing<'a>, Unfit> {
+    let things = [
+        tables(document, &PHANTOM_SECTION),
+        tables(document, &VIRTUAL_SECTION),
+    ];
+    let mut things = things.concat().into_iter();
+    let named = things.find(|body| body.has_name(name));
     let top = || {
-        let table = root.get("table").filter(|_| name == "table");
-        bodies(table).first().copied().map(Thing::TableTop)
+        let tables = tables(document, &TABLE_SECTION);
+        let table = tables.first().filter(|_| name == TABLE_SECTION.name);
+        table.copied().map(WrittenThing::TableTop)
     };
     named
-        .map(Thing::Object)
+        .map(WrittenThing::Object)
         .or_else(top)
         .ok_or_else(|| no_thing(name))
 }
@@ -250,7 +229,6 @@ fn no_light(index: usize) -> Unfit {
 }
 
 fn set_light(spliced: &mut Spliced, body: Body, old: &Light, new: &Light) {
-    let keys = light_keys(new);
     match (old, new) {
         (
             Light::Point { .. },
@@ -259,8 +237,8 @@ fn set_light(spliced: &mut Spliced, body: Body, old: &Light, new: &Light) {
                 intensity,
             },
         ) => {
-            spliced.set_numbers(body, "position_m", &position_m.to_array(), POSITION, None);
-            spliced.set_numbers(body, "intensity", &intensity.to_array(), RATIO, None);
+            set_vector(spliced, body, &POINT_LIGHT.position_m, *position_m);
+            set_vector(spliced, body, &POINT_LIGHT.intensity, *intensity);
         }
         (
             Light::Directional {
@@ -274,190 +252,100 @@ fn set_light(spliced: &mut Spliced, body: Body, old: &Light, new: &Light) {
         ) => {
             // Written with any length, so it is as it was unless it points elsewhere.
             if unit_direction(*direction) != *old_direction {
-                spliced.set_numbers(body, "direction", &direction.to_array(), DIRECTION, None);
+                set_vector(spliced, body, &DIRECTIONAL_LIGHT.direction, *direction);
             }
-            spliced.set_numbers(body, "irradiance", &irradiance.to_array(), RATIO, None);
+            set_vector(spliced, body, &DIRECTIONAL_LIGHT.irradiance, *irradiance);
         }
-        (Light::Point { .. }, Light::Directional { .. }) => {
-            rename_light(spliced, body, ["kind", "position_m", "intensity"], keys);
-        }
-        (Light::Directional { .. }, Light::Point { .. }) => {
-            rename_light(spliced, body, ["kind", "direction", "irradiance"], keys);
+        (Light::Point { .. }, Light::Directional { .. })
+        | (Light::Directional { .. }, Light::Point { .. }) => {
+            // Each key becomes the one that is alike: kind, where it is, how strong it is.
+            for ((old_key, _), (new_key, text)) in light_keys(old).into_iter().zip(light_keys(new))
+            {
+                spliced.rename(body, old_key, new_key, text);
+            }
         }
     }
 }
 
-fn rename_light(
-    spliced: &mut Spliced,
-    body: Body,
-    old_keys: [&str; 3],
-    new_keys: [(&'static str, String); 3],
-) {
-    for (old_key, (new_key, text)) in old_keys.into_iter().zip(new_keys) {
-        spliced.rename(body, old_key, new_key, text);
-    }
-}
-
-fn light_keys(light: &Light) -> [(&'static str, String); 3] {
-    let vector = |vector: &DVec3, digits| super::numbers::new_array(&vector.to_array(), digits);
+fn light_keys(light: &Light) -> [NewKey; 3] {
     match light {
         Light::Point {
             position_m,
             intensity,
         } => [
-            ("kind", quoted("point")),
-            ("position_m", vector(position_m, POSITION)),
-            ("intensity", vector(intensity, RATIO)),
+            new_key(&LIGHT.kind, &LightKind::Point),
+            new_key(&POINT_LIGHT.position_m, position_m),
+            new_key(&POINT_LIGHT.intensity, intensity),
         ],
         Light::Directional {
             direction,
             irradiance,
         } => [
-            ("kind", quoted("directional")),
-            ("direction", vector(direction, DIRECTION)),
-            ("irradiance", vector(irradiance, RATIO)),
+            new_key(&LIGHT.kind, &LightKind::Directional),
+            new_key(&DIRECTIONAL_LIGHT.direction, direction),
+            new_key(&DIRECTIONAL_LIGHT.irradiance, irradiance),
         ],
     }
 }
 
-fn set_placement(spliced: &mut Spliced, body: Body, placement: &Placement) {
+fn set_placement(
+    spliced: &mut Spliced,
+    thing: WrittenThing,
+    placement: &Placement,
+) -> Result<(), Unfit> {
     let Placement {
         position_m,
         rotation_deg,
         scale,
-    } = placement;
-    spliced.set_numbers(
-        body,
-        "position_m",
-        &position_m.to_array(),
-        POSITION,
-        Some(0.0),
-    );
-    spliced.set_numbers(
-        body,
-        "rotation_deg",
-        &rotation_deg.to_array(),
-        ANGLE,
-        Some(0.0),
-    );
-    spliced.set_numbers(body, "scale", &scale.to_array(), RATIO, Some(1.0));
+    } = *placement;
+    match thing {
+        WrittenThing::Object(body) => {
+            set_vector(spliced, body, &PLACEMENT.position_m, position_m);
+            set_vector(spliced, body, &PLACEMENT.rotation_deg, rotation_deg);
+            set_vector(spliced, body, &PLACEMENT.scale, scale);
+        }
+        WrittenThing::TableTop(body) => {
+            let lifted = Placement {
+                position_m: DVec3::Z * position_m.z,
+                ..Placement::default()
+            };
+            if *placement != lifted {
+                return Err(Unfit::TableTop);
+            }
+            let key = &TABLE.height_m;
+            let (digits, default) = (key.takes.digits, Some(*key.default()));
+            spliced.set_numbers(body, key.name, &[position_m.z], digits, default);
+        }
+    }
+    Ok(())
 }
 
-/// The keys that differ, with their texts; no text where a key is to go.
-fn shadow_keys(old: &ShadowSettings, new: &ShadowSettings) -> Vec<(&'static str, Option<String>)> {
-    let ShadowSettings {
-        technique,
-        samples,
-        counting,
-        max_silhouette_error_px,
-        frame_budget_ms,
-        shafts,
-        quality,
-        without: _,
-    } = *new;
-    let ratio = |number: f64| super::numbers::new_number(number, RATIO);
-    // Another quality gives other defaults: what it says itself goes, what it does not stands.
-    let regraded = quality != old.quality;
-    let given = quality.map_or_else(ShadowSettings::default, Quality::shadows);
-    let mut all = shaft_keys(&old.shafts, &shafts);
-    let all_sources = || quoted("all");
-    all.push((
-        regraded || shafts.sources != old.shafts.sources,
-        "sources",
-        (!regraded || shafts.sources != given.shafts.sources).then(|| {
-            let count = |count: u32| count.to_string();
-            shafts.sources.map_or_else(all_sources, count)
-        }),
-    ));
-    all.extend([
-        (
-            quality != old.quality,
-            "quality",
-            quality.map(|quality| quoted(quality.name())),
-        ),
-        (
-            technique != old.technique,
-            "technique",
-            Some(quoted(word(&Technique::BY_NAME, technique))),
-        ),
-        (
-            regraded || samples != old.samples,
-            "samples",
-            (!regraded || samples != given.samples).then(|| samples.to_string()),
-        ),
-        (
-            counting != old.counting,
-            "counting",
-            Some(quoted(word(&Counting::BY_NAME, counting))),
-        ),
-        (
-            regraded || max_silhouette_error_px != old.max_silhouette_error_px,
-            "max_silhouette_error_px",
-            (!regraded || max_silhouette_error_px != given.max_silhouette_error_px)
-                .then(|| ratio(max_silhouette_error_px)),
-        ),
-        (
-            frame_budget_ms != old.frame_budget_ms,
-            "frame_budget_ms",
-            frame_budget_ms.map(ratio),
-        ),
-    ]);
-    all.into_iter()
-        .filter(|(differs, ..)| *differs)
-        .map(|(_, key, text)| (key, text))
-        .collect()
-}
-
-/// For each key of shafts whether it differs, and its text.
-fn shaft_keys(
-    old: &ShaftSettings,
-    new: &ShaftSettings,
-) -> Vec<(bool, &'static str, Option<String>)> {
-    let ShaftSettings {
-        // A quality has its say in it.
-        sources: _,
-        patches,
-        source_power,
-        receivers_per_leaf,
-        least_part,
-        map_px,
-        difference,
-    } = *new;
-    let differs = difference != old.difference;
-    let (named, compositing) = match difference {
-        Difference::Ratio => (None, None),
-        Difference::Subtract => (Some(quoted("subtract")), None),
-        Difference::Encoded => (None, Some(quoted("ldr"))),
+/// Writes the keys that a change makes otherwise than they are; what else the file says stays.
+fn set_shadows(
+    spliced: &mut Spliced,
+    document: &Document<&str>,
+    scene: &Scene,
+    change: &ShadowChange,
+) {
+    let here = ShadowChange {
+        from: scene.shadows,
+        to: change.made_in(scene.shadows),
     };
-    let ratio = |number: f64| Some(super::numbers::new_number(number, RATIO));
-    let count = |number: u32| Some(number.to_string());
-    vec![
-        (patches != old.patches, "patches", count(patches)),
-        (
-            source_power != old.source_power,
-            "source_power",
-            ratio(source_power),
-        ),
-        (
-            receivers_per_leaf != old.receivers_per_leaf,
-            "receivers_per_leaf",
-            count(receivers_per_leaf),
-        ),
-        (
-            least_part != old.least_part,
-            "least_part",
-            ratio(least_part),
-        ),
-        (map_px != old.map_px, "map_px", count(map_px)),
-        (differs, "difference", named),
-        (differs, "compositing", compositing),
-    ]
-}
-
-/// The word for a setting.
-fn word<T: PartialEq>(words: &[(&'static str, T)], meant: T) -> &'static str {
-    let found = words.iter().find(|(_, meaning)| *meaning == meant);
-    found.map_or("", |(word, _)| word)
+    let keys = here.keys().into_iter();
+    match tables(document, &SHADOWS_SECTION).first() {
+        Some(&body) => keys.for_each(|change| match change.text {
+            Some(text) => spliced.set(body, change.key, text),
+            None => spliced.remove_key(body, change.key),
+        }),
+        None => {
+            let new: Vec<NewKey> = keys
+                .filter_map(|change| Some((change.key, change.text?)))
+                .collect();
+            if !new.is_empty() {
+                add_table(spliced, document, &SHADOWS_SECTION, &new);
+            }
+        }
+    }
 }
 
 fn resize(
@@ -468,56 +356,51 @@ fn resize(
     size_m: f64,
 ) -> Result<(), Unfit> {
     let missing = || Unfit::Missing(format!("anchor with the name \"{anchor}\""));
-    let root = document.as_table();
-    let named = |key: &str| {
-        let tables = bodies(root.get(key));
-        tables.into_iter().find(|body| body.has_name(anchor))
+    let named = |section: &Section| {
+        let mut tables = tables(document, section).into_iter();
+        tables.find(|body| body.has_name(anchor))
     };
-    if let Some(marker) = named("marker") {
-        spliced.set_numbers(marker, "size_m", &[size_m], PRINT, None);
+    let (size, center) = (&MARKER.size_m, &ON_BOARD.center_m);
+    if let Some(marker) = named(&MARKER_SECTION) {
+        spliced.set_numbers(marker, size.name, &[size_m], size.takes.digits, None);
         return Ok(());
     }
-    let board = named("board").ok_or_else(missing)?;
+    let board = named(&BOARD_SECTION).ok_or_else(missing)?;
     let known = scene.anchors.iter().find(|known| known.name == anchor);
     let markers = &known.ok_or_else(missing)?.markers;
     let stretch = size_m / markers.first().ok_or_else(missing)?.size_m;
-    let written: Option<&Item> = board.item("markers");
+    let written: Option<&Item> = board.item(BOARD.markers.name);
     for (body, marker) in bodies(written).into_iter().zip(markers) {
+        let size_m = [marker.size_m * stretch];
         let center_m = (marker.center_m * stretch).to_array();
-        spliced.set_numbers(body, "size_m", &[marker.size_m * stretch], PRINT, None);
-        spliced.set_numbers(body, "center_m", &center_m, PRINT, None);
+        spliced.set_numbers(body, size.name, &size_m, size.takes.digits, None);
+        spliced.set_numbers(body, center.name, &center_m, center.takes.digits, None);
     }
     Ok(())
 }
 
-fn virtual_keys(new: &NewVirtual, scene: &Scene) -> Vec<(&'static str, String)> {
-    let mut keys = vec![("name", quoted(&new.name)), ("mesh", quoted(&new.mesh))];
-    if scene
-        .anchors
-        .first()
-        .is_none_or(|world| world.name != new.on)
-    {
-        keys.push(("on", quoted(&new.on)));
+fn virtual_keys(new: &NewVirtual, scene: &Scene) -> Vec<NewKey> {
+    let mut keys = vec![
+        new_key(&THING_NAME.name, &new.name),
+        (SHAPE.mesh.name, quoted(&new.mesh)),
+    ];
+    let world = scene.anchors.first();
+    if world.is_none_or(|world| world.name != new.on) {
+        keys.push((STANDING.on.name, quoted(&new.on)));
     }
-    let default = Placement::default();
     let Placement {
         position_m,
         rotation_deg,
         scale,
     } = new.placement;
-    let mut vector = |key, vector: DVec3, digits| {
-        keys.push((key, super::numbers::new_array(&vector.to_array(), digits)));
-    };
-    vector("position_m", position_m, POSITION);
-    if rotation_deg != default.rotation_deg {
-        vector("rotation_deg", rotation_deg, ANGLE);
-    }
-    if scale != default.scale {
-        vector("scale", scale, RATIO);
+    keys.push(new_key(&PLACEMENT.position_m, &position_m));
+    for (key, value) in [
+        (&PLACEMENT.rotation_deg, rotation_deg),
+        (&PLACEMENT.scale, scale),
+    ] {
+        if value != *key.default() {
+            keys.push(new_key(key, &value));
+        }
     }
     keys
-}
-
-fn quoted(text: &str) -> String {
-    toml::Value::from(text).to_string()
 }

@@ -17,7 +17,7 @@ use crate::app::truth::changed_by;
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
 use crate::render::Shown;
-use crate::scene::{Counting, Scene, ShadowTechnique};
+use crate::scene::{Scene, ShadowTechnique, VolumeCounting};
 
 /// By how many pixels silhouettes may move.
 const ERRORS_PX: [f64; 6] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
@@ -138,24 +138,24 @@ impl Chart for LeftOut {
         let mut looks = Looks::of(lab, unit)?;
         let scene = &mut looks.scene;
         scene.shadows.max_silhouette_error_px = 0.0;
-        scene.shadows.counting = Counting::DepthFail;
+        scene.shadows.counting = VolumeCounting::DepthFail;
         scene.shadows.shafts.sources = None;
         let is_soft = scene.chosen_technique().0 == ShadowTechnique::Shafts;
         let step = lab.step();
         let all = draw(lab, &looks)?;
         let mut ways = Vec::new();
         if !is_soft {
-            ways.push((CAPS, 0.0, Counting::Auto, None));
+            ways.push((CAPS, 0.0, VolumeCounting::Auto, None));
         }
         // Many shadows take a while, too long for a look at what triangles do to soft ones.
         if !(is_soft && lab.quick) {
             let errors_px = ERRORS_PX.iter().skip(step - 1).step_by(step);
-            let way = |&error_px: &f64| (TRIANGLES, error_px, Counting::DepthFail, None);
+            let way = |&error_px: &f64| (TRIANGLES, error_px, VolumeCounting::DepthFail, None);
             ways.extend(errors_px.map(way));
         }
         if is_soft {
             let counts = SOURCE_COUNTS.iter().skip(step - 1).step_by(step);
-            ways.extend(counts.map(|&few| (SOURCES, 0.0, Counting::DepthFail, Some(few))));
+            ways.extend(counts.map(|&few| (SOURCES, 0.0, VolumeCounting::DepthFail, Some(few))));
         }
         let mut rows = Vec::new();
         for (left_out, max_silhouette_error_px, counting, sources) in ways {

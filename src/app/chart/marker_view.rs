@@ -19,7 +19,7 @@ use crate::app::truth::sheets::{camera_above, photograph, with_noise};
 use crate::app::truth::{PoseErrors, shifts_px};
 use crate::geometry::camera::Intrinsics;
 use crate::render::{Layers, REAL, Renderer, Shown, VIRTUAL_HIDES};
-use crate::scene::{Anchor, DetectorKind, Family, Marker, Search, TrackingSettings};
+use crate::scene::{Anchor, DetectorKind, Family, Marker, SearchArea, TrackingSettings};
 use crate::tracking::{Status, Tracker};
 
 const CAMERA: Intrinsics = Intrinsics {
@@ -95,7 +95,7 @@ fn ways() -> [(&'static str, TrackingSettings); 3] {
         ..bare_library()
     };
     let ours = TrackingSettings {
-        search: Search::Near,
+        search: SearchArea::Near,
         ..TrackingSettings::default()
     };
     [

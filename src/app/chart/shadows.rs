@@ -16,7 +16,7 @@ use crate::app::stages::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
 use crate::app::truth::{Drawn, LinearPicture};
 use crate::render::Shown;
-use crate::scene::{Counting, Quality, Scene, ShadowSettings, ShaftSettings, Technique};
+use crate::scene::{Quality, Scene, ShadowSettings, ShaftSettings, Technique, VolumeCounting};
 
 /// The chart.
 pub struct Shadows;
@@ -94,15 +94,15 @@ fn ways(scene: &Scene) -> Vec<ShadowWay> {
         add(series(shadows.samples), name.to_owned(), shadows);
     }
     for (samples, max_silhouette_error_px, counting) in [
-        (1, 0.0, Counting::Auto),
-        (1, 0.0, Counting::DepthFail),
-        (1, 8.0, Counting::Auto),
-        (4, 0.0, Counting::DepthFail),
-        (4, 8.0, Counting::Auto),
+        (1, 0.0, VolumeCounting::Auto),
+        (1, 0.0, VolumeCounting::DepthFail),
+        (1, 8.0, VolumeCounting::Auto),
+        (4, 0.0, VolumeCounting::DepthFail),
+        (4, 8.0, VolumeCounting::Auto),
     ] {
         let setting = match counting {
-            Counting::Auto => format!("{max_silhouette_error_px} px"),
-            Counting::DepthFail => "depth-fail".to_owned(),
+            VolumeCounting::Auto => format!("{max_silhouette_error_px} px"),
+            VolumeCounting::DepthFail => "depth-fail".to_owned(),
         };
         let shadows = ShadowSettings {
             technique: Technique::Volumes,

@@ -15,7 +15,7 @@ use crate::app::stages::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
 use crate::app::truth::{PoseErrors, TruePoses, shifts_px};
 use crate::capture::FrameSource;
-use crate::scene::{ArucoRefinement, DetectorKind, Search, TrackingSettings};
+use crate::scene::{ArucoRefinement, DetectorKind, SearchArea, TrackingSettings};
 use crate::tracking::{Status, Tracker};
 
 /// Frames of a recording that `--quick` looks at.
@@ -55,7 +55,7 @@ const OURS: &str = "gnomon";
 /// What a program does that only calls a library: its corners, found anew in each picture, and a pose from them.
 pub fn bare_library() -> TrackingSettings {
     TrackingSettings {
-        search: Search::Full,
+        search: SearchArea::Full,
         pose_from_pixels: false,
         filter: false,
         refine_edges: false,
@@ -100,10 +100,10 @@ fn ways() -> Vec<TrackingWay> {
         aruco("none", ArucoRefinement::None),
         aruco("contour", ArucoRefinement::Contour),
         aruco("apriltag", ArucoRefinement::AprilTag),
-        ours("corners", Search::Full, false, false),
-        ours("pixels", Search::Full, true, false),
-        ours("followed", Search::Near, true, false),
-        ours("filtered", Search::Near, true, true),
+        ours("corners", SearchArea::Full, false, false),
+        ours("pixels", SearchArea::Full, true, false),
+        ours("followed", SearchArea::Near, true, false),
+        ours("filtered", SearchArea::Near, true, true),
     ]
 }
 

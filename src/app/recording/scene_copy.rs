@@ -12,15 +12,34 @@ use anyhow::{Context as _, Result};
 use toml_edit::{DocumentMut, Item, Table, Value};
 
 use crate::app::files::new_file::sync_folder;
+use crate::scene::format::{CAMERA, CAMERA_SECTION};
 use crate::scene::material_libraries::with_libraries_named;
 use crate::scene::{FileKind, NamedFile, Scene};
 
 /// The name of the scene in its folder.
 pub const SCENE_NAME: &str = "scene.toml";
-/// Folders in a session's folder for what its scene names.
-pub const COPY_FOLDERS: [&str; 4] = ["models", "room", "probe", "markers"];
-/// The session carries the calibration itself, and its frames come as they were turned and chosen.
-const CAMERA_S_OWN: [&str; 5] = ["calibration", "mirror", "size_px", "fps", "format"];
+/// The folder in a session's folder for what its scene names, by what that is; `None` for what holds for the camera alone.
+pub fn copy_folder(kind: FileKind) -> Option<&'static str> {
+    match kind {
+        FileKind::Recording | FileKind::Calibration => None,
+        FileKind::Mesh => Some("models"),
+        FileKind::RoomMesh => Some("room"),
+        FileKind::Probe => Some("probe"),
+        FileKind::Dictionary => Some("markers"),
+    }
+}
+
+/// All of these folders.
+pub fn copy_folders() -> impl Iterator<Item = &'static str> {
+    FileKind::ALL.into_iter().filter_map(copy_folder)
+}
+
+/// Keys that hold for the camera alone: the session carries the calibration itself, and its frames come as they were
+/// turned and chosen.
+fn keys_of_the_camera() -> impl Iterator<Item = &'static str> {
+    let names = CAMERA_SECTION.keys().map(|key| key.name());
+    names.filter(|name| *name != CAMERA.source.name)
+}
 
 /// Copies a scene file into a session's folder with all that it names, and reads the copy again.
 ///
@@ -53,23 +72,25 @@ pub fn copy_scene(scene: &Path, session: &Path) -> Result<()> {
 
 /// Lets the scene play the folder that it lies in. Comments of settings that go stay.
 fn play_own_folder(document: &mut DocumentMut) {
-    let Some(camera) = document.get_mut("camera") else {
+    let Some(camera) = document.get_mut(CAMERA_SECTION.name) else {
         return;
     };
-    if let Some(source) = camera.get_mut("source").and_then(Item::as_value_mut) {
+    if let Some(source) = camera
+        .get_mut(CAMERA.source.name)
+        .and_then(Item::as_value_mut)
+    {
         let decor = source.decor().clone();
         *source = Value::from(".");
         *source.decor_mut() = decor;
     }
-    let comments: Vec<String> = CAMERA_S_OWN
-        .iter()
+    let comments: Vec<String> = keys_of_the_camera()
         .filter_map(|key| comments_of(camera.as_table()?, key))
         .collect();
     if let Some(camera) = camera.as_table_like_mut() {
-        for key in CAMERA_S_OWN {
+        for key in keys_of_the_camera() {
             camera.remove(key);
         }
-        if let Some(mut source) = camera.key_mut("source")
+        if let Some(mut source) = camera.key_mut(CAMERA.source.name)
             && !comments.is_empty()
         {
             let decor = source.leaf_decor_mut();
@@ -114,10 +135,12 @@ impl Copies<'_> {
         }
         let of_kind = self.known.keys().filter(|(kind, _)| *kind == named.kind);
         let number = of_kind.count() + 1;
+        let Some(folder) = copy_folder(named.kind) else {
+            return Ok(None);
+        };
+        let own_name = format!("{folder}/{number}");
         let name = match named.kind {
-            FileKind::Recording | FileKind::Calibration => return Ok(None),
-            FileKind::Mesh => self.copy_mesh(&named.path, &format!("models/{number}"))?,
-            FileKind::RoomMesh => self.copy_mesh(&named.path, &format!("room/{number}"))?,
+            FileKind::Mesh | FileKind::RoomMesh => self.copy_mesh(&named.path, &own_name)?,
             FileKind::Probe => {
                 let bytes = read(&named.path)?;
                 // Whoever reads it goes by its content.
@@ -126,11 +149,10 @@ impl Copies<'_> {
                 } else {
                     "exr"
                 };
-                self.put(format!("probe/{number}.{extension}"), &bytes)?
+                self.put(format!("{own_name}.{extension}"), &bytes)?
             }
-            FileKind::Dictionary => {
-                self.put(format!("markers/{number}.yml"), &read(&named.path)?)?
-            }
+            FileKind::Dictionary => self.put(format!("{own_name}.yml"), &read(&named.path)?)?,
+            FileKind::Recording | FileKind::Calibration => return Ok(None),
         };
         self.known.insert(key, name.clone());
         Ok(Some(name))
@@ -178,6 +200,7 @@ fn write_new(path: &Path, bytes: &[u8]) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::format::SECTIONS;
 
     fn config(name: &str) -> PathBuf {
         Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -214,6 +237,59 @@ mod tests {
             let text = fs::read_to_string(folder.path().join(SCENE_NAME)).unwrap();
             assert!(text.contains(comment), "comments stay");
         }
+    }
+
+    /// Whatever key names a file, by its entry: none may be left behind.
+    #[test]
+    fn files_of_every_key_are_copied() {
+        let folder = tempfile::tempdir().unwrap();
+        let home = folder.path().join("home");
+        fs::create_dir_all(&home).unwrap();
+        let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+        for name in ["phantom", "virtual", "floor", "wall", "shelf"] {
+            fs::write(home.join(name).with_extension("obj"), mesh).unwrap();
+        }
+        let codes =
+            "nmarkers: 2\nmarkersize: 3\nmarker_0: \"110100000\"\nmarker_1: \"111001011\"\n";
+        for name in ["board.yml", "marker.yml", "lens.toml"] {
+            fs::write(home.join(name), codes).unwrap();
+        }
+        let probe = config("../recordings/room/probe.hdr");
+        fs::copy(probe, home.join("probe.hdr")).unwrap();
+        fs::create_dir(home.join("take")).unwrap();
+        let text = "[camera]\nsource = \"take\"\ncalibration = \"lens.toml\"\n[tracking]\ndetector = \"aruco\"\n\
+            [[board]]\nname = \"b\"\nfamily = \"board.yml\"\nmarkers = [{ id = 0, size_m = 0.04, center_m = [0, 0] }]\n\
+            [[marker]]\nname = \"m\"\nfamily = \"marker.yml\"\nid = 1\nsize_m = 0.04\n\
+            [[phantom]]\nname = \"p\"\nmesh = \"phantom.obj\"\n[[virtual]]\nname = \"v\"\nmesh = \"virtual.obj\"\n\
+            [probe]\nimage = \"probe.hdr\"\nroom = [\"floor.obj\", \"wall.obj\"]\n[[room]]\nmesh = \"shelf.obj\"\n";
+        let scene = home.join("scene.toml");
+        fs::write(&scene, text).unwrap();
+
+        // The scene has every key that names a file.
+        let document: toml::Table = text.parse().unwrap();
+        for section in SECTIONS {
+            for key in section.keys().filter(|key| key.file().is_some()) {
+                let table = match document.get(section.name) {
+                    Some(toml::Value::Array(tables)) => tables[0].as_table(),
+                    Some(table) => table.as_table(),
+                    None => None,
+                };
+                let has = table.is_some_and(|table| table.contains_key(key.name()));
+                assert!(has, "{}.{} names a file", section.name, key.name());
+            }
+        }
+
+        let session = folder.path().join("session");
+        fs::create_dir(&session).unwrap();
+        copy_scene(&scene, &session).unwrap();
+        fs::remove_dir_all(&home).unwrap();
+        let copy = Scene::load(&session.join(SCENE_NAME)).unwrap();
+        assert_eq!((copy.anchors.len(), copy.phantoms.len()), (2, 1));
+        assert_eq!(copy.probe.map(|probe| probe.room.len()), Some(3));
+        // Folders that an older session is known by.
+        let mut folders: Vec<&str> = copy_folders().collect();
+        folders.sort_unstable();
+        assert_eq!(folders, ["markers", "models", "probe", "room"]);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-use super::scene_copy::{COPY_FOLDERS, SCENE_NAME};
+use super::scene_copy::{SCENE_NAME, copy_folders};
 use crate::app::files::is_at;
 use crate::app::files::job_files::Replacing;
 use crate::app::files::lock;
@@ -100,7 +100,7 @@ impl Drop for SessionFolder {
             for name in FILES {
                 _ = fs::remove_file(self.path.join(name));
             }
-            for name in COPY_FOLDERS {
+            for name in copy_folders() {
                 _ = fs::remove_dir_all(self.path.join(name));
             }
             _ = fs::remove_dir(&self.path);
@@ -149,5 +149,5 @@ fn names_in(path: &Path) -> io::Result<Vec<String>> {
 }
 
 fn is_of_session(name: &str) -> bool {
-    FILES.contains(&name) || COPY_FOLDERS.contains(&name)
+    FILES.contains(&name) || copy_folders().any(|folder| folder == name)
 }

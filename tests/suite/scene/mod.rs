@@ -13,8 +13,8 @@ use gnomon::app::jobs::check::summary;
 use gnomon::geometry::mesh::Mesh;
 use gnomon::light::{Light, Material};
 use gnomon::scene::{
-    ArucoRefinement, Codes, Counting, DetectorKind, Family, Object, Quality, Scene, SceneError,
-    ShadowSettings, ShaftSettings, Shortcuts, Technique,
+    ArucoRefinement, Codes, DetectorKind, Family, Object, Quality, Scene, SceneError,
+    ShadowSettings, ShaftSettings, Shortcuts, Technique, VolumeCounting,
 };
 use tempfile::TempDir;
 
@@ -132,7 +132,7 @@ fn a_small_scene_has_the_defaults() {
             quality: None,
             technique: Technique::Auto,
             samples: 4,
-            counting: Counting::Auto,
+            counting: VolumeCounting::Auto,
             max_silhouette_error_px: 0.5,
             frame_budget_ms: None,
             shafts: Default::default(),
@@ -301,7 +301,7 @@ frame_budget_ms = 16
             quality: Some(Quality::Accurate),
             technique: Technique::Volumes,
             samples: 1,
-            counting: Counting::DepthFail,
+            counting: VolumeCounting::DepthFail,
             max_silhouette_error_px: 0.0,
             frame_budget_ms: Some(16.0),
             // All of them: what this quality means.

@@ -13,6 +13,7 @@ use crate::geometry::levels::{Level, levels};
 use crate::geometry::mesh::MeshReport;
 use crate::geometry::outline_scale::largest_scale;
 use crate::light::Light;
+use crate::scene::format::{SHADOWS, SHADOWS_SECTION};
 use crate::scene::{Anchor, DetectorKind, Object, Quality, Scene, ShadowSettings};
 use budget::budget_line;
 use room::room_lines;
@@ -107,27 +108,28 @@ fn shadow_lines(text: &mut String, scene: &Scene) {
     );
     let detail = match scene.shadows.max_silhouette_error_px {
         0.0 => "all triangles at any distance".to_owned(),
-        error_px => format!("silhouettes within {} px", short(error_px)),
+        error_px => format!(
+            "silhouettes within {} {}",
+            short(error_px),
+            SHADOWS.max_silhouette_error_px.takes.unit
+        ),
     };
     line(text, "detail", &detail);
 }
 
 /// A quality, and what the scene sets otherwise.
 fn quality_row(quality: Quality, shadows: &ShadowSettings) -> String {
-    let meant = quality.shadows();
-    let mut others = Vec::new();
-    if shadows.samples != meant.samples {
-        others.push("samples");
-    }
-    if shadows.max_silhouette_error_px != meant.max_silhouette_error_px {
-        others.push("max_silhouette_error_px");
-    }
-    if shadows.shafts.sources != meant.shafts.sources {
-        others.push("sources");
-    }
     let name = quality.name();
+    let others = shadows.keys_beside_quality();
     match others.is_empty() {
-        true => format!("{name}: samples, detail and sources are what it means"),
+        true => {
+            let keys = SHADOWS_SECTION.keys();
+            let set: Vec<&str> = keys
+                .filter(|key| key.quality_text(quality).is_some())
+                .map(|key| key.name())
+                .collect();
+            format!("{name}: {} are what it means", set.join(", "))
+        }
         false => format!("{name}, but the scene sets {}", others.join(" and ")),
     }
 }

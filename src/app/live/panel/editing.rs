@@ -5,6 +5,7 @@ use glam::DVec3;
 
 use crate::app::authoring::Edit;
 use crate::app::live::command::{Commands, SceneCommand};
+use crate::scene::{Numbers, Whole};
 
 /// An edit that is under way.
 #[derive(Debug, Default)]
@@ -39,20 +40,20 @@ fn is_held(ui: &Ui) -> bool {
 }
 
 /// A number with its name, that is taken when it is written out, or as it is dragged; whether it has changed.
-pub fn number(ui: &mut Ui, name: &str, value: &mut f64, speed: f64, unit: &str) -> bool {
+pub fn number(ui: &mut Ui, name: &str, value: &mut f64, speed: f64, allowed: &Numbers) -> Response {
     ui.horizontal(|ui| {
-        let field = field(ui, value, speed, unit);
+        let field = field(ui, value, speed, allowed);
         let label = ui.label(name);
-        field.labelled_by(label.id).changed()
+        field.labelled_by(label.id)
     })
     .inner
 }
 
-/// Three numbers in a row.
-pub fn vector(ui: &mut Ui, name: &str, value: &mut DVec3, speed: f64, unit: &str) -> bool {
+/// Three numbers in a row; whether one has changed.
+pub fn vector(ui: &mut Ui, name: &str, value: &mut DVec3, speed: f64, allowed: &Numbers) -> bool {
     ui.horizontal(|ui| {
         let [x, y, z] = value.as_mut();
-        let fields = [x, y, z].map(|component| field(ui, component, speed, unit));
+        let fields = [x, y, z].map(|component| field(ui, component, speed, allowed));
         let label = ui.label(name);
         fields
             .map(|field| field.labelled_by(label.id).changed())
@@ -62,7 +63,7 @@ pub fn vector(ui: &mut Ui, name: &str, value: &mut DVec3, speed: f64, unit: &str
 }
 
 /// A power of light as its strength and its colour; whether it has changed.
-pub fn power(ui: &mut Ui, name: &str, value: &mut DVec3) -> bool {
+pub fn power(ui: &mut Ui, name: &str, value: &mut DVec3, allowed: &Numbers) -> bool {
     let mut strength = value.max_element();
     let mut colour = match strength > 0.0 {
         true => (*value / strength).as_vec3().to_array(),
@@ -71,7 +72,7 @@ pub fn power(ui: &mut Ui, name: &str, value: &mut DVec3) -> bool {
     let changed = ui
         .horizontal(|ui| {
             let speed = 0.01 * strength.max(0.01);
-            let strength = field(ui, &mut strength, speed, "");
+            let strength = field(ui, &mut strength, speed, allowed);
             let colour = ui.color_edit_button_rgb(&mut colour);
             let label = ui.label(name);
             let fields = [strength, colour];
@@ -81,18 +82,40 @@ pub fn power(ui: &mut Ui, name: &str, value: &mut DVec3) -> bool {
         })
         .inner;
     if changed {
-        *value = strength.clamp(0.0, 1e9) * DVec3::from_array(colour.map(f64::from));
+        *value = strength * DVec3::from_array(colour.map(f64::from));
     }
     changed
 }
 
-/// A number alone.
-pub fn field(ui: &mut Ui, value: &mut f64, speed: f64, unit: &str) -> Response {
-    ui.add(
+/// A number alone, with its unit. What it is changed to is allowed.
+pub fn field(ui: &mut Ui, value: &mut f64, speed: f64, allowed: &Numbers) -> Response {
+    let suffix = match allowed.unit {
+        "" => String::new(),
+        "degrees" => "°".to_owned(),
+        unit => format!(" {unit}"),
+    };
+    let field = ui.add(
         DragValue::new(value)
             .speed(speed)
             .max_decimals(4)
-            .suffix(unit)
+            .suffix(suffix)
             .update_while_editing(false),
-    )
+    );
+    if field.changed() {
+        *value = allowed.nearest(*value, speed);
+    }
+    field
+}
+
+/// A whole number with its name.
+pub fn whole(ui: &mut Ui, name: &str, value: &mut u32, allowed: &Whole) -> Response {
+    ui.horizontal(|ui| {
+        let field = DragValue::new(value)
+            .range(allowed.least..=allowed.most)
+            .update_while_editing(false);
+        let field = ui.add(field);
+        let label = ui.label(name);
+        field.labelled_by(label.id)
+    })
+    .inner
 }

@@ -2,10 +2,15 @@
 
 use std::path::PathBuf;
 
-use eframe::egui::{ComboBox, DragValue, Ui};
+use eframe::egui::{ComboBox, Ui};
 
 use super::Facts;
+use super::editing::field;
 use crate::app::live::command::{Commands, SceneCommand};
+use crate::scene::format::MARKER;
+
+/// Millimetres per point that a size is dragged.
+const SPEED_MM: f64 = 0.5;
 
 /// What was answered so far.
 #[derive(Debug)]
@@ -58,11 +63,8 @@ impl FirstUse {
             });
         self.id = Some(id);
         ui.horizontal(|ui| {
-            let field = DragValue::new(&mut self.size_mm)
-                .range(1.0..=2000.0)
-                .speed(0.5)
-                .suffix(" mm");
-            let field = ui.add(field);
+            let allowed = MARKER.size_m.takes.scaled(1e3, "mm");
+            let field = field(ui, &mut self.size_mm, SPEED_MM, &allowed);
             let label = ui.label("side of its black square");
             field.labelled_by(label.id);
         });

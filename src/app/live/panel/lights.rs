@@ -8,6 +8,7 @@ use crate::app::authoring::Edit;
 use crate::app::live::command::{Commands, SceneCommand, Selected, WindowCommand};
 use crate::app::live::window_state::WindowState;
 use crate::light::Light;
+use crate::scene::format::{AMBIENT, DIRECTIONAL_LIGHT, POINT_LIGHT};
 use crate::scene::{Scene, unit_direction};
 
 /// A light that is added: where a desk lamp stands, as bright on the table as display white.
@@ -47,18 +48,22 @@ pub fn show(
                     position_m,
                     intensity,
                 } => {
-                    let moved = vector(ui, "m", position_m, 0.002, "");
-                    power(ui, "W/sr", intensity) || moved
+                    let m = POINT_LIGHT.position_m.takes.numbers;
+                    let moved = vector(ui, m.unit, position_m, 0.002, &m.unit(""));
+                    let watts = &POINT_LIGHT.intensity.takes.numbers;
+                    power(ui, "W/sr", intensity, watts) || moved
                 }
                 Light::Directional {
                     direction,
                     irradiance,
                 } => {
-                    let turned = vector(ui, "travels", direction, 0.005, "");
+                    let any = &DIRECTIONAL_LIGHT.direction.takes.numbers;
+                    let turned = vector(ui, "travels", direction, 0.005, any);
                     if turned {
                         *direction = unit_direction(*direction);
                     }
-                    power(ui, "W/m²", irradiance) || turned
+                    let watts = &DIRECTIONAL_LIGHT.irradiance.takes.numbers;
+                    power(ui, "W/m²", irradiance, watts) || turned
                 }
             };
             let points_somewhere =
@@ -69,7 +74,8 @@ pub fn show(
         });
     }
     let mut ambient = scene.ambient_radiance;
-    if power(ui, "ambient radiance", &mut ambient) {
+    let allowed = &AMBIENT.radiance.takes.numbers;
+    if power(ui, "ambient radiance", &mut ambient, allowed) {
         editing.changed(ui, Edit::Ambient(ambient), commands);
     }
     if ui.button("Add a light").clicked() {

@@ -7,12 +7,11 @@ use super::editing::{Editing, vector};
 use crate::app::authoring::Edit;
 use crate::app::live::command::{Commands, SceneCommand, Selected, WindowCommand};
 use crate::app::live::window_state::WindowState;
+use crate::scene::format::PLACEMENT;
 use crate::scene::{Object, Placement, Scene};
 
 /// Metres, degrees and factors per point that a field is dragged.
 const SPEEDS: [f64; 3] = [0.0005, 0.5, 0.005];
-/// No thing is smaller than this part of itself: a scale of 0 would be none.
-const LEAST_SCALE: f64 = 1e-3;
 
 /// Shows them.
 pub fn show(
@@ -72,14 +71,23 @@ fn fields(
         ui.weak(format!("on {}", anchor.name));
     }
     let [position, rotation, scale] = SPEEDS;
-    let moved = vector(ui, "m", &mut placement.position_m, position, "");
-    let turned = vector(ui, "turned", &mut placement.rotation_deg, rotation, "°");
-    let scaled = vector(ui, "scale", &mut placement.scale, scale, "");
+    let [m, degrees, factor] = [
+        &PLACEMENT.position_m,
+        &PLACEMENT.rotation_deg,
+        &PLACEMENT.scale,
+    ]
+    .map(|key| key.takes.numbers);
+    let placed = &mut placement.position_m;
+    let moved = vector(ui, m.unit, placed, position, &m.unit(""));
+    let turned = vector(
+        ui,
+        "turned",
+        &mut placement.rotation_deg,
+        rotation,
+        &degrees,
+    );
+    let scaled = vector(ui, "scale", &mut placement.scale, scale, &factor);
     if moved || turned || scaled {
-        for factor in placement.scale.as_mut() {
-            let sign = if factor.is_sign_negative() { -1.0 } else { 1.0 };
-            *factor = sign * factor.abs().max(LEAST_SCALE);
-        }
         let thing = thing.name.clone();
         editing.changed(ui, Edit::Place { thing, placement }, commands);
     }

@@ -7,6 +7,7 @@ use super::editing::{Editing, field};
 use crate::app::authoring::Edit;
 use crate::app::live::command::Commands;
 use crate::scene::Scene;
+use crate::scene::format::MARKER;
 use crate::tracking::{AnchorPose, Status};
 
 /// Above this the calibration or the markers' sizes are wrong, pixels.
@@ -73,9 +74,10 @@ fn size(
         return;
     };
     let mut size_mm = marker.size_m * 1e3;
-    let field = field(ui, &mut size_mm, SPEED_MM, " mm").labelled_by(label.id);
+    let allowed = MARKER.size_m.takes.scaled(1e3, "mm");
+    let field = field(ui, &mut size_mm, SPEED_MM, &allowed).labelled_by(label.id);
     if field.changed() {
-        let size_m = size_mm.clamp(0.1, 1e5) * 1e-3;
+        let size_m = size_mm * 1e-3;
         let anchor = name.to_owned();
         editing.changed(ui, Edit::AnchorSize { anchor, size_m }, commands);
     }

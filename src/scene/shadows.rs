@@ -1,0 +1,316 @@
+//! `[shadows]`: how shadows are made.
+
+use super::error::SceneError;
+use super::quality::Quality;
+use super::ranges::{Numbers, Whole};
+use super::reader::Table;
+use super::schema::key::Missing::{ByQuality, Is, Means};
+use super::schema::section::{Example, Section, Times};
+use super::schema::settings::{KeyChange, Settings as _};
+use super::shortcuts::Shortcuts;
+use super::{ProbeScene, Scene};
+use crate::geometry::outline_scale::LARGEST_MOVE_PX;
+use crate::shafts::difference::Difference;
+
+choices! {
+    /// How shadows are made.
+    pub enum Technique, "technique" {
+        /// What the scene's lights call for: shafts with a probe, else volumes.
+        Auto = "auto",
+        /// Shadow volumes (Haller, Drab & Hartmann 2003).
+        Volumes = "volumes",
+        /// Soft shadows of a probe's light in a room (Gibson, Cook, Howard & Hubbold 2003).
+        Shafts = "shafts",
+    }
+}
+
+choices! {
+    /// How shadow volumes are counted.
+    pub enum VolumeCounting, "way of counting" {
+        /// Depth-pass where it is known to be right, depth-fail elsewhere: the same picture for less.
+        Auto = "auto",
+        /// Depth-fail everywhere.
+        DepthFail = "depth-fail",
+    }
+}
+
+choices! {
+    /// How what is hidden is taken out of the video in linear light.
+    pub enum LinearDifference, "way to take light away" {
+        /// Of the pixel's light as large a part as of the modelled light.
+        Ratio = "ratio",
+        /// The radiance that the model says is missing.
+        Subtract = "subtract",
+    }
+}
+
+choices! {
+    /// In which numbers light is taken out of the video.
+    pub enum CompositingSpace, "way to composite" {
+        /// In linear light, as `difference` says.
+        Linear = "float",
+        /// In encoded levels, as Gibson et al. 2003 had to; it takes no `difference`.
+        Encoded = "ldr",
+    }
+}
+
+/// What makes a scene's shadows: a [`Technique`] that is chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ShadowTechnique {
+    /// Shadow volumes.
+    Volumes,
+    /// Soft shadows of a probe's light in a room.
+    Shafts,
+}
+
+impl ShadowTechnique {
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Volumes => Technique::Volumes.name(),
+            Self::Shafts => Technique::Shafts.name(),
+        }
+    }
+}
+
+settings! {
+    /// How shadows are made and how finely.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct ShadowSettings, SHADOWS: ShadowKeys;
+
+    /// What the others are taken from where the file does not say them.
+    quality: Option<Quality> => Means(None, "none, which is as balanced");
+    /// The technique that is asked for.
+    technique: Technique => Is(Technique::Auto);
+    /// Samples per pixel.
+    samples: u32, Whole::one_of("number of samples", &[1, 4]) => ByQuality { fast: 1, balanced: 4, accurate: 4 };
+    /// How volumes are counted.
+    counting: VolumeCounting => Is(VolumeCounting::Auto);
+    /// By less than this many pixels a coarser version of a thing may move its silhouette, as the camera and the lights
+    /// see it; 0: things are never made coarser.
+    max_silhouette_error_px: f64, Numbers::between(0.0, LARGEST_MOVE_PX).unit("px")
+        => ByQuality { fast: 2.0, balanced: 0.5, accurate: 0.0 };
+    /// What drawing a frame may take: as many sources (volumes: as fine outlines) as fit, up to what the other keys say.
+    /// What is drawn then depends on the machine.
+    frame_budget_ms: Option<f64>, Numbers::above(0.0, 1e6).unit("ms") => Means(None, "no limit");
+    besides {
+        /// What technique shafts alone is asked for.
+        shafts: ShaftSettings => ShaftSettings::default();
+        /// Shortcuts that technique volumes is not to take; no key of a scene file.
+        without: Shortcuts => Shortcuts::NONE;
+    }
+}
+
+settings! {
+    /// How finely shafts make soft shadows.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct ShaftSettings, SHAFTS: ShaftKeys;
+
+    /// Shafts: sources, each with a shadow of its own (n of Gibson et al. 2003); "all": every one that is hidden.
+    sources: Option<u32>, Whole::between(1, 4096).or("all", "number of sources")
+        => ByQuality { fast: Some(10), balanced: Some(50), accurate: None };
+    /// Shafts: patches that the room is cut into, about.
+    patches: u32, Whole::between(100, 20_000) => Is(1500);
+    /// Shafts: part of all power that the sources send out, the brightest first.
+    source_power: f64, Numbers::above(0.0, 1.0) => Is(1.0);
+    /// Shafts: patches in a leaf of the receivers' octree.
+    receivers_per_leaf: u32, Whole::between(1, 1000) => Is(8);
+    /// Shafts that bring every vertex less than this part of its light are cut no further.
+    least_part: f64, Numbers::between(0.0, 1.0) => Is(0.02);
+    /// Shafts: side of a source's shadow map, pixels.
+    map_px: u32, Whole::one_of("side of maps", &[16, 32, 64, 128, 256, 512, 1024]) => Is(256);
+    besides {
+        /// How what is hidden is taken out of the video.
+        difference: Difference => Difference::Ratio;
+    }
+}
+
+keys! {
+    /// The two keys that are one setting, [`ShaftSettings::difference`].
+    pub static DIFFERENCE: DifferenceKeys;
+
+    /// Shafts: how what is hidden is taken out of the video.
+    difference: LinearDifference => Is(LinearDifference::Ratio);
+    /// Shafts: in which numbers that is done.
+    compositing: CompositingSpace => Is(CompositingSpace::Linear);
+}
+
+/// `[shadows]`.
+pub static SHADOWS_SECTION: Section = Section {
+    name: "shadows",
+    says: "How shadows are made. docs/accuracy.md compares the qualities.",
+    times: Times::UpToOnce,
+    groups: &[ShadowKeys::ALL, ShaftKeys::ALL, DifferenceKeys::ALL],
+    shown: &[
+        ("quality", Example::Aside("\"balanced\"")),
+        ("frame_budget_ms", Example::Aside("16.0")),
+    ],
+    is_aside: false,
+};
+
+impl Quality {
+    /// What it means where nothing else is said.
+    pub fn shadows(self) -> ShadowSettings {
+        ShadowSettings::default().with_quality(self)
+    }
+}
+
+impl ShadowSettings {
+    /// With another quality and all that it sets; the rest stays.
+    pub fn with_quality(self, quality: Quality) -> Self {
+        Self {
+            quality: Some(quality),
+            shafts: self.shafts.at_quality(quality),
+            ..self.at_quality(quality)
+        }
+    }
+
+    /// The names of the keys that a quality sets, and that are otherwise here than it means.
+    pub fn keys_beside_quality(&self) -> Vec<&'static str> {
+        let Some(quality) = self.quality else {
+            return Vec::new();
+        };
+        let change = ShadowChange {
+            from: self.with_quality(quality),
+            to: *self,
+        };
+        let keys = change.keys().into_iter().map(|change| change.key);
+        keys.collect()
+    }
+}
+
+/// Other settings of shadows: what differs between the two changes, and nothing else.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShadowChange {
+    /// As they were.
+    pub from: ShadowSettings,
+    /// As they are to be.
+    pub to: ShadowSettings,
+}
+
+impl ShadowChange {
+    /// Settings with the change.
+    pub fn made_in(&self, settings: ShadowSettings) -> ShadowSettings {
+        let Self { from, to } = self;
+        let shafts = settings.shafts.with_changes(&from.shafts, &to.shafts);
+        ShadowSettings {
+            shafts,
+            ..settings.with_changes(from, to)
+        }
+    }
+
+    /// What becomes of the keys that it changes.
+    pub fn keys(&self) -> Vec<KeyChange> {
+        let Self { from, to } = self;
+        let of_quality = || {
+            to.quality
+                .map_or_else(ShadowSettings::default, Quality::shadows)
+        };
+        let given = (from.quality != to.quality).then(of_quality);
+        let shafts = given.map(|given| given.shafts);
+        let mut keys = ShadowSettings::changed_keys(from, to, given.as_ref());
+        keys.extend(ShaftSettings::changed_keys(
+            &from.shafts,
+            &to.shafts,
+            shafts.as_ref(),
+        ));
+        if from.shafts.difference != to.shafts.difference {
+            keys.extend(difference_keys(to.shafts.difference));
+        }
+        keys
+    }
+}
+
+/// Reads it.
+pub fn shadows(root: &Table, probe: Option<&ProbeScene>) -> Result<ShadowSettings, SceneError> {
+    let Some(table) = SHADOWS_SECTION.table(root)? else {
+        return Ok(ShadowSettings::default());
+    };
+    let quality = SHADOWS.quality.read(&table)?;
+    let default = quality.map_or_else(ShadowSettings::default, Quality::shadows);
+    check_technique(&table, probe)?;
+    Ok(ShadowSettings {
+        shafts: ShaftSettings {
+            difference: difference(&table)?,
+            ..ShaftSettings::read(&table, &default.shafts)?
+        },
+        ..ShadowSettings::read(&table, &default)?
+    })
+}
+
+/// Whether this scene has what the technique needs.
+fn check_technique(table: &Table, probe: Option<&ProbeScene>) -> Result<(), SceneError> {
+    let Some(value) = SHADOWS.technique.value(table) else {
+        return Ok(());
+    };
+    match (value.text()?, probe) {
+        ("environment", _) => {
+            Err(value.error("this version does not render it; allowed: auto, volumes, shafts"))
+        }
+        ("shafts", None) => Err(value.error(
+            "the scene has no [probe], which shafts take their light from; allowed: auto, volumes",
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// `compositing` decides in which numbers, `difference` how within linear light.
+fn difference(table: &Table) -> Result<Difference, SceneError> {
+    let difference = DIFFERENCE.difference.read(table)?;
+    let compositing = DIFFERENCE.compositing.read(table)?;
+    match (compositing, DIFFERENCE.difference.value(table)) {
+        (CompositingSpace::Encoded, Some(named)) => Err(DIFFERENCE.compositing.value(table).unwrap_or(named).error(
+            "difference is of float compositing; ldr always takes encoded levels away: leave one of the two out",
+        )),
+        (CompositingSpace::Encoded, None) => Ok(Difference::Encoded),
+        (CompositingSpace::Linear, _) => Ok(match difference {
+            LinearDifference::Ratio => Difference::Ratio,
+            LinearDifference::Subtract => Difference::Subtract,
+        }),
+    }
+}
+
+/// What becomes of the two keys.
+fn difference_keys(difference: Difference) -> [KeyChange; 2] {
+    let (linear, compositing) = match difference {
+        Difference::Ratio => (LinearDifference::Ratio, CompositingSpace::Linear),
+        Difference::Subtract => (LinearDifference::Subtract, CompositingSpace::Linear),
+        Difference::Encoded => (LinearDifference::Ratio, CompositingSpace::Encoded),
+    };
+    let DifferenceKeys {
+        difference: key,
+        compositing: numbers,
+    } = &DIFFERENCE;
+    [
+        KeyChange {
+            key: key.name,
+            text: (linear != *key.default())
+                .then(|| key.text(&linear))
+                .flatten(),
+        },
+        KeyChange {
+            key: numbers.name,
+            text: (compositing != *numbers.default())
+                .then(|| numbers.text(&compositing))
+                .flatten(),
+        },
+    ]
+}
+
+impl Scene {
+    /// The technique that makes this scene's shadows, and why.
+    pub fn chosen_technique(&self) -> (ShadowTechnique, &'static str) {
+        match self.shadows.technique {
+            Technique::Auto => match &self.probe {
+                None => (ShadowTechnique::Volumes, "the scene has no probe"),
+                Some(probe) if probe.is_far => {
+                    let reason = "the scene has a probe; without a room its light comes from afar";
+                    (ShadowTechnique::Shafts, reason)
+                }
+                Some(_) => (ShadowTechnique::Shafts, "the scene has a probe and a room"),
+            },
+            Technique::Shafts => (ShadowTechnique::Shafts, "the scene asks for it"),
+            Technique::Volumes => (ShadowTechnique::Volumes, "the scene asks for it"),
+        }
+    }
+}
