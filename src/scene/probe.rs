@@ -10,7 +10,7 @@ use super::error::SceneError;
 use super::mesh_file::{self, Normals};
 use super::named_files::FileKind;
 use super::objects::ALBEDO;
-use super::placement::{POSITION, PlacementKeys, placement};
+use super::placement::{ANGLE, POSITION, PlacementKeys, placement};
 use super::probe_file::{ProbeFile, ProbeKind, ProbeReading, read};
 use super::ranges::Numbers;
 use super::reader::{Table, Value};
@@ -36,7 +36,7 @@ keys! {
     /// Which layer of an OpenEXR file, by its name or the part of its channels' names before the last dot.
     layer: Option<String> => Means(None, "the only one, or the one that is called combined");
     /// By how much all of it is turned to the left, seen from above.
-    turn_deg: f64, Numbers::between(-3600.0, 3600.0) => Is(0.0);
+    turn_deg: f64, ANGLE => Is(0.0);
     /// Where it was taken, in the world.
     position_m: DVec3, Vectors::three(POSITION) => Is(DVec3::ZERO);
     /// Display white over the probe's unit of radiance.
@@ -76,6 +76,7 @@ pub static PROBE_SECTION: Section = Section {
     groups: &[ProbeKeys::ALL],
     shown: &[
         ("image", Example::Live("\"probe.hdr\"")),
+        ("layer", Example::Aside("\"ViewLayer.Combined\"")),
         ("position_m", Example::Live("[0, 0, 0.06]")),
         ("room", Example::Live("\"room.obj\"")),
     ],
