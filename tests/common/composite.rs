@@ -700,7 +700,7 @@ impl<'a> Expected<'a> {
 
     fn is_on_edge(&self, place: DVec2) -> bool {
         let mut lights = self.lights.iter();
-        lights.any(|light| near_edges::is_on_edge(&self.world, &self.view, place, light))
+        lights.any(|light| near_edges::is_on_edge(self.world, &self.view, place, light))
     }
 
     /// How far from a pixel's samples, pixels, there is what explains its value: 0 where their own states do; `None` if

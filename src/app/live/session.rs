@@ -71,9 +71,9 @@ enum PictureState {
     /// None has come yet.
     Awaited,
     /// The newest, until a newer one comes.
-    Following(DrawnPicture),
+    Following(Box<DrawnPicture>),
     /// One that is held, while a light is found in it by clicks.
-    FindingLight(DrawnPicture, ShadowClicks),
+    FindingLight(Box<DrawnPicture>, Box<ShadowClicks>),
 }
 
 /// The frame that was drawn last.
@@ -154,14 +154,14 @@ impl PictureState {
     fn drawn(&self) -> Option<&DrawnPicture> {
         match self {
             Self::Awaited => None,
-            Self::Following(picture) | Self::FindingLight(picture, _) => Some(picture),
+            Self::Following(picture) | Self::FindingLight(picture, _) => Some(picture.as_ref()),
         }
     }
 
     fn drawn_mut(&mut self) -> Option<&mut DrawnPicture> {
         match self {
             Self::Awaited => None,
-            Self::Following(picture) | Self::FindingLight(picture, _) => Some(picture),
+            Self::Following(picture) | Self::FindingLight(picture, _) => Some(picture.as_mut()),
         }
     }
 
@@ -184,7 +184,7 @@ impl PictureState {
 
     fn clicks(&self) -> Option<&ShadowClicks> {
         match self {
-            Self::FindingLight(_, clicks) => Some(clicks),
+            Self::FindingLight(_, clicks) => Some(clicks.as_ref()),
             Self::Awaited | Self::Following(_) => None,
         }
     }
@@ -197,7 +197,7 @@ impl PictureState {
                 Self::Following(picture)
             }
             (Self::Following(picture) | Self::FindingLight(picture, _), Some(clicks)) => {
-                Self::FindingLight(picture, clicks)
+                Self::FindingLight(picture, Box::new(clicks))
             }
         };
     }
@@ -292,11 +292,11 @@ impl LiveSession {
         ) {
             self.recorders.add_poses(&tracked);
             self.notices.tracking.clone_from(&tracked.trouble);
-            self.picture = PictureState::Following(DrawnPicture {
+            self.picture = PictureState::Following(Box::new(DrawnPicture {
                 tracked,
                 drawn: None,
                 pending: None,
-            });
+            }));
             self.draw(state, true)?;
             return Ok(true);
         }
