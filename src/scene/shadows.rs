@@ -314,3 +314,41 @@ impl Scene {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quality_sets_its_own_keys_and_leaves_the_rest() {
+        let from = ShadowSettings {
+            samples: 1,
+            counting: VolumeCounting::DepthFail,
+            shafts: ShaftSettings {
+                sources: Some(7),
+                patches: 900,
+                ..ShaftSettings::default()
+            },
+            ..ShadowSettings::default()
+        };
+        let to = from.with_quality(Quality::Accurate);
+        assert_eq!((to.samples, to.shafts.sources), (4, None));
+        assert_eq!((to.counting, to.shafts.patches), (from.counting, 900));
+        // What the quality says goes, and only that.
+        let keys = ShadowChange { from, to }.keys();
+        let keys: Vec<(&str, Option<&str>)> = keys
+            .iter()
+            .map(|change| (change.key, change.text.as_deref()))
+            .collect();
+        let expected = [
+            ("quality", Some("\"accurate\"")),
+            ("samples", None),
+            ("max_silhouette_error_px", None),
+            ("sources", None),
+        ];
+        assert_eq!(keys, expected);
+        assert!(to.keys_beside_quality().is_empty());
+        let other = ShadowSettings { samples: 1, ..to };
+        assert_eq!(other.keys_beside_quality(), ["samples"]);
+    }
+}

@@ -642,7 +642,7 @@ fn mistakes_are_told_and_leave_nothing() {
     refused(&with(&["--distance", "0:1"]), &["like 0:7:412.5"]);
     refused(
         &with(&["--name", "a, b"]),
-        &["--name \"a, b\"", "allowed: a text without commas"],
+        &["'a, b'", "--name", "allowed: a text without commas"],
     );
     refused(&with(&["--mirror"]), &["is a scene"]);
     refused(&with(&["--plane-tolerance-mm", "nan"]), &["out of range"]);

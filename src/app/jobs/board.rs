@@ -14,7 +14,7 @@ use crate::app::input::source;
 use crate::app::input::usual_tracking::usual_tracking;
 use crate::app::stages::progress::Progress;
 use crate::capture::{FrameSource, Notice};
-use crate::scene::{CameraSettings, DetectorKind, Family, Marker, TrackingSettings, format};
+use crate::scene::{CameraSettings, DetectorKind, Family, Marker, TrackingSettings};
 use crate::tracking::mapping::{LearntBoard, MapSettings, learn_board};
 use crate::tracking::{Detection, Detector, grey_from_rgba};
 
@@ -79,9 +79,6 @@ pub fn board(request: &BoardRequest, stop: &AtomicBool) -> Result<()> {
             (camera.clone(), usual_tracking(request.family, *decimation))
         }
     };
-    if let Err(refusal) = format::ANCHOR_NAME.name.of_option(&request.name) {
-        bail!("--name \"{}\": {refusal}", request.name);
-    }
     files.reads_family(request.family);
     if let Some(out) = &request.out {
         files.writes("--out", out, ResultKind::LearntBoard);
