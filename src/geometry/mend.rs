@@ -583,6 +583,7 @@ pub(super) fn restore_backs(positions: &[Vec3], faces: &mut Vec<Face>) -> usize 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::cuboid::cuboid;
 
     fn face(vertices: [u32; 3]) -> Face {
         let front = Side {
@@ -598,23 +599,9 @@ mod tests {
 
     /// Faces of the box from the origin to `size`, two a side, each with vertices of its own.
     fn loose_box(size: Vec3) -> (Vec<Vec3>, Vec<Face>) {
-        let sides = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let corner = |bits: u32| {
-            let bits = [bits & 1, bits >> 1 & 1, bits >> 2 & 1];
-            size * Vec3::from_array(bits.map(|bit| bit as f32))
-        };
-        let positions: Vec<Vec3> = sides
-            .iter()
-            .flat_map(|&[a, b, c, d]| [a, b, c, a, c, d])
-            .map(corner)
-            .collect();
+        let (corners, triangles) = cuboid(Vec3::ZERO, size);
+        let corner = |&corner: &u32| corners[corner as usize];
+        let positions = triangles.iter().flatten().map(corner).collect();
         let faces = (0..12)
             .map(|number| face([3 * number, 3 * number + 1, 3 * number + 2]))
             .collect();

@@ -10,6 +10,7 @@ pub mod bounds;
 pub mod camera;
 pub mod coincidence;
 pub mod counting;
+pub mod cuboid;
 pub mod homography;
 pub mod least_squares;
 pub mod levels;

@@ -112,36 +112,11 @@ fn corner_angle_rad(positions: &[Vec3], corners: [u32; 3], corner: usize) -> f64
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// A cube of side 2 about the origin.
-    fn cube() -> (Vec<Vec3>, Vec<[u32; 3]>) {
-        let positions = (0..8)
-            .map(|bits| {
-                Vec3::from_array(std::array::from_fn(|axis| {
-                    if bits >> axis & 1 == 1 { 1.0 } else { -1.0 }
-                }))
-            })
-            .collect();
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        (
-            positions,
-            quads
-                .iter()
-                .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-                .collect(),
-        )
-    }
+    use crate::geometry::cuboid::cuboid;
 
     #[test]
     fn a_cube_stays_flat_below_its_crease_angle() {
-        let (positions, triangles) = cube();
+        let (positions, triangles) = cuboid(Vec3::NEG_ONE, Vec3::ONE);
         for crease_deg in [0.0_f64, 30.0, 89.0] {
             let normals = made_normals(&positions, &triangles, crease_deg.to_radians());
             for (corners, normals) in triangles.iter().zip(normals) {
@@ -156,7 +131,7 @@ mod tests {
 
     #[test]
     fn a_cube_within_its_crease_angle_has_its_diagonals_whatever_way_its_squares_are_cut() {
-        let (positions, triangles) = cube();
+        let (positions, triangles) = cuboid(Vec3::NEG_ONE, Vec3::ONE);
         let normals = made_normals(&positions, &triangles, 90.0_f64.to_radians());
         for (corners, normals) in triangles.iter().zip(normals) {
             for (&corner, normal) in corners.iter().zip(normals) {

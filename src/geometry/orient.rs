@@ -314,30 +314,13 @@ impl<'a> Shell<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::cuboid::cuboid;
     use std::f32::consts::{PI, TAU};
 
     fn boxed(low: f32, high: f32, first: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-        let positions = (0..8)
-            .map(|corner| {
-                Vec3::from_array(std::array::from_fn(|axis| {
-                    if corner >> axis & 1 == 1 { high } else { low }
-                }))
-            })
-            .collect();
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let triangles = quads
-            .iter()
-            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-            .map(|corners| corners.map(|corner| first + corner))
-            .collect();
-        (positions, triangles)
+        let (positions, triangles) = cuboid(Vec3::splat(low), Vec3::splat(high));
+        let later = |corners: [u32; 3]| corners.map(|corner| first + corner);
+        (positions, triangles.into_iter().map(later).collect())
     }
 
     fn inside_out(triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {

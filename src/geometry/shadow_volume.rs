@@ -563,6 +563,7 @@ fn planes(positions: &[Vec3], triangles: &[[u32; 3]], edges: &[PairedEdge]) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::cuboid::cuboid;
     use std::collections::HashMap;
 
     const FACING: [i8; 2] = [1, 0];
@@ -570,29 +571,7 @@ mod tests {
     const SURPLUS: [i8; 2] = [-1, -1];
 
     fn cube() -> Caster {
-        let positions = (0..8)
-            .map(|corner| {
-                Vec3::new(
-                    (corner & 1) as f32,
-                    (corner >> 1 & 1) as f32,
-                    (corner >> 2 & 1) as f32,
-                )
-            })
-            .collect();
-        let triangles = vec![
-            [0, 2, 3],
-            [0, 3, 1],
-            [4, 5, 7],
-            [4, 7, 6],
-            [0, 1, 5],
-            [0, 5, 4],
-            [2, 6, 7],
-            [2, 7, 3],
-            [0, 4, 6],
-            [0, 6, 2],
-            [1, 3, 7],
-            [1, 7, 5],
-        ];
+        let (positions, triangles) = cuboid(Vec3::ZERO, Vec3::ONE);
         Caster::new(positions, triangles)
     }
 

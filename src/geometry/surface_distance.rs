@@ -519,6 +519,7 @@ fn in_parallel<T: Send>(count: usize, work: impl Fn(Range<usize>) -> Vec<T> + Sy
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::cuboid::cuboid;
     use crate::geometry::mesh::RawTriangle;
     use glam::Vec3;
 
@@ -573,22 +574,9 @@ mod tests {
 
     #[test]
     fn the_outline_is_where_faces_meet_at_an_angle() {
-        let corner = |bits: u32| {
-            Vec3::from_array([0, 1, 2].map(|axis| if bits >> axis & 1 == 1 { 1.0 } else { 0.0 }))
-        };
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let cube: Vec<[Vec3; 3]> = quads
-            .iter()
-            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-            .map(|triangle| triangle.map(corner))
-            .collect();
+        let (corners, triangles) = cuboid(Vec3::ZERO, Vec3::ONE);
+        let places = |triangle: [u32; 3]| triangle.map(|corner| corners[corner as usize]);
+        let cube: Vec<[Vec3; 3]> = triangles.into_iter().map(places).collect();
         let mut shares: Vec<f64> = surface(&cube)
             .edges
             .iter()

@@ -36,32 +36,8 @@ fn half_solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::cuboid::cuboid;
     use std::f64::consts::PI;
-
-    fn cube() -> (Vec<Vec3>, Vec<[u32; 3]>) {
-        let positions = (0..8)
-            .map(|corner| {
-                Vec3::new(
-                    (corner & 1) as f32,
-                    (corner >> 1 & 1) as f32,
-                    (corner >> 2 & 1) as f32,
-                )
-            })
-            .collect();
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let triangles = quads
-            .iter()
-            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-            .collect();
-        (positions, triangles)
-    }
 
     #[test]
     fn an_octant_is_an_eighth_of_the_sphere() {
@@ -89,7 +65,7 @@ mod tests {
 
     #[test]
     fn a_cube_is_around_what_lies_in_it() {
-        let (positions, triangles) = cube();
+        let (positions, triangles) = cuboid(Vec3::ZERO, Vec3::ONE);
         let at = |x, y, z| winding_number(&positions, triangles.clone(), DVec3::new(x, y, z));
         for (x, y, z, turns) in [
             (0.5, 0.5, 0.5, 1.0),

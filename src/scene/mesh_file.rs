@@ -259,6 +259,7 @@ fn material(mtl: Option<&tobj::Material>) -> Material {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::cuboid::SIDES;
 
     const SMOOTH: Normals = Normals::GivenOrMade { crease_rad: 0.5 };
 
@@ -292,15 +293,8 @@ mod tests {
     #[test]
     fn groups_and_loose_quads_weld_into_a_closed_box() {
         let mut text = String::new();
-        for [a, b, c, d] in [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ] {
-            for corner in [a, b, c, d] {
+        for side in SIDES {
+            for corner in side {
                 text += &format!("v {} {} {}\n", corner & 1, corner >> 1 & 1, corner >> 2);
             }
             text += "g side\nf -4 -3 -2 -1\n";

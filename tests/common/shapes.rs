@@ -114,28 +114,8 @@ impl Soup {
 }
 
 pub fn cuboid(low: [f32; 3], high: [f32; 3]) -> Soup {
-    let corner = |index: usize| {
-        Vec3::from_array(std::array::from_fn(|axis| {
-            if index >> axis & 1 == 0 {
-                low[axis]
-            } else {
-                high[axis]
-            }
-        }))
-    };
-    let quads = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    let triangles = quads
-        .iter()
-        .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-        .collect();
-    Soup::new((0..8).map(corner).collect(), triangles)
+    let (positions, triangles) = gnomon::geometry::cuboid::cuboid(low.into(), high.into());
+    Soup::new(positions, triangles)
 }
 
 /// Two triangles in the plane z = 0 that face +z.

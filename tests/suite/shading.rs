@@ -6,6 +6,7 @@ use glam::{DAffine3, DVec2, DVec3, Vec3};
 use gnomon::app::truth::ray_cast::pixels;
 use gnomon::capture::Frame;
 use gnomon::geometry::camera::Intrinsics;
+use gnomon::geometry::cuboid::cuboid;
 use gnomon::geometry::mesh::Mesh;
 use gnomon::light::{Light, Material, irradiance, reflectance};
 use gnomon::render::{Layers, Renderer, Shown};
@@ -113,29 +114,8 @@ impl Crate {
     }
 
     fn object(self, name: &str) -> Object {
-        let corner = |index: usize| {
-            let pick = |axis: usize| {
-                if index >> axis & 1 == 0 {
-                    self.low[axis]
-                } else {
-                    self.high[axis]
-                }
-            };
-            Vec3::new(pick(0) as f32, pick(1) as f32, pick(2) as f32)
-        };
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let triangles = quads
-            .iter()
-            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-            .collect();
-        let mesh = flat_mesh((0..8).map(corner).collect(), triangles);
+        let (positions, triangles) = cuboid(self.low.as_vec3(), self.high.as_vec3());
+        let mesh = flat_mesh(positions, triangles);
         object(name, mesh, ALBEDO, DAffine3::IDENTITY)
     }
 

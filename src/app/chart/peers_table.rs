@@ -5,6 +5,7 @@ use std::f32::consts::TAU;
 use glam::{DAffine3, DMat3, DVec2, DVec3, Vec3};
 
 use crate::geometry::camera::Intrinsics;
+use crate::geometry::cuboid;
 use crate::geometry::mesh::{Mesh, RawTriangle};
 use crate::light::{Light, Material};
 use crate::scene::{Anchor, Object, Scene, ShadowSettings};
@@ -189,30 +190,10 @@ fn plane() -> Mesh {
 }
 
 fn cuboid() -> Mesh {
-    let corners: Vec<Vec3> = (0..8)
-        .map(|corner| {
-            Vec3::new(
-                (corner & 1) as f32,
-                (corner >> 1 & 1) as f32,
-                (corner >> 2) as f32,
-            )
-        })
-        .map(|unit| unit * Vec3::new(0.06, 0.06, 0.08) - Vec3::new(0.03, 0.03, 0.0))
-        .collect();
-    let sides = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    mesh(
-        &corners,
-        sides
-            .into_iter()
-            .flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]),
-    )
+    let (corners, triangles) = cuboid::cuboid(Vec3::ZERO, Vec3::ONE);
+    let placed = |unit: Vec3| unit * Vec3::new(0.06, 0.06, 0.08) - Vec3::new(0.03, 0.03, 0.0);
+    let corners: Vec<Vec3> = corners.into_iter().map(placed).collect();
+    mesh(&corners, triangles)
 }
 
 /// A closed torus about z with radii 5 and 2 cm times `scale` and about as many triangles as asked for.
