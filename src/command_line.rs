@@ -12,7 +12,7 @@ use gnomon::app::jobs::board::Distance;
 use gnomon::app::jobs::probe::exposure_of;
 use gnomon::calibration::{Target, TargetMarkers};
 use gnomon::light::probe_maps::Circle;
-use gnomon::scene::format::{ANCHOR_NAME, AnyKey as _, CAMERA, PRINTED, TRACKING};
+use gnomon::scene::format::{ANCHOR_NAME, AnyKey as _, CAMERA, PRINTED, PROBE, TRACKING};
 use gnomon::scene::{Family, PixelFormat, Shortcut, WantedFormat};
 
 /// Virtual things on a real table, lit and shadowed as if they stood there.
@@ -434,7 +434,7 @@ pub struct ProbeArgs {
     #[arg(long, value_name = "PART", value_parser = reflectance_of, default_value = "1")]
     pub reflectance: f64,
     /// The camera was turned so far to the left from looking along the world's +y
-    #[arg(long, value_name = "DEG", value_parser = degrees_of, default_value = "0", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEG", value_parser = |text: &str| PROBE.turn_deg.of_option(text), default_value = "0", allow_negative_numbers = true)]
     pub turn_deg: f64,
     /// It was tilted downward by so much
     #[arg(long, value_name = "DEG", value_parser = degrees_of, default_value = "0", allow_negative_numbers = true)]
@@ -663,6 +663,11 @@ mod tests {
                 "without commas",
             ),
             (
+                "probe a.hdr --kind panorama --out b.hdr",
+                "--turn-deg 2000000",
+                "-1000000 to 1000000",
+            ),
+            (
                 "markers --ids 1 --size-mm 40 --out a.pdf",
                 "--name a;b",
                 "without commas",
@@ -710,6 +715,7 @@ mod tests {
             "markers",
             "mirror",
             "name",
+            "turn-deg",
         ];
         assert_eq!(shared, BTreeSet::from(expected));
     }

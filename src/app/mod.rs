@@ -1,7 +1,8 @@
 //! The jobs of the program, and what they share: its clock, files, frames, stages and windows.
 //!
 //! A job (each module of [`jobs`], [`live`] and [`chart`]) imports no other job; what two of them need lies in a group below
-//! them. Lowest first: [`stopwatch`] → [`files`] → [`input`] → [`recording`] → [`stages`] → `scene_warnings` →
+//! them. Lowest first: [`stopwatch`] → [`files`] → [`room_transport_cache`] →
+//! [`input`] → [`recording`] → [`stages`] → `scene_warnings` →
 //! [`authoring`] → [`truth`] → [`window`] → the jobs. Charts alone know [`truth`]. `tests/architecture.rs` keeps that.
 
 pub mod authoring;

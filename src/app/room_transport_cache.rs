@@ -10,12 +10,14 @@ use std::sync::Arc;
 
 use crate::geometry::camera::Intrinsics;
 use crate::render::{Gpu, RenderError, Renderer};
-use crate::scene::Scene;
+use crate::scene::{Scene, plain_file};
 use crate::shafts::room::Room;
 use crate::shafts::room_transport::RoomTransport;
 
 /// Another layout, or another way to work rooms out.
 const VERSION: u32 = 2;
+/// Bytes of the largest room that is taken from the disk.
+const MOST_ROOM: u64 = 1 << 30;
 /// The newest ones stay.
 const MOST_ROOMS: usize = 16;
 
@@ -67,7 +69,7 @@ pub fn ready(room: &Room<'_>, folder: Option<&Path>) -> ReadyRoom {
 }
 
 fn read(path: &Path) -> Option<RoomTransport> {
-    let bytes = fs::read(path).ok()?;
+    let bytes = plain_file::read(path, MOST_ROOM).ok()?;
     let (sum, room) = bytes.split_at_checked(size_of::<u64>())?;
     if sum != checksum(room) {
         return None;

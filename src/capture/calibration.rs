@@ -11,6 +11,7 @@ use opencv::core::{
 use serde_json::{Map, Value};
 
 use crate::geometry::camera::Intrinsics;
+use crate::scene::plain_file;
 
 /// Why a calibration cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -194,7 +195,7 @@ impl UncheckedCalibration {
 }
 
 fn read(path: &Path) -> Result<UncheckedCalibration, CalibrationError> {
-    let text = std::fs::read_to_string(path).map_err(|error| CalibrationError::Io {
+    let text = plain_file::read_text(path).map_err(|error| CalibrationError::Io {
         path: path.to_owned(),
         error,
     })?;

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use exif::{In, Tag, Value};
 use opencv::core::{Mat, MatTraitConst, Vec3b, Vec3f, Vector};
+use opencv::photo;
 use opencv::photo::CalibrateCRFTrait;
-use opencv::{imgcodecs, photo};
 
 use super::alignment::shift_px;
 use super::pixels;
@@ -83,9 +83,7 @@ impl Bracket {
         let mut size_px = [0; 2];
         let mut pictures = Vec::new();
         for path in paths {
-            let picture = imgcodecs::imread(path, imgcodecs::IMREAD_COLOR)
-                .ok()
-                .filter(|picture| !picture.empty())
+            let picture = pixels::read_picture(path)
                 .ok_or_else(|| ExposureError::Unreadable { path: path.clone() })?;
             let found_px = pixels::size_of(&picture);
             if pictures.is_empty() {

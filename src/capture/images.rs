@@ -3,11 +3,8 @@
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
-use opencv::core::{Mat, MatTraitConst};
-use opencv::imgcodecs;
-
 use super::error::{CaptureError, Notice};
-use super::pixels;
+use super::pixels::{self, read_picture};
 
 /// Images carry no time of their own.
 pub(super) const ASSUMED_FPS: f64 = 30.0;
@@ -38,7 +35,7 @@ impl ImageFrames {
         paths.sort_by(|a, b| natural_order(&name_of(a), &name_of(b)));
         let size_px = paths
             .iter()
-            .find_map(|path| read(path).map(|picture| pixels::size_of(&picture)))
+            .find_map(|path| read_picture(path).map(|picture| pixels::size_of(&picture)))
             .ok_or_else(|| CaptureError::NoGoodFrame {
                 path: folder.to_owned(),
             })?;
@@ -65,7 +62,7 @@ impl ImageFrames {
         while let Some(path) = self.paths.get(self.next_index as usize) {
             let index = self.next_index;
             self.next_index += 1;
-            match read(path) {
+            match read_picture(path) {
                 None => notices.push(Notice::Broken {
                     path: path.clone(),
                     first: index,
@@ -94,13 +91,6 @@ impl ImageFrames {
         }
         Ok(None)
     }
-}
-
-/// `None` where OpenCV cannot decode the file; it has no better word for it.
-fn read(path: &Path) -> Option<Mat> {
-    imgcodecs::imread(path, imgcodecs::IMREAD_COLOR)
-        .ok()
-        .filter(|picture| !picture.empty())
 }
 
 fn name_of(path: &Path) -> String {

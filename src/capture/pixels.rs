@@ -1,7 +1,31 @@
-//! From OpenCV's pictures to plain pixels.
+//! Picture files by OpenCV, and from its pictures to plain pixels.
+
+use std::path::Path;
 
 use opencv::core::{Mat, MatTraitConst, Vec4b};
-use opencv::imgproc;
+use opencv::{imgcodecs, imgproc};
+
+/// No file is too small for a picture of so many pixels.
+const SMALL_PIXELS: u64 = 32 << 20;
+/// What a byte of a larger one holds at most: in photographs it is about one.
+const MOST_PIXELS_PER_BYTE: u64 = 64;
+
+/// The colours of a picture file, 8-bit BGR; `None` where OpenCV cannot decode it (it has no better word for it), or its
+/// header asks for more pixels than a file of its size has.
+pub(super) fn read_picture(path: &Path) -> Option<Mat> {
+    let file = std::fs::metadata(path)
+        .ok()
+        .filter(std::fs::Metadata::is_file)?;
+    if let Ok((width, height)) = image::image_dimensions(path) {
+        let most = SMALL_PIXELS.max(file.len().saturating_mul(MOST_PIXELS_PER_BYTE));
+        if u64::from(width) * u64::from(height) > most {
+            return None;
+        }
+    }
+    imgcodecs::imread(path, imgcodecs::IMREAD_COLOR)
+        .ok()
+        .filter(|picture| !picture.empty())
+}
 
 /// Width and height of a picture.
 pub(super) fn size_of(picture: &Mat) -> [u32; 2] {
@@ -15,4 +39,41 @@ pub(super) fn rgba_from_bgr(bgr: &Mat) -> opencv::Result<Vec<u8>> {
     imgproc::cvt_color_def(bgr, &mut target, imgproc::COLOR_BGR2RGBA)?;
     drop(target);
     Ok(rgba)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_file_with_a_huge_header_is_no_picture() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        image::GrayImage::new(8, 4).save(&path).unwrap();
+        assert_eq!(
+            read_picture(&path).map(|picture| size_of(&picture)),
+            Some([8, 4])
+        );
+        // The size stands in the first chunk, whose checksum is made anew.
+        let mut bytes = std::fs::read(&path).unwrap();
+        bytes[16..20].copy_from_slice(&30_000_u32.to_be_bytes());
+        bytes[20..24].copy_from_slice(&30_000_u32.to_be_bytes());
+        let sum = checksum(&bytes[12..29]);
+        bytes[29..33].copy_from_slice(&sum.to_be_bytes());
+        std::fs::write(&path, &bytes).unwrap();
+        assert_eq!(image::image_dimensions(&path).unwrap(), (30_000, 30_000));
+        assert!(read_picture(&path).is_none());
+        assert!(read_picture(folder.path()).is_none());
+    }
+
+    /// CRC-32 as PNG has it (ISO 3309).
+    fn checksum(bytes: &[u8]) -> u32 {
+        let step = |sum: u32, byte: &u8| {
+            (0..8).fold(sum ^ u32::from(*byte), |sum, _| match sum & 1 {
+                1 => sum >> 1 ^ 0xedb8_8320,
+                _ => sum >> 1,
+            })
+        };
+        !bytes.iter().fold(!0, step)
+    }
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::error::CaptureError;
+use crate::scene::plain_file;
 
 const HEADER: &str = "frame,time_s";
 
@@ -15,7 +16,7 @@ pub(super) struct FrameTimes {
 
 impl FrameTimes {
     pub(super) fn load(path: &Path) -> Result<Self, CaptureError> {
-        let text = std::fs::read_to_string(path).map_err(|error| CaptureError::Io {
+        let text = plain_file::read_text(path).map_err(|error| CaptureError::Io {
             path: path.to_owned(),
             error,
         })?;

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use super::error::SceneError;
+use super::plain_file;
 
 /// Markers of one size, each told from all others and from their turns.
 #[derive(Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -30,7 +31,7 @@ impl Dictionary {
     /// # Errors
     /// A file that cannot be read; a mistake in it, with its line.
     pub(super) fn read(path: &Path) -> Result<&'static Self, SceneError> {
-        let text = std::fs::read_to_string(path).map_err(|error| {
+        let text = plain_file::read_text(path).map_err(|error| {
             SceneError::of_file(path, format!("the dictionary cannot be read: {error}"))
         })?;
         let dictionary = Self::parse(path, &text)?;

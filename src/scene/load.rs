@@ -6,6 +6,7 @@ use toml::de::DeTable;
 
 use super::error::SceneError;
 use super::named_files::NamedFile;
+use super::plain_file::{self, MOST_TEXT};
 use super::reader::{Document, Table};
 use super::{Scene, anchors, camera, format, lights, objects, probe, shadows, tracking};
 
@@ -29,7 +30,7 @@ impl Scene {
 
     /// The text of a scene file.
     pub fn read_text(path: &Path) -> Result<String, SceneError> {
-        let bytes = std::fs::read(path).map_err(|error| {
+        let bytes = plain_file::read(path, MOST_TEXT).map_err(|error| {
             SceneError::of_file(path, format!("the scene cannot be read: {error}"))
         })?;
         String::from_utf8(bytes).map_err(|error| {

@@ -11,6 +11,7 @@ use super::error::SceneError;
 use super::material_libraries::libraries;
 use super::named_files::FileKind;
 use super::obj_scan::{ScanError, ScannedObj, scan_mtl, scan_obj};
+use super::plain_file::{self, MOST_MESH, MOST_TEXT};
 use super::reader::Value;
 use crate::geometry::mesh::{Mesh, MeshReport, RawTriangle};
 use crate::light::Material;
@@ -43,7 +44,7 @@ const LEAST_ROUGHNESS: f64 = 0.01;
 /// Reads the mesh that a scene's value names.
 pub fn load(value: &Value, kind: FileKind, normals: Normals) -> Result<LoadedMesh, SceneError> {
     let path = value.existing_path(kind)?;
-    let bytes = std::fs::read(&path)
+    let bytes = plain_file::read(&path, MOST_MESH)
         .map_err(|error| value.error(format!("the mesh cannot be read: {error}")))?;
     // Only names and comments may be in another encoding, and nothing depends on them.
     let note_read = |path: &Path| value.note_consulted(path);
@@ -152,7 +153,7 @@ fn read_with_tobj(
 
 /// An MTL file's text; empty where there is no such file, for meshes often travel without.
 fn checked_mtl(path: &PathBuf) -> Result<String, SceneError> {
-    let bytes = match std::fs::read(path) {
+    let bytes = match plain_file::read(path, MOST_TEXT) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(String::new()),
         Err(error) => {

@@ -27,6 +27,7 @@ mod named_files;
 mod obj_scan;
 mod objects;
 mod placement;
+pub mod plain_file;
 mod probe;
 pub mod probe_file;
 mod quality;

@@ -18,9 +18,10 @@ const FLOORS: [&str; 9] = [
 ];
 
 /// The groups of `app`, lowest first; the jobs stand on all of them.
-const APP_GROUPS: [&str; 9] = [
+const APP_GROUPS: [&str; 10] = [
     "stopwatch",
     "files",
+    "room_transport_cache",
     "input",
     "recording",
     "stages",

@@ -9,7 +9,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 use glam::{DAffine3, DVec3};
 
 use crate::geometry::pose::{pose_from_rodrigues, rodrigues_from_pose};
-use crate::scene::Anchor;
+use crate::scene::{Anchor, plain_file};
 use crate::tracking::{AnchorPose, Status};
 
 /// The header, and so the meaning, of every row.
@@ -105,7 +105,7 @@ impl GivenPoses {
     /// # Errors
     /// File and line of the first row that cannot be read.
     pub fn read(path: &Path, anchors: &[Anchor]) -> Result<Self> {
-        let text = std::fs::read_to_string(path)
+        let text = plain_file::read_text(path)
             .with_context(|| format!("cannot read the poses {}", path.display()))?;
         Self::parse(&text, anchors).with_context(|| format!("in the poses {}", path.display()))
     }

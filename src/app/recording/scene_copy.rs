@@ -14,6 +14,7 @@ use toml_edit::{DocumentMut, Item, Table, Value};
 use crate::app::files::new_file::sync_folder;
 use crate::scene::format::{CAMERA, CAMERA_SECTION};
 use crate::scene::material_libraries::with_libraries_named;
+use crate::scene::plain_file::{self, MOST_MESH};
 use crate::scene::{FileKind, NamedFile, Scene};
 
 /// The name of the scene in its folder.
@@ -181,7 +182,7 @@ impl Copies<'_> {
 }
 
 fn read(path: &Path) -> Result<Vec<u8>> {
-    fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))
+    plain_file::read(path, MOST_MESH).with_context(|| format!("{}: cannot be read", path.display()))
 }
 
 /// Writes a file that must not be there: a session's folder is a new one.

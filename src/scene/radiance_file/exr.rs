@@ -14,8 +14,6 @@ use half::f16;
 use super::{Pixels, checked_size};
 use crate::light::chromaticities::Chromaticities;
 
-/// What the best of the format's compressions make of a constant picture.
-const MOST_PIXELS_PER_BYTE: usize = 4096;
 /// Layers that an error lists.
 const LISTED: usize = 8;
 
@@ -41,15 +39,12 @@ pub fn read(bytes: Vec<u8>, wanted: Option<&str>) -> Result<Pixels, String> {
     let Layer { part, channels, .. } = chosen(layers, wanted)?;
     let header = reader.headers()[part].clone();
     let window = header.shared_attributes.display_window;
-    let size_px = checked_size(window.size.width(), window.size.height())?;
-    let data_px = checked_size(header.layer_size.width(), header.layer_size.height())?;
-    let largest = (size_px[0] * size_px[1]).max(data_px[0] * data_px[1]);
-    if largest > length.saturating_mul(MOST_PIXELS_PER_BYTE) {
-        return Err(format!(
-            "cut off: {length} bytes cannot hold {} x {} pixels",
-            data_px[0], data_px[1]
-        ));
-    }
+    let size_px = checked_size(window.size.width(), window.size.height(), length)?;
+    checked_size(
+        header.layer_size.width(),
+        header.layer_size.height(),
+        length,
+    )?;
     let corner = header.own_attributes.layer_position - window.position;
     let mut pixels = vec![Vec3::ZERO; size_px[0] * size_px[1]];
     let full = Vec2(0, 0);

@@ -10,8 +10,6 @@ use image::codecs::hdr::HdrDecoder;
 use super::{Pixels, checked_size};
 use crate::light::chromaticities::{Chromaticities, EQUAL_ENERGY_WHITE, SRGB, srgb_from_xyz};
 
-/// A byte holds no more pixels than this, even where one is repeated.
-const MOST_PIXELS_PER_BYTE: usize = 256;
 /// Primaries as near to sRGB's as programs round them.
 const SAME_CHROMATICITY: f64 = 2e-3;
 
@@ -46,20 +44,12 @@ struct Axis {
 pub fn read(bytes: &[u8]) -> Result<Pixels, String> {
     let header = header(bytes).map_err(|what| format!("broken as Radiance HDR: {what}"))?;
     let (lines, along) = (header.lines, header.along_a_line);
+    let rest = &bytes[header.length..];
     let size_px = match lines.is_vertical {
-        true => checked_size(along.count, lines.count)?,
-        false => checked_size(lines.count, along.count)?,
+        true => checked_size(along.count, lines.count, rest.len())?,
+        false => checked_size(lines.count, along.count, rest.len())?,
     };
     let count = size_px[0] * size_px[1];
-    let rest = &bytes[header.length..];
-    if count > rest.len().saturating_mul(MOST_PIXELS_PER_BYTE) {
-        return Err(format!(
-            "cut off: {} bytes cannot hold {} x {} pixels",
-            rest.len(),
-            size_px[0],
-            size_px[1]
-        ));
-    }
     // The decoder knows one order and one header.
     let plain = format!(
         "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {} +X {}\n",
@@ -73,7 +63,18 @@ pub fn read(bytes: &[u8]) -> Result<Pixels, String> {
         .read_image(bytemuck::cast_slice_mut(&mut stored))
         .map_err(broken)?;
 
-    let from_file = header.srgb_from_file()?;
+    if let Some(matrix) = header.srgb_from_file()? {
+        for pixel in &mut stored {
+            *pixel = (matrix * pixel.as_dvec3()).as_vec3();
+        }
+    }
+    if (lines.is_vertical, lines.is_negative, along.is_negative) == (true, true, false) {
+        return Ok(Pixels {
+            size_px,
+            pixels: stored,
+            notes: header.notes,
+        });
+    }
     let mut pixels = vec![Vec3::ZERO; count];
     for (index, pixel) in stored.into_iter().enumerate() {
         let line = lines.place(index / along.count);
@@ -82,10 +83,7 @@ pub fn read(bytes: &[u8]) -> Result<Pixels, String> {
             true => [line, at],
             false => [at, line],
         };
-        pixels[row * size_px[0] + column] = match from_file {
-            Some(matrix) => (matrix * pixel.as_dvec3()).as_vec3(),
-            None => pixel,
-        };
+        pixels[row * size_px[0] + column] = pixel;
     }
     Ok(Pixels {
         size_px,
@@ -373,7 +371,11 @@ mod tests {
             assert!(text.contains(word), "{text:?} lacks {word:?}");
         };
         refused(b"#?RADIANCE\n\n-Y 8192 +X 16384\n\x02\x02", "cut off");
-        refused(b"#?RADIANCE\n\n-Y 99999999999 +X 99999999999\n", "too many");
+        refused(b"#?RADIANCE\n\n-Y 99999 +X 99999\n", "too many");
+        refused(
+            b"#?RADIANCE\n\n-Y 99999999999 +X 99999999999\n",
+            "can be counted",
+        );
         refused(b"#?RADIANCE\n\n-Y 2 -Y 2\n", "not a size");
         refused(b"#?RADIANCE\n\n-Y -2 +X 2\n", "not a count");
         refused(

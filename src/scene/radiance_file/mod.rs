@@ -3,16 +3,20 @@
 mod exr;
 mod hdr;
 
-use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
 use glam::Vec3;
 
+use super::plain_file::{self, MOST_PICTURE};
 use crate::light::radiance_picture::RadiancePicture;
 
 /// Pixels of the largest picture that is read: 32768 x 16384 would take 6 GiB.
 const MOST_PIXELS: usize = 16384 * 8192;
+/// No file is too small for so many pixels: a constant sky takes next to nothing.
+const SMALL_PIXELS: usize = 4 << 20;
+/// What a byte of a larger picture holds at most; runs of Radiance HDR hold 16.
+const MOST_PIXELS_PER_BYTE: usize = 16;
 /// The largest half: what was brighter became infinite in files of halves, of which most are.
 const LARGEST_HALF: f32 = 65504.0;
 
@@ -45,7 +49,7 @@ struct Pixels {
 /// more pixels than any probe has, or several layers of which none was picked.
 pub fn read(path: &Path, layer: Option<&str>) -> Result<RadianceFile, String> {
     let say = |message: String| format!("{}: {message}", path.display());
-    let bytes = fs::read(path).map_err(|error| match error.kind() {
+    let bytes = plain_file::read(path, MOST_PICTURE).map_err(|error| match error.kind() {
         ErrorKind::NotFound => say("no such file".to_owned()),
         _ => say(error.to_string()),
     })?;
@@ -103,12 +107,19 @@ fn make_finite(pixels: &mut [Vec3]) -> Option<String> {
     })
 }
 
-fn checked_size(width: usize, height: usize) -> Result<[usize; 2], String> {
+/// A size that a file of so many bytes may have, before anything is allocated.
+fn checked_size(width: usize, height: usize, length: usize) -> Result<[usize; 2], String> {
     match width.checked_mul(height) {
-        Some(pixels) if pixels <= MOST_PIXELS => Ok([width, height]),
-        _ => Err(format!(
+        Some(pixels) if pixels > MOST_PIXELS => Err(format!(
             "{width} x {height} pixels are too many; at most {MOST_PIXELS} in all"
         )),
+        Some(pixels) if pixels <= SMALL_PIXELS.max(length.saturating_mul(MOST_PIXELS_PER_BYTE)) => {
+            Ok([width, height])
+        }
+        Some(_) => Err(format!(
+            "cut off, or not what its header says: {length} bytes hardly hold {width} x {height} pixels"
+        )),
+        None => Err("more pixels than can be counted".to_owned()),
     }
 }
 

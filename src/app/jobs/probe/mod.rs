@@ -4,7 +4,6 @@
 mod preview;
 
 use std::fmt::Write as _;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, anyhow, bail, ensure};
@@ -22,7 +21,7 @@ use crate::light::probe_maps::{Circle, Projection, fitting_width_px, unwrap, wor
 use crate::light::radiance_picture::RadiancePicture;
 use crate::light::response::{Exposure, Response, merge};
 use crate::scene::probe_file::flaws_told;
-use crate::scene::radiance_file;
+use crate::scene::{plain_file, radiance_file};
 use preview::preview;
 
 /// Columns of a probe unless another number is asked for: a third of a degree each, finer than a ball shows.
@@ -398,7 +397,7 @@ fn brightened(probe: &Probe, factor: f64) -> Result<Probe> {
 }
 
 fn read_response(path: &Path) -> Result<Response> {
-    let text = fs::read_to_string(path)
+    let text = plain_file::read_text(path)
         .with_context(|| format!("cannot read the response {}", path.display()))?;
     Response::from_csv(&text)
         .map_err(|(line, message)| anyhow!("{}:{line}: {message}", path.display()))
@@ -446,7 +445,7 @@ fn exposures(request: &ProbeRequest) -> Result<Vec<f64>> {
 /// Lines of a picture's name and its time.
 fn exposures_of_file(path: &Path, pictures: &[PathBuf]) -> Result<Vec<f64>> {
     let text =
-        fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        plain_file::read_text(path).with_context(|| format!("cannot read {}", path.display()))?;
     let mut times = Vec::new();
     for (index, line) in text.lines().enumerate() {
         let line = line.split('#').next().unwrap_or_default().trim();
@@ -541,6 +540,8 @@ fn lights_told(lights: &[BrightLight]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]
