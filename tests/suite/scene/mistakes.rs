@@ -49,6 +49,9 @@ const MISTAKES: &[Mistake] = &[
     added("[light\n", 6, 7, &["not TOML", "unclosed table"]),
     added("x = \n", 6, 5, &["not TOML"]),
     changed("name = \"table\"", "name = \"table\"\nname = \"top\"", 5, 1, &["not TOML", "duplicate key"]),
+    // What is no plain file is neither read without end nor waited for
+    added("[[phantom]]\nname = \"p\"\nmesh = \"/dev/zero\"\n", 8, 8, &["phantom.mesh", "not a plain file"]),
+    added("[probe]\nimage = \"/dev/zero\"\n", 7, 9, &["probe.image", "/dev/zero", "not a plain file"]),
     // Unknown keys and tables
     added("[[lihgt]]\n", 6, 3, &["lihgt: unknown key", "did you mean \"light\"?", "allowed: camera, tracking, board"]),
     changed("source", "sourc", 2, 1, &["camera.sourc: unknown key", "did you mean \"source\"?", "calibration"]),
