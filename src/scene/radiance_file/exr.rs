@@ -261,8 +261,10 @@ mod tests {
                 .into_iter()
                 .collect(),
         );
-        let mut attributes = LayerAttributes::default();
-        attributes.layer_name = name.map(|name| Text::new_or_panic(name));
+        let attributes = LayerAttributes {
+            layer_name: name.map(Text::new_or_panic),
+            ..LayerAttributes::default()
+        };
         exr::image::Layer::new((4, 2), attributes, Encoding::FAST_LOSSLESS, channels)
     }
 
