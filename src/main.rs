@@ -25,6 +25,7 @@ use gnomon::app::jobs::replay::{self, replay};
 use gnomon::app::jobs::track::{self, is_scene, track};
 use gnomon::app::live;
 use gnomon::app::stages::report::Report;
+use gnomon::app::talk;
 use gnomon::capture::live::is_live;
 use gnomon::scene::format::MARKER;
 use gnomon::scene::{CameraSettings, Scene};
@@ -42,7 +43,7 @@ fn main() -> ExitCode {
     match run(Cli::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("gnomon: {error:#}");
+            talk::say(format_args!("gnomon: {error:#}"));
             ExitCode::FAILURE
         }
     }
@@ -59,15 +60,15 @@ fn run(cli: Cli) -> Result<()> {
         Command::Record(args) => run_record(args),
         Command::Probe(args) => run_probe(args),
         Command::Cameras => {
-            print!("{}", cameras::cameras()?);
+            talk::give(&cameras::cameras()?);
             Ok(())
         }
         Command::Chart(args) => run_chart(args),
         Command::Check { scene } => {
             let scene = Scene::load(&scene)?;
-            print!("{}", check::summary(&scene));
+            talk::give(&check::summary(&scene));
             if let Some(warning) = first_look(&scene) {
-                print!("{}", check::warning_line(&warning));
+                talk::give(&check::warning_line(&warning));
             }
             Ok(())
         }
@@ -123,7 +124,7 @@ fn run_chart(args: ChartArgs) -> Result<()> {
         sessions: args.sessions,
         adapter: args.adapter,
     };
-    eprintln!("{}", chart(&request, &stop)?);
+    talk::say(chart(&request, &stop)?);
     Ok(())
 }
 
@@ -174,7 +175,7 @@ fn run_markers(args: MarkersArgs) -> Result<()> {
         dpi: args.dpi,
     })?;
     for path in written {
-        eprintln!("{}", path.display());
+        talk::say(path.display());
     }
     Ok(())
 }
@@ -198,11 +199,11 @@ fn run_calibrate(args: CalibrateArgs) -> Result<()> {
     let done = calibrate::calibrate(&request, &stop)?;
     // Where the calibration itself goes to stdout, the rest is talk.
     match is_stdout(&request.out) {
-        true => eprint!("{}", done.summary),
-        false => print!("{}", done.summary),
+        true => talk::say_lines(&done.summary),
+        false => talk::give(&done.summary),
     }
     for warning in &done.warnings {
-        eprintln!("warning: {warning}");
+        talk::say(format_args!("warning: {warning}"));
     }
     if !done.notices.is_empty() {
         bail!(
@@ -261,7 +262,7 @@ fn run_record(args: RecordArgs) -> Result<()> {
         out: args.out,
         seconds: args.seconds,
     };
-    eprintln!("{}", record::record(&request, &stop)?);
+    talk::say(record::record(&request, &stop)?);
     Ok(())
 }
 
@@ -290,12 +291,12 @@ fn run_probe(args: ProbeArgs) -> Result<()> {
     };
     let told = probe::probe(&request)?;
     for remark in &told.remarks {
-        eprintln!("{remark}");
+        talk::say(remark);
     }
     // Where the response goes to stdout, the rest is talk.
     match request.save_response.as_deref().is_some_and(is_stdout) {
-        true => eprint!("{}", told.lights),
-        false => print!("{}", told.lights),
+        true => talk::say_lines(&told.lights),
+        false => talk::give(&told.lights),
     }
     Ok(())
 }
@@ -371,9 +372,9 @@ fn end_at_interrupt() -> Result<()> {
 
 /// Says what was done.
 fn conclude(report: &Report) -> Result<()> {
-    eprintln!("{}", report.done);
+    talk::say(&report.done);
     for remark in &report.remarks {
-        eprintln!("{remark}");
+        talk::say(remark);
     }
     report.conclude()
 }

@@ -1,7 +1,7 @@
 //! The jobs of the program, and what they share: its clock, files, frames, stages and windows.
 //!
 //! A job (each module of [`jobs`], [`live`] and [`chart`]) imports no other job; what two of them need lies in a group below
-//! them. Lowest first: [`stopwatch`] → [`files`] → [`room_transport_cache`] →
+//! them. Lowest first: [`stopwatch`], [`talk`] → [`files`] → [`room_transport_cache`] →
 //! [`input`] → [`recording`] → [`stages`] → `scene_warnings` →
 //! [`authoring`] → [`truth`] → [`window`] → the jobs. Charts alone know [`truth`]. `tests/architecture.rs` keeps that.
 
@@ -16,5 +16,6 @@ pub mod room_transport_cache;
 pub mod scene_warnings;
 pub mod stages;
 pub mod stopwatch;
+pub mod talk;
 pub mod truth;
 pub mod window;

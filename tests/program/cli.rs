@@ -692,3 +692,53 @@ fn bare_layers_know_no_virtual_thing() {
     assert!(shadow.iter().all(|&bits| bits & 2 == 0) && shadow.contains(&1));
     assert!(layer("gain").to_rgb16().iter().all(|&gain| gain == 32768));
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn nobody_who_listens_is_no_failure_and_a_full_stream_neither() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // A full device.
+    let full = || {
+        let device = std::fs::File::options().write(true).open("/dev/full");
+        Stdio::from(device.expect("Linux has it"))
+    };
+    let lamp = config("lamp");
+    let run = |stdout: Stdio, stderr: Stdio, arguments: &[&str]| {
+        let mut command = Process::new(assert_cmd::cargo::cargo_bin("gnomon"));
+        command.current_dir(folder.path()).args(arguments);
+        command.stdout(stdout).stderr(stderr);
+        command.status().expect("a run").code()
+    };
+    let check = ["check", &lamp];
+    assert_eq!(run(full(), Stdio::null(), &check), Some(0));
+    // A pipe that nobody reads from any more.
+    let closed = || {
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        Stdio::from(writer)
+    };
+    assert_eq!(run(closed(), closed(), &check), Some(0));
+    let wrong = ["check", "no-such-scene.toml"];
+    assert_eq!(run(Stdio::null(), full(), &wrong), Some(1));
+    assert_eq!(run(Stdio::null(), closed(), &wrong), Some(1));
+}
+
+#[test]
+fn control_characters_of_files_are_spelt_out() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = folder.path().join("a.toml");
+    for text in [
+        "[camera]\nsource = \"a\u{1b}]0;title\u{7}\"\n",
+        "[cam\u{1b}[2Jera]\n",
+    ] {
+        std::fs::write(&scene, text).expect("a scene");
+        let output = gnomon(folder.path())
+            .args(["check", "a.toml"])
+            .output()
+            .expect("a run");
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.contains("\\u{1b}"), "{said:?}");
+        assert!(!said.contains(['\u{1b}', '\u{7}']), "{said:?}");
+    }
+}

@@ -13,6 +13,7 @@ use crate::app::files::result_kind::ResultKind;
 use crate::app::input::source;
 use crate::app::input::usual_tracking::usual_tracking;
 use crate::app::stages::progress::Progress;
+use crate::app::talk;
 use crate::capture::{FrameSource, Notice};
 use crate::scene::{CameraSettings, DetectorKind, Family, Marker, TrackingSettings};
 use crate::tracking::mapping::{LearntBoard, MapSettings, learn_board};
@@ -92,14 +93,14 @@ pub fn board(request: &BoardRequest, stop: &AtomicBool) -> Result<()> {
         Some(distance) => to_scale(&learnt, distance)?,
         None => learnt,
     };
-    eprint!("{}", certainty_text(&learnt));
+    talk::say_lines(&certainty_text(&learnt));
     if settings.detector == DetectorKind::Aruco {
-        eprintln!("a scene with this board needs [tracking] detector = \"aruco\"");
+        talk::say("a scene with this board needs [tracking] detector = \"aruco\"");
     }
     let block = board_block(&learnt, &request.name);
     match &request.out {
         Some(path) => write_text(path, &block)?,
-        None => print!("{block}"),
+        None => talk::give(&block),
     }
     if !notices.is_empty() {
         let notices: Vec<String> = notices.iter().map(ToString::to_string).collect();

@@ -21,6 +21,7 @@ use super::selection::selected_at;
 use super::session::LiveSession;
 use super::shadow_lines::ShadowLines;
 use super::window_state::WindowState;
+use crate::app::talk;
 use crate::app::window::fit::PictureFit;
 use crate::app::window::notices::{CameraState, Weight};
 use crate::app::window::screen::Screen;
@@ -372,7 +373,7 @@ impl eframe::App for LiveWindow {
     fn on_exit(&mut self) {
         for said in self.session.finish() {
             match said {
-                Ok(text) => eprintln!("{text}"),
+                Ok(text) => talk::say(text),
                 Err(error) => self.shared.fail(error.into()),
             }
         }

@@ -36,6 +36,7 @@ use crate::app::stages::tracked::{
     Ended, Frames, Poser, QUEUE, TrackedFrame, each_tracked_frame, join,
 };
 use crate::app::stopwatch::Stopwatch;
+use crate::app::talk;
 use contact_sheet::ContactSheet;
 
 /// A request to replay a recording.
@@ -77,7 +78,7 @@ pub fn replay(request: &ReplayRequest, stop: &AtomicBool) -> Result<Report> {
     let mut scene = files.reads_scene(&request.scene)?;
     scene.shadows.without = request.without;
     for warning in scene_warnings::warnings(&scene) {
-        eprintln!("warning: {warning}");
+        talk::say(format_args!("warning: {warning}"));
     }
     request.name_files(&mut files)?;
     files.check()?;
@@ -212,7 +213,7 @@ impl ReplayDrawing {
         intrinsics: Intrinsics,
     ) -> Result<Self> {
         let gpu = Arc::new(Gpu::open(request.adapter.as_deref())?);
-        eprintln!("drawing on {}", gpu.description());
+        talk::say(format_args!("drawing on {}", gpu.description()));
         let renderer =
             crate::app::room_transport_cache::renderer(Arc::clone(&gpu), scene, intrinsics)?;
         let sink = request
