@@ -39,7 +39,7 @@ const LARGE_JOBS: [&str; 2] = ["live", "chart"];
 const WINDOWS: &[&str] = &["app/window/", "app/live/", "app/jobs/calibrate/watched/"];
 
 /// A word of code, and the only places (below `src/`) where it may stand.
-const HOMES: [(&str, &[&str]); 16] = [
+const HOMES: [(&str, &[&str]); 15] = [
     // The window shows a texture of the renderer's.
     ("wgpu", &["render/", "app/window/screen.rs"]),
     ("eframe", WINDOWS),
@@ -64,7 +64,6 @@ const HOMES: [(&str, &[&str]); 16] = [
     ("Instant", &["app/stopwatch.rs"]),
     ("SystemTime", &["app/stopwatch.rs"]),
     // Nothing is said where a closed stream would end the job.
-    ("print", &[]),
     ("println", &[]),
     ("eprint", &[]),
     ("eprintln", &[]),
