@@ -2,15 +2,15 @@
 
 use glam::Vec3;
 
-/// The sides as quads of corners, counter-clockwise seen from outside. Bits of a corner's number say for x, y and z, the lowest
-/// bit first, whether it is high.
+/// The sides as quads of corners, low and high x first, then y, then z; counter-clockwise seen from outside. Bits of a corner's
+/// number say for x, y and z, the lowest bit first, whether it is high.
 pub const SIDES: [[u32; 4]; 6] = [
-    [0, 2, 3, 1],
-    [4, 5, 7, 6],
-    [0, 1, 5, 4],
-    [2, 6, 7, 3],
     [0, 4, 6, 2],
     [1, 3, 7, 5],
+    [0, 1, 5, 4],
+    [2, 6, 7, 3],
+    [0, 2, 3, 1],
+    [4, 5, 7, 6],
 ];
 
 /// Eight corners, and two triangles for each of the six sides.

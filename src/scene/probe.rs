@@ -18,6 +18,7 @@ use super::schema::key::Missing::{Is, Means};
 use super::schema::section::{Example, Section, Times};
 use super::schema::values::{InWords, Vectors, Written};
 use super::{ProbeScene, RoomPiece};
+use crate::geometry::cuboid::cuboid;
 use crate::geometry::winding::winding_number;
 
 /// Without a room the light comes from a box that reaches so far to each side of the probe: on a table it comes from the same
@@ -222,24 +223,12 @@ fn box_piece(value: &Value, albedo: Option<DVec3>) -> Result<RoomPiece, SceneErr
 }
 
 /// A box between its lowest and its highest corner.
-fn box_between(corners: [Vec3; 2], albedo: Option<Vec3>) -> RoomPiece {
-    let corner = |index: usize| {
-        let pick = |axis: usize| corners[index >> axis & 1][axis];
-        Vec3::new(pick(0), pick(1), pick(2))
-    };
-    // Counter-clockwise seen from outside.
-    const FACES: [[usize; 4]; 6] = [
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-    ];
-    let triangles = FACES
-        .iter()
-        .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-        .map(|triangle| (triangle.map(corner), albedo));
+fn box_between([low, high]: [Vec3; 2], albedo: Option<Vec3>) -> RoomPiece {
+    let (corners, triangles) = cuboid(low, high);
+    let places = |triangle: [u32; 3]| triangle.map(|corner| corners[corner as usize]);
+    let triangles = triangles
+        .into_iter()
+        .map(|corners| (places(corners), albedo));
     RoomPiece {
         triangles: triangles.collect(),
         is_closed: true,
