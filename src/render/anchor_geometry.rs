@@ -187,12 +187,10 @@ fn ties(scene: &Scene, index: usize) -> bool {
     let object = &scene.virtuals[index];
     let own = triangles_in_anchor(object);
     let others = scene.phantoms.iter().chain(&scene.virtuals[..index]);
-    others
-        .filter(|other| other.visible)
-        .any(|other| {
-            other.anchor != object.anchor
-                || may_coincide(&own, &triangles_in_anchor(other), IN_ONE_PLACE_M)
-        })
+    others.filter(|other| other.visible).any(|other| {
+        other.anchor != object.anchor
+            || may_coincide(&own, &triangles_in_anchor(other), IN_ONE_PLACE_M)
+    })
 }
 
 /// Surfaces that are this near to each other, metres, may be drawn at the same depth.
