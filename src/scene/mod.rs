@@ -23,6 +23,7 @@ mod lights;
 mod load;
 pub mod material_libraries;
 mod mesh_file;
+mod mip_36h12;
 mod named_files;
 mod obj_scan;
 mod objects;
