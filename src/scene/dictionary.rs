@@ -26,21 +26,16 @@ const MOST_MARKERS: usize = 4096;
 /// again.
 static READ: Mutex<Vec<&'static Dictionary>> = Mutex::new(Vec::new());
 
-/// ArUco's MIP 36h12.
-pub(super) fn mip_36h12() -> &'static Dictionary {
-    static MIP_36H12: LazyLock<Dictionary> = LazyLock::new(|| Dictionary {
-        name: "DICT_ARUCO_MIP_36h12".to_owned(),
-        cells: 6,
-        codes: CODES.to_vec(),
-        least_distance: 12,
-    });
-    &MIP_36H12
-}
-
 impl Dictionary {
     /// ArUco's MIP 36h12, which not every OpenCV has.
     pub fn mip_36h12() -> &'static Self {
-        mip_36h12()
+        static MIP_36H12: LazyLock<Dictionary> = LazyLock::new(|| Dictionary {
+            name: "DICT_ARUCO_MIP_36h12".to_owned(),
+            cells: 6,
+            codes: CODES.to_vec(),
+            least_distance: 12,
+        });
+        &MIP_36H12
     }
 
     /// Reads a file in YAML: `nmarkers`, `markersize`, and `marker_0`, `marker_1` … with a 1 for each white cell.

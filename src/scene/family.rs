@@ -4,7 +4,6 @@ use std::fmt;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-use super::dictionary::mip_36h12;
 use super::{Dictionary, SceneError};
 
 /// A family of markers as printed: its codes and the black border around them. The same code in another border is
@@ -178,6 +177,19 @@ impl Family {
             .map(|&(_, codes, drawing)| Self::of(codes).drawn_as(drawing))
     }
 
+    /// Of OpenCV's dictionaries, which begin with the same markers, the smallest that has a number; else the family itself.
+    pub fn smallest_with(self, id: u32) -> Self {
+        let Codes::Aruco { cells, .. } = self.codes else {
+            return self;
+        };
+        let counts = [50, 100, 250, 1000].into_iter();
+        let count = counts.filter(|&count| id < u32::from(count)).min();
+        count.map_or(self, |count| Self {
+            codes: aruco(cells, count),
+            ..self
+        })
+    }
+
     /// Whether a name is that of a dictionary's file, which [`Family::from_file`] reads.
     pub fn is_file_name(name: &str) -> bool {
         let extension = Path::new(name).extension().unwrap_or_default();
@@ -232,6 +244,11 @@ impl Family {
     /// Width of the black border, cells.
     pub fn border_cells(self) -> u32 {
         u32::from(self.border_cells)
+    }
+
+    /// Whether it is lighter outside the square whose corners are found than inside.
+    pub fn is_lighter_outside(self) -> bool {
+        (self.ink == Ink::BlackOnWhite) != self.has_ring()
     }
 
     /// Cells a side of the square whose corners are found: border and code, or the ring.
@@ -302,7 +319,7 @@ impl Codes {
             Self::Custom48h12 => 42_211,
             Self::Aruco { count, .. } => u32::from(count),
             Self::ArucoOriginal => 1024,
-            Self::ArucoMip36h12 => mip_36h12().id_count(),
+            Self::ArucoMip36h12 => Dictionary::mip_36h12().id_count(),
             Self::Own(dictionary) => dictionary.id_count(),
         }
     }

@@ -44,7 +44,7 @@ mod transport;
 pub use camera::{CameraSettings, PixelFormat, WantedFormat};
 pub use dictionary::Dictionary;
 pub use error::{SceneError, TextPlace};
-pub use family::{Codes, Family};
+pub use family::{Codes, Drawing, Family, Ink};
 pub use lights::unit_direction;
 pub use load::Reading;
 pub use named_files::{FileKind, NamedFile};
@@ -81,6 +81,14 @@ pub struct Scene {
     pub shadows: ShadowSettings,
 }
 
+impl Scene {
+    /// The families of all markers, as often as they have some.
+    pub fn families(&self) -> Vec<Family> {
+        let markers = self.anchors.iter().flat_map(|anchor| &anchor.markers);
+        markers.map(|marker| marker.family).collect()
+    }
+}
+
 /// A marker in its anchor's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Marker {
@@ -94,6 +102,19 @@ pub struct Marker {
     pub center_m: DVec2,
     /// Counter-clockwise turn in the board's plane, radians.
     pub rotation_rad: f64,
+}
+
+impl Marker {
+    /// A marker in the middle of its anchor's frame.
+    pub fn alone(family: Family, id: u32, size_m: f64) -> Self {
+        Self {
+            family,
+            id,
+            size_m,
+            center_m: DVec2::ZERO,
+            rotation_rad: 0.0,
+        }
+    }
 }
 
 /// A board of markers or a lone marker, with its own frame (x right, y up as printed, z towards the viewer).
@@ -110,13 +131,7 @@ impl Anchor {
     pub fn lone(name: String, family: Family, id: u32, size_m: f64) -> Self {
         Self {
             name,
-            markers: vec![Marker {
-                family,
-                id,
-                size_m,
-                center_m: DVec2::ZERO,
-                rotation_rad: 0.0,
-            }],
+            markers: vec![Marker::alone(family, id, size_m)],
         }
     }
 }

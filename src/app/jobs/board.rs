@@ -15,7 +15,7 @@ use crate::app::input::usual_tracking::usual_tracking;
 use crate::app::stages::progress::Progress;
 use crate::app::talk;
 use crate::capture::{FrameSource, Notice};
-use crate::scene::{CameraSettings, DetectorKind, Family, Marker, TrackingSettings};
+use crate::scene::{CameraSettings, Family, Marker, TrackingSettings};
 use crate::tracking::mapping::{LearntBoard, MapSettings, learn_board};
 use crate::tracking::{Detection, Detector, grey_from_rgba};
 
@@ -77,7 +77,7 @@ pub fn board(request: &BoardRequest, stop: &AtomicBool) -> Result<()> {
         }
         BoardInput::Recording { camera, decimation } => {
             files.reads_camera(camera);
-            (camera.clone(), usual_tracking(request.family, *decimation))
+            (camera.clone(), usual_tracking(*decimation))
         }
     };
     files.reads_family(request.family);
@@ -94,9 +94,6 @@ pub fn board(request: &BoardRequest, stop: &AtomicBool) -> Result<()> {
         None => learnt,
     };
     talk::say_lines(&certainty_text(&learnt));
-    if settings.detector == DetectorKind::Aruco {
-        talk::say("a scene with this board needs [tracking] detector = \"aruco\"");
-    }
     let block = board_block(&learnt, &request.name);
     match &request.out {
         Some(path) => write_text(path, &block)?,

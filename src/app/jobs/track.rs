@@ -15,6 +15,7 @@ use crate::app::files::result_kind::ResultKind;
 use crate::app::input::live_capture::LiveCapture;
 use crate::app::input::live_input::LiveInput;
 use crate::app::input::mirror_watch::MirrorWatch;
+use crate::app::input::sightings::Sightings;
 use crate::app::input::source;
 use crate::app::input::usual_tracking::usual_tracking;
 use crate::app::stages::report::Report;
@@ -34,7 +35,7 @@ pub struct TrackRequest {
     pub input: TrackInput,
     /// Where to write the poses.
     pub poses: Option<PathBuf>,
-    /// Where to write every marker that the detector sees.
+    /// Where to write every marker that the detector sees or that a pose rests on.
     pub markers: Option<PathBuf>,
     /// Where to write what it cost.
     pub stats: Option<PathBuf>,
@@ -79,14 +80,11 @@ pub fn track(request: &TrackRequest, stop: &AtomicBool) -> Result<Report> {
     request.name_results(&mut files);
     files.check()?;
     let (frames_in, intrinsics) = open(&plan.camera)?;
-    let poser = Poser::Tracker(
-        Box::new(Tracker::new(&plan.settings, &plan.anchors, intrinsics)?),
-        MirrorWatch::new(&plan.settings, &plan.anchors),
-    );
+    let poser = plan.poser(intrinsics)?;
     let raw = request
         .markers
         .as_ref()
-        .map(|_| Raw::new(&plan.settings, &plan.anchors))
+        .map(|_| Raw::new(&plan.settings, &plan.families()))
         .transpose()?;
     let mut run = TrackRun {
         request,
@@ -142,17 +140,18 @@ impl TrackRun<'_> {
         if let Some(raw) = &mut self.raw {
             raw.add(&tracked)?;
         }
+        self.plan.anchors.extend(tracked.came.iter().cloned());
         self.frames.push(KeptFrame::of(tracked));
         Ok(())
     }
 
-    /// The anchors that are written and told of.
+    /// The anchors in the order in which they are written and told of; those that came by themselves by their numbers.
     fn listed(&self) -> Vec<usize> {
-        (0..self.plan.anchors.len())
-            .filter(|&anchor| {
-                !self.plan.lists_found_alone || self.tally.lost[anchor] < self.tally.frames
-            })
-            .collect()
+        let mut listed: Vec<usize> = (0..self.plan.anchors.len()).collect();
+        if self.plan.every_marker.is_some() {
+            listed.sort_by_key(|&anchor| self.plan.anchors[anchor].markers[0].id);
+        }
+        listed
     }
 
     /// An anchor's name, and the frames without a pose of it.
@@ -200,7 +199,7 @@ impl TrackRun<'_> {
             .map(|(name, lost)| format!("\"{name}\" was not found in {lost} of them"))
             .collect();
         let frames = self.tally.frames;
-        let done = match self.plan.lists_found_alone {
+        let done = match self.plan.every_marker.is_some() {
             true => format!("{frames} frames, {} markers found", listed.len()),
             false => format!("{frames} frames"),
         };
@@ -238,8 +237,8 @@ struct TrackPlan {
     camera: CameraSettings,
     settings: TrackingSettings,
     anchors: Vec<Anchor>,
-    /// Whether anchors that no frame shows are left out: nobody named them.
-    lists_found_alone: bool,
+    /// A family and the size of its markers where each that is seen is an anchor, as they come.
+    every_marker: Option<(Family, f64)>,
 }
 
 impl TrackPlan {
@@ -251,7 +250,7 @@ impl TrackPlan {
                     camera: scene.camera,
                     settings: scene.tracking,
                     anchors: scene.anchors,
-                    lists_found_alone: false,
+                    every_marker: None,
                 }
             }
             TrackInput::RecordingWithScene(camera, path) => {
@@ -261,7 +260,7 @@ impl TrackPlan {
                     camera: camera.clone(),
                     settings: scene.tracking,
                     anchors: scene.anchors,
-                    lists_found_alone: false,
+                    every_marker: None,
                 }
             }
             TrackInput::LoneMarkers {
@@ -274,20 +273,40 @@ impl TrackPlan {
                 files.reads_family(*family);
                 Self {
                     camera: camera.clone(),
-                    settings: usual_tracking(*family, *decimation),
-                    anchors: lone_anchors(*family, *size_m),
-                    lists_found_alone: true,
+                    settings: usual_tracking(*decimation),
+                    anchors: Vec::new(),
+                    every_marker: Some((*family, *size_m)),
                 }
             }
         })
     }
 }
 
-/// An anchor for each marker of a family, by the name of its number.
-fn lone_anchors(family: Family, size_m: f64) -> Vec<Anchor> {
-    (0..family.id_count())
-        .map(|id| Anchor::lone(id.to_string(), family, id, size_m))
-        .collect()
+impl TrackPlan {
+    fn families(&self) -> Vec<Family> {
+        let markers = self.anchors.iter().flat_map(|anchor| &anchor.markers);
+        let every_marker = self.every_marker.iter().map(|&(family, _)| family);
+        markers
+            .map(|marker| marker.family)
+            .chain(every_marker)
+            .collect()
+    }
+
+    fn poser(&self, intrinsics: Intrinsics) -> Result<Poser> {
+        let mirror_watch = MirrorWatch::new(&self.settings, self.families());
+        Ok(match self.every_marker {
+            Some((family, size_m)) => Poser::tracker(
+                Tracker::of_every_marker(&self.settings, (family, size_m), intrinsics)?,
+                mirror_watch,
+                Sightings::of_family(family),
+            ),
+            None => Poser::tracker(
+                Tracker::new(&self.settings, &self.anchors, intrinsics)?,
+                mirror_watch,
+                Sightings::of_anchors(&self.anchors),
+            ),
+        })
+    }
 }
 
 /// The poses of a frame, kept until all anchors are known.
@@ -339,11 +358,9 @@ struct Raw {
 }
 
 impl Raw {
-    fn new(settings: &TrackingSettings, anchors: &[Anchor]) -> Result<Self> {
-        let markers = anchors.iter().flat_map(|anchor| &anchor.markers);
-        let families: Vec<Family> = markers.map(|marker| marker.family).collect();
+    fn new(settings: &TrackingSettings, families: &[Family]) -> Result<Self> {
         Ok(Self {
-            detector: Detector::new(settings, &families)?,
+            detector: Detector::new(settings, families)?,
             grey: Vec::new(),
             text: DetectionsText::new(),
         })
@@ -352,7 +369,8 @@ impl Raw {
     fn add(&mut self, tracked: &TrackedFrame) -> Result<()> {
         grey_from_rgba(&tracked.frame, &mut self.grey)?;
         let detections = self.detector.detect(&self.grey, tracked.frame.size_px)?;
-        self.text.add_frame(tracked.frame.index, &detections);
+        let (index, used) = (tracked.frame.index, &tracked.used);
+        self.text.add_frame(index, &detections, used);
         Ok(())
     }
 }

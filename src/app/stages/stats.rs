@@ -99,6 +99,7 @@ impl Stats {
 /// The detector of `--stats`.
 pub fn detector_in_words(tracking: &TrackingSettings) -> String {
     match tracking.detector {
+        DetectorKind::ByFamily => format!("by family, decimation {}", tracking.decimation),
         DetectorKind::AprilTag => format!("apriltag, decimation {}", tracking.decimation),
         DetectorKind::Aruco => "aruco".to_owned(),
     }

@@ -35,6 +35,9 @@ pub fn summary(scene: &Scene) -> String {
             .unwrap_or("what the recording carries"),
     );
     let detector = match scene.tracking.detector {
+        DetectorKind::ByFamily => {
+            "by family: libapriltag for AprilTag's, OpenCV's ArUco for the others"
+        }
         DetectorKind::AprilTag => "libapriltag",
         DetectorKind::Aruco => "OpenCV's ArUco",
     };
