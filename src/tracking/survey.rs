@@ -27,7 +27,7 @@ const FAMILIES: [&str; 15] = [
     "DICT_ARUCO_ORIGINAL",
 ];
 /// A marker of any family must look like itself by this much to be named.
-const LEAST_AGREEMENT: f64 = 0.65;
+const LEAST_AGREEMENT: f64 = 0.75;
 /// Of two markers in one place the one nearer to the other's middle than this part of its side is in its way.
 const SAME_PLACE: f64 = 0.5;
 

@@ -100,7 +100,10 @@ impl Sightings {
             true => "no marker of any family is seen".to_owned(),
             false => format!("{} {} seen", listed(&seen), self.is_or_are()),
         };
+        // Nobody said that there is any marker where every one is wanted.
+        let is_told = |wanted: &&Wanted| !wanted.markers.is_empty() || self.saw_others();
         let missing = self.wanted.iter().filter(|wanted| !wanted.is_found);
+        let missing = missing.filter(is_told);
         let told: Vec<String> = missing
             .map(|wanted| {
                 let wants: Vec<String> = wanted.markers.iter().map(in_words).collect();

@@ -179,7 +179,7 @@ impl TrackRun<'_> {
                 drawn: 0,
                 drops,
                 lost: listed.iter().map(|&anchor| self.lost(anchor)).collect(),
-                detector: detector_in_words(&self.plan.settings),
+                detector: detector_in_words(&self.plan.settings, &self.plan.families()),
                 technique: None,
                 adapter: None,
                 stages: self.tally.log.summary(),

@@ -491,7 +491,7 @@ fn a_family_may_be_a_file_beside_the_scene() {
     for (detector, name, id, message) in [
         ("aruco", "own.yml", 2, "own.yml"),
         ("aruco", "other.yml", 0, "other.yml"),
-        ("apriltag", "own.yml", 0, "detector = \"aruco\""),
+        ("apriltag", "own.yml", 0, "leave out tracking.detector"),
     ] {
         let error = scene(detector, name, id)
             .expect_err("a mistake")

@@ -403,7 +403,7 @@ impl ReplayRun<'_> {
             lost: names.zip(self.tally.lost.iter().copied()).collect(),
             detector: match &self.request.poses_from {
                 Some(path) => format!("none: poses from {}", path.display()),
-                None => detector_in_words(&self.scene.tracking),
+                None => detector_in_words(&self.scene.tracking, &self.scene.families()),
             },
             technique: Some(self.scene.chosen_technique().0.name()),
             adapter,
