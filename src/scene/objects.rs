@@ -149,6 +149,11 @@ pub static PHANTOM_SECTION: Section = Section {
         ("position_m", Example::Live("[-0.055, 0.035, 0.0]")),
         ("rotation_deg", Example::Live("[0, 0, 20]")),
         ("scale", Example::Live("1")),
+        ("turn_deg_per_s", Example::Aside("30")),
+        (
+            "path",
+            Example::Aside("[{ time_s = 0 }, { time_s = 2, position_m = [0.1, 0, 0] }]"),
+        ),
         ("material", Example::Live("{ albedo = [0.62, 0.55, 0.42] }")),
     ],
     is_aside: false,
@@ -175,6 +180,11 @@ pub static VIRTUAL_SECTION: Section = Section {
         ("position_m", Example::Live("[0.022, 0.0, 0.036]")),
         ("rotation_deg", Example::Live("[70, 0, 35]")),
         ("scale", Example::Live("[1, 1, 1]")),
+        ("turn_deg_per_s", Example::Aside("30")),
+        (
+            "path",
+            Example::Aside("[{ time_s = 0 }, { time_s = 2, position_m = [0.1, 0, 0] }]"),
+        ),
         (
             "material",
             Example::Live("{ albedo = [0.75, 0.16, 0.12], roughness = 0.4 }"),
