@@ -16,6 +16,17 @@ pub enum Cell {
     Open,
 }
 
+impl Cell {
+    /// The cell of a negative.
+    fn inverted(self) -> Self {
+        match self {
+            Self::Black => Self::White,
+            Self::White => Self::Black,
+            Self::Open => Self::Open,
+        }
+    }
+}
+
 /// A marker's cells as printed, rows from the top.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PrintedMarker {
@@ -59,13 +70,8 @@ impl PrintedMarker {
             printed.cells.reverse();
         }
         if family.ink() == Ink::WhiteOnBlack {
-            let inverted = |cell: &Cell| match cell {
-                Cell::Black => Cell::White,
-                Cell::White => Cell::Black,
-                Cell::Open => Cell::Open,
-            };
-            printed.around = inverted(&printed.around);
-            printed.cells = printed.cells.iter().map(inverted).collect();
+            printed.around = printed.around.inverted();
+            printed.cells = printed.cells.into_iter().map(Cell::inverted).collect();
         }
         Ok(printed)
     }
