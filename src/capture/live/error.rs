@@ -53,7 +53,7 @@ pub enum LiveError {
     /// It offers nothing that was asked for, or nothing that can be decoded.
     #[error(
         "{camera}: cannot give {wanted}; it offers {}",
-        offers_in_words(offers)
+        offers_in_words(offers, unknown)
     )]
     NoFormat {
         /// The camera.
@@ -62,6 +62,8 @@ pub enum LiveError {
         wanted: String,
         /// What it has.
         offers: Vec<Offer>,
+        /// What it has besides, in formats that are not read: the camera's own names of them.
+        unknown: Vec<String>,
     },
     /// The camera's driver refuses, or the camera has gone.
     #[error("{camera}: {message}")]
@@ -120,7 +122,12 @@ fn in_words(found: &[String]) -> String {
     }
 }
 
-fn offers_in_words(offers: &[Offer]) -> String {
+fn offers_in_words(offers: &[Offer], unknown: &[String]) -> String {
+    if !unknown.is_empty() {
+        let known: Vec<String> = offers.iter().map(ToString::to_string).collect();
+        let unread = format!("{}, which gnomon does not read", unknown.join(", "));
+        return [known, vec![unread]].concat().join(", ");
+    }
     if offers.is_empty() {
         return "no format that gnomon reads (it may be the second device of a camera: try the number before)".to_owned();
     }
