@@ -96,6 +96,19 @@ pub enum LiveError {
         /// The address.
         address: String,
     },
+    /// The stream goes on with pictures of another size.
+    #[error(
+        "{address}: its pictures are {} x {} from here on, they were {} x {}",
+        size_px[0], size_px[1], before_px[0], before_px[1]
+    )]
+    StreamResized {
+        /// The address.
+        address: String,
+        /// Width and height of the picture at hand.
+        size_px: [u32; 2],
+        /// Width and height of those before.
+        before_px: [u32; 2],
+    },
     /// A recording that is to be played cannot be.
     #[error(transparent)]
     Recording(#[from] CaptureError),

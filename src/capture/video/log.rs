@@ -14,6 +14,8 @@ pub(super) enum Said {
     TimeBase {
         /// Seconds that a tick of the time stamps lasts.
         tick_secs: f64,
+        /// Frames per second, where they are known.
+        fps: Option<f64>,
     },
     /// A frame is about to come.
     Frame(FrameHead),
@@ -53,7 +55,8 @@ pub(super) fn meaning(line: &str) -> Option<Said> {
         return of_showinfo(said);
     }
     // A picture of its own that ends too soon is given all the same.
-    let is_half_jpeg = line.starts_with("[mjpeg") && line.contains("[error] ");
+    let is_half_jpeg =
+        line.starts_with("[mjpeg") && (line.contains("[error] ") || line.contains("EOI missing"));
     if is_half_jpeg || line.contains("corrupt decoded frame") {
         return Some(Said::Corrupt);
     }
@@ -77,7 +80,8 @@ fn of_showinfo(said: &str) -> Option<Said> {
     if let Some(config) = said.strip_prefix("config in time_base: ") {
         let (tick, _) = config.split_once(',')?;
         let tick_secs = ratio(tick)?;
-        return Some(Said::TimeBase { tick_secs });
+        let fps = value_of(config, "frame_rate: ").and_then(ratio);
+        return Some(Said::TimeBase { tick_secs, fps });
     }
     if said.starts_with("color_range:") {
         let value = |key| value_of(said, key).unwrap_or("unknown").to_owned();
@@ -141,7 +145,8 @@ mod tests {
         let base =
             "[Parsed_showinfo_1 @ 0x1] [info] config in time_base: 1/15360, frame_rate: 30/1";
         let tick_secs = 1.0 / 15360.0;
-        assert_eq!(meaning(base), Some(Said::TimeBase { tick_secs }));
+        let fps = Some(30.0);
+        assert_eq!(meaning(base), Some(Said::TimeBase { tick_secs, fps }));
         let none = "[Parsed_showinfo_1 @ 0x1] [info] config out time_base: 0/0, frame_rate: 0/0";
         assert_eq!(meaning(none), None);
         let tags = "[Parsed_showinfo_1 @ 0x1] [info] color_range:tv color_space:bt2020nc color_primaries:bt2020 \

@@ -6,6 +6,7 @@ mod log;
 mod planes;
 mod probe;
 mod process;
+pub(super) mod stream;
 
 use std::ffi::OsString;
 use std::io::Read as _;
@@ -13,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::{CaptureError, Notice};
 use colours::{Colours, ToSrgb};
-use planes::{PixelLayout, rgba8, rgba16};
+use planes::{rgba8, rgba16};
 use probe::{Header, Packets, Probe};
 use process::{Decoder, Next, NoDecoder, RawFrame};
 
@@ -40,7 +41,7 @@ pub(super) struct VideoFrames {
     /// The first frame is decoded when the video is opened, and waits.
     waiting: Option<RawFrame>,
     clock: Clock,
-    to_srgb: Option<ToSrgb>,
+    conversion: Conversion,
     remark: Option<&'static str>,
     damage: Damage,
     next_index: u32,
@@ -97,15 +98,18 @@ impl VideoFrames {
             clock: Clock::new(1.0 / header.fps.unwrap_or(ASSUMED_FPS)),
             header,
             decoder,
-            to_srgb: None,
+            conversion: Conversion::default(),
             remark: None,
             damage,
             next_index: 0,
             good_frames: 0,
             ended: false,
         };
-        let first = video.waiting.as_ref();
-        video.remark = first.and_then(|first| video.colours_of(first)?.0.remark());
+        if let (Some(first), Some((_, layout, [_, lines]))) =
+            (&video.waiting, video.decoder.pixels())
+        {
+            video.remark = Colours::of(&first.colours, layout, lines).remark();
+        }
         Ok(video)
     }
 
@@ -160,8 +164,10 @@ impl VideoFrames {
                 self.damage.corrupt += 1;
             }
             self.good_frames += 1;
+            let lines = self.header.lines;
             let rgba = self
-                .rgba_of(&frame)
+                .conversion
+                .rgba_of(&self.decoder, &frame, lines)
                 .map_err(|message| CaptureError::Pixels {
                     path: self.path.clone(),
                     frame: index,
@@ -260,20 +266,24 @@ impl VideoFrames {
         let ends_early = length_secs * self.fps() > slack_frames;
         (may_be_cut && ends_early && self.next_index < announced).then_some(announced)
     }
+}
 
-    fn colours_of(&self, frame: &RawFrame) -> Option<(Colours, PixelLayout)> {
-        let (_, layout, [_, height]) = self.decoder.pixels()?;
-        let lines = self.header.lines.unwrap_or(height);
-        Some((Colours::of(&frame.colours, layout, lines), layout))
-    }
+/// From decoded pixels to sRGB.
+#[derive(Default)]
+struct Conversion {
+    to_srgb: Option<ToSrgb>,
+}
 
-    /// sRGB of the frame whose pixels are at hand.
-    fn rgba_of(&mut self, frame: &RawFrame) -> Result<Vec<u8>, String> {
-        let (Some((colours, layout)), Some((pixels, _, size_px))) =
-            (self.colours_of(frame), self.decoder.pixels())
-        else {
-            return Err("no pixels came".to_owned());
-        };
+impl Conversion {
+    /// sRGB of the frame whose pixels the decoder has at hand. `lines`: the rows of the stream's pictures.
+    fn rgba_of(
+        &mut self,
+        decoder: &Decoder,
+        frame: &RawFrame,
+        lines: Option<u32>,
+    ) -> Result<Vec<u8>, String> {
+        let (pixels, layout, size_px) = decoder.pixels().ok_or("no pixels came")?;
+        let colours = Colours::of(&frame.colours, layout, lines.unwrap_or(size_px[1]));
         if colours.is_srgb() {
             return rgba8(pixels, layout, size_px, colours.coding)
                 .map_err(|error| error.to_string());
@@ -285,9 +295,7 @@ impl VideoFrames {
         let to_srgb = known
             .filter(|known| known.fits(colours, largest))
             .unwrap_or_else(|| ToSrgb::new(colours, largest));
-        let rgba = to_srgb.rgba(&coded);
-        self.to_srgb = Some(to_srgb);
-        Ok(rgba)
+        Ok(self.to_srgb.insert(to_srgb).rgba(&coded))
     }
 }
 

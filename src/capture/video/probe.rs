@@ -99,7 +99,7 @@ impl Probe {
         Some(Header {
             counted_frames: stream.nb_frames.and_then(|count| count.parse().ok()),
             duration_secs: secs(stream.duration.as_ref()).or_else(|| secs(whole)),
-            fps: rate(&stream.avg_frame_rate).or_else(|| rate(&stream.r_frame_rate)),
+            fps: nominal_fps(rate(&stream.avg_frame_rate), rate(&stream.r_frame_rate)),
             lines: stream.height,
             container: container
                 .and_then(|format| format.format_name)
@@ -119,6 +119,14 @@ impl Drop for Probe {
         // Both fail only where it has ended already.
         _ = self.child.kill();
         _ = self.child.wait();
+    }
+}
+
+/// The average, but where it counts what is no frame (AVI with reordered frames): no more than the steps of the time stamps.
+fn nominal_fps(average: Option<f64>, by_steps: Option<f64>) -> Option<f64> {
+    match (average, by_steps) {
+        (Some(average), Some(by_steps)) => Some(average.min(by_steps)),
+        (one, other) => one.or(other),
     }
 }
 

@@ -51,6 +51,8 @@ pub(super) struct Decoder {
     frames_out: ChildStdout,
     said: Receiver<Said>,
     tick_secs: f64,
+    /// The rate that the stream says.
+    pub fps: Option<f64>,
     /// A frame whose colours were not told yet.
     head: Option<FrameHead>,
     corrupt: bool,
@@ -111,6 +113,7 @@ impl Decoder {
             frames_out,
             said,
             tick_secs: 0.0,
+            fps: None,
             head: None,
             corrupt: false,
             layout: None,
@@ -127,7 +130,9 @@ impl Decoder {
             match self.said.recv_timeout(PATIENCE) {
                 Ok(Said::Input) => self.opened = true,
                 Ok(Said::Decoding) => self.has_video = true,
-                Ok(Said::TimeBase { tick_secs }) => self.tick_secs = tick_secs,
+                Ok(Said::TimeBase { tick_secs, fps }) => {
+                    (self.tick_secs, self.fps) = (tick_secs, fps)
+                }
                 Ok(Said::Frame(head)) => self.head = Some(head),
                 Ok(Said::Corrupt) => self.corrupt = true,
                 Ok(Said::Complaint(words) | Said::Fatal(words)) => return Next::Complaint(words),
