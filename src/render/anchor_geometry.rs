@@ -143,7 +143,7 @@ impl AnchorGeometry {
             (Role::Real, &scene.phantoms),
             (Role::Virtual, &scene.virtuals),
         ] {
-            for anchor in 0..scene.anchors.len() {
+            for anchor in 0..scene.node_count() {
                 let mut shared = SharedCorners::default();
                 let there = objects
                     .iter()
