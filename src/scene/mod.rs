@@ -25,6 +25,7 @@ pub mod material_libraries;
 mod mesh_file;
 mod motion;
 mod named_files;
+mod not_a_scene;
 mod obj_scan;
 mod objects;
 mod placement;
