@@ -3,7 +3,7 @@
 # Mesa's layer that asks the desktop for its favourite card complains on machines without a desktop; gnomon chooses itself.
 export NODEVICE_SELECT = 1
 
-.PHONY: demo install uninstall test test-deep test-camera soak charts reference bench bench-volumes bench-tracking setup setup-tests
+.PHONY: demo install uninstall test test-camera soak charts reference bench bench-volumes bench-tracking setup setup-tests
 
 demo: setup
 	cargo build --release
