@@ -26,6 +26,7 @@ mod mesh_file;
 mod mip_36h12;
 mod motion;
 mod named_files;
+mod not_a_scene;
 mod obj_scan;
 mod objects;
 mod placement;

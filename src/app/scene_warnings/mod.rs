@@ -2,6 +2,7 @@
 
 mod degenerate;
 mod room;
+mod unlikely;
 
 use crate::light::Light;
 use crate::scene::{Object, Scene};
@@ -17,6 +18,7 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
         .collect();
     let mut warnings = room::warnings(scene);
     warnings.extend(degenerate::warnings(scene));
+    warnings.extend(unlikely::warnings(scene));
     if let Some(probe) = &scene.probe {
         let notes = probe.notes.iter();
         warnings.extend(notes.map(|note| format!("{}: {note}", probe.image.display())));
