@@ -7,7 +7,7 @@ use super::attachments::{depth_stencil, loaded};
 use super::background::Background;
 use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
-use super::gpu_scene::GpuScene;
+use super::gpu_scene::{DrawnLight, GpuScene};
 use super::light_sums::{BY_GAIN, LightSums};
 use super::passes::Passes;
 use super::screen_bounds::ScreenBounds;
@@ -25,9 +25,14 @@ pub(super) struct Accumulated {
 }
 
 impl Accumulated {
-    pub fn new(gpu: &Gpu, background: &Background, samples: u32, glossy: bool) -> Self {
+    pub fn new(
+        gpu: &Gpu,
+        background: &Background,
+        samples: u32,
+        (glossy, shaped): (bool, bool),
+    ) -> Self {
         Self {
-            surfaces: Surfaces::new(gpu, samples, glossy),
+            surfaces: Surfaces::new(gpu, samples, glossy, shaped),
             volumes: Volumes::new(gpu, &GEOMETRY_GROUPS, samples, &[gpu.light_format; 2]),
             sums: LightSums::new(gpu, background, samples, BY_GAIN),
         }
@@ -42,41 +47,87 @@ impl Accumulated {
         is_first: bool,
     ) {
         let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
-        let (surfaces, volumes) = (&self.surfaces, &self.volumes);
+        let surfaces = &self.surfaces;
         set_scissor(pass, pixels);
+        let whole = DrawnLight::Whole(light);
         if is_first {
             let ambient = [
                 (&surfaces.ambient_on_real, Role::Real),
                 (&surfaces.ambient_on_virtual, Role::Virtual),
             ];
             for (pipelines, role) in ambient {
-                gpu_scene.draw_surfaces(pass, pipelines, role, light, pixels);
+                gpu_scene.draw_surfaces(pass, pipelines, role, whole, pixels);
             }
         }
-        if gpu_scene.light_count() == 0 {
-            return;
+        let pieces = gpu_scene.pieces_of(light);
+        match pieces.len() {
+            0 => {}
+            1 => self.draw_sharp(pass, frame, pieces.start),
+            _ => {
+                let reaching = &surfaces.light_reaching_real;
+                gpu_scene.draw_surfaces(pass, reaching, Role::Real, whole, pixels);
+                for piece in pieces {
+                    self.draw_piece(pass, frame, piece);
+                }
+            }
         }
-        if gpu_scene.count_volumes(pass, volumes, Among::All, Role::Real, light, pixels) {
+    }
+
+    /// Draws a light that is one piece.
+    fn draw_sharp(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>, piece: usize) {
+        let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
+        let (surfaces, volumes) = (&self.surfaces, &self.volumes);
+        if gpu_scene.count_volumes(pass, volumes, Among::All, Role::Real, piece, pixels) {
             volumes.keep(pass, Role::Real, pixels);
         }
         gpu_scene.draw_surfaces(
             pass,
             &surfaces.light_reaching_real,
             Role::Real,
-            light,
+            DrawnLight::Piece(piece),
             pixels,
         );
+        self.draw_virtual(pass, frame, piece);
+    }
+
+    /// Draws one of several pieces of a light, of which all has reached the real surfaces already.
+    fn draw_piece(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>, piece: usize) {
+        let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
+        let (surfaces, volumes) = (&self.surfaces, &self.volumes);
+        volumes.forget(pass, pixels);
+        if gpu_scene.count_volumes(pass, volumes, Among::All, Role::Real, piece, pixels) {
+            volumes.keep(pass, Role::Real, pixels);
+            gpu_scene.draw_surfaces(
+                pass,
+                &surfaces.light_kept_from_real,
+                Role::Real,
+                DrawnLight::HiddenPiece(piece),
+                pixels,
+            );
+        }
+        self.draw_virtual(pass, frame, piece);
+    }
+
+    /// Draws what virtual things take of a piece and get of it; what real ones hide of it is known.
+    fn draw_virtual(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        frame: &FrameContext<'_>,
+        piece: usize,
+    ) {
+        let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
+        let (surfaces, volumes) = (&self.surfaces, &self.volumes);
         let lit = Among::LitByReal;
-        if gpu_scene.count_volumes(pass, volumes, lit, Role::Virtual, light, pixels) {
+        if gpu_scene.count_volumes(pass, volumes, lit, Role::Virtual, piece, pixels) {
             gpu_scene.draw_surfaces(
                 pass,
                 &surfaces.light_hidden_from_real,
                 Role::Real,
-                light,
+                DrawnLight::Piece(piece),
                 pixels,
             );
         }
-        gpu_scene.draw_virtuals_facing(pass, &surfaces.light_on_virtual, light, pixels);
+        gpu_scene.draw_virtuals_facing(pass, &surfaces.light_on_virtual, piece, pixels);
     }
 }
 

@@ -44,7 +44,7 @@ pub use camera::{CameraSettings, PixelFormat, WantedFormat};
 pub use dictionary::Dictionary;
 pub use error::{SceneError, TextPlace};
 pub use family::{Codes, Family};
-pub use lights::unit_direction;
+pub use lights::{SceneLight, unit_direction};
 pub use load::Reading;
 pub use named_files::{FileKind, NamedFile};
 pub use placement::Placement;
@@ -70,14 +70,22 @@ pub struct Scene {
     pub phantoms: Vec<Object>,
     /// What the picture alone shows.
     pub virtuals: Vec<Object>,
-    /// Lights in world space.
-    pub lights: Vec<Light>,
+    /// What shines.
+    pub lights: Vec<SceneLight>,
     /// Radiance of the constant surrounding light, linear RGB.
     pub ambient_radiance: DVec3,
     /// The light that a probe saw, and the room that sent it.
     pub probe: Option<ProbeScene>,
     /// How shadows are made.
     pub shadows: ShadowSettings,
+}
+
+impl Scene {
+    /// The lights that stand in the world, in world space.
+    pub fn world_lights(&self) -> Vec<Light> {
+        let standing = self.lights.iter().filter(|light| light.anchor == 0);
+        standing.map(|light| light.light).collect()
+    }
 }
 
 /// A marker in its anchor's frame.

@@ -486,15 +486,12 @@ pub fn linear_of_level(level: f64) -> f64 {
 }
 
 pub fn sun(direction: [f64; 3], irradiance: [f64; 3]) -> Light {
-    Light::Directional {
-        direction: DVec3::from_array(direction).normalize(),
-        irradiance: DVec3::from_array(irradiance),
-    }
+    Light::directional(
+        DVec3::from_array(direction).normalize(),
+        DVec3::from_array(irradiance),
+    )
 }
 
 pub fn lamp(position_m: [f64; 3], intensity: [f64; 3]) -> Light {
-    Light::Point {
-        position_m: DVec3::from_array(position_m),
-        intensity: DVec3::from_array(intensity),
-    }
+    Light::point(DVec3::from_array(position_m), DVec3::from_array(intensity))
 }

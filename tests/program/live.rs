@@ -25,7 +25,7 @@ use gnomon::app::stopwatch::Stopwatch;
 use gnomon::app::window::Wake;
 use gnomon::capture::{Frame, FrameSource};
 use gnomon::geometry::light_placing::{LightFreedom, PosedCamera};
-use gnomon::light::Light;
+use gnomon::light::{Light, Shape};
 use gnomon::render::{Renderer, Shown};
 use gnomon::scene::{CameraSettings, Placement, Scene};
 use gnomon::tracking::Status;
@@ -272,6 +272,7 @@ fn what_is_edited_is_drawn_as_if_it_had_always_been_so() {
         light: Light::Point {
             position_m: DVec3::new(0.2, 0.2, 0.5),
             intensity: DVec3::splat(0.8),
+            shape: Shape::Point,
         },
     };
     session.edit_scene(SceneCommand::Commit(moved_torus()), &state);

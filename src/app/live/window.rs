@@ -26,6 +26,7 @@ use crate::app::window::fit::PictureFit;
 use crate::app::window::notices::{CameraState, Weight};
 use crate::app::window::screen::Screen;
 use crate::geometry::light_placing::PosedCamera;
+use crate::scene::SceneLight;
 
 /// The window looks at the world at least this often, even when no frame comes.
 const PULSE: Duration = Duration::from_millis(200);
@@ -227,9 +228,9 @@ impl LiveWindow {
                 (GizmoTarget::Thing { name, placement }, anchor)
             }
             Selected::Light(index) => {
-                let light = *scene.lights.get(*index)?;
+                let SceneLight { anchor, light } = *scene.lights.get(*index)?;
                 let index = *index;
-                (GizmoTarget::Light { index, light }, 0)
+                (GizmoTarget::Light { index, light }, anchor)
             }
         };
         let sight = PosedCamera {

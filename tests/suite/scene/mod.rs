@@ -290,7 +290,8 @@ frame_budget_ms = 16
         scene.lights,
         [Light::Directional {
             direction: -DVec3::Z,
-            irradiance: DVec3::splat(2.0)
+            irradiance: DVec3::splat(2.0),
+            angle_rad: 0.0
         }]
     );
     assert_eq!(scene.ambient_radiance, DVec3::splat(0.5));
