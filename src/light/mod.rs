@@ -290,18 +290,12 @@ mod tests {
 
     #[test]
     fn light_falls_off_with_the_square_of_distance_and_the_cosine() {
-        let lamp = Light::Point {
-            position_m: DVec3::new(0.0, 0.0, 2.0),
-            intensity: DVec3::splat(8.0),
-        };
+        let lamp = Light::point(DVec3::new(0.0, 0.0, 2.0), DVec3::splat(8.0));
         assert!((irradiance(&lamp, DVec3::ZERO, DVec3::Z).x - 2.0).abs() < 1e-12);
         let tilted = DVec3::new(0.8, 0.0, 0.6);
         assert!((irradiance(&lamp, DVec3::ZERO, tilted).x - 1.2).abs() < 1e-12);
         assert_eq!(irradiance(&lamp, DVec3::ZERO, DVec3::NEG_Z), DVec3::ZERO);
-        let sun = Light::Directional {
-            direction: DVec3::NEG_Z,
-            irradiance: DVec3::splat(3.0),
-        };
+        let sun = Light::directional(DVec3::NEG_Z, DVec3::splat(3.0));
         assert!((irradiance(&sun, DVec3::splat(7.0), tilted).x - 1.8).abs() < 1e-12);
     }
 

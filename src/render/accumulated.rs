@@ -87,11 +87,21 @@ impl Accumulated {
             DrawnLight::Piece(piece),
             pixels,
         );
-        self.draw_virtual(pass, frame, piece);
+        self.draw_taken(pass, frame, piece);
+        gpu_scene.draw_virtuals_facing(pass, &surfaces.light_on_virtual, piece, pixels);
     }
 
     /// Draws one of several pieces of a light, of which all has reached the real surfaces already.
     fn draw_piece(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>, piece: usize) {
+        self.draw_hidden(pass, frame, piece);
+        let on_virtual = &self.surfaces.light_on_virtual;
+        frame
+            .gpu_scene
+            .draw_virtuals_facing(pass, on_virtual, piece, frame.bounds.pixels);
+    }
+
+    /// Draws what is hidden of a piece from real surfaces, which all of it has reached.
+    fn draw_hidden(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>, piece: usize) {
         let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
         let (surfaces, volumes) = (&self.surfaces, &self.volumes);
         volumes.forget(pass, pixels);
@@ -105,16 +115,20 @@ impl Accumulated {
                 pixels,
             );
         }
-        self.draw_virtual(pass, frame, piece);
+        self.draw_taken(pass, frame, piece);
     }
 
-    /// Draws what virtual things take of a piece and get of it; what real ones hide of it is known.
-    fn draw_virtual(
-        &self,
-        pass: &mut wgpu::RenderPass<'_>,
-        frame: &FrameContext<'_>,
-        piece: usize,
-    ) {
+    /// Draws what real and virtual things hide of the ambient light from real surfaces, all of which has reached them. (What of
+    /// it reaches virtual ones is gathered: indirect.rs.)
+    fn draw_surroundings(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>) {
+        set_scissor(pass, frame.bounds.pixels);
+        for piece in frame.gpu_scene.pieces_of_surroundings() {
+            self.draw_hidden(pass, frame, piece);
+        }
+    }
+
+    /// Draws what virtual things take of a piece from real surfaces; what real ones hide of it is known.
+    fn draw_taken(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>, piece: usize) {
         let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
         let (surfaces, volumes) = (&self.surfaces, &self.volumes);
         let lit = Among::LitByReal;
@@ -127,7 +141,6 @@ impl Accumulated {
                 pixels,
             );
         }
-        gpu_scene.draw_virtuals_facing(pass, &surfaces.light_on_virtual, piece, pixels);
     }
 }
 
@@ -144,8 +157,9 @@ impl TechniquePasses for Accumulated {
     fn draw(&mut self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) {
         let sums = &self.sums;
         let count = frame.gpu_scene.light_count().max(1);
+        let surroundings = frame.gpu_scene.pieces_of_surroundings();
         for light in 0..count {
-            let (first, last) = (light == 0, light + 1 == count);
+            let (first, last) = (light == 0, light + 1 == count && surroundings.is_empty());
             let load = match first {
                 true => wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
                 false => wgpu::LoadOp::Load,
@@ -157,6 +171,16 @@ impl TechniquePasses for Accumulated {
                 Some(depth_stencil(&sums.depth_stencil, first, last)),
             );
             self.draw_light(&mut pass, frame, light, first);
+        }
+        if !surroundings.is_empty() {
+            let load = wgpu::LoadOp::Load;
+            let mut pass = passes.begin(
+                "surroundings",
+                Some(GpuSpan::Light.part(false, true)),
+                &[loaded(&sums.reaching, load), loaded(&sums.change, load)],
+                Some(depth_stencil(&sums.depth_stencil, false, true)),
+            );
+            self.draw_surroundings(&mut pass, frame);
         }
         sums.composite(passes, frame);
     }

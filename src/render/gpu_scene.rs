@@ -2,11 +2,12 @@
 
 use std::ops::Range;
 
-use glam::{DAffine3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
+use crate::light::pieces::surroundings;
 use crate::light::{Light, Shape};
 use crate::scene::{Scene, SceneLight, ShadowSettings, Shortcut};
 
@@ -109,7 +110,11 @@ impl GpuScene {
             things,
             view_group: gpu.bind_group(&VIEW_GROUP, [views.binding()]),
             camera_from_anchor: vec![None; scene.anchors.len()],
-            lights: Lights::new(gpu, lights(scene, lit_by)),
+            lights: Lights::new(
+                gpu,
+                lights(scene, lit_by),
+                hidden_surroundings(scene, lit_by),
+            ),
             shaped: scene.lights.iter().any(|light| is_shaped(&light.light)),
             glossy: scene.virtuals.iter().any(|object| {
                 let mut materials = object.materials.iter();
@@ -162,6 +167,16 @@ impl GpuScene {
     /// The pieces of a light, of which each casts its shadows.
     pub fn pieces_of(&self, light: usize) -> Range<usize> {
         self.lights.pieces_of(light)
+    }
+
+    /// From how many directions light from all around may be hidden.
+    pub fn surroundings_count(&self) -> usize {
+        self.lights.surroundings_count()
+    }
+
+    /// The pieces of the light from all around that virtual things hide.
+    pub fn pieces_of_surroundings(&self) -> Range<usize> {
+        self.lights.pieces_of_surroundings()
     }
 
     /// Triangles of the levels that the present frame's things are drawn in.
@@ -538,6 +553,15 @@ fn lights(scene: &Scene, lit_by: LitBy) -> Vec<SceneLight> {
     match lit_by {
         LitBy::Lights => scene.lights.clone(),
         LitBy::Room => Vec::new(),
+    }
+}
+
+/// The ambient light as lights whose shadows are drawn: from above, for tables lie flat.
+fn hidden_surroundings(scene: &Scene, lit_by: LitBy) -> Vec<Light> {
+    let count = scene.shadows.ambient_samples as usize;
+    match lit_by == LitBy::Lights && scene.ambient_radiance != DVec3::ZERO {
+        true => surroundings(DVec3::Z, scene.ambient_radiance, count),
+        false => Vec::new(),
     }
 }
 

@@ -20,6 +20,9 @@ use super::uniforms::{CameraLight, LIGHT_GROUP, UniformRow};
 pub(super) struct Lights {
     scene: Vec<SceneLight>,
     placed: Vec<PlacedLight>,
+    /// What shines from all around, a light for each direction; they have slots like the rest.
+    surroundings: Vec<Piece>,
+    /// All pieces of the lights, then the surroundings.
     pieces: Vec<Piece>,
     /// For each light the slots of its pieces, as many as it ever had.
     slots: Vec<Vec<usize>>,
@@ -46,14 +49,18 @@ pub(super) struct Piece {
 }
 
 impl Lights {
-    pub fn new(gpu: &Gpu, scene: Vec<SceneLight>) -> Self {
+    /// `surroundings`: what virtual things may hide of light from all around.
+    pub fn new(gpu: &Gpu, scene: Vec<SceneLight>, surroundings: Vec<Light>) -> Self {
         let capacity = 2 * scene.len();
+        let slot_count = surroundings.len();
+        let piece = |(slot, light)| Piece { light, slot };
         let (uniforms, group) = uniforms(gpu, capacity);
         Self {
             slots: vec![Vec::new(); scene.len()],
             placed: Vec::new(),
             pieces: Vec::new(),
-            slot_count: 0,
+            slot_count,
+            surroundings: surroundings.into_iter().enumerate().map(piece).collect(),
             scene,
             uniforms,
             capacity,
@@ -111,6 +118,7 @@ impl Lights {
             }
             placed.pieces = first..self.pieces.len();
         }
+        self.pieces.extend(&self.surroundings);
         let needed = self.scene.len() + self.slot_count;
         if needed > self.capacity {
             self.capacity = needed.next_power_of_two();
@@ -158,6 +166,16 @@ impl Lights {
         self.placed
             .get(light)
             .map_or(0..0, |placed| placed.pieces.clone())
+    }
+
+    /// How many directions of the surroundings there are.
+    pub fn surroundings_count(&self) -> usize {
+        self.surroundings.len()
+    }
+
+    /// Which of them are the surroundings.
+    pub fn pieces_of_surroundings(&self) -> Range<usize> {
+        self.pieces.len().saturating_sub(self.surroundings.len())..self.pieces.len()
     }
 
     /// Puts a whole light into group 1.

@@ -121,11 +121,13 @@ pub fn scene(
         }],
         phantoms,
         virtuals,
-        lights,
+        lights: lights.into_iter().map(Into::into).collect(),
         ambient_radiance: DVec3::splat(ambient),
         shadows: ShadowSettings {
             technique: Technique::Auto,
             samples: 4,
+            // (Tests of what the surroundings give turn it on.)
+            ambient_samples: 0,
             ..ShadowSettings::default()
         },
         ..Scene::default()
@@ -300,7 +302,7 @@ impl Stage {
         let path = folder.path().join("scene.toml");
         std::fs::write(&path, toml).expect("a scene file");
         let mut scene = Scene::load(&path).unwrap_or_else(|error| panic!("{error}"));
-        scene.lights = lights;
+        scene.lights = lights.into_iter().map(Into::into).collect();
         scene.ambient_radiance = ambient_radiance;
         let objects = scene.phantoms.iter().chain(&scene.virtuals);
         let scales = objects.map(|object| object.anchor_from_object).collect();

@@ -323,7 +323,7 @@ fn a_saved_scene_wakes_the_window_and_shows_at_once_and_a_mistake_keeps_the_last
     .unwrap();
     let is_taken = |session: &LiveSession| {
         let light = session.scene().unwrap().lights[0];
-        matches!(light, Light::Point { position_m, .. } if position_m.x == 0.3)
+        matches!(light.light, Light::Point { position_m, .. } if position_m.x == 0.3)
     };
     // No frame comes any more, and the window looks at nothing unless it is woken.
     while !is_taken(&session) {
@@ -517,7 +517,7 @@ fn a_light_is_found_by_clicks_on_corners_and_their_shadows() {
     );
     assert!(session.clicks().is_none(), "{:?}", session.notices);
     let written = Scene::load(&path).unwrap();
-    let Light::Point { position_m, .. } = written.lights[0] else {
+    let Light::Point { position_m, .. } = written.lights[0].light else {
         panic!("a lamp");
     };
     let off_m = position_m.distance(true_m);

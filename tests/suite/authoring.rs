@@ -277,7 +277,7 @@ mod edits {
         };
         assert_eq!(a.lights.len(), b.lights.len(), "{what}");
         for (a, b) in a.lights.iter().zip(&b.lights) {
-            let alike = match (a, b) {
+            let alike = match (&a.light, &b.light) {
                 (
                     Light::Point {
                         position_m: p,
@@ -389,6 +389,8 @@ mod edits {
                 from: scene.shadows,
                 to: ShadowSettings {
                     without: Shortcuts::NONE,
+                    light_samples: [16, 64, 100][random.below(3)],
+                    ambient_samples: [0, 32, 50][random.below(3)],
                     technique: if random.chance(0.5) {
                         Technique::Auto
                     } else {

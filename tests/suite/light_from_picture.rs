@@ -26,7 +26,7 @@ impl Known {
                 intensity,
                 shape: Shape::Point,
             },
-        ] = scene.lights[..]
+        ] = scene.world_lights()[..]
         else {
             panic!("one lamp is expected")
         };

@@ -45,7 +45,9 @@ impl ChosenTechnique {
                 let shaped = gpu_scene.shaped;
                 // (A lamp that moves along may be lost, and one of some size has soft shadows.)
                 let is_plain = |light: &SceneLight| light.anchor == 0 && !light.light.has_size();
-                let is_single = samples == 1 && matches!(&scene.lights[..], [one] if is_plain(one));
+                let is_single = samples == 1
+                    && gpu_scene.surroundings_count() == 0
+                    && matches!(&scene.lights[..], [one] if is_plain(one));
                 let technique = match is_single && !scene.shadows.without.has(Shortcut::Direct) {
                     true => Self::Direct(Direct::new(gpu, background, glossy, shaped)),
                     false => Self::Accumulated(Accumulated::new(
