@@ -137,7 +137,7 @@ impl Accumulated {
                 pass,
                 &surfaces.light_hidden_from_real,
                 Role::Real,
-                DrawnLight::Piece(piece),
+                DrawnLight::Taken(piece),
                 pixels,
             );
         }

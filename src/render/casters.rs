@@ -127,7 +127,7 @@ impl Casters {
                 ))
             })
             .collect();
-        for (index, Piece { light, slot }) in pieces.iter().enumerate() {
+        for (index, Piece { light, slot, .. }) in pieces.iter().enumerate() {
             let Some(shadows) = self.shadows.get_mut(*slot) else {
                 continue;
             };

@@ -2,12 +2,11 @@
 
 use std::ops::Range;
 
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, Vec3};
 use rayon::prelude::*;
 
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
-use crate::light::pieces::surroundings;
 use crate::light::{Light, Shape};
 use crate::scene::{Scene, SceneLight, ShadowSettings, Shortcut};
 
@@ -24,6 +23,7 @@ use super::screen_bounds::{ScreenBounds, screen_bounds};
 use super::shown::Shown;
 use super::stencil::REAL_HIDES;
 use super::surfaces::Sided;
+use super::surroundings::hidden_surroundings;
 use super::uniforms::{AnchorView, UniformRow, VIEW_GROUP};
 use super::volumes::{Among, Volumes, set_scissor};
 
@@ -43,6 +43,8 @@ pub(super) enum DrawnLight {
     Whole(usize),
     /// A piece of one.
     Piece(usize),
+    /// What virtual things take where they hide a piece.
+    Taken(usize),
     /// A piece where real things hide it: the stencil's reference says that.
     HiddenPiece(usize),
 }
@@ -128,7 +130,8 @@ impl GpuScene {
     /// Takes another state of the same scene: lights otherwise, things elsewhere, shown or hidden. What surroundings
     /// reflect stays as it was gathered, where the same corners are there to get it.
     pub fn follow(&mut self, gpu: &Gpu, scene: &Scene) {
-        self.lights.follow(lights(scene, self.lit_by));
+        let surroundings = hidden_surroundings(scene, self.lit_by);
+        self.lights.follow(lights(scene, self.lit_by), surroundings);
         self.shaped = scene.lights.iter().any(|light| is_shaped(&light.light));
         let standing = standing(scene);
         if self.standing == standing {
@@ -363,6 +366,7 @@ impl GpuScene {
         match light {
             DrawnLight::Whole(light) => self.lights.set_whole(pass, light),
             DrawnLight::Piece(piece) => self.lights.set_piece(pass, piece),
+            DrawnLight::Taken(piece) => self.lights.set_taken(pass, piece),
             DrawnLight::HiddenPiece(piece) => {
                 self.lights.set_piece(pass, piece);
                 pass.set_stencil_reference(REAL_HIDES);
@@ -553,15 +557,6 @@ fn lights(scene: &Scene, lit_by: LitBy) -> Vec<SceneLight> {
     match lit_by {
         LitBy::Lights => scene.lights.clone(),
         LitBy::Room => Vec::new(),
-    }
-}
-
-/// The ambient light as lights whose shadows are drawn: from above, for tables lie flat.
-fn hidden_surroundings(scene: &Scene, lit_by: LitBy) -> Vec<Light> {
-    let count = scene.shadows.ambient_samples as usize;
-    match lit_by == LitBy::Lights && scene.ambient_radiance != DVec3::ZERO {
-        true => surroundings(DVec3::Z, scene.ambient_radiance, count),
-        false => Vec::new(),
     }
 }
 

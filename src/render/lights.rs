@@ -46,21 +46,22 @@ pub(super) struct Piece {
     pub light: Light,
     /// Its number, which stays the same from frame to frame.
     pub slot: usize,
+    /// What a real surface loses where a virtual thing hides the piece, if that is something else, and the slot of that.
+    pub taken: Option<(Light, usize)>,
 }
 
 impl Lights {
-    /// `surroundings`: what virtual things may hide of light from all around.
-    pub fn new(gpu: &Gpu, scene: Vec<SceneLight>, surroundings: Vec<Light>) -> Self {
+    /// `surroundings`: what of light from all around things may hide, and what a surface loses where virtual ones do.
+    pub fn new(gpu: &Gpu, scene: Vec<SceneLight>, surroundings: Vec<[Light; 2]>) -> Self {
         let capacity = 2 * scene.len();
-        let slot_count = surroundings.len();
-        let piece = |(slot, light)| Piece { light, slot };
+        let count = surroundings.len();
         let (uniforms, group) = uniforms(gpu, capacity);
         Self {
             slots: vec![Vec::new(); scene.len()],
             placed: Vec::new(),
             pieces: Vec::new(),
-            slot_count,
-            surroundings: surroundings.into_iter().enumerate().map(piece).collect(),
+            slot_count: 2 * count,
+            surroundings: surrounding_pieces(surroundings),
             scene,
             uniforms,
             capacity,
@@ -69,8 +70,9 @@ impl Lights {
     }
 
     /// Takes as many lights that shine otherwise.
-    pub fn follow(&mut self, scene: Vec<SceneLight>) {
+    pub fn follow(&mut self, scene: Vec<SceneLight>, surroundings: Vec<[Light; 2]>) {
         self.scene = scene;
+        self.surroundings = surrounding_pieces(surroundings);
     }
 
     /// Places the lights; those on anchors without a pose do not shine.
@@ -114,7 +116,8 @@ impl Lights {
                     self.slot_count += 1;
                 }
                 let slot = slots[index];
-                self.pieces.push(Piece { light, slot });
+                let taken = None;
+                self.pieces.push(Piece { light, slot, taken });
             }
             placed.pieces = first..self.pieces.len();
         }
@@ -135,6 +138,9 @@ impl Lights {
         }
         for piece in &self.pieces {
             write(self.scene.len() + piece.slot, &piece.light);
+            if let Some((light, slot)) = &piece.taken {
+                write(self.scene.len() + slot, light);
+            }
         }
     }
 
@@ -183,12 +189,30 @@ impl Lights {
         pass.set_bind_group(1, &self.group, &[self.uniforms.offset(light)]);
     }
 
+    /// Puts what a piece loses to virtual things into group 1.
+    pub fn set_taken(&self, pass: &mut wgpu::RenderPass<'_>, piece: usize) {
+        let piece = self.pieces.get(piece);
+        let slot = piece.map_or(0, |piece| piece.taken.map_or(piece.slot, |(_, slot)| slot));
+        let offset = self.uniforms.offset(self.scene.len() + slot);
+        pass.set_bind_group(1, &self.group, &[offset]);
+    }
+
     /// Puts a piece into group 1.
     pub fn set_piece(&self, pass: &mut wgpu::RenderPass<'_>, piece: usize) {
         let slot = self.pieces.get(piece).map_or(0, |piece| piece.slot);
         let offset = self.uniforms.offset(self.scene.len() + slot);
         pass.set_bind_group(1, &self.group, &[offset]);
     }
+}
+
+fn surrounding_pieces(surroundings: Vec<[Light; 2]>) -> Vec<Piece> {
+    let count = surroundings.len();
+    let piece = |(slot, [light, taken]): (usize, [Light; 2])| Piece {
+        light,
+        slot,
+        taken: Some((taken, count + slot)),
+    };
+    surroundings.into_iter().enumerate().map(piece).collect()
 }
 
 fn uniforms(gpu: &Gpu, count: usize) -> (UniformRow, wgpu::BindGroup) {

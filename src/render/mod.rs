@@ -31,6 +31,7 @@ mod shafts;
 mod shown;
 mod stencil;
 mod surfaces;
+mod surroundings;
 mod technique;
 mod uniforms;
 mod volumes;

@@ -126,8 +126,6 @@ pub fn scene(
         shadows: ShadowSettings {
             technique: Technique::Auto,
             samples: 4,
-            // (Tests of what the surroundings give turn it on.)
-            ambient_samples: 0,
             ..ShadowSettings::default()
         },
         ..Scene::default()
