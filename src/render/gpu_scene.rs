@@ -83,7 +83,7 @@ pub(super) struct GpuScene {
 impl GpuScene {
     pub fn new(gpu: &Gpu, scene: &Scene, intrinsics: Intrinsics, lit_by: LitBy) -> Self {
         let device = &gpu.device;
-        let view_count = scene.anchors.len() + scene.virtuals.len();
+        let view_count = scene.node_count() + scene.virtuals.len();
         let views = UniformRow::new::<AnchorView>(device, "views", view_count);
         let mut known_levels = KnownLevels::default();
         let AnchorGeometry {
@@ -111,7 +111,7 @@ impl GpuScene {
             batches,
             things,
             view_group: gpu.bind_group(&VIEW_GROUP, [views.binding()]),
-            camera_from_anchor: vec![None; scene.anchors.len()],
+            camera_from_anchor: vec![None; scene.node_count()],
             lights: Lights::new(
                 gpu,
                 lights(scene, lit_by),
