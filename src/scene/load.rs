@@ -77,7 +77,7 @@ impl Scene {
         let camera = camera::camera(&root)?;
         let tracking = tracking::tracking(&root)?;
         let anchors = anchors::anchors(&root, tracking.detector)?;
-        let lights = lights::lights(&root)?;
+        let lights = lights::lights(&root, &anchors)?;
         let ambient_radiance = lights::ambient_radiance(&root)?;
         let probe = probe::probe(&root)?;
         let shadows = shadows::shadows(&root, probe.as_ref())?;

@@ -47,7 +47,7 @@ pub use camera::{CameraSettings, PixelFormat, WantedFormat};
 pub use dictionary::Dictionary;
 pub use error::{SceneError, TextPlace};
 pub use family::{Codes, Drawing, Family, Ink};
-pub use lights::unit_direction;
+pub use lights::{SceneLight, unit_direction};
 pub use load::Reading;
 pub use motion::{Motion, PathEnd, Station};
 pub use named_files::{FileKind, NamedFile};
@@ -74,8 +74,8 @@ pub struct Scene {
     pub phantoms: Vec<Object>,
     /// What the picture alone shows.
     pub virtuals: Vec<Object>,
-    /// Lights in world space.
-    pub lights: Vec<Light>,
+    /// What shines.
+    pub lights: Vec<SceneLight>,
     /// Radiance of the constant surrounding light, linear RGB.
     pub ambient_radiance: DVec3,
     /// The light that a probe saw, and the room that sent it.
@@ -89,6 +89,12 @@ impl Scene {
     pub fn families(&self) -> Vec<Family> {
         let markers = self.anchors.iter().flat_map(|anchor| &anchor.markers);
         markers.map(|marker| marker.family).collect()
+    }
+
+    /// The lights that stand in the world, in world space.
+    pub fn world_lights(&self) -> Vec<Light> {
+        let standing = self.lights.iter().filter(|light| light.anchor == 0);
+        standing.map(|light| light.light).collect()
     }
 }
 

@@ -431,10 +431,7 @@ fn hold_gains(name: &str, real: &[Crate], seeming: &[Crate], light: Light) -> [u
     for (index, pixel) in pixels(SIZE_PX) {
         // The real boxes' own faces are no table.
         let (eye, _) = ray(&camera, pixel);
-        let sight = Light::Point {
-            position_m: eye,
-            intensity: DVec3::ONE,
-        };
+        let sight = Light::point(eye, DVec3::ONE);
         let seen = |point: DVec3| real.iter().any(|it| it.hides(point, &sight));
         if !clear[index] || everywhere(&camera, pixel, 1.5, seen) != Some(false) {
             continue;

@@ -38,7 +38,7 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
 
 fn is_dark(scene: &Scene) -> bool {
     let shines = scene.lights.iter().any(|light| {
-        let strength = match *light {
+        let strength = match light.light {
             Light::Point { intensity, .. } => intensity,
             Light::Directional { irradiance, .. } => irradiance,
         };
