@@ -15,6 +15,7 @@ pub mod homography;
 pub mod least_squares;
 pub mod levels;
 pub mod light_placing;
+mod looks;
 pub mod matrix;
 mod mend;
 pub mod mesh;

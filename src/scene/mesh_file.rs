@@ -4,6 +4,7 @@
 use std::cell::RefCell;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
@@ -15,6 +16,7 @@ use super::plain_file::{self, MOST_MESH, MOST_TEXT};
 use super::reader::Value;
 use crate::geometry::mesh::{Mesh, MeshReport, RawTriangle};
 use crate::light::Material;
+use crate::light::texture::Texture;
 
 /// Diffuse reflectance where neither the scene nor a mesh's MTL file gives one.
 pub const DEFAULT_ALBEDO: f64 = 0.5;
@@ -25,8 +27,12 @@ pub struct LoadedMesh {
     pub mesh: Mesh,
     pub report: MeshReport,
     pub materials: Vec<Material>,
-    /// For each of them whether an MTL file gives it.
+    /// For each of them whether a file gives it.
     pub is_given: Vec<bool>,
+    /// What the materials' maps name.
+    pub textures: Vec<Arc<Texture>>,
+    /// What of the file is passed over or taken for something else, one sentence each.
+    pub notes: Vec<String>,
 }
 
 /// Where a mesh's normals come from.
@@ -102,6 +108,8 @@ fn read(
         report,
         materials: builder.materials,
         is_given: builder.is_given,
+        textures: Vec::new(),
+        notes: Vec::new(),
     })
 }
 
@@ -252,8 +260,8 @@ fn material(mtl: Option<&tobj::Material>) -> Material {
         pr.map(|pr| pr * pr).or(ns)
     });
     Material {
-        albedo: albedo.unwrap_or(DVec3::splat(DEFAULT_ALBEDO)),
         roughness: roughness.map(|roughness| roughness.clamp(LEAST_ROUGHNESS, 1.0)),
+        ..Material::matt(albedo.unwrap_or(DVec3::splat(DEFAULT_ALBEDO)))
     }
 }
 
@@ -280,13 +288,7 @@ mod tests {
             loaded.mesh.corner_normals,
             [[given, Vec3::Z, Vec3::Z], [Vec3::Z, Vec3::Z, given]]
         );
-        assert_eq!(
-            loaded.materials,
-            [Material {
-                albedo: DVec3::splat(0.5),
-                roughness: None
-            }]
-        );
+        assert_eq!(loaded.materials, [Material::matt(DVec3::splat(0.5))]);
         let flat = read(Path::new("a.obj"), text, Normals::Flat, &|_| ()).unwrap();
         assert_eq!(flat.mesh.corner_normals, [[Vec3::Z; 3]; 2]);
     }
@@ -330,10 +332,7 @@ mod tests {
         let path = folder.path().join("a.obj");
         let mtl = folder.path().join("a.mtl");
         let text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl matt\nf 1 2 3\nusemtl shiny\nf 1 4 2\nusemtl none\nf 1 3 4\n";
-        let plain = Material {
-            albedo: DVec3::splat(0.5),
-            roughness: None,
-        };
+        let plain = Material::matt(DVec3::splat(0.5));
         assert_eq!(
             read(&path, text, SMOOTH, &|_| ()).unwrap().materials,
             [plain],
@@ -349,10 +348,7 @@ mod tests {
         assert_eq!(loaded.mesh.triangle_materials, [0, 1, 2]);
         assert_eq!(
             loaded.materials[0],
-            Material {
-                albedo: DVec3::new(0.25, 0.5, 1.0),
-                roughness: None
-            }
+            Material::matt(DVec3::new(0.25, 0.5, 1.0))
         );
         assert!((loaded.materials[1].roughness.unwrap() - 0.02_f64.sqrt()).abs() < 1e-6);
         assert_eq!(loaded.materials[2], plain);

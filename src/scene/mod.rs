@@ -1,11 +1,13 @@
 //! A scene: what is tracked, what is real, what is virtual, what lights them; one TOML file, parsed into types that cannot be wrong.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use glam::{DAffine3, DVec2, DVec3, Vec3};
 
 use crate::geometry::mesh::{Mesh, MeshReport};
 use crate::light::probe::Probe;
+use crate::light::texture::Texture;
 use crate::light::{Light, Material};
 pub use crate::shafts::difference::Difference;
 
@@ -132,6 +134,10 @@ pub struct Object {
     pub mesh_report: MeshReport,
     /// As many as `mesh.triangle_materials` names; never empty.
     pub materials: Vec<Material>,
+    /// What the materials' maps name.
+    pub textures: Vec<Arc<Texture>>,
+    /// What of its file is passed over or taken for something else, one sentence each.
+    pub notes: Vec<String>,
     /// Index into [`Scene::anchors`].
     pub anchor: usize,
     /// Placement with rotation and scale; its determinant is never 0.

@@ -229,6 +229,8 @@ fn table_top(table: &Table) -> Result<Object, SceneError> {
         mesh,
         mesh_report: report,
         materials,
+        textures: Vec::new(),
+        notes: Vec::new(),
         anchor: 0,
         anchor_from_object: DAffine3::from_translation(DVec3::Z * height_m),
         casts: false,
@@ -284,6 +286,8 @@ fn object(
         mesh,
         mesh_report: loaded.report,
         materials,
+        textures: loaded.textures,
+        notes: loaded.notes,
         anchor,
         anchor_from_object,
         casts,
@@ -343,10 +347,9 @@ fn rectangle(value: &Value, albedo: DVec3) -> Result<LoadedMesh, SceneError> {
     Ok(LoadedMesh {
         mesh,
         report,
-        materials: vec![Material {
-            albedo,
-            roughness: None,
-        }],
+        materials: vec![Material::matt(albedo)],
         is_given: vec![true],
+        textures: Vec::new(),
+        notes: Vec::new(),
     })
 }

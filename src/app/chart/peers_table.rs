@@ -152,10 +152,9 @@ fn object(name: &str, mesh: Mesh, albedo: DVec3, anchor: usize, position_m: DVec
         name: name.to_owned(),
         mesh,
         mesh_report,
-        materials: vec![Material {
-            albedo,
-            roughness: None,
-        }],
+        materials: vec![Material::matt(albedo)],
+        textures: Vec::new(),
+        notes: Vec::new(),
         anchor,
         anchor_from_object: DAffine3::from_translation(position_m),
         casts: true,
