@@ -26,7 +26,10 @@ pub fn named_file(folder: &Path, name: &str) -> Option<PathBuf> {
 #[cfg(unix)]
 fn raw_name(name: &str) -> OsString {
     use std::os::unix::ffi::OsStringExt as _;
-    let bytes: Option<Vec<u8>> = name.chars().map(|c| u8::try_from(u32::from(c)).ok()).collect();
+    let bytes: Option<Vec<u8>> = name
+        .chars()
+        .map(|c| u8::try_from(u32::from(c)).ok())
+        .collect();
     bytes.map_or_else(|| name.into(), OsString::from_vec)
 }
 

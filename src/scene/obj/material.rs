@@ -35,7 +35,10 @@ type Library<'a> = (&'a Path, &'a str);
 impl Converter {
     /// What the materials' maps name.
     pub fn textures(self) -> Vec<Arc<Texture>> {
-        self.textures.into_iter().map(|(_, texture)| texture).collect()
+        self.textures
+            .into_iter()
+            .map(|(_, texture)| texture)
+            .collect()
     }
 
     /// The material that an MTL file describes. Its gloss comes from `Pr` (squared, as is usual) or else from `Ns`, unless
@@ -118,7 +121,8 @@ impl Converter {
             }
         };
         if map.role == MapRole::Bump && !is_of_normals(&self.textures[texture as usize].1) {
-            let message = format!("{keyword}: a picture of heights is not used; allowed: of normals");
+            let message =
+                format!("{keyword}: a picture of heights is not used; allowed: of normals");
             notes.add_at(library, text, map.at, message);
             return None;
         }
@@ -276,7 +280,11 @@ fn with_opacity(mut texture: Texture, opacity: &Texture, role: MapRole) -> Textu
             let alpha = match has_alpha {
                 true => opacity.rgba[from + 3],
                 false => {
-                    let sum: u32 = opacity.rgba[from..from + 3].iter().copied().map(u32::from).sum();
+                    let sum: u32 = opacity.rgba[from..from + 3]
+                        .iter()
+                        .copied()
+                        .map(u32::from)
+                        .sum();
                     (sum / 3) as u8
                 }
             };

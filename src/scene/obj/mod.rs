@@ -29,14 +29,13 @@ pub const FARTHEST: f64 = 1e7;
 /// # Errors
 /// What cannot be meant: a face's corner that is none, or that names a vertex that is not there or no place; no faces; a
 /// library that is there and cannot be read.
-pub fn read(
-    path: &Path,
-    bytes: &[u8],
-    note_read: &dyn Fn(&Path),
-) -> Result<RawModel, SceneError> {
+pub fn read(path: &Path, bytes: &[u8], note_read: &dyn Fn(&Path)) -> Result<RawModel, SceneError> {
     let text = text::decoded(bytes);
     if text.trim().is_empty() {
-        return Err(SceneError::of_file(path, "the file is empty; a mesh is expected"));
+        return Err(SceneError::of_file(
+            path,
+            "the file is empty; a mesh is expected",
+        ));
     }
     let mut reader = Reader::new(path, &text);
     for record in records(&text) {
@@ -123,13 +122,20 @@ impl<'a> Reader<'a> {
         match record.keyword() {
             "v" => self.add_vertex(record),
             "vt" => {
-                let mut numbers = record.words().map(|word| number(word).unwrap_or(0.0) as f32);
+                let mut numbers = record
+                    .words()
+                    .map(|word| number(word).unwrap_or(0.0) as f32);
                 let mut next = || numbers.next().unwrap_or(0.0);
                 self.texture_places.push(Vec2::new(next(), next()));
             }
             "vn" => {
                 let mut numbers = record.words().map(number);
-                let mut next = || numbers.next().flatten().map_or(f32::NAN, |part| part as f32);
+                let mut next = || {
+                    numbers
+                        .next()
+                        .flatten()
+                        .map_or(f32::NAN, |part| part as f32)
+                };
                 self.normals.push(Vec3::new(next(), next(), next()));
             }
             "f" | "fo" => return self.add_face(record),

@@ -78,7 +78,12 @@ pub fn read(path: &Path, text: &str, notes: &mut Notes) -> Vec<MtlMaterial> {
         if keyword == "newmtl" {
             let name = record.rest().to_owned();
             if name.is_empty() {
-                notes.add_at(path, text, record.start, "newmtl: a material without a name");
+                notes.add_at(
+                    path,
+                    text,
+                    record.start,
+                    "newmtl: a material without a name",
+                );
             }
             materials.push(MtlMaterial {
                 name,
@@ -90,7 +95,12 @@ pub fn read(path: &Path, text: &str, notes: &mut Notes) -> Vec<MtlMaterial> {
             continue;
         }
         let Some(material) = materials.last_mut() else {
-            notes.add_at(path, text, record.start, "before the first newmtl: not used");
+            notes.add_at(
+                path,
+                text,
+                record.start,
+                "before the first newmtl: not used",
+            );
             continue;
         };
         if let Some(message) = add(material, keyword, &record) {
@@ -148,14 +158,18 @@ fn add(material: &mut MtlMaterial, keyword: &str, record: &Record) -> Option<Str
         // What surroundings give is known here, a model of light is chosen by the numbers, and no light goes through.
         "ka" | "illum" | "ni" | "tf" | "sharpness" | "km" | "map_aat" => None,
         "pc" | "pcr" | "ps" | "aniso" | "anisor" => {
-            let is_used = record.words().filter_map(number).any(|number| number != 0.0);
+            let is_used = record
+                .words()
+                .filter_map(number)
+                .any(|number| number != 0.0);
             is_used.then(|| format!("{keyword}: not used"))
         }
         _ => Some(format!("{keyword}: not used")),
     }
 }
 
-fn map_role(keyword: &str) -> Option<MapRole> {
+/// What a record's picture says; `None` for records of other kinds.
+pub fn map_role(keyword: &str) -> Option<MapRole> {
     Some(match keyword.to_ascii_lowercase().as_str() {
         "map_kd" => MapRole::Diffuse,
         "map_pr" => MapRole::Roughness,
@@ -220,8 +234,8 @@ pub fn map(record: &Record, role: MapRole) -> MtlMap {
 
 /// The options that pictures have.
 const OPTIONS: [&str; 13] = [
-    "-s", "-o", "-t", "-mm", "-bm", "-boost", "-texres", "-clamp", "-blendu", "-blendv", "-imfchan",
-    "-type", "-cc",
+    "-s", "-o", "-t", "-mm", "-bm", "-boost", "-texres", "-clamp", "-blendu", "-blendv",
+    "-imfchan", "-type", "-cc",
 ];
 
 /// An option at the beginning of a text, and what is behind it. A name may begin with `-` as well.
@@ -276,8 +290,7 @@ fn reflectance(
     keyword: &str,
     (color, note): (Option<[f64; 3]>, Option<String>),
 ) -> (Option<[f64; 3]>, Option<String>) {
-    let is_above =
-        color.is_some_and(|color| color.iter().any(|part| *part > 1.0 + ROUNDING));
+    let is_above = color.is_some_and(|color| color.iter().any(|part| *part > 1.0 + ROUNDING));
     let above = is_above.then(|| format!("{keyword}: more than 1 is taken for 1"));
     (
         color.map(|color| color.map(|part| part.min(1.0))),
@@ -329,7 +342,10 @@ mod tests {
         assert_eq!((wall.metallic, wall.opacity), (Some(1.0), Some(0.2)));
         assert_eq!(wall.emission, Some([2.0, 0.0, 0.0]));
         let map = &wall.maps[0];
-        assert_eq!((map.file.as_str(), map.role), ("Red Wall.png", MapRole::Diffuse));
+        assert_eq!(
+            (map.file.as_str(), map.role),
+            ("Red Wall.png", MapRole::Diffuse)
+        );
         assert_eq!((map.scale, map.offset), ([2.0, 3.0], [0.5, 0.0]));
         assert_eq!((map.multiplier, map.is_clamped), (0.2, true));
         assert_eq!(materials[1].opacity, Some(0.75));
@@ -342,7 +358,10 @@ mod tests {
             ("map_Kd\t-s 1 1 1 red.png", "red.png"),
             ("map_Kd -s 2 wall.png", "wall.png"),
             ("map_Kd -o 1 2 3 4", "4"),
-            ("map_Kd -blendu off -imfchan l C:\\maps\\x y.tga # old", "C:\\maps\\x y.tga"),
+            (
+                "map_Kd -blendu off -imfchan l C:\\maps\\x y.tga # old",
+                "C:\\maps\\x y.tga",
+            ),
             ("map_Kd -odd.png", "-odd.png"),
             ("map_Kd \"in quotes.png\"", "in quotes.png"),
             ("map_Kd #1.png", "#1.png"),

@@ -26,8 +26,7 @@ impl Reader<'_> {
             textures: libraries.textures.clone(),
             ..RawModel::default()
         };
-        let (mut cutter, mut places, mut cut) =
-            (PolygonCutter::default(), Vec::new(), Vec::new());
+        let (mut cutter, mut places, mut cut) = (PolygonCutter::default(), Vec::new(), Vec::new());
         let mut lost_normals = None;
         for face in &faces {
             let corners = self.corners_of(face);
@@ -82,7 +81,8 @@ impl Reader<'_> {
                 if corner.vertex as usize >= known {
                     let at = face.at as usize;
                     let number = u64::from(corner.vertex) + 1;
-                    let message = format!("f: vertex {number} does not exist; the file has {known}");
+                    let message =
+                        format!("f: vertex {number} does not exist; the file has {known}");
                     return Err(self.error_at(at, line(at).len(), message));
                 }
                 if let Some(&at) = self.nowhere.get(&corner.vertex) {
