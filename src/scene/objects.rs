@@ -146,6 +146,8 @@ pub static PHANTOM_SECTION: Section = Section {
     shown: &[
         ("name", Example::Live("\"house\"")),
         ("mesh", Example::Live("\"models/house.obj\"")),
+        ("up", Example::Aside("\"y\"")),
+        ("fit_m", Example::Aside("0.1")),
         ("rect_m", Example::Aside("[-0.21, -0.1485, 0.21, 0.1485]")),
         ("on", Example::Live("\"table\"")),
         ("position_m", Example::Live("[-0.055, 0.035, 0.0]")),
@@ -172,6 +174,8 @@ pub static VIRTUAL_SECTION: Section = Section {
     shown: &[
         ("name", Example::Live("\"torus\"")),
         ("mesh", Example::Live("\"models/torus.obj\"")),
+        ("up", Example::Aside("\"y\"")),
+        ("fit_m", Example::Aside("0.1")),
         ("on", Example::Live("\"table\"")),
         ("position_m", Example::Live("[0.022, 0.0, 0.036]")),
         ("rotation_deg", Example::Live("[70, 0, 35]")),
