@@ -5,16 +5,20 @@ pub mod brightest;
 pub mod chromaticities;
 pub mod contrast;
 pub mod form_factor;
+pub mod material;
 pub mod pieces;
 pub mod prefiltered;
 pub mod probe;
 pub mod probe_maps;
 pub mod radiance_picture;
 pub mod response;
+pub mod texture;
 
 use std::f64::consts::PI;
 
 use glam::{DAffine3, DVec2, DVec3};
+
+pub use material::Material;
 
 /// A light that shines by itself, in one space (as a rule the world's).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -174,15 +178,6 @@ impl Light {
     }
 }
 
-/// How a surface reflects light.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Material {
-    /// Diffuse reflectance, linear RGB in [0, 1].
-    pub albedo: DVec3,
-    /// α of the GGX layer of a dielectric in (0, 1]; `None`: Lambert alone.
-    pub roughness: Option<f64>,
-}
-
 /// Irradiance that an unhidden light gives to a point with a unit normal, both in the light's space: exactly, also near a large
 /// light, and of the part that is above the horizon.
 pub fn irradiance(light: &Light, point: DVec3, normal: DVec3) -> DVec3 {
@@ -252,9 +247,10 @@ pub fn spot_ramp(inner_rad: f64, outer_rad: f64) -> [f64; 2] {
     [scale, -outer_rad.cos() * scale]
 }
 
-/// The BRDF of a material for unit directions to the light and to the camera; the twin of `reflectance` in
-/// shading.wgsl. Lambert under a dielectric GGX layer (Walter et al. 2007, Schlick's Fresnel term, height-correlated
-/// Smith term), coupled so that both ways of light are equal and none is made (Ashikhmin & Shirley 2000, section 3).
+/// The BRDF of a material for unit directions to the light and to the camera, without its pictures; the twin of
+/// `reflectance` in shading.wgsl. What is no metal is Lambert under a dielectric GGX layer (Walter et al. 2007, Schlick's
+/// Fresnel term, height-correlated Smith term), coupled so that both ways of light are equal and none is made (Ashikhmin &
+/// Shirley 2000, section 3); a metal is the layer alone, in its colour.
 pub fn reflectance(material: &Material, normal: DVec3, to_light: DVec3, to_camera: DVec3) -> DVec3 {
     let diffuse = material.albedo / PI;
     let cos_light = normal.dot(to_light);
@@ -269,11 +265,14 @@ pub fn reflectance(material: &Material, normal: DVec3, to_light: DVec3, to_camer
     let distribution = alpha_squared / (PI * spread * spread);
     let smith = |cosine: f64| (cosine * cosine * (1.0 - alpha_squared) + alpha_squared).sqrt();
     let visibility = 0.5 / (cos_light * smith(cos_camera) + cos_camera * smith(cos_light));
-    let specular = distribution * visibility * fresnel(to_light.dot(halfway));
+    let lobe = distribution * visibility;
+    let way = to_light.dot(halfway);
+    let metal = lobe * (material.albedo + (DVec3::ONE - material.albedo) * grazing(way));
     // What the layer lets in and out again; the mean keeps a white material white.
     let let_through =
         (1.0 - fresnel(cos_light)) * (1.0 - fresnel(cos_camera)) / (1.0 - MEAN_FRESNEL);
-    diffuse * let_through + specular
+    let dielectric = diffuse * let_through + lobe * fresnel(way);
+    dielectric.lerp(metal, material.metallic)
 }
 
 /// Cosine-weighted mean of [`fresnel`] over the hemisphere: F₀ + (1 − F₀) / 21.
@@ -281,7 +280,12 @@ const MEAN_FRESNEL: f64 = 0.04 + 0.96 / 21.0;
 
 /// Schlick's approximation for a dielectric of index 1.5.
 fn fresnel(cosine: f64) -> f64 {
-    0.04 + 0.96 * (1.0 - cosine.clamp(0.0, 1.0)).powi(5)
+    0.04 + 0.96 * grazing(cosine)
+}
+
+/// Schlick's weight of grazing light.
+fn grazing(cosine: f64) -> f64 {
+    (1.0 - cosine.clamp(0.0, 1.0)).powi(5)
 }
 
 #[cfg(test)]
@@ -303,8 +307,8 @@ mod tests {
     fn no_material_reflects_more_than_arrives_and_light_may_be_turned_round() {
         for alpha in [0.1, 0.3, 1.0] {
             let material = Material {
-                albedo: DVec3::ONE,
                 roughness: Some(alpha),
+                ..Material::matt(DVec3::ONE)
             };
             let at = |polar: f64, azimuth: f64| {
                 let (sine, cosine) = polar.sin_cos();

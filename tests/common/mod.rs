@@ -41,10 +41,7 @@ pub fn project_file(path: &str) -> std::path::PathBuf {
 }
 
 /// The material of things whose colour does not matter.
-pub const GREY: Material = Material {
-    albedo: DVec3::splat(0.5),
-    roughness: None,
-};
+pub const GREY: Material = Material::matt(DVec3::splat(0.5));
 
 /// A mesh with flat normals and one material.
 pub fn flat_mesh(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Mesh {
@@ -61,6 +58,7 @@ pub fn flat_mesh(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Mesh {
         triangles,
         corner_normals,
         triangle_materials,
+        ..Mesh::default()
     }
 }
 
@@ -96,10 +94,10 @@ pub fn object(name: &str, mesh: Mesh, albedo: DVec3, world_from_object: DAffine3
         name: name.to_owned(),
         mesh,
         mesh_report: MeshReport::default(),
-        materials: vec![Material {
-            albedo,
-            roughness: None,
-        }],
+        materials: vec![Material::matt(albedo)],
+        material_names: Vec::new(),
+        textures: Vec::new(),
+        notes: Vec::new(),
         anchor: 0,
         motion: None,
         anchor_from_object: world_from_object,

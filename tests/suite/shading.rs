@@ -235,8 +235,8 @@ fn expected_radiance(material: &Material, lights: &[Light], point: DVec3, normal
 
 fn hold_sphere(name: &str, roughness: Option<f64>, lights: &[Light]) {
     let material = Material {
-        albedo: ALBEDO,
         roughness,
+        ..Material::matt(ALBEDO)
     };
     let (picture, _) = render(
         &sphere_scene(material, lights.to_vec()),
@@ -297,10 +297,7 @@ fn lights_add_up_in_linear_light() {
     hold_sphere("two lights", None, &[first, second]);
 
     // The same without the twin: the pictures themselves add up.
-    let material = Material {
-        albedo: ALBEDO,
-        roughness: None,
-    };
+    let material = Material::matt(ALBEDO);
     let picture = |lights: &[Light]| {
         render(
             &sphere_scene(material, lights.to_vec()),

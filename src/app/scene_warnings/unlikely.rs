@@ -29,7 +29,7 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
     let shows = scene.virtuals.iter().any(|thing| thing.visible);
     if shows && is_dark(scene) {
         warnings.push(
-            "nothing lights the scene: virtual things are black; give a [[light]], ambient_radiance or a [probe]"
+            "nothing lights the scene: virtual things are black; give a [[light]], [ambient] or a [probe]"
                 .to_owned(),
         );
     }

@@ -152,13 +152,7 @@ fn a_small_scene_has_the_defaults() {
         (object.anchor, object.casts, object.mesh_report.closed),
         (0, true, true)
     );
-    assert_eq!(
-        object.materials,
-        [Material {
-            albedo: DVec3::splat(0.5),
-            roughness: None
-        }]
-    );
+    assert_eq!(object.materials, [Material::matt(DVec3::splat(0.5))]);
     assert_eq!(object.anchor_from_object, glam::DAffine3::IDENTITY);
 }
 
@@ -259,8 +253,8 @@ frame_budget_ms = 16
     assert_eq!(
         object.materials,
         [Material {
-            albedo: DVec3::new(0.1, 0.2, 0.3),
-            roughness: Some(0.4)
+            roughness: Some(0.4),
+            ..Material::matt(DVec3::new(0.1, 0.2, 0.3))
         }]
     );
     // Scaled to (2, 1, 1), turned about x to (2, -1, 1), about z to (1, 2, 1), moved.
