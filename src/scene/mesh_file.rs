@@ -9,6 +9,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::error::SceneError;
+use super::gltf;
 use super::material_libraries::libraries;
 use super::named_files::FileKind;
 use super::obj_scan::{ScanError, ScannedObj, scan_mtl, scan_obj};
@@ -44,20 +45,38 @@ pub enum Normals {
     GivenOrMade { crease_rad: f64 },
 }
 
+/// The axis of a file that points upwards.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Up {
+    /// As glTF has it; it becomes the scene's z.
+    Y,
+    /// As the scene has it.
+    Z,
+}
+
 /// Smoothest surface that is kept apart from a mirror.
-const LEAST_ROUGHNESS: f64 = 0.01;
+pub const LEAST_ROUGHNESS: f64 = 0.01;
 
 /// Reads the mesh that a scene's value names.
 pub fn load(value: &Value, kind: FileKind, normals: Normals) -> Result<LoadedMesh, SceneError> {
     let path = value.existing_path(kind)?;
     let bytes = plain_file::read(&path, MOST_MESH)
         .map_err(|error| value.error(format!("the mesh cannot be read: {error}")))?;
+    if gltf::is_gltf(&path, &bytes) {
+        let note_read = |path: &Path| value.note_consulted(path);
+        return gltf::load(&path, &bytes, (normals, Up::Y), &note_read)
+            .map_err(|error| of_scene(error, value));
+    }
     // Only names and comments may be in another encoding, and nothing depends on them.
     let note_read = |path: &Path| value.note_consulted(path);
-    read(&path, &String::from_utf8_lossy(&bytes), normals, &note_read).map_err(|mut error| {
-        error.message += &format!(" (a mesh of {})", value.location());
-        error
-    })
+    read(&path, &String::from_utf8_lossy(&bytes), normals, &note_read)
+        .map_err(|error| of_scene(error, value))
+}
+
+/// A mesh's error with the place that names the mesh.
+fn of_scene(mut error: SceneError, value: &Value) -> SceneError {
+    error.message += &format!(" (a mesh of {})", value.location());
+    error
 }
 
 /// `note_read` is told of every file that is looked for besides.
