@@ -213,6 +213,15 @@ impl Mesh {
         self
     }
 
+    /// The shape and its materials alone, without what textures and colours need.
+    pub fn without_looks(&self) -> Self {
+        Self {
+            looks: Vec::new(),
+            corner_looks: Vec::new(),
+            ..self.clone()
+        }
+    }
+
     pub(super) fn without_unused_positions(mut self) -> Self {
         let mut new_index = vec![u32::MAX; self.positions.len()];
         let mut kept = Vec::with_capacity(self.positions.len());

@@ -309,14 +309,19 @@ fn corners(object: &Object, mesh: &Mesh) -> Vec<SurfaceCorner> {
         .iter()
         .zip(&mesh.corner_normals)
         .zip(&mesh.triangle_materials)
-        .flat_map(|((triangle, normals), &material)| {
+        .enumerate()
+        .flat_map(|(number, ((triangle, normals), &material))| {
             let material = object.materials[material as usize];
+            let albedo = match mesh.looks.is_empty() {
+                true => material.albedo,
+                false => object.albedo(number),
+            };
             [0, 1, 2].map(|corner| SurfaceCorner {
                 position: positions[triangle[corner] as usize],
                 normal: (normal_matrix * normals[corner].as_dvec3())
                     .normalize_or_zero()
                     .as_vec3(),
-                albedo: material.albedo.as_vec3(),
+                albedo: albedo.as_vec3(),
                 roughness: material.roughness.unwrap_or(0.0) as f32,
             })
         })

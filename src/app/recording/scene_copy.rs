@@ -13,6 +13,8 @@ use toml_edit::{DocumentMut, Item, Table, Value};
 
 use crate::app::files::new_file::sync_folder;
 use crate::scene::format::{CAMERA, CAMERA_SECTION};
+use crate::scene::gltf::copies::with_files_named;
+use crate::scene::gltf::is_gltf;
 use crate::scene::material_libraries::with_libraries_named;
 use crate::scene::plain_file::{self, MOST_MESH};
 use crate::scene::{FileKind, NamedFile, Scene};
@@ -159,10 +161,33 @@ impl Copies<'_> {
         Ok(Some(name))
     }
 
+    /// Copies a glTF file with its buffers and pictures into a folder of its own.
+    fn copy_gltf(&self, mesh: &Path, bytes: &[u8], folder: &str) -> Result<String> {
+        let mut parts: Vec<PathBuf> = Vec::new();
+        let with_own_names = with_files_named(mesh, bytes, |part| {
+            let known = parts.iter().position(|known| known == part);
+            let name = format!("part-{}", known.unwrap_or(parts.len()) + 1);
+            if known.is_none() {
+                parts.push(part.to_owned());
+                self.put(format!("{folder}/{name}"), &read(part)?)?;
+            }
+            Ok::<_, anyhow::Error>(name)
+        })?;
+        let extension = match bytes.starts_with(b"glTF") {
+            true => "glb",
+            false => "gltf",
+        };
+        self.put(format!("{folder}/mesh.{extension}"), &with_own_names)
+    }
+
     /// Copies a mesh with its materials into a folder of its own.
     fn copy_mesh(&self, mesh: &Path, folder: &str) -> Result<String> {
+        let bytes = read(mesh)?;
+        if is_gltf(mesh, &bytes) {
+            return self.copy_gltf(mesh, &bytes, folder);
+        }
         let mut libraries: Vec<PathBuf> = Vec::new();
-        let with_own_names = with_libraries_named(mesh, &read(mesh)?, |library| {
+        let with_own_names = with_libraries_named(mesh, &bytes, |library| {
             let known = libraries.iter().position(|known| known == library);
             let number = known.unwrap_or(libraries.len()) + 1;
             let name = format!("material-{number}.mtl");

@@ -123,7 +123,7 @@ impl<'a> GltfFile<'a> {
 ///
 /// # Errors
 /// A URI with a scheme or a host; one that is no text.
-pub fn file_of_uri(beside: &Path, uri: &str) -> Result<PathBuf, String> {
+pub(super) fn file_of_uri(beside: &Path, uri: &str) -> Result<PathBuf, String> {
     let has_scheme = uri.split_once(':').is_some_and(|(scheme, _)| {
         scheme.len() > 1 && scheme.chars().all(|c| c.is_ascii_alphanumeric())
     });

@@ -2,6 +2,7 @@
 //! and lights are passed over. <https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html>
 
 mod accessors;
+pub mod copies;
 mod extensions;
 mod file;
 mod materials;
@@ -20,7 +21,6 @@ use super::mesh_file::{LoadedMesh, Normals, Up};
 use crate::geometry::mesh::{Mesh, RawLooks};
 use crate::light::material::Coverage;
 use file::GltfFile;
-pub use file::file_of_uri;
 use primitives::Builder;
 
 /// Whether bytes may be a glTF file: binary, or JSON.
