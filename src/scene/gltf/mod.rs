@@ -19,7 +19,7 @@ use glam::{DMat4, DVec3};
 use super::error::SceneError;
 use super::mesh_file::{LoadedMesh, Normals, Up};
 use crate::geometry::mesh::{Mesh, RawLooks};
-use crate::light::material::Coverage;
+use crate::light::material::{Coverage, Material};
 use file::GltfFile;
 use primitives::Builder;
 
@@ -84,19 +84,7 @@ pub(super) fn load(
     if mesh.triangles.is_empty() {
         return Err(SceneError::of_file(path, "no triangle has an area"));
     }
-    if normals == Normals::Flat {
-        let blends = |coverage: &Coverage| *coverage == Coverage::Blend;
-        if builder
-            .materials
-            .iter()
-            .any(|material| blends(&material.coverage))
-        {
-            file.note(
-                "what is half transparent hides as if it were opaque: a phantom is there or not"
-                    .to_owned(),
-            );
-        }
-    }
+    note_coverage(&mut file, &builder.materials, normals);
     Ok(LoadedMesh {
         mesh,
         report,
@@ -105,4 +93,37 @@ pub(super) fn load(
         textures: builder.textures.kept,
         notes: file.notes,
     })
+}
+
+/// Tells what becomes of materials that are not opaque.
+fn note_coverage(file: &mut GltfFile<'_>, materials: &[Material], normals: Normals) {
+    let is_blended = |material: &Material| material.coverage == Coverage::Blend;
+    let is_masked = |material: &Material| matches!(material.coverage, Coverage::Mask { .. });
+    let is_phantom = normals == Normals::Flat;
+    if materials.iter().any(is_blended) {
+        file.note(
+            match is_phantom {
+                true => {
+                    "what is half transparent hides as if it were opaque: a phantom is there or not"
+                }
+                false => {
+                    "what is half transparent is drawn, and casts its shadow, as if it were opaque"
+                }
+            }
+            .to_owned(),
+        );
+    }
+    if materials.iter().any(is_masked) {
+        file.note(
+            match is_phantom {
+                true => {
+                    "alphaMode MASK is passed over: a phantom is there with its whole triangles"
+                }
+                false => {
+                    "what alphaMode MASK cuts out still casts the shadow of its whole triangles"
+                }
+            }
+            .to_owned(),
+        );
+    }
 }
