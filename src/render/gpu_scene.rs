@@ -68,7 +68,7 @@ pub(super) struct GpuScene {
 impl GpuScene {
     pub fn new(gpu: &Gpu, scene: &Scene, intrinsics: Intrinsics, lit_by: LitBy) -> Self {
         let device = &gpu.device;
-        let view_count = scene.anchors.len() + scene.virtuals.len();
+        let view_count = scene.node_count() + scene.virtuals.len();
         let views = UniformRow::new::<AnchorView>(device, "views", view_count);
         let camera_lights = UniformRow::new::<CameraLight>(device, "lights", scene.lights.len());
         let mut known_levels = KnownLevels::default();
@@ -99,7 +99,7 @@ impl GpuScene {
             things,
             view_group: gpu.bind_group(&VIEW_GROUP, [views.binding()]),
             light_group: gpu.bind_group(&LIGHT_GROUP, [camera_lights.binding()]),
-            camera_from_anchor: vec![None; scene.anchors.len()],
+            camera_from_anchor: vec![None; scene.node_count()],
             lights: lights(scene, lit_by),
             kinds: SurfaceKinds {
                 glossy: scene.virtuals.iter().any(|object| {

@@ -17,6 +17,7 @@ mod detail;
 mod figures;
 mod gltf;
 mod light_from_picture;
+mod motion;
 mod picture;
 mod probe;
 mod scene;
