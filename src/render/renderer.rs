@@ -11,6 +11,7 @@ use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
 use crate::light::Material;
+use crate::light::texture::Texture;
 use crate::scene::{Object, Scene, ShadowSettings, ShadowTechnique, Shortcut, Shortcuts};
 use crate::shafts::room::Room;
 use crate::shafts::room_transport::RoomTransport;
@@ -68,6 +69,7 @@ struct Shape {
     /// Of each thing its name, its anchor, its mesh's triangles and whether it casts.
     things: Vec<(String, usize, usize, bool)>,
     materials: Vec<Material>,
+    textures: Vec<Arc<Texture>>,
 }
 
 impl Shape {
@@ -85,6 +87,7 @@ impl Shape {
             nodes: scene.node_count(),
             things: things().map(shape).collect(),
             materials: things().flat_map(|thing| thing.materials.clone()).collect(),
+            textures: things().flat_map(|thing| thing.textures.clone()).collect(),
         }
     }
 }

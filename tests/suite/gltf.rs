@@ -190,6 +190,8 @@ fn textures_are_read_with_their_transforms() {
             "{}",
             look.tangent
         );
+        // The picture's top lies where z is high: so does a normal's y, which is across the face's (-y) and u.
+        assert_eq!(look.tangent.w, 1.0);
     }
     let missing = read(&json, &files[..1]).unwrap_err();
     assert!(

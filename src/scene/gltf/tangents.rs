@@ -63,8 +63,9 @@ impl Geometry for Triangles<'_> {
 
     fn set_tangent(&mut self, found: Option<TangentSpace>, face: usize, corner: usize) {
         if let Some(found) = found {
-            // As texture coordinates grow downwards in glTF's pictures, so do its bitangents.
-            self.tangents[face][corner] = Vec4::from_array(found.tangent_encoded());
+            // MikkTSpace's bitangent goes as v grows, which is downwards in glTF's pictures; their normals' y is upwards.
+            let [x, y, z, side] = found.tangent_encoded();
+            self.tangents[face][corner] = Vec4::new(x, y, z, -side);
         }
     }
 }
