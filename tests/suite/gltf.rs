@@ -216,7 +216,7 @@ fn hostile_files_are_errors_with_their_place() {
         ),
         (
             "length",
-            |j| j["buffers"][0]["byteLength"] = json!(1 << 40),
+            |j| j["buffers"][0]["byteLength"] = json!(1_u64 << 40),
             "buffers[0]: 100 bytes",
         ),
         (
