@@ -24,26 +24,30 @@ pub mod format;
 pub mod gltf;
 mod lights;
 mod load;
-pub mod material_libraries;
-mod mesh_file;
+pub mod mesh_file;
 mod motion;
 mod named_files;
-mod obj_scan;
+pub mod notes;
+pub mod obj;
 mod objects;
-mod picture_file;
 mod placement;
 pub mod plain_file;
+pub mod ply;
 mod probe;
 pub mod probe_file;
 mod quality;
 pub mod radiance_file;
 mod ranges;
+pub mod raw_model;
 mod reader;
 mod reference;
 mod shadows;
 mod shortcuts;
+mod stl;
+mod texture_file;
 mod tracking;
 mod transport;
+mod vertex_colors;
 
 pub use camera::{CameraSettings, PixelFormat, WantedFormat};
 pub use dictionary::Dictionary;
@@ -138,6 +142,8 @@ pub struct Object {
     pub mesh_report: MeshReport,
     /// As many as `mesh.triangle_materials` names; never empty.
     pub materials: Vec<Material>,
+    /// What its file calls them; empty texts where it does not, or no texts.
+    pub material_names: Vec<String>,
     /// What the materials' maps name.
     pub textures: Vec<Arc<Texture>>,
     /// What of its file is passed over or taken for something else, one sentence each.

@@ -7,7 +7,7 @@ use glam::{DAffine3, DVec3, Vec3};
 
 use super::anchors::unique_name;
 use super::error::{SceneError, suggestion};
-use super::mesh_file::{self, DEFAULT_ALBEDO, LoadedMesh};
+use super::mesh_file::{self, DEFAULT_ALBEDO, LoadedMesh, MeshReading, Up};
 use super::motion::{MotionKeys, motion};
 use super::named_files::FileKind;
 use super::placement::{POSITION, PlacementKeys, placement};
@@ -36,10 +36,14 @@ keys! {
     /// The shape of a thing.
     pub static SHAPE: ShapeKeys;
 
-    /// Its shape, a glTF file (.glb, .gltf; its y is up) or OBJ. Counter-clockwise seen from outside; materials from the
-    /// file or its MTL file (Kd is taken as linear reflectance, Ns or Pr as roughness), polygons should be convex. A phantom is
+    /// Its shape: glTF, OBJ, PLY or STL. Counter-clockwise seen from outside; materials from its file or MTL file (Kd is
+    /// taken as linear reflectance, Ns or Pr as roughness; see docs/gltf.md). A phantom is
     /// always flat: normals in the file are passed over.
     mesh: Option<PathBuf>, FileKind::Mesh => Means(None, "none: a phantom may have rect_m");
+    /// Which axis of the mesh's file points up, along z of what it stands on.
+    up: Option<Up> => Means(None, "\"z\"; glTF: \"y\"");
+    /// What the longest side of the mesh is scaled to; the file's origin stays.
+    fit_m: Option<f64>, Numbers::above(0.0, 1e5).unit("m") => Means(None, "the numbers in the file are metres");
 }
 
 keys! {
@@ -240,6 +244,7 @@ fn table_top(table: &Table) -> Result<Object, SceneError> {
         mesh,
         report,
         materials,
+        material_names,
         ..
     } = rectangle(&rect, albedo)?;
     Ok(Object {
@@ -247,6 +252,7 @@ fn table_top(table: &Table) -> Result<Object, SceneError> {
         mesh,
         mesh_report: report,
         materials,
+        material_names,
         textures: Vec::new(),
         notes: Vec::new(),
         anchor: 0,
@@ -282,7 +288,14 @@ fn object(
         (Some(_), Some(rect)) => {
             return Err(rect.error("the thing has a mesh; allowed: mesh or rect_m, not both"));
         }
-        (Some(mesh), None) => mesh_file::load(&mesh, SHAPE.mesh.takes, normals)?,
+        (Some(mesh), None) => {
+            let reading = MeshReading {
+                normals,
+                up: SHAPE.up.read(table)?,
+                fit_m: SHAPE.fit_m.read(table)?,
+            };
+            mesh_file::load(&mesh, SHAPE.mesh.takes, reading)?
+        }
         (None, Some(rect)) => rectangle(&rect, DVec3::splat(DEFAULT_ALBEDO))?,
         (None, None) if kind == ThingKind::Phantom => {
             return Err(table.error(format!("\"{name}\": no shape; mesh or rect_m is expected")));
@@ -306,6 +319,7 @@ fn object(
         mesh,
         mesh_report: loaded.report,
         materials,
+        material_names: loaded.material_names,
         textures: loaded.textures,
         notes: loaded.notes,
         anchor,
@@ -381,6 +395,7 @@ fn rectangle(value: &Value, albedo: DVec3) -> Result<LoadedMesh, SceneError> {
         mesh,
         report,
         materials: vec![Material::matt(albedo)],
+        material_names: vec![String::new()],
         is_given: vec![true],
         textures: Vec::new(),
         notes: Vec::new(),

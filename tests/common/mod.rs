@@ -95,6 +95,7 @@ pub fn object(name: &str, mesh: Mesh, albedo: DVec3, world_from_object: DAffine3
         mesh,
         mesh_report: MeshReport::default(),
         materials: vec![Material::matt(albedo)],
+        material_names: Vec::new(),
         textures: Vec::new(),
         notes: Vec::new(),
         anchor: 0,

@@ -238,7 +238,8 @@ fn hostile_files_are_errors_with_their_place() {
             "zeros",
             |j| {
                 j["accessors"][0] = json!({"componentType": 5126, "count": 1_u64 << 40, "type": "VEC3",
-                "min": [0, 0, 0], "max": [0, 0, 0]});
+                "min": [0, 0, 0], "max": [0, 0, 0],
+                    "sparse": {"count": 1, "indices": {"bufferView": 1, "componentType": 5121}, "values": {"bufferView": 0}}});
             },
             "without a view",
         ),

@@ -245,6 +245,11 @@ fn hold_sphere(name: &str, roughness: Option<f64>, lights: &[Light]) {
 
 /// Holds a scene's sphere against what the twins say of a material.
 fn hold_scene(name: &str, scene: &Scene, material: &Material) {
+    hold_bent(name, scene, material, |normal| normal);
+}
+
+/// The same of a sphere whose normals are others.
+fn hold_bent(name: &str, scene: &Scene, material: &Material, bent: impl Fn(DVec3) -> DVec3) {
     let lights = &scene.lights;
     let (picture, _) = render(
         scene,
@@ -256,6 +261,7 @@ fn hold_scene(name: &str, scene: &Scene, material: &Material) {
     let mut worst = 0.0_f64;
     let mut brightest = 0;
     for &(index, point, normal) in &points {
+        let normal = bent(normal);
         let expected = material.emission + expected_radiance(material, lights, point, normal);
         for channel in 0..3 {
             let level = picture[4 * index + channel];
@@ -339,7 +345,7 @@ fn pictures_and_colors_multiply_the_material() {
     let textures = vec![
         texture("color", [188, 230, 255, 255]),
         texture("metal and roughness", [0, 204, 102, 255]),
-        texture("normal", [128, 128, 255, 255]),
+        texture("normal", [140, 128, 255, 255]),
     ];
     let seen = Material {
         roughness: Some(0.5),
@@ -380,7 +386,14 @@ fn pictures_and_colors_multiply_the_material() {
         };
         sphere.mesh.looks = sphere.mesh.positions.iter().map(corner).collect();
         sphere.mesh.corner_looks.clone_from(&sphere.mesh.triangles);
-        hold_scene("textured", &scene, &expected);
+        // The normal map leans towards u by x and towards v by y, of -1 to 1.
+        let bent = |normal: DVec3| {
+            let along_u = normal.cross(DVec3::new(0.3, 0.5, 0.8)).normalize();
+            let along_v = normal.cross(along_u);
+            let [x, y] = [140.0, 128.0].map(|byte: f64| byte / 255.0 * 2.0 - 1.0);
+            (along_u * x + along_v * y + normal).normalize()
+        };
+        hold_bent("textured", &scene, &expected, bent);
     }
 }
 

@@ -153,6 +153,7 @@ fn object(name: &str, mesh: Mesh, albedo: DVec3, anchor: usize, position_m: DVec
         mesh,
         mesh_report,
         materials: vec![Material::matt(albedo)],
+        material_names: Vec::new(),
         textures: Vec::new(),
         notes: Vec::new(),
         anchor,

@@ -2,6 +2,7 @@
 
 mod degenerate;
 mod room;
+pub mod sizes;
 
 use crate::light::Light;
 use crate::scene::{Object, Scene};
@@ -17,6 +18,14 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
         .collect();
     let mut warnings = room::warnings(scene);
     warnings.extend(degenerate::warnings(scene));
+    let things = || scene.phantoms.iter().chain(&scene.virtuals);
+    for note in things().flat_map(|object| &object.notes) {
+        // Things may have the same file.
+        if !warnings.contains(note) {
+            warnings.push(note.clone());
+        }
+    }
+    warnings.extend(things().filter_map(sizes::warning));
     if let Some(probe) = &scene.probe {
         let notes = probe.notes.iter();
         warnings.extend(notes.map(|note| format!("{}: {note}", probe.image.display())));

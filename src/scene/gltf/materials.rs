@@ -10,7 +10,8 @@ use super::textures::Textures;
 use crate::light::Material;
 use crate::light::material::{Coverage, Maps, Shading};
 use crate::scene::error::SceneError;
-use crate::scene::mesh_file::{DEFAULT_ALBEDO, LEAST_ROUGHNESS};
+use crate::scene::mesh_file::LEAST_ROUGHNESS;
+use crate::scene::raw_model::GivenMaterial;
 
 /// Most that one channel of emission may be; what is above would be no number in the picture's sums.
 const MOST_EMISSION: f64 = 1e6;
@@ -22,10 +23,9 @@ pub(super) fn material(
     textures: &mut Textures,
     given: &gltf::Material<'_>,
     (is_colored, note_read): (bool, &dyn Fn(&Path)),
-) -> Result<Material, SceneError> {
+) -> Result<GivenMaterial, SceneError> {
     let Some(index) = given.index() else {
-        let albedo = if is_colored { 1.0 } else { DEFAULT_ALBEDO };
-        return Ok(Material::matt(DVec3::splat(albedo)));
+        return Ok(GivenMaterial::unknown(is_colored));
     };
     let place = format!("materials[{index}]");
     let mut material = metallic_roughness(file, textures, given, note_read)?;
@@ -75,7 +75,11 @@ pub(super) fn material(
         material.maps.normal_scale,
     ];
     match numbers.iter().all(|number| number.is_finite()) {
-        true => Ok(material),
+        true => Ok(GivenMaterial {
+            name: given.name().unwrap_or_default().to_owned(),
+            material,
+            is_given: true,
+        }),
         false => Err(file.error(&place, "a factor is not finite")),
     }
 }

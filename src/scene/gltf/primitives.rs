@@ -15,23 +15,19 @@ use super::skins::{morph, scene_from_vertices, turned_tangent};
 use super::tangents::made_tangents;
 use super::textures::Textures;
 use crate::geometry::mesh::{CornerLook, RawLooks, RawTriangle};
-use crate::light::Material;
 use crate::scene::error::SceneError;
-use crate::scene::mesh_file::Normals;
+use crate::scene::raw_model::GivenMaterial;
 
 /// Corners that all primitives have together at most, where the file itself has no more bytes.
 const MOST_CORNERS: usize = 12_000_000;
 
 /// Triangles so far.
+#[derive(Default)]
 pub(super) struct Builder {
-    normals: Normals,
     pub positions: Vec<Vec3>,
     pub triangles: Vec<RawTriangle>,
     pub looks: RawLooks,
-    /// Whether a material or a colour asks for looks.
-    pub needs_looks: bool,
-    pub materials: Vec<Material>,
-    pub is_given: Vec<bool>,
+    pub materials: Vec<GivenMaterial>,
     pub textures: Textures,
     /// By the file's number, and whether corners have colours.
     index_of_material: HashMap<(Option<usize>, bool), u32>,
@@ -49,21 +45,6 @@ struct Vertices {
 }
 
 impl Builder {
-    pub fn new(normals: Normals) -> Self {
-        Self {
-            normals,
-            positions: Vec::new(),
-            triangles: Vec::new(),
-            looks: RawLooks::default(),
-            needs_looks: false,
-            materials: Vec::new(),
-            is_given: Vec::new(),
-            textures: Textures::default(),
-            index_of_material: HashMap::new(),
-            without_surface: 0,
-        }
-    }
-
     /// Adds a mesh where its node or its skin has it.
     pub fn add(
         &mut self,
@@ -128,24 +109,6 @@ impl Builder {
         }
     }
 
-    /// Turns all that there is, without mirroring it.
-    pub fn turn(&mut self, turn: DMat4) {
-        let turned = |vector: Vec3| turn.transform_vector3(vector.as_dvec3()).as_vec3();
-        self.positions
-            .iter_mut()
-            .for_each(|place| *place = turned(*place));
-        for normal in self
-            .triangles
-            .iter_mut()
-            .flat_map(|triangle| &mut triangle.normals)
-        {
-            *normal = normal.map(turned);
-        }
-        for look in &mut self.looks.looks {
-            look.tangent = turned(look.tangent.truncate()).extend(look.tangent.w);
-        }
-    }
-
     fn material(
         &mut self,
         file: &mut GltfFile<'_>,
@@ -161,7 +124,6 @@ impl Builder {
         let read = material(file, &mut self.textures, &given, (is_colored, note_read))?;
         let index = self.materials.len() as u32;
         self.materials.push(read);
-        self.is_given.push(given.index().is_some() || is_colored);
         self.index_of_material.insert(key, index);
         Ok(index)
     }
@@ -177,9 +139,7 @@ impl Builder {
     ) -> Result<(), SceneError> {
         let first = self.positions.len() as u32;
         let mut normals: Vec<Option<Vec3>> = Vec::with_capacity(vertices.normals.len());
-        let maps = &self.materials[material as usize].maps;
-        self.needs_looks |= vertices.has_colors || maps.used().next().is_some();
-        let normal_map = maps.normal;
+        let normal_map = self.materials[material as usize].material.maps.normal;
         for (index, scene_from_mesh) in scene_from_vertex.iter().enumerate() {
             let position = scene_from_mesh
                 .transform_point3(vertices.positions[index])
@@ -210,10 +170,7 @@ impl Builder {
                 }
             })
             .collect();
-        let given = |vertex: u32| match self.normals {
-            Normals::Flat => None,
-            Normals::GivenOrMade { .. } => normals[vertex as usize],
-        };
+        let given = |vertex: u32| normals[vertex as usize];
         let start = self.triangles.len();
         self.triangles
             .extend(triangles.iter().map(|corners| RawTriangle {

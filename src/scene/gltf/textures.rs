@@ -12,7 +12,7 @@ use super::file::GltfFile;
 use crate::light::material::{Filter, Map, Wrap};
 use crate::light::texture::Texture;
 use crate::scene::error::SceneError;
-use crate::scene::picture_file;
+use crate::scene::texture_file;
 
 /// Memory that all pictures of a file may take, bytes.
 const MOST_BYTES: usize = 1 << 30;
@@ -156,16 +156,12 @@ fn decoded(
         .buffer_view
         .and_then(|view| document.views().nth(view.value()));
     let read = match (view, &json.uri) {
-        (Some(view), _) => picture_file::decode(&name, file.view(&place, &view)?),
-        (None, Some(uri)) => picture_file::decode(&name, &file.resource(&place, uri, note_read)?),
+        (Some(view), _) => texture_file::decode(name.clone(), file.view(&place, &view)?, None),
+        (None, Some(uri)) => {
+            let bytes = file.resource(&place, uri, note_read)?;
+            texture_file::decode(name.clone(), &bytes, None)
+        }
         (None, None) => return Err(file.error(&place, "neither bufferView nor uri")),
     };
-    let read = read.map_err(|message| file.error(&place, format!("\"{name}\": {message}")))?;
-    if let Some([width, height]) = read.scaled_from_px {
-        let [kept_width, kept_height] = read.texture.size_px;
-        file.note(format!(
-            "{place} \"{name}\" of {width}x{height} is scaled to {kept_width}x{kept_height}"
-        ));
-    }
-    Ok(read.texture)
+    read.map_err(|message| file.error(&place, format!("\"{name}\" {message}")))
 }

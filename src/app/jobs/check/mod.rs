@@ -6,11 +6,12 @@ mod room;
 
 use std::fmt::Write;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
+use crate::app::scene_warnings::sizes::{length, sides_m};
 use crate::app::scene_warnings::warnings;
 use crate::geometry::levels::{Level, levels};
-use crate::geometry::mesh::MeshReport;
+use crate::geometry::mesh::{CornerLook, MeshReport};
 use crate::geometry::outline_scale::largest_scale;
 use crate::light::Light;
 use crate::scene::format::{SHADOWS, SHADOWS_SECTION};
@@ -224,7 +225,8 @@ fn object_row(object: &Object, anchors: &[Anchor], with_levels: bool) -> TableRo
                 .map_or(object.anchor, |motion| motion.anchor),
         )
         .map_or("nothing", |anchor| &anchor.name);
-    let mut notes = mesh_notes(&object.mesh_report);
+    let mut notes = vec![material_note(object)];
+    notes.extend(mesh_notes(&object.mesh_report));
     if with_levels {
         notes.extend(levels_note(object));
     }
@@ -246,11 +248,58 @@ fn object_row(object: &Object, anchors: &[Anchor], with_levels: bool) -> TableRo
         cells: vec![
             object.name.clone(),
             format!("on {anchor}"),
+            size_cell(object),
             mesh_cell(object),
             casts.to_owned(),
         ],
         note: notes.join(", "),
     }
+}
+
+/// The sides of the smallest box around a thing where it stands.
+fn size_cell(object: &Object) -> String {
+    let sides = sides_m(object).to_array().map(length);
+    sides.join(" x ")
+}
+
+/// What a thing is made of, each material with its name and colour, and the memory that it takes.
+fn material_note(object: &Object) -> String {
+    /// So many say enough.
+    const SHOWN: usize = 6;
+    let mut told: Vec<String> = object
+        .materials
+        .iter()
+        .enumerate()
+        .take(SHOWN)
+        .map(|(index, material)| {
+            let name = object.material_names.get(index).map_or("", String::as_str);
+            format!("{name} albedo {}", vector(material.albedo))
+                .trim()
+                .to_owned()
+        })
+        .collect();
+    if object.materials.len() > SHOWN {
+        told.push(format!("{} more materials", object.materials.len() - SHOWN));
+    }
+    for texture in object.textures.iter().take(SHOWN) {
+        let [width, height] = texture.size_px;
+        told.push(format!("{} {width}x{height}", texture.name));
+    }
+    let mesh = &object.mesh;
+    let bytes = mesh.positions.len() * size_of::<Vec3>()
+        + mesh.triangles.len() * size_of::<([u32; 3], [Vec3; 3], u32)>()
+        + mesh.looks.len() * size_of::<CornerLook>()
+        + mesh.corner_looks.len() * size_of::<[u32; 3]>()
+        + object
+            .textures
+            .iter()
+            .map(|texture| texture.bytes())
+            .sum::<usize>();
+    told.push(match bytes {
+        0..1_000_000 => format!("{} kB", bytes.div_ceil(1000)),
+        _ => format!("{:.1} MB", bytes as f64 / 1e6),
+    });
+    told.join(", ")
 }
 
 /// Size and topology of a mesh, and how it casts.
