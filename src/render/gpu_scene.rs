@@ -19,10 +19,11 @@ use super::gpu::Gpu;
 use super::indirect::Indirect;
 use super::insides::{Insides, insides};
 use super::lights::Lights;
+use super::materials::{materials_group, needs_looks};
 use super::screen_bounds::{ScreenBounds, screen_bounds};
 use super::shown::Shown;
 use super::stencil::REAL_HIDES;
-use super::surfaces::Sided;
+use super::surfaces::{Sided, SurfaceKinds};
 use super::surroundings::hidden_surroundings;
 use super::uniforms::{AnchorView, UniformRow, VIEW_GROUP};
 use super::volumes::{Among, Volumes, set_scissor};
@@ -55,10 +56,10 @@ pub(super) struct GpuScene {
     intrinsics: Intrinsics,
     /// Those that cast shadow volumes.
     lights: Lights,
-    /// Whether any virtual thing has a glossy layer.
-    pub glossy: bool,
-    /// Whether any light is more than a point or a direction.
-    pub shaped: bool,
+    /// What the virtual things' materials and the lights have.
+    pub kinds: SurfaceKinds,
+    /// The materials, where there are such as need it.
+    materials: Option<wgpu::BindGroup>,
     batches: Vec<SurfaceBatch>,
     things: Vec<AnchoredModel>,
     /// For each thing the level that is drawn.
@@ -92,6 +93,7 @@ impl GpuScene {
             virtual_corners,
         } = AnchorGeometry::new(device, scene, &mut known_levels);
         let world_virtuals = virtual_corners.iter().find(|(anchor, _)| *anchor == 0);
+        let looks = scene.virtuals.iter().any(needs_looks);
         Self {
             lit_by,
             standing: standing(scene),
@@ -117,11 +119,15 @@ impl GpuScene {
                 lights(scene, lit_by),
                 hidden_surroundings(scene, lit_by),
             ),
-            shaped: scene.lights.iter().any(|light| is_shaped(&light.light)),
-            glossy: scene.virtuals.iter().any(|object| {
-                let mut materials = object.materials.iter();
-                materials.any(|material| material.roughness.is_some())
-            }),
+            kinds: SurfaceKinds {
+                glossy: scene.virtuals.iter().any(|object| {
+                    let mut materials = object.materials.iter();
+                    materials.any(|material| material.roughness.is_some())
+                }),
+                shaped: scene.lights.iter().any(|light| is_shaped(&light.light)),
+                looks,
+            },
+            materials: looks.then(|| materials_group(gpu, scene)),
             intrinsics,
             views,
         }
@@ -132,7 +138,7 @@ impl GpuScene {
     pub fn follow(&mut self, gpu: &Gpu, scene: &Scene) {
         let surroundings = hidden_surroundings(scene, self.lit_by);
         self.lights.follow(lights(scene, self.lit_by), surroundings);
-        self.shaped = scene.lights.iter().any(|light| is_shaped(&light.light));
+        self.kinds.shaped = scene.lights.iter().any(|light| is_shaped(&light.light));
         let standing = standing(scene);
         if self.standing == standing {
             return;
@@ -548,6 +554,16 @@ impl GpuScene {
         pass.set_bind_group(0, &self.view_group, &[view]);
         pass.set_vertex_buffer(0, batch.corners.slice(..));
         pass.set_vertex_buffer(1, batch.indirect.slice(..));
+        if let Some(looks) = &batch.looks {
+            pass.set_vertex_buffer(2, looks.slice(..));
+        }
+        if let Some(materials) = self
+            .materials
+            .as_ref()
+            .filter(|_| batch.role == Role::Virtual)
+        {
+            pass.set_bind_group(3, materials, &[]);
+        }
         pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
     }
 }

@@ -19,6 +19,7 @@ mod insides;
 mod layers;
 mod light_sums;
 mod lights;
+mod materials;
 mod passes;
 mod pipelines;
 mod quality_controller;

@@ -11,6 +11,7 @@ use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
 use crate::light::Material;
+use crate::light::texture::Texture;
 use crate::scene::{
     Object, Scene, SceneLight, ShadowSettings, ShadowTechnique, Shortcut, Shortcuts,
 };
@@ -71,6 +72,7 @@ struct Shape {
     /// Of each thing its name, its anchor, its mesh's triangles and whether it casts.
     things: Vec<(String, usize, usize, bool)>,
     materials: Vec<Material>,
+    textures: Vec<Arc<Texture>>,
 }
 
 impl Shape {
@@ -91,6 +93,7 @@ impl Shape {
             nodes: scene.node_count(),
             things: things().map(shape).collect(),
             materials: things().flat_map(|thing| thing.materials.clone()).collect(),
+            textures: things().flat_map(|thing| thing.textures.clone()).collect(),
         }
     }
 }

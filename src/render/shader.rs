@@ -11,7 +11,7 @@ macro_rules! files {
 }
 
 /// All files under `shaders/`.
-const FILES: [(&str, &str); 21] = files![
+const FILES: [(&str, &str); 22] = files![
     "area_lights.wgsl",
     "background.wgsl",
     "common.wgsl",
@@ -22,6 +22,7 @@ const FILES: [(&str, &str); 21] = files![
     "fullscreen.wgsl",
     "layers.wgsl",
     "light_sums.wgsl",
+    "materials.wgsl",
     "mapped_source.wgsl",
     "partly_covered.wgsl",
     "pixel_sums.wgsl",
@@ -194,6 +195,7 @@ mod tests {
                 &["MULTISAMPLED"],
                 &["ENCODED"],
                 &["MULTISAMPLED", "ENCODED"],
+                &["LOOKS"],
             ] {
                 let text = source(name, flags).unwrap();
                 assert_eq!(error(name, &text), None, "{flags:?}");

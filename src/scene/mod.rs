@@ -21,6 +21,7 @@ mod dictionary;
 mod error;
 mod family;
 pub mod format;
+pub mod gltf;
 mod lights;
 mod load;
 pub mod mesh_file;

@@ -36,12 +36,12 @@ keys! {
     /// The shape of a thing.
     pub static SHAPE: ShapeKeys;
 
-    /// Its shape. Counter-clockwise seen from outside; materials from its file or MTL file (Kd is taken
-    /// as linear reflectance, Ns or Pr as roughness; see docs/models.md). A phantom is
+    /// Its shape: glTF, OBJ, PLY or STL. Counter-clockwise seen from outside; materials from its file or MTL file (Kd is
+    /// taken as linear reflectance, Ns or Pr as roughness; see docs/gltf.md). A phantom is
     /// always flat: normals in the file are passed over.
     mesh: Option<PathBuf>, FileKind::Mesh => Means(None, "none: a phantom may have rect_m");
     /// Which axis of the mesh's file points up, along z of what it stands on.
-    up: Option<Up> => Means(None, "\"z\"");
+    up: Option<Up> => Means(None, "\"z\"; glTF: \"y\"");
     /// What the longest side of the mesh is scaled to; the file's origin stays.
     fit_m: Option<f64>, Numbers::above(0.0, 1e5).unit("m") => Means(None, "the numbers in the file are metres");
 }
@@ -307,15 +307,16 @@ fn object(
         (None, None) => return Err(table.error(format!("\"{name}\": no shape; mesh is expected"))),
     };
     let mut materials = loaded.materials;
+    let mut mesh = loaded.mesh;
     if let Some(material) = MATERIAL_SECTION.table(table)? {
-        override_materials(&mut materials, &material)?;
+        override_materials(&mut materials, &mut mesh, &material)?;
     }
     // A mirror turns each triangle's winding; turning it back keeps the outside outside.
     let mirrored = anchor_from_object.matrix3.determinant() < 0.0;
     let mesh = if mirrored {
-        loaded.mesh.with_winding_reversed()
+        mesh.with_winding_reversed()
     } else {
-        loaded.mesh
+        mesh
     };
     Ok(Object {
         name,
@@ -348,17 +349,29 @@ pub fn anchor_index(on: &Value, anchors: &[Anchor]) -> Result<usize, SceneError>
         })
 }
 
-/// Each key that the scene gives replaces that of every material of the mesh.
-fn override_materials(materials: &mut [Material], table: &Table) -> Result<(), SceneError> {
-    if let Some(albedo) = MATERIAL.albedo.read(table)? {
-        materials
-            .iter_mut()
-            .for_each(|material| material.albedo = albedo);
+/// Each key that the scene gives replaces that of every material of the mesh, with the picture that says it and, of the
+/// colour, the corners' colours.
+fn override_materials(
+    materials: &mut [Material],
+    mesh: &mut Mesh,
+    table: &Table,
+) -> Result<(), SceneError> {
+    let albedo = MATERIAL.albedo.read(table)?;
+    let roughness = MATERIAL.roughness.read(table)?;
+    for material in materials {
+        if let Some(albedo) = albedo {
+            material.albedo = albedo;
+            material.maps.color = None;
+        }
+        if let Some(roughness) = roughness {
+            material.roughness = Some(roughness);
+            material.maps.roughness = None;
+        }
     }
-    if let Some(roughness) = MATERIAL.roughness.read(table)? {
-        materials
-            .iter_mut()
-            .for_each(|material| material.roughness = Some(roughness));
+    if albedo.is_some() {
+        for look in &mut mesh.looks {
+            look.color = Vec3::ONE.extend(look.color.w);
+        }
     }
     Ok(())
 }

@@ -2,8 +2,8 @@
 
 mod degenerate;
 mod room;
-mod unlikely;
 pub mod sizes;
+mod unlikely;
 
 use crate::light::Light;
 use crate::scene::{Object, Scene};
@@ -31,6 +31,10 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
     if let Some(probe) = &scene.probe {
         let notes = probe.notes.iter();
         warnings.extend(notes.map(|note| format!("{}: {note}", probe.image.display())));
+    }
+    for thing in scene.phantoms.iter().chain(&scene.virtuals) {
+        let notes = thing.notes.iter();
+        warnings.extend(notes.map(|note| format!("\"{}\": {note}", thing.name)));
     }
     for (number, light) in scene.lights.iter().enumerate() {
         // Where other anchors are is not known before there are pictures.
