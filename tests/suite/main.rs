@@ -15,6 +15,7 @@ mod calibrate;
 mod counting;
 mod detail;
 mod figures;
+mod lenses;
 mod light_from_picture;
 mod motion;
 mod picture;
