@@ -3,12 +3,24 @@
 struct Lens {
     focal_px: vec2f,
     center_px: vec2f,
-    // k1 k2 p1 p2 of OpenCV, then k3.
+    // OpenCV's k1 k2 p1 p2, of a fisheye k1 k2 k3 k4.
     distortion: vec4f,
+    // k3 k4 k5 k6
+    rational: vec4f,
+    // s1 s2 s3 s4
+    prism: vec4f,
+    // The columns of the homography of a tilted sensor.
+    tilt_x: vec4f,
+    tilt_y: vec4f,
+    tilt_z: vec4f,
     size_px: vec2u,
-    k3: f32,
+    // One of the constants below.
+    model: u32,
     padding: u32,
 }
+
+const RATIONAL: u32 = 1u;
+const FISHEYE: u32 = 2u;
 
 // Set when the shader is built; a perfect lens lets the picture pass untouched.
 override DISTORTS: bool = true;
@@ -24,10 +36,27 @@ fn undistorted(pixel: vec2i) -> vec3f {
     let ideal = (vec2f(pixel) - lens.center_px) / lens.focal_px;
     let k = lens.distortion;
     let r2 = dot(ideal, ideal);
-    let radial = 1.0 + r2 * (k.x + r2 * (k.y + r2 * lens.k3));
+    if lens.model == FISHEYE {
+        let radius = sqrt(r2);
+        let angle = atan(radius);
+        let a2 = angle * angle;
+        let bent = angle * (1.0 + a2 * (k.x + a2 * (k.y + a2 * (k.z + a2 * k.w))));
+        // At the axis the radius is the angle.
+        let scale = select(1.0, bent / max(radius, 1e-6), radius > 1e-6);
+        return bilinear(ideal * scale * lens.focal_px + lens.center_px);
+    }
+    var radial = 1.0 + r2 * (k.x + r2 * (k.y + r2 * lens.rational.x));
+    if lens.model == RATIONAL {
+        radial /= 1.0 + r2 * (lens.rational.y + r2 * (lens.rational.z + r2 * lens.rational.w));
+    }
     let cross_term = 2.0 * ideal.x * ideal.y;
-    let seen = ideal * radial
+    var seen = ideal * radial
         + vec2f(k.z * cross_term + k.w * (r2 + 2.0 * ideal.x * ideal.x), k.z * (r2 + 2.0 * ideal.y * ideal.y) + k.w * cross_term);
+    if lens.model == RATIONAL {
+        seen += r2 * (lens.prism.xz + r2 * lens.prism.yw);
+        let tilted = lens.tilt_x.xyz * seen.x + lens.tilt_y.xyz * seen.y + lens.tilt_z.xyz;
+        seen = tilted.xy / tilted.z;
+    }
     return bilinear(seen * lens.focal_px + lens.center_px);
 }
 

@@ -19,9 +19,14 @@ const POSE: usize = 6;
 
 /// The camera's parameters in their order.
 pub(super) fn parameters_of(intrinsics: &Intrinsics) -> Parameters {
-    let [k1, k2, p1, p2, k3] = intrinsics.distortion;
+    let [k1, k2, p1, p2, k3] = polynomial_of(intrinsics);
     let (focal, center) = (intrinsics.focal_px, intrinsics.center_px);
     [focal.x, focal.y, center.x, center.y, k1, k2, p1, p2, k3]
+}
+
+/// The distortion `k1 k2 p1 p2 k3` of a camera that has been calibrated here.
+pub(super) fn polynomial_of(intrinsics: &Intrinsics) -> [f64; 5] {
+    std::array::from_fn(|k| intrinsics.distortion.coefficients()[k])
 }
 
 /// The standard deviations of those parameters that are `free`, 0 for the others; infinite for all where the views
@@ -177,6 +182,7 @@ fn by_parameters(intrinsics: &Intrinsics, point: DVec2) -> [DVec2; 9] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::camera::Distortion;
 
     #[test]
     fn derivatives_by_the_parameters_are_what_small_steps_make() {
@@ -184,7 +190,7 @@ mod tests {
             size_px: [640, 480],
             focal_px: DVec2::new(615.0, 613.0),
             center_px: DVec2::new(321.4, 238.2),
-            distortion: [-0.35, 0.15, -0.002, 0.001, -0.03],
+            distortion: Distortion::Polynomial([-0.35, 0.15, -0.002, 0.001, -0.03]),
         };
         const STEP: f64 = 1e-6;
         let point = DVec2::new(0.4, -0.3);
@@ -195,7 +201,11 @@ mod tests {
                 1 => camera.focal_px.y += step,
                 2 => camera.center_px.x += step,
                 3 => camera.center_px.y += step,
-                coefficient => camera.distortion[coefficient - 4] += step,
+                coefficient => {
+                    let mut coefficients = polynomial_of(&camera);
+                    coefficients[coefficient - 4] += step;
+                    camera.distortion = Distortion::Polynomial(coefficients);
+                }
             }
             camera.pixel_from_plane(camera.distort(point))
         };

@@ -8,10 +8,10 @@ use opencv::core::{
 };
 use opencv::prelude::*;
 
-use super::deviations::{Parameters, deviations, parameters_of};
+use super::deviations::{Parameters, deviations, parameters_of, polynomial_of};
 use super::views::{FEWEST_VIEWS, TILTED_RAD, TargetView, Views, coverage_of, lacks_of};
 use super::{CalibrateError, Coverage, Lack};
-use crate::geometry::camera::Intrinsics;
+use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::pose::pose_from_rodrigues;
 
 /// A camera, and how it is known.
@@ -265,7 +265,9 @@ impl CameraFit {
             size_px,
             focal_px: DVec2::new(matrix[0], matrix[4]),
             center_px: DVec2::new(matrix[2], matrix[5]),
-            distortion: std::array::from_fn(|k| coefficients.get(k).copied().unwrap_or(0.0)),
+            distortion: Distortion::Polynomial(std::array::from_fn(|k| {
+                coefficients.get(k).copied().unwrap_or(0.0)
+            })),
         };
         let poses = turns.iter().zip(&shifts);
         Ok(Self {
@@ -317,7 +319,7 @@ fn folds(intrinsics: &Intrinsics) -> bool {
         .map(|corner| intrinsics.plane_from_pixel(corner).length())
         .into_iter()
         .fold(0.0, f64::max);
-    let [k1, k2, _, _, k3] = intrinsics.distortion;
+    let [k1, k2, _, _, k3] = polynomial_of(intrinsics);
     let radius = |r: f64| r * (1.0 + r * r * (k1 + r * r * (k2 + r * r * k3)));
     // Barrel distortion needs more than `farthest` to reach it, but never twice that in a lens that this model fits.
     let mut before = 0.0;

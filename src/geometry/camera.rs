@@ -1,6 +1,8 @@
-//! The pinhole camera with OpenCV's lens distortion.
+//! The pinhole camera with a lens before it.
 
 use glam::{DMat2, DVec2, DVec3, Mat4, Vec4};
+
+pub use super::lens::Distortion;
 
 /// Intrinsics of a camera: the matrix K and the lens distortion, both as OpenCV defines them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,8 +13,8 @@ pub struct Intrinsics {
     pub focal_px: DVec2,
     /// Principal point in pixels; an integer coordinate is a pixel's centre.
     pub center_px: DVec2,
-    /// `k1 k2 p1 p2 k3`.
-    pub distortion: [f64; 5],
+    /// What the lens does.
+    pub distortion: Distortion,
 }
 
 /// A point as a camera sees it.
@@ -98,55 +100,21 @@ impl Intrinsics {
 
     /// Applies the lens distortion to a point of the plane z = 1 in camera space.
     pub fn distort(&self, point: DVec2) -> DVec2 {
-        let [k1, k2, p1, p2, k3] = self.distortion;
-        let (x, y) = (point.x, point.y);
-        let r2 = point.length_squared();
-        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-        DVec2::new(
-            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-        )
+        self.distortion.distort(point)
     }
 
     /// The derivative of [`Self::distort`] by the point.
     pub fn distortion_jacobian(&self, point: DVec2) -> DMat2 {
-        let [k1, k2, p1, p2, k3] = self.distortion;
-        let (x, y) = (point.x, point.y);
-        let r2 = point.length_squared();
-        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-        let slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3));
-        let mixed = x * y * slope + 2.0 * (p1 * x + p2 * y);
-        DMat2::from_cols(
-            DVec2::new(radial + x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x, mixed),
-            DVec2::new(mixed, radial + y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x),
-        )
+        self.distortion.jacobian(point)
     }
 
-    /// The undistorted pixel of a distorted one, by Newton's method to the last digits; `None` where the distortion model
-    /// folds and has no inverse.
-    ///
-    /// OpenCV's `undistortPoints` stops after five rounds of a fixed-point iteration, tenths of a pixel short in a wide
-    /// lens's corners.
+    /// The undistorted pixel of a distorted one, to the last digits; `None` where the distortion model folds and has no
+    /// inverse.
     pub fn undistorted_pixel(&self, distorted_px: DVec2) -> Option<DVec2> {
-        const ROUNDS: usize = 30;
-        const TOLERANCE: f64 = 1e-12;
-        let target = self.plane_from_pixel(distorted_px);
-        let mut point = target;
-        for _ in 0..ROUNDS {
-            let step = self.distortion_jacobian(point).inverse() * (self.distort(point) - target);
-            if !step.is_finite() {
-                return None;
-            }
-            point -= step;
-            if step.length() < TOLERANCE * (1.0 + point.length()) {
-                // Behind the fold the map mirrors; its Jacobian is symmetric.
-                let jacobian = self.distortion_jacobian(point);
-                let unfolded =
-                    jacobian.determinant() > 0.0 && jacobian.x_axis.x + jacobian.y_axis.y > 0.0;
-                return unfolded.then(|| self.pixel_from_plane(point));
-            }
-        }
-        None
+        let point = self
+            .distortion
+            .undistort(self.plane_from_pixel(distorted_px))?;
+        Some(self.pixel_from_plane(point))
     }
 
     /// The pixel of a point of the plane z = 1, without distortion.
@@ -187,7 +155,7 @@ mod tests {
             size_px: [640, 480],
             focal_px: DVec2::new(615.0, 613.0),
             center_px: DVec2::new(321.4, 238.2),
-            distortion,
+            distortion: Distortion::Polynomial(distortion),
         }
     }
 

@@ -105,6 +105,7 @@ pub fn near_corners(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::camera::Distortion;
 
     const NEAR: [DVec3; 4] = [
         DVec3::new(-0.01, -0.01, 1.0),
@@ -175,7 +176,7 @@ mod tests {
             size_px: [640, 480],
             focal_px: DVec2::splat(500.0),
             center_px: DVec2::new(319.5, 239.5),
-            distortion: [0.0; 5],
+            distortion: Distortion::NONE,
         };
         let corners = near_corners(&intrinsics, 0.5, &DAffine3::IDENTITY);
         let half = DVec2::new(321.0, 241.0) / 500.0 * 0.5;

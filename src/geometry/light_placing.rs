@@ -333,6 +333,7 @@ impl Problem for ShadowFit<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::camera::Distortion;
     use glam::DQuat;
 
     const TABLE: Facet = Facet {
@@ -346,7 +347,7 @@ mod tests {
                 size_px: [640, 480],
                 focal_px: DVec2::new(615.0, 613.0),
                 center_px: DVec2::new(321.0, 238.0),
-                distortion: [0.0; 5],
+                distortion: Distortion::NONE,
             },
             camera_from_world: DAffine3::from_rotation_translation(
                 DQuat::from_rotation_x(2.3),

@@ -13,6 +13,7 @@ pub mod counting;
 pub mod cuboid;
 pub mod homography;
 pub mod least_squares;
+pub mod lens;
 pub mod levels;
 pub mod light_placing;
 mod looks;

@@ -235,6 +235,7 @@ fn clipped(polygon: &[DVec3], normal: DVec3, offset: f64) -> Vec<DVec3> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::camera::Distortion;
     use glam::{DQuat, DVec2};
 
     /// From half a metre above the table's near edge, looking down at its middle.
@@ -248,7 +249,7 @@ mod tests {
                 size_px: [640, 480],
                 focal_px: DVec2::new(600.0, 590.0),
                 center_px: DVec2::new(321.0, 236.0),
-                distortion: [0.0; 5],
+                distortion: Distortion::NONE,
             },
             camera_from_world,
             near_m: 0.01,

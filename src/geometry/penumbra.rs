@@ -139,7 +139,7 @@ mod tests {
                 size_px: [400, 300],
                 focal_px: DVec2::splat(500.0),
                 center_px: DVec2::new(200.0, 150.0),
-                distortion: [0.0; 5],
+                distortion: crate::geometry::lens::Distortion::Polynomial([0.0; 5]),
             },
             camera_from_world: DAffine3 {
                 matrix3: DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0)),

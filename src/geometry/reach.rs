@@ -191,13 +191,14 @@ pub fn shadow_end(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::camera::Distortion;
     use glam::{DQuat, DVec2};
 
     const CAMERA: Intrinsics = Intrinsics {
         size_px: [640, 480],
         focal_px: DVec2::new(600.0, 600.0),
         center_px: DVec2::new(319.5, 239.5),
-        distortion: [0.0; 5],
+        distortion: Distortion::NONE,
     };
 
     fn looking_down() -> DAffine3 {

@@ -232,7 +232,7 @@ impl StandingThings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::camera::Intrinsics;
+    use crate::geometry::camera::{Distortion, Intrinsics};
     use glam::{DAffine3, DMat3, DVec2};
 
     fn square(half_m: f64, z_m: f64) -> [[DVec3; 3]; 2] {
@@ -284,7 +284,7 @@ mod tests {
                 size_px: [640, 480],
                 focal_px: DVec2::splat(600.0),
                 center_px: DVec2::new(320.0, 240.0),
-                distortion: [0.0; 5],
+                distortion: Distortion::NONE,
             },
             camera_from_world,
         };

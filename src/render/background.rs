@@ -48,7 +48,7 @@ impl Background {
                 | wgpu::TextureUsages::COPY_DST
                 | wgpu::TextureUsages::COPY_SRC,
         );
-        let distorts = intrinsics.distortion != [0.0; 5];
+        let distorts = intrinsics.distortion.distorts();
         let lens = UniformRow::new::<Lens>(&gpu.device, "lens", 1);
         lens.write(&gpu.queue, 0, &Lens::new(intrinsics));
         let view = recorded.create_view(&Default::default());

@@ -1,10 +1,11 @@
 //! Uniform structs, each the twin of a WGSL struct; a test holds them against it offset by offset.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DAffine3, Mat4, Vec4};
+use glam::{DAffine3, DMat3, DVec3, Mat4, Vec4};
 
 use crate::geometry::bounds::HalfSpace;
-use crate::geometry::camera::Intrinsics;
+use crate::geometry::camera::{Distortion, Intrinsics};
+use crate::geometry::lens;
 use crate::geometry::shadow_volume::LightPlace;
 use crate::light::{Light, Shape, spot_ramp};
 
@@ -155,20 +156,41 @@ pub(super) struct Lens {
     pub focal_px: [f32; 2],
     pub center_px: [f32; 2],
     pub distortion: [f32; 4],
+    pub rational: [f32; 4],
+    pub prism: [f32; 4],
+    pub tilt_x: [f32; 4],
+    pub tilt_y: [f32; 4],
+    pub tilt_z: [f32; 4],
     pub size_px: [u32; 2],
-    pub k3: f32,
+    pub model: u32,
     pub padding: u32,
 }
 
 impl Lens {
     pub fn new(intrinsics: &Intrinsics) -> Self {
-        let [k1, k2, p1, p2, k3] = intrinsics.distortion.map(|coefficient| coefficient as f32);
+        let mut all = [0.0; 14];
+        let given = intrinsics.distortion.coefficients();
+        all[..given.len()].copy_from_slice(given);
+        let [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, _, _] =
+            all.map(|number| number as f32);
+        let (model, tilt) = match intrinsics.distortion {
+            Distortion::Polynomial(_) => (0, None),
+            Distortion::Rational(coefficients) => (1, lens::tilt(&coefficients)),
+            Distortion::Fisheye(_) => (2, None),
+        };
+        let tilt = tilt.unwrap_or(DMat3::IDENTITY);
+        let column = |axis: DVec3| axis.as_vec3().extend(0.0).to_array();
         Self {
             focal_px: intrinsics.focal_px.as_vec2().to_array(),
             center_px: intrinsics.center_px.as_vec2().to_array(),
             distortion: [k1, k2, p1, p2],
+            rational: [k3, k4, k5, k6],
+            prism: [s1, s2, s3, s4],
+            tilt_x: column(tilt.x_axis),
+            tilt_y: column(tilt.y_axis),
+            tilt_z: column(tilt.z_axis),
             size_px: intrinsics.size_px,
-            k3,
+            model,
             padding: 0,
         }
     }
@@ -341,7 +363,8 @@ mod tests {
         );
         let video = shader::source("video.wgsl", &[]).unwrap();
         assert_twins!(
-            &video, Lens, focal_px, center_px, distortion, size_px, k3, padding
+            &video, Lens, focal_px, center_px, distortion, rational, prism, tilt_x, tilt_y, tilt_z,
+            size_px, model, padding
         );
     }
 }

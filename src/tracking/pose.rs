@@ -302,12 +302,13 @@ mod tests {
     use glam::DQuat;
 
     use super::*;
+    use crate::geometry::camera::Distortion;
 
     const CAMERA: Intrinsics = Intrinsics {
         size_px: [640, 480],
         focal_px: DVec2::new(615.0, 613.0),
         center_px: DVec2::new(321.4, 238.2),
-        distortion: [0.0; 5],
+        distortion: Distortion::NONE,
     };
 
     /// A camera that looks at the anchor from above, turned and tilted.

@@ -4,7 +4,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DAffine3, DQuat, DVec2, DVec3, Vec2};
-use gnomon::geometry::camera::Intrinsics;
+use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::light::Light;
 
 use super::random::{Random, random_camera};
@@ -383,7 +383,7 @@ pub fn degenerate_case(random: &mut Random) -> Case {
             size_px: SIZE_PX,
             focal_px: DVec2::splat(random.between(40.0, 110.0).round()),
             center_px: DVec2::new(35.5, 26.5),
-            distortion: [0.0; 5],
+            distortion: Distortion::NONE,
         },
         name: names.join(", "),
     }

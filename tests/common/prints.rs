@@ -4,7 +4,7 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 use glam::{DAffine3, DQuat, DVec2};
-use gnomon::geometry::camera::Intrinsics;
+use gnomon::geometry::camera::{Distortion, Intrinsics};
 
 use super::sheets::CAMERA;
 
@@ -12,7 +12,7 @@ pub const CHESSBOARD: &str = "--chessboard 8x5 --square-mm 25";
 pub const CHARUCO: &str = "--charuco 9x6 --square-mm 25 --marker-mm 18 --dictionary DICT_5X5_100";
 
 pub const BENT_CAMERA: Intrinsics = Intrinsics {
-    distortion: [-0.28, 0.09, 0.0015, -0.001, 0.0],
+    distortion: Distortion::Polynomial([-0.28, 0.09, 0.0015, -0.001, 0.0]),
     ..CAMERA
 };
 

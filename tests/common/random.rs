@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use glam::{DAffine3, DQuat, DVec2, DVec3, Vec3};
-use gnomon::geometry::camera::Intrinsics;
+use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::light::Light;
 
 use super::shapes::{self, Soup};
@@ -256,7 +256,7 @@ pub fn random_stage(random: &mut Random, broken: bool) -> (Stage, Vec<DVec3>, In
         size_px,
         focal_px: DVec2::splat(random.between(35.0, 130.0)),
         center_px: DVec2::new(random.between(30.0, 42.0), random.between(22.0, 32.0)),
-        distortion: [0.0; 5],
+        distortion: Distortion::NONE,
     };
     (stage, places, intrinsics)
 }

@@ -4,7 +4,7 @@ use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 #[allow(unused_imports)] // Each test uses its own part.
 pub use gnomon::app::truth::sheets::{Light, camera_above, photograph, with_noise};
 use gnomon::capture::Frame;
-use gnomon::geometry::camera::Intrinsics;
+use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::scene::{Anchor, DetectorKind, Family, Marker, SearchArea, TrackingSettings};
 use gnomon::tracking::{AnchorPose, Tracker};
 
@@ -12,11 +12,11 @@ pub const CAMERA: Intrinsics = Intrinsics {
     size_px: [640, 480],
     focal_px: DVec2::new(615.0, 613.0),
     center_px: DVec2::new(321.4, 238.2),
-    distortion: [0.0; 5],
+    distortion: Distortion::NONE,
 };
 
 pub const WIDE_CAMERA: Intrinsics = Intrinsics {
-    distortion: [-0.28, 0.09, 0.0015, -0.001, -0.01],
+    distortion: Distortion::Polynomial([-0.28, 0.09, 0.0015, -0.001, -0.01]),
     ..CAMERA
 };
 

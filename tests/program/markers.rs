@@ -5,7 +5,7 @@ use std::path::Path;
 use assert_cmd::Command;
 use glam::{DMat3, DVec2, DVec3};
 use gnomon::capture::Frame;
-use gnomon::geometry::camera::Intrinsics;
+use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::scene::Scene;
 use gnomon::tracking::{Status, Tracker};
 
@@ -43,7 +43,7 @@ fn look_at(picture: &Path, dpi: f64) -> (Frame, Intrinsics) {
         focal_px: DVec2::splat(0.4 * pixels_per_m),
         // Between the pixels' centres.
         center_px: DVec2::from(size_px.map(|side| f64::from(side) / 2.0 - 0.5)),
-        distortion: [0.0; 5],
+        distortion: Distortion::NONE,
     };
     let frame = Frame {
         index: 0,

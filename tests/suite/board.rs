@@ -11,7 +11,7 @@ use crate::common::sheets;
 use assert_cmd::Command;
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 use gnomon::app::jobs::board::board_block;
-use gnomon::geometry::camera::Intrinsics;
+use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::scene::{Anchor, Family, Marker, Scene, TrackingSettings};
 use gnomon::tracking::mapping::{LearntBoard, MapError, MapSettings, learn_board};
 use gnomon::tracking::{Detection, Detector, grey_from_rgba};
@@ -20,7 +20,7 @@ const CAMERA: Intrinsics = Intrinsics {
     size_px: [1280, 720],
     focal_px: DVec2::new(920.0, 918.0),
     center_px: DVec2::new(641.3, 357.9),
-    distortion: [0.08, -0.19, 0.0008, -0.0005, 0.05],
+    distortion: Distortion::Polynomial([0.08, -0.19, 0.0008, -0.0005, 0.05]),
 };
 
 const SETTINGS: MapSettings = MapSettings {

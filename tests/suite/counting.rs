@@ -6,7 +6,7 @@ use crate::common::{
     Picture, Stage, Thing, lamp, look_at, project_file, shapes, stability_row, sun,
 };
 use glam::{DAffine3, DVec2, DVec3, Vec3};
-use gnomon::geometry::camera::Intrinsics;
+use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::light::Light;
 use gnomon::scene::VolumeCounting;
 
@@ -14,7 +14,7 @@ const CAMERA: Intrinsics = Intrinsics {
     size_px: [320, 240],
     focal_px: DVec2::splat(325.0),
     center_px: DVec2::new(159.5, 119.5),
-    distortion: [0.0; 5],
+    distortion: Distortion::NONE,
 };
 
 /// Holds what both ways draw against each other, camera by camera.

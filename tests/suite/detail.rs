@@ -3,7 +3,7 @@
 
 use crate::common::{Stage, Thing, lamp, linear_of_level, look_at, shapes};
 use glam::{DVec2, DVec3, Vec3};
-use gnomon::geometry::camera::Intrinsics;
+use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::render::Renderer;
 use gnomon::scene::{Shortcut, Shortcuts};
 
@@ -11,7 +11,7 @@ const CAMERA: Intrinsics = Intrinsics {
     size_px: [320, 240],
     focal_px: DVec2::splat(650.0),
     center_px: DVec2::new(159.5, 119.5),
-    distortion: [0.0; 5],
+    distortion: Distortion::NONE,
 };
 const MIDDLE: DVec3 = DVec3::new(0.0, 0.0, 0.06);
 /// So many levels of 255 nobody sees.

@@ -16,6 +16,7 @@ mod counting;
 mod detail;
 mod figures;
 mod gltf;
+mod lenses;
 mod light_from_picture;
 mod motion;
 mod picture;

@@ -1,7 +1,7 @@
 //! Things that move by themselves, held against the same things where they have got to.
 
 use glam::{DVec2, DVec3};
-use gnomon::geometry::camera::Intrinsics;
+use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::render::{Renderer, Shown, VIRTUAL};
 use gnomon::scene::Scene;
 
@@ -11,7 +11,7 @@ const CAMERA: Intrinsics = Intrinsics {
     size_px: [320, 240],
     focal_px: DVec2::splat(360.0),
     center_px: DVec2::new(159.5, 119.5),
-    distortion: [0.0; 5],
+    distortion: Distortion::NONE,
 };
 /// A picture, and what each of its pixels belongs to.
 struct Shot {

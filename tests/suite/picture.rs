@@ -13,7 +13,7 @@ use glam::{DAffine3, DQuat, DVec2, DVec3};
 use gnomon::app::truth::TruePoses;
 use gnomon::app::truth::ray_cast::{View, pixels};
 use gnomon::capture::load_calibration;
-use gnomon::geometry::camera::Intrinsics;
+use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::light::Light;
 use gnomon::render::{REAL, Renderer, Shown};
 use gnomon::scene::{Quality, Scene, ShadowSettings, Shortcut, Shortcuts};
@@ -67,7 +67,7 @@ fn judge(stage: &Stage, renderer: &mut Renderer, view: View) -> Verdict {
     renderer.upload(&noise).expect("an uploaded frame");
     let noisy = stage.picture(renderer, view.camera_from_world);
     let mut video = noise.rgba;
-    if view.intrinsics.distortion != [0.0; 5] {
+    if view.intrinsics.distortion.distorts() {
         renderer.draw(&stage.poses(view.camera_from_world), Shown::Bare);
         video = renderer.read_picture().expect("the video");
     }
@@ -341,7 +341,7 @@ const DESK: Intrinsics = Intrinsics {
     size_px: [640, 480],
     focal_px: DVec2::splat(650.0),
     center_px: DVec2::new(319.5, 239.5),
-    distortion: [0.0; 5],
+    distortion: Distortion::NONE,
 };
 
 /// Holds a scene of the world's anchor with one and four samples.
@@ -607,7 +607,7 @@ fn hold_meshes(paths: &[PathBuf]) {
         size_px: [320, 240],
         focal_px: DVec2::splat(330.0),
         center_px: DVec2::new(159.5, 119.5),
-        distortion: [0.0; 5],
+        distortion: Distortion::NONE,
     };
     let mut run = Run::default();
     for path in paths {
@@ -676,7 +676,7 @@ fn no_seam_where_a_virtual_shadow_meets_a_real_one() {
         size_px: [320, 240],
         focal_px: DVec2::splat(700.0),
         center_px: DVec2::new(159.5, 119.5),
-        distortion: [0.0; 5],
+        distortion: Distortion::NONE,
     };
     let view = View {
         intrinsics,

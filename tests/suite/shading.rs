@@ -5,7 +5,7 @@ use crate::common::{flat_mesh, gpu, grey_frame, lamp, look_at, object, scene, su
 use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
 use gnomon::app::truth::ray_cast::pixels;
 use gnomon::capture::Frame;
-use gnomon::geometry::camera::Intrinsics;
+use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::geometry::cuboid::cuboid;
 use gnomon::geometry::mesh::{CornerLook, Mesh};
 use gnomon::light::material::{Encoding, Map, Maps};
@@ -23,7 +23,7 @@ const PERFECT_LENS: Intrinsics = Intrinsics {
     size_px: SIZE_PX,
     focal_px: DVec2::new(600.0, 590.0),
     center_px: DVec2::new(237.1, 182.9),
-    distortion: [0.0; 5],
+    distortion: Distortion::NONE,
 };
 
 /// Every pixel another colour than its neighbours.
@@ -693,8 +693,21 @@ fn what_goes_fades_and_the_rest_stays_bit_for_bit() {
 
 #[test]
 fn lens_distortion_is_undone_bilinearly() {
+    for distortion in [
+        Distortion::Polynomial([0.08, -0.19, 0.004, -0.003, 0.05]),
+        Distortion::Rational([
+            0.08, -0.19, 0.004, -0.003, 0.05, 0.1, -0.06, 0.02, 0.003, -0.002, -0.004, 0.001, 0.03,
+            -0.02,
+        ]),
+        Distortion::Fisheye([-0.013, 0.021, -0.019, 0.005]),
+    ] {
+        undistorted_as_by_rays(distortion);
+    }
+}
+
+fn undistorted_as_by_rays(distortion: Distortion) {
     let lens = Intrinsics {
-        distortion: [0.08, -0.19, 0.004, -0.003, 0.05],
+        distortion,
         ..PERFECT_LENS
     };
     let video = noise(SIZE_PX);
@@ -716,22 +729,28 @@ fn lens_distortion_is_undone_bilinearly() {
         let index = at(y, SIZE_PX[1]) * SIZE_PX[0] as usize + at(x, SIZE_PX[0]);
         f64::from(video[4 * index + channel])
     };
-    let [k1, k2, p1, p2, k3] = lens.distortion;
     let (mut worst, mut moved, mut untouched) = (0.0_f64, 0.0_f64, 0);
     for (index, pixel) in pixels(SIZE_PX) {
         if !clear[index] || layers.gain[index] != [1.0; 3] {
             continue;
         }
         untouched += 1;
-        // OpenCV's model, written from its documentation.
-        let x = (pixel.x - lens.center_px.x) / lens.focal_px.x;
-        let y = (pixel.y - lens.center_px.y) / lens.focal_px.y;
-        let r2 = x * x + y * y;
-        let radial = 1.0 + k1 * r2 + k2 * r2.powi(2) + k3 * r2.powi(3);
-        let seen_x = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
-        let seen_y = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y;
-        let u = seen_x * lens.focal_px.x + lens.center_px.x;
-        let v = seen_y * lens.focal_px.y + lens.center_px.y;
+        let ideal = (pixel - lens.center_px) / lens.focal_px;
+        let seen = match distortion {
+            // OpenCV's model, written from its documentation.
+            Distortion::Polynomial([k1, k2, p1, p2, k3]) => {
+                let DVec2 { x, y } = ideal;
+                let r2 = x * x + y * y;
+                let radial = 1.0 + k1 * r2 + k2 * r2.powi(2) + k3 * r2.powi(3);
+                DVec2::new(
+                    x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+                    y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+                )
+            }
+            // `lenses.rs` holds these against OpenCV.
+            other => other.distort(ideal),
+        };
+        let DVec2 { x: u, y: v } = seen * lens.focal_px + lens.center_px;
         moved = moved.max((DVec2::new(u, v) - pixel).length());
         let (s, t) = (u - u.floor(), v - v.floor());
         for channel in 0..3 {

@@ -10,7 +10,7 @@ use crate::common::{Stage, Thing, lamp, look_at, look_with_up, project_file, sta
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use gnomon::app::truth::FACES_AWAY;
 use gnomon::app::truth::ray_cast::{Ray, Triangle, View, World};
-use gnomon::geometry::camera::Intrinsics;
+use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::light::Light;
 use gnomon::render::{Layers, REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};
 use gnomon::scene::ShadowSettings;
@@ -23,7 +23,7 @@ const CAMERA: Intrinsics = Intrinsics {
     size_px: [640, 480],
     focal_px: DVec2::new(650.0, 650.0),
     center_px: DVec2::new(319.5, 239.5),
-    distortion: [0.0; 5],
+    distortion: Distortion::NONE,
 };
 
 fn bar(name: &str, stage: &Stage, view: &View) -> Layers {

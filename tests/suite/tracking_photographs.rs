@@ -7,7 +7,7 @@ use std::path::Path;
 
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use gnomon::capture::Frame;
-use gnomon::geometry::camera::Intrinsics;
+use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::scene::{Anchor, ArucoRefinement, DetectorKind, Family, Marker, TrackingSettings};
 use gnomon::tracking::{Detector, Status, Tracker};
 
@@ -63,7 +63,7 @@ fn photographs_of_a_turned_tag_show_its_turn() {
         size_px: [1056, 792],
         focal_px: DVec2::new(329.8729619143081, 332.94611303946357),
         center_px: DVec2::new(528.0, 396.0),
-        distortion: [0.0; 5],
+        distortion: Distortion::NONE,
     };
     let card = [marker(76, 0.065, 0.0, 0.0)];
     // The contours of OpenCV's default miss a tag that is turned away by 70°.
@@ -115,7 +115,7 @@ const GRID_CAMERA: Intrinsics = Intrinsics {
     size_px: [640, 480],
     focal_px: DVec2::new(606.568, 609.958),
     center_px: DVec2::new(324.444, 245.653),
-    distortion: [0.0577336, 0.2612784, -0.00336207, -0.00063571, -1.239927],
+    distortion: Distortion::Polynomial([0.0577336, 0.2612784, -0.00336207, -0.00063571, -1.239927]),
 };
 
 /// The 6 x 6 tags of Kalibr's grids: 88 mm, 0.3 of it apart, black borders of 2 cells.
@@ -143,7 +143,7 @@ fn photographs_of_an_april_grid_show_all_its_tags() {
         size_px: [640, 480],
         focal_px: DVec2::new(606.57, 609.98),
         center_px: DVec2::new(324.44, 245.65),
-        distortion: [0.0; 5],
+        distortion: Distortion::NONE,
     };
     let grid = april_grid();
     let anchors = [anchor("grid", &grid)];
@@ -504,7 +504,7 @@ fn camera_of(frame: &Frame) -> Intrinsics {
         size_px: frame.size_px,
         focal_px: DVec2::splat(0.95 * width.max(height)),
         center_px: 0.5 * DVec2::new(width - 1.0, height - 1.0),
-        distortion: [0.0; 5],
+        distortion: Distortion::NONE,
     }
 }
 
@@ -567,7 +567,7 @@ fn photographs_of_road_signs_show_their_tags() {
         size_px: [640, 480],
         focal_px,
         center_px,
-        distortion: [0.0; 5],
+        distortion: Distortion::NONE,
     };
     let table = camera(DVec2::new(338.563, 338.939), DVec2::new(336.455, 230.487));
     let road = camera(DVec2::new(336.776, 336.027), DVec2::new(333.358, 212.774));

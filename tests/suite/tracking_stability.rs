@@ -4,7 +4,7 @@
 
 use glam::{DAffine3, DVec2, DVec3};
 use gnomon::capture::Frame;
-use gnomon::geometry::camera::Intrinsics;
+use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::scene::{Anchor, DetectorKind, Marker, TrackingSettings};
 use gnomon::tracking::{AnchorPose, Detector, LossReason, Status};
 
@@ -20,7 +20,7 @@ const MIDDLE: Intrinsics = Intrinsics {
     size_px: [320, 240],
     focal_px: CAMERA.focal_px,
     center_px: DVec2::new(160.4, 118.2),
-    distortion: [0.0; 5],
+    distortion: Distortion::NONE,
 };
 
 /// A frame and where its anchor truly is.
@@ -1377,7 +1377,9 @@ fn empty_pictures_and_extreme_cameras() {
                     10f64.powf(random.between(-2.0, 6.0)),
                 ),
                 center_px: DVec2::new(random.between(-1e4, 1e4), random.between(-500.0, 500.0)),
-                distortion: std::array::from_fn(|_| random.between(-3.0, 3.0)),
+                distortion: Distortion::Polynomial(std::array::from_fn(|_| {
+                    random.between(-3.0, 3.0)
+                })),
             }
         } else {
             MIDDLE

@@ -10,7 +10,7 @@ use crate::common::{Stage, Thing, lamp, linear_of_level, look_at, sun};
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use gnomon::app::truth::FACES_AWAY;
 use gnomon::app::truth::ray_cast::{Exact, GRAZES, SeenSurface, View, World, pixels};
-use gnomon::geometry::camera::Intrinsics;
+use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::light::{Light, irradiance};
 use gnomon::render::{REAL, REAL_HIDES, VIRTUAL_HIDES};
 use std::f64::consts::PI;
@@ -130,7 +130,7 @@ fn edges_are_as_smooth_as_four_samples_can_make_them() {
         size_px: [320, 240],
         focal_px: DVec2::splat(300.0),
         center_px: DVec2::new(161.3, 118.7),
-        distortion: [0.0; 5],
+        distortion: Distortion::NONE,
     };
     let mut random = Random::new(17);
     let lump = shapes::sphere(0.05, 8, 11).map(|place| place * random.between(0.7, 1.3) as f32);
@@ -225,7 +225,7 @@ fn terminator_of_a_coarse_smooth_sphere() {
         size_px: [320, 240],
         focal_px: DVec2::splat(330.0),
         center_px: DVec2::new(159.5, 119.5),
-        distortion: [0.0; 5],
+        distortion: Distortion::NONE,
     };
     let view = View {
         intrinsics,

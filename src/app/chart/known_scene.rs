@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::app::truth::affine;
 use crate::app::truth::ray_cast::{Triangle, View, World};
-use crate::geometry::camera::Intrinsics;
+use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::light::{Light, Shape};
 use crate::render::{REAL, VIRTUAL};
 use crate::scene::{Object, Scene};
@@ -108,7 +108,7 @@ impl KnownScene {
                 focal_px: DVec2::new(k[0][0], k[1][1]),
                 // There a pixel's centre is at .5.
                 center_px: DVec2::new(k[0][2], k[1][2]) - 0.5,
-                distortion: [0.0; 5],
+                distortion: Distortion::NONE,
             },
             camera_from_world: affine(&file.camera.world_to_camera)
                 .with_context(|| path.display().to_string())?,

@@ -17,7 +17,7 @@ use super::tracking::bare_library;
 use crate::app::stages::stats::quantile;
 use crate::app::truth::sheets::{camera_above, photograph, with_noise};
 use crate::app::truth::{PoseErrors, shifts_px};
-use crate::geometry::camera::Intrinsics;
+use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::render::{Layers, REAL, Renderer, Shown, VIRTUAL_HIDES};
 use crate::scene::{Anchor, DetectorKind, Family, Marker, SearchArea, TrackingSettings};
 use crate::tracking::{Status, Tracker};
@@ -26,7 +26,7 @@ const CAMERA: Intrinsics = Intrinsics {
     size_px: [640, 480],
     focal_px: DVec2::new(615.0, 613.0),
     center_px: DVec2::new(321.4, 238.2),
-    distortion: [0.0; 5],
+    distortion: Distortion::NONE,
 };
 const MARKER_M: f64 = 0.04;
 /// Noise of the pictures, levels of 255.

@@ -4,7 +4,7 @@ use std::f32::consts::TAU;
 
 use glam::{DAffine3, DMat3, DVec2, DVec3, Vec3};
 
-use crate::geometry::camera::Intrinsics;
+use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::cuboid;
 use crate::geometry::mesh::{Mesh, RawTriangle};
 use crate::light::{Light, Material};
@@ -28,7 +28,7 @@ pub fn intrinsics(size_px: [u32; 2]) -> Intrinsics {
         focal_px: DVec2::splat(650.0 * height / 480.0),
         // There a pixel's centre is at .5.
         center_px: DVec2::new(width, height) / 2.0 - 0.5,
-        distortion: [0.0; 5],
+        distortion: Distortion::NONE,
     }
 }
 

@@ -136,7 +136,7 @@ impl ResultKind {
             Self::Calibration => has_keys(
                 bytes,
                 &["focal_px", "center_px", "distortion"],
-                &["size_px"],
+                &["size_px", "model"],
             ),
             Self::Frames | Self::Session | Self::Folder => false,
         }

@@ -7,7 +7,7 @@ use glam::{DAffine3, DVec2};
 use crate::app::input::live_capture::Arrived;
 use crate::app::stopwatch::Stopwatch;
 use crate::capture::{Frame, check_frame_size};
-use crate::geometry::camera::Intrinsics;
+use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::scene::{Anchor, Family, Scene, TrackingSettings};
 use crate::tracking::{
     AnchorPose, Detection, Detector, Quad, Tracker, TrackingError, grey_from_rgba, rejected_quads,
@@ -195,7 +195,7 @@ pub fn guessed_intrinsics(size_px: [u32; 2]) -> Intrinsics {
         size_px,
         focal_px: DVec2::splat(width.max(height) / 2.0 / GUESSED_HALF_WIDTH),
         center_px: (DVec2::new(width, height) - 1.0) / 2.0,
-        distortion: [0.0; 5],
+        distortion: Distortion::NONE,
     }
 }
 

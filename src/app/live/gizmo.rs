@@ -299,7 +299,7 @@ fn distance_to_segment(point: DVec2, from: DVec2, to: DVec2) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::camera::Intrinsics;
+    use crate::geometry::camera::{Distortion, Intrinsics};
     use crate::light::Shape;
     use glam::{DAffine3, DMat3};
 
@@ -317,7 +317,7 @@ mod tests {
                 size_px: [640, 480],
                 focal_px: DVec2::splat(600.0),
                 center_px: DVec2::new(319.5, 239.5),
-                distortion: [0.0; 5],
+                distortion: Distortion::NONE,
             },
             camera_from_world: world_from_camera.inverse(),
         }

@@ -67,12 +67,13 @@ fn mean_length(shifts: &[DVec2; 4]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::camera::Distortion;
 
     const CAMERA: Intrinsics = Intrinsics {
         size_px: [640, 480],
         focal_px: DVec2::new(600.0, 500.0),
         center_px: DVec2::new(320.0, 240.0),
-        distortion: [0.0; 5],
+        distortion: Distortion::NONE,
     };
 
     /// A table that lies square before the camera: what is 1 mm aside is focal_px / depth mm aside in the picture.

@@ -100,7 +100,7 @@ impl<'a> SheetView<'a> {
         let [width, height] = camera.size_px;
         let (mut from, mut to) = ([0, 0], [width, height]);
         // Distortion bends the sheet's edges, and what reaches behind the camera has no outline.
-        if camera.distortion == [0.0; 5] && corners.iter().all(|corner| corner.z > 1e-3) {
+        if !camera.distortion.distorts() && corners.iter().all(|corner| corner.z > 1e-3) {
             let pixels = corners.map(|c| camera.pixel_from_plane(c.truncate() / c.z));
             let low = pixels.into_iter().fold(pixels[0], DVec2::min) - 1.0;
             let high = pixels.into_iter().fold(pixels[0], DVec2::max) + 2.0;
@@ -178,7 +178,7 @@ impl Light {
                 let pixel = DVec2::new(f64::from(x), f64::from(y)) + offset;
                 let target = camera.plane_from_pixel(pixel);
                 let mut point = target;
-                if camera.distortion != [0.0; 5] {
+                if camera.distortion.distorts() {
                     for _ in 0..15 {
                         point += target - camera.distort(point);
                     }

@@ -267,8 +267,10 @@ fn camera_text(calibration: &Calibration) -> String {
     let names = ["k1", "k2", "p1", "p2", "k3"];
     let coefficients: Vec<String> = (0..5)
         .map(|k| {
-            let (coefficient, deviation) =
-                (camera.distortion[k], calibration.distortion_deviations[k]);
+            let (coefficient, deviation) = (
+                camera.distortion.coefficients()[k],
+                calibration.distortion_deviations[k],
+            );
             if coefficient == 0.0 {
                 format!("{} 0", names[k])
             } else {

@@ -1,0 +1,426 @@
+//! What the trees of calibration files mean: the one place that knows their keys.
+
+use serde_json::{Map, Value};
+
+use crate::geometry::camera::Distortion;
+
+/// What a file says, before it is known to make sense.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct UncheckedCalibration {
+    pub size_px: Option<[u32; 2]>,
+    pub focal_px: [f64; 2],
+    pub center_px: [f64; 2],
+    pub distortion: Distortion,
+}
+
+/// Which formula a file's coefficients belong to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum LensModel {
+    /// Told by the number of the coefficients, as OpenCV does.
+    ByNumber,
+    /// Five at most.
+    Brown,
+    /// Four.
+    Fisheye,
+}
+
+type Named = Vec<(String, UncheckedCalibration)>;
+
+const OWN_KEYS: [&str; 5] = ["size_px", "focal_px", "center_px", "model", "distortion"];
+// Keys are compared in small letters without underscores, hyphens and blanks.
+const MATRIX_KEYS: [&str; 5] = [
+    "cameramatrix",
+    "intrinsicmatrix",
+    "cameraintrinsics",
+    "k",
+    "mtx",
+];
+const DISTORTION_KEYS: [&str; 7] = [
+    "distortioncoefficients",
+    "distcoeffs",
+    "distortioncoeffs",
+    "distcoeff",
+    "distortion",
+    "d",
+    "dist",
+];
+const WIDTH_KEYS: [&str; 2] = ["imagewidth", "width"];
+const HEIGHT_KEYS: [&str; 2] = ["imageheight", "height"];
+const SIZE_KEYS: [&str; 3] = ["resolution", "imagesize", "imgsize"];
+const MODEL_KEYS: [&str; 3] = ["distortionmodel", "cameramodel", "model"];
+
+/// The cameras that a tree describes, each with its name.
+pub(super) fn cameras(tree: &Map<String, Value>) -> Result<Named, String> {
+    let one = |camera| Ok(vec![("the camera".to_owned(), camera)]);
+    if let Some(Value::Object(camera)) = tree.get("camera") {
+        return one(of_session(camera)?);
+    }
+    if let Some(list) = tree.get("Calibration").and_then(|it| it.get("cameras")) {
+        return of_calib_io(list);
+    }
+    let is_kalibr = |entry: &Value| entry.get("intrinsics").is_some();
+    if tree.values().any(is_kalibr) {
+        let cameras = tree.iter().filter(|(_, entry)| is_kalibr(entry));
+        return cameras
+            .map(|(name, entry)| {
+                let camera = entry.as_object().map(of_kalibr);
+                let camera = camera.unwrap_or_else(|| Err("must be a table".to_owned()));
+                Ok((
+                    name.clone(),
+                    camera.map_err(|why| format!("{name}: {why}"))?,
+                ))
+            })
+            .collect();
+    }
+    if find(tree, &MATRIX_KEYS).is_some() {
+        return one(of_opencv(tree)?);
+    }
+    one(of_own(tree)?)
+}
+
+/// `size_px = [640, 480]`, `focal_px`, `center_px`, `model = "fisheye"`, `distortion = [k1, k2, p1, p2, k3]`.
+fn of_own(tree: &Map<String, Value>) -> Result<UncheckedCalibration, String> {
+    if let Some(unknown) = tree.keys().find(|key| !OWN_KEYS.contains(&key.as_str())) {
+        return Err(format!(
+            "unknown key '{unknown}'; a calibration has {}",
+            OWN_KEYS.join(", ")
+        ));
+    }
+    let pair = |key| {
+        let value = tree
+            .get(key)
+            .ok_or_else(|| format!("{key} = [x, y] is missing"))?;
+        numbers::<2>(value).ok_or_else(|| format!("{key} must be two finite numbers"))
+    };
+    Ok(UncheckedCalibration {
+        size_px: tree.get("size_px").map(size).transpose()?,
+        focal_px: pair("focal_px")?,
+        center_px: pair("center_px")?,
+        distortion: distortion(model_of(tree)?, tree.get("distortion"))?,
+    })
+}
+
+/// `{size, K: {fx, fy, cx, cy}, dist}`.
+fn of_session(camera: &Map<String, Value>) -> Result<UncheckedCalibration, String> {
+    let entry = |key| {
+        let value = camera
+            .get("K")
+            .and_then(|matrix| matrix.get(key))
+            .and_then(Value::as_f64);
+        value.ok_or_else(|| format!("camera.K.{key} must be a finite number"))
+    };
+    Ok(UncheckedCalibration {
+        size_px: camera.get("size").map(size).transpose()?,
+        focal_px: [entry("fx")?, entry("fy")?],
+        center_px: [entry("cx")?, entry("cy")?],
+        distortion: distortion(model_of(camera)?, camera.get("dist"))?,
+    })
+}
+
+/// What the calibration tools of OpenCV, ROS 1, ROS 2 and PhotonVision write.
+fn of_opencv(tree: &Map<String, Value>) -> Result<UncheckedCalibration, String> {
+    let model = model_of(tree)?;
+    refuse_cut_pictures(tree)?;
+    let (key, matrix) = find(tree, &MATRIX_KEYS).ok_or("the camera matrix is missing")?;
+    let [fx, skew, cx, s1, fy, cy, s2, s3, one] = numbers::<9>(data_of(matrix))
+        .ok_or_else(|| format!("{key} must be a matrix of 3 x 3 finite numbers"))?;
+    if [skew, s1, s2, s3] != [0.0; 4] || one != 1.0 {
+        return Err(format!("{key} must be [fx 0 cx; 0 fy cy; 0 0 1]"));
+    }
+    let coefficients = find(tree, &DISTORTION_KEYS).map(|(_, value)| data_of(value));
+    Ok(UncheckedCalibration {
+        size_px: size_of(tree)?,
+        focal_px: [fx, fy],
+        center_px: [cx, cy],
+        distortion: distortion(model, coefficients)?,
+    })
+}
+
+/// A camera of Kalibr's camchain: `camera_model`, `intrinsics`, `distortion_model`, `distortion_coeffs`, `resolution`.
+fn of_kalibr(camera: &Map<String, Value>) -> Result<UncheckedCalibration, String> {
+    let model = model_of(camera)?;
+    let [fx, fy, cx, cy] = camera
+        .get("intrinsics")
+        .and_then(numbers::<4>)
+        .ok_or("intrinsics must be four finite numbers fx, fy, cx, cy")?;
+    Ok(UncheckedCalibration {
+        size_px: size_of(camera)?,
+        focal_px: [fx, fy],
+        center_px: [cx, cy],
+        distortion: distortion(
+            model,
+            find(camera, &DISTORTION_KEYS).map(|(_, value)| value),
+        )?,
+    })
+}
+
+/// calib.io's list of cameras, whose parameters are numbers with a state each.
+fn of_calib_io(list: &Value) -> Result<Named, String> {
+    let list = list
+        .as_array()
+        .ok_or("Calibration.cameras must be a list")?;
+    let cameras = list.iter().enumerate().map(|(k, entry)| {
+        let name = format!("camera {k}");
+        let camera = of_calib_io_camera(entry).map_err(|why| format!("{name}: {why}"))?;
+        Ok((name, camera))
+    });
+    cameras.collect()
+}
+
+fn of_calib_io_camera(entry: &Value) -> Result<UncheckedCalibration, String> {
+    const COEFFICIENTS: [&str; 14] = [
+        "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tauX", "tauY",
+    ];
+    let model = &entry["model"];
+    let kind = model["polymorphic_name"].as_str().unwrap_or("none");
+    if kind != "libCalib::CameraModelOpenCV" {
+        return Err(format!(
+            "the camera model '{kind}' is not supported; libCalib::CameraModelOpenCV is"
+        ));
+    }
+    let data = &model["ptr_wrapper"]["data"];
+    let parameters = data["parameters"]
+        .as_object()
+        .ok_or("model.ptr_wrapper.data.parameters is missing")?;
+    let value = |name: &str| {
+        let value = parameters
+            .get(name)
+            .map(|entry| entry.get("val").unwrap_or(entry));
+        value
+            .map(|value| {
+                value
+                    .as_f64()
+                    .ok_or_else(|| format!("{name} must be a number"))
+            })
+            .transpose()
+    };
+    let needed = |name: &str| value(name)?.ok_or_else(|| format!("{name} is missing"));
+    let known = ["f", "ar", "cx", "cy"];
+    let mut names = parameters.keys().map(String::as_str);
+    if let Some(other) = names.find(|name| !known.contains(name) && !COEFFICIENTS.contains(name))
+        && value(other)?.is_none_or(|value| value != 0.0)
+    {
+        return Err(format!("the parameter '{other}' is not supported"));
+    }
+    let mut all = [0.0; 14];
+    for (coefficient, name) in all.iter_mut().zip(COEFFICIENTS) {
+        *coefficient = value(name)?.unwrap_or(0.0);
+    }
+    let focal = needed("f")?;
+    let base = &data["CameraModelCRT"]["CameraModelBase"];
+    let sides = base.get("imageSize").map(size).transpose()?;
+    Ok(UncheckedCalibration {
+        size_px: sides,
+        focal_px: [focal, focal * value("ar")?.unwrap_or(1.0)],
+        center_px: [needed("cx")?, needed("cy")?],
+        distortion: by_number(&all)?,
+    })
+}
+
+/// The lens model by all keys that decide it. What is not known is refused, never passed over.
+fn model_of(tree: &Map<String, Value>) -> Result<LensModel, String> {
+    let mut found = LensModel::ByNumber;
+    for (key, value) in tree {
+        let name = normalised(key);
+        let is_fisheye = matches!(name.as_str(), "fisheyemodel" | "fisheye" | "isfisheye");
+        let model = if is_fisheye {
+            match value {
+                Value::Null => LensModel::ByNumber,
+                value if value.as_bool() == Some(true) || value.as_f64() == Some(1.0) => {
+                    LensModel::Fisheye
+                }
+                value if value.as_bool() == Some(false) || value.as_f64() == Some(0.0) => {
+                    LensModel::ByNumber
+                }
+                other => return Err(format!("{key} must be 0 or 1, not {other}")),
+            }
+        } else if MODEL_KEYS.contains(&name.as_str()) {
+            model_by_name(key, value)?
+        } else if name == "xi" && value.as_f64() != Some(0.0) {
+            return Err(format!(
+                "{key} belongs to the omnidirectional model, which is not supported"
+            ));
+        } else {
+            continue;
+        };
+        match (found, model) {
+            (_, LensModel::ByNumber) => {}
+            (LensModel::ByNumber, _) => found = model,
+            (before, now) if before != now => {
+                return Err(format!(
+                    "{key} contradicts the other keys of the lens's model"
+                ));
+            }
+            _ => {}
+        }
+    }
+    Ok(found)
+}
+
+fn model_by_name(key: &str, value: &Value) -> Result<LensModel, String> {
+    let name = match value {
+        Value::Null => "",
+        Value::String(name) => name,
+        other => return Err(format!("{key} must be a name, not {other}")),
+    };
+    match normalised(name).as_str() {
+        "" | "pinhole" | "perspective" | "rationalpolynomial" | "rational" | "thinprism"
+        | "tilted" | "opencv" => Ok(LensModel::ByNumber),
+        "plumbbob" | "radtan" | "radialtangential" | "brownconrady" | "brown" | "none" => {
+            Ok(LensModel::Brown)
+        }
+        "equidistant" | "equi" | "fisheye" | "kannalabrandt" | "kannalabrandt4"
+        | "opencvfisheye" => Ok(LensModel::Fisheye),
+        _ => Err(format!(
+            "{key}: the model '{name}' is not supported; plumb_bob (radtan), rational_polynomial and equidistant \
+             (fisheye) are"
+        )),
+    }
+}
+
+/// ROS's matrix is that of the whole picture, which these keys cut or shrink.
+fn refuse_cut_pictures(tree: &Map<String, Value>) -> Result<(), String> {
+    for key in ["binning_x", "binning_y"] {
+        if tree
+            .get(key)
+            .and_then(Value::as_f64)
+            .is_some_and(|by| by > 1.0)
+        {
+            return Err(format!(
+                "{key} says that the pictures are smaller than what was calibrated; that is not supported"
+            ));
+        }
+    }
+    let offset = |key| tree.get("roi").and_then(|roi| roi.get(key)?.as_f64());
+    if [offset("x_offset"), offset("y_offset")]
+        .into_iter()
+        .flatten()
+        .any(|by| by != 0.0)
+    {
+        return Err(
+            "roi says that the pictures are a part of what was calibrated; that is not supported"
+                .to_owned(),
+        );
+    }
+    Ok(())
+}
+
+fn size_of(tree: &Map<String, Value>) -> Result<Option<[u32; 2]>, String> {
+    let side = |keys: &[&str]| {
+        let found = find(tree, keys);
+        found
+            .map(|(key, value)| side_px(value).ok_or_else(|| bad_side(key)))
+            .transpose()
+    };
+    if let (Some(width), Some(height)) = (side(&WIDTH_KEYS)?, side(&HEIGHT_KEYS)?) {
+        return Ok(Some([width, height]));
+    }
+    find(tree, &SIZE_KEYS)
+        .map(|(_, value)| size(value))
+        .transpose()
+}
+
+fn find<'a>(tree: &'a Map<String, Value>, keys: &[&str]) -> Option<(&'a str, &'a Value)> {
+    keys.iter().find_map(|wanted| {
+        let found = tree.iter().find(|(key, _)| normalised(key) == *wanted);
+        found.map(|(key, value)| (key.as_str(), value))
+    })
+}
+
+fn normalised(key: &str) -> String {
+    let kept = key
+        .chars()
+        .filter(|letter| !matches!(letter, '_' | '-' | ' '));
+    kept.flat_map(char::to_lowercase).collect()
+}
+
+/// A matrix is written as `{rows, cols, data}`, or as its numbers alone.
+fn data_of(matrix: &Value) -> &Value {
+    matrix.get("data").unwrap_or(matrix)
+}
+
+/// `[width, height]` or `{width, height}`.
+fn size(value: &Value) -> Result<[u32; 2], String> {
+    let sides = match value {
+        Value::Array(sides) if sides.len() == 2 => Some((&sides[0], &sides[1])),
+        Value::Object(sides) => sides.get("width").zip(sides.get("height")),
+        _ => None,
+    };
+    let sides = sides.and_then(|(width, height)| Some([side_px(width)?, side_px(height)?]));
+    sides.ok_or_else(|| bad_side("the picture size [width, height]"))
+}
+
+fn side_px(value: &Value) -> Option<u32> {
+    let side = value.as_f64()?;
+    (side.fract() == 0.0 && (1.0..=32768.0).contains(&side)).then_some(side as u32)
+}
+
+fn bad_side(what: &str) -> String {
+    format!("{what} must be whole numbers of pixels from 1 to 32768")
+}
+
+fn numbers<const N: usize>(value: &Value) -> Option<[f64; N]> {
+    flat_numbers(value)?.try_into().ok()
+}
+
+/// The numbers of a list, or of a list of rows.
+fn flat_numbers(value: &Value) -> Option<Vec<f64>> {
+    let mut found = Vec::new();
+    for entry in value.as_array()? {
+        match entry {
+            Value::Array(row) => found.extend(
+                row.iter()
+                    .map(Value::as_f64)
+                    .collect::<Option<Vec<f64>>>()?,
+            ),
+            number => found.push(number.as_f64()?),
+        }
+    }
+    Some(found)
+}
+
+fn distortion(model: LensModel, value: Option<&Value>) -> Result<Distortion, String> {
+    let given = match value {
+        None | Some(Value::Null) => Vec::new(),
+        Some(value) => flat_numbers(value)
+            .ok_or("the distortion must be a list of finite numbers k1, k2, p1, p2, k3")?,
+    };
+    let past = |most: usize| given.iter().skip(most).find(|number| **number != 0.0);
+    match model {
+        LensModel::Fisheye => {
+            if let Some(extra) = past(4) {
+                return Err(format!(
+                    "a fisheye has 4 coefficients k1, k2, k3, k4; {extra} is among those after them"
+                ));
+            }
+            let mut four = [0.0; 4];
+            four.iter_mut()
+                .zip(&given)
+                .for_each(|(to, from)| *to = *from);
+            Ok(Distortion::Fisheye(four))
+        }
+        LensModel::Brown if past(5).is_some() => Err(format!(
+            "plumb_bob has 5 coefficients k1, k2, p1, p2, k3, not {}; name the model rational_polynomial",
+            given.len()
+        )),
+        LensModel::Brown | LensModel::ByNumber => by_number(&given),
+    }
+}
+
+/// OpenCV's order; missing coefficients are 0.
+fn by_number(given: &[f64]) -> Result<Distortion, String> {
+    if given.iter().skip(14).any(|number| *number != 0.0) {
+        return Err(format!(
+            "the distortion has {} coefficients; 4, 5, 8, 12 or 14 are supported",
+            given.len()
+        ));
+    }
+    let mut all = [0.0; 14];
+    all.iter_mut().zip(given).for_each(|(to, from)| *to = *from);
+    let [k1, k2, p1, p2, k3, rest @ ..] = all;
+    Ok(if rest == [0.0; 9] {
+        Distortion::Polynomial([k1, k2, p1, p2, k3])
+    } else {
+        Distortion::Rational(all)
+    })
+}

@@ -1,0 +1,262 @@
+//! Calibration files: gnomon's own TOML or JSON, a session's JSON, OpenCV's FileStorage (YAML, XML, JSON), ROS's
+//! `CameraInfo`, Kalibr's camchain, PhotonVision's and calib.io's JSON, COLMAP's `cameras.txt`. All but the last become the
+//! same tree of values first (`tree.rs`), so there is one place that knows the keys (`kinds.rs`).
+
+mod colmap;
+mod kinds;
+mod tree;
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec2;
+
+use self::kinds::UncheckedCalibration;
+use crate::geometry::camera::{Distortion, Intrinsics};
+use crate::scene::plain_file;
+
+/// Why a calibration cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum CalibrationError {
+    /// The system refuses to read it.
+    #[error("{}: {error}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        error: std::io::Error,
+    },
+    /// Not what its extension says.
+    #[error("{}: {message}", path.display())]
+    Syntax {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with line and column where known.
+        message: String,
+    },
+    /// A value that no camera has, or one that is missing.
+    #[error("{}: {message}", path.display())]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong and what is allowed.
+        message: String,
+    },
+    /// The file holds no picture size, and nothing else tells it.
+    #[error(
+        "{}: the calibration does not say for which picture size it holds; add size_px = [width, height] \
+         (OpenCV: image_width and image_height)",
+        path.display()
+    )]
+    NoSize {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The frames are of another size than the calibration.
+    #[error(
+        "{frames_of} has frames of {} x {} pixels, but its calibration is for {} x {}; calibrate at the recording's size",
+        frame_px[0], frame_px[1], calibration_px[0], calibration_px[1]
+    )]
+    OtherSize {
+        /// The recording.
+        frames_of: String,
+        /// Width and height of its frames.
+        frame_px: [u32; 2],
+        /// Width and height that the calibration holds for.
+        calibration_px: [u32; 2],
+    },
+}
+
+/// Reads a calibration that says its own picture size.
+pub fn load_calibration(path: &Path) -> Result<Intrinsics, CalibrationError> {
+    let calibration = read(path, None)?;
+    let size_px = calibration
+        .size_px
+        .ok_or_else(|| CalibrationError::NoSize {
+            path: path.to_owned(),
+        })?;
+    calibration.into_intrinsics(path, size_px)
+}
+
+/// Reads a calibration for frames of a known size: one that says no size is taken to hold for them, one that says
+/// another is refused. `frames_of` names the recording in the message.
+pub fn load_calibration_for(
+    path: &Path,
+    frame_px: [u32; 2],
+    frames_of: &str,
+) -> Result<Intrinsics, CalibrationError> {
+    let intrinsics = load_calibration_or_fill(path, frame_px)?;
+    check_frame_size(&intrinsics, frame_px, frames_of)?;
+    Ok(intrinsics)
+}
+
+/// Refuses a calibration that was made at another picture size. `frames_of` names the recording in the message.
+pub fn check_frame_size(
+    intrinsics: &Intrinsics,
+    frame_px: [u32; 2],
+    frames_of: &str,
+) -> Result<(), CalibrationError> {
+    if intrinsics.size_px == frame_px {
+        return Ok(());
+    }
+    Err(CalibrationError::OtherSize {
+        frames_of: frames_of.to_owned(),
+        frame_px,
+        calibration_px: intrinsics.size_px,
+    })
+}
+
+/// As [`load_calibration`], with a size for files that say none.
+pub(super) fn load_calibration_or_fill(
+    path: &Path,
+    default_px: [u32; 2],
+) -> Result<Intrinsics, CalibrationError> {
+    let calibration = read(path, Some(default_px))?;
+    let size_px = calibration.size_px.unwrap_or(default_px);
+    calibration.into_intrinsics(path, size_px)
+}
+
+/// A calibration in gnomon's own format, which [`load_calibration`] reads from a `.toml` file to the bit.
+pub fn calibration_text(intrinsics: &Intrinsics) -> String {
+    let Intrinsics {
+        size_px: [width, height],
+        focal_px,
+        center_px,
+        distortion,
+    } = intrinsics;
+    let (model, names) = match distortion {
+        Distortion::Polynomial(_) => ("", "k1, k2, p1, p2, k3"),
+        Distortion::Rational(_) => ("", "k1, k2, p1, p2, k3 to k6, s1 to s4, tilt about x and y"),
+        Distortion::Fisheye(_) => ("model = \"fisheye\"\n", "k1, k2, k3, k4"),
+    };
+    let coefficients = distortion.coefficients();
+    // `?` writes as many digits as tell the number from its neighbours, and a point in each.
+    format!(
+        "size_px = [{width}, {height}]\n\
+         focal_px = [{:?}, {:?}]\n\
+         center_px = [{:?}, {:?}]\n\
+         {model}distortion = {coefficients:?}    # {names}\n",
+        focal_px.x, focal_px.y, center_px.x, center_px.y
+    )
+}
+
+impl UncheckedCalibration {
+    fn into_intrinsics(
+        self,
+        path: &Path,
+        size_px: [u32; 2],
+    ) -> Result<Intrinsics, CalibrationError> {
+        let refuse = |message: String| {
+            Err(CalibrationError::Value {
+                path: path.to_owned(),
+                message,
+            })
+        };
+        let Self {
+            focal_px,
+            center_px,
+            distortion,
+            ..
+        } = self;
+        let mut numbers = focal_px
+            .iter()
+            .chain(&center_px)
+            .chain(distortion.coefficients());
+        if !numbers.all(|number| number.is_finite()) {
+            return refuse(
+                "focal lengths, centre and distortion must be finite numbers".to_owned(),
+            );
+        }
+        if size_px.contains(&0) || size_px.iter().any(|&side| side > 32768) {
+            return refuse(format!(
+                "the picture size {} x {} must be from 1 to 32768",
+                size_px[0], size_px[1]
+            ));
+        }
+        if focal_px.iter().any(|&focal| focal <= 0.0) {
+            return refuse(format!(
+                "the focal lengths {} and {} must be greater than 0",
+                focal_px[0], focal_px[1]
+            ));
+        }
+        // A cropped picture may have its centre outside, but not far.
+        for (center, side) in center_px.iter().zip(size_px.map(f64::from)) {
+            if *center < -0.5 * side || *center > 1.5 * side {
+                return refuse(format!(
+                    "the principal point ({}, {}) lies far from a picture of {} x {} pixels",
+                    center_px[0], center_px[1], size_px[0], size_px[1]
+                ));
+            }
+        }
+        Ok(Intrinsics {
+            size_px,
+            focal_px: DVec2::from_array(focal_px),
+            center_px: DVec2::from_array(center_px),
+            distortion,
+        })
+    }
+}
+
+fn read(path: &Path, frame_px: Option<[u32; 2]>) -> Result<UncheckedCalibration, CalibrationError> {
+    let text = plain_file::read_text(path).map_err(|error| CalibrationError::Io {
+        path: path.to_owned(),
+        error,
+    })?;
+    // Windows' editors begin a file with a byte order mark.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+    let syntax = |message| CalibrationError::Syntax {
+        path: path.to_owned(),
+        message,
+    };
+    let value = |message| CalibrationError::Value {
+        path: path.to_owned(),
+        message,
+    };
+    let extension = path
+        .extension()
+        .and_then(|extension| extension.to_str())
+        .unwrap_or_default()
+        .to_ascii_lowercase();
+    let tree = match extension.as_str() {
+        "toml" => tree::of_toml(text),
+        "json" => tree::of_json(text),
+        "yaml" | "yml" => tree::of_yaml(text),
+        "xml" => tree::of_xml(text),
+        "txt" => {
+            let cameras = colmap::cameras(text).map_err(value)?;
+            return only_camera(cameras, frame_px).map_err(value);
+        }
+        _ => Err(
+            "a calibration is a .toml, .json, .yaml, .yml or .xml file, or COLMAP's cameras.txt"
+                .to_owned(),
+        ),
+    };
+    let tree = tree.map_err(syntax)?;
+    let cameras = kinds::cameras(&tree).map_err(value)?;
+    only_camera(cameras, frame_px).map_err(value)
+}
+
+/// The camera that is meant: the only one there is, or the only one with the frames' size.
+fn only_camera(
+    mut cameras: Vec<(String, UncheckedCalibration)>,
+    frame_px: Option<[u32; 2]>,
+) -> Result<UncheckedCalibration, String> {
+    let names: Vec<String> = cameras.iter().map(|(name, _)| name.clone()).collect();
+    if let Some(frame_px) = frame_px
+        && cameras.len() > 1
+    {
+        cameras.retain(|(_, camera)| camera.size_px.is_none_or(|size_px| size_px == frame_px));
+    }
+    let is_one = cameras.windows(2).all(|pair| pair[0].1 == pair[1].1);
+    match cameras.pop() {
+        Some((_, camera)) if is_one => Ok(camera),
+        _ if names.is_empty() => Err("there is no camera in it".to_owned()),
+        _ => Err(format!(
+            "it holds {} cameras ({}), and their sizes do not tell which is meant; keep that one alone",
+            names.len(),
+            names.join(", ")
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests;
