@@ -250,7 +250,7 @@ fn hold_scene(name: &str, scene: &Scene, material: &Material) {
 
 /// The same of a sphere whose normals are others.
 fn hold_bent(name: &str, scene: &Scene, material: &Material, bent: impl Fn(DVec3) -> DVec3) {
-    let lights = &scene.lights;
+    let lights = &scene.world_lights()[..];
     let (picture, _) = render(
         scene,
         PERFECT_LENS,
