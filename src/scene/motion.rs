@@ -3,7 +3,7 @@
 use glam::{DAffine3, DQuat, DVec3};
 
 use super::error::SceneError;
-use super::placement::{ANGLE, POSITION};
+use super::placement::{ANGLE, POSITION, turn};
 use super::ranges::Numbers;
 use super::reader::{Table, Value};
 use super::schema::key::Missing::{Is, Means};
@@ -122,12 +122,9 @@ impl Motion {
         let next = self
             .path
             .partition_point(|station| station.time_s <= time_s);
-        let (before, after) = match (next, self.path.get(next)) {
-            (0, _) | (_, None) => {
-                let there = if next == 0 { first } else { last };
-                return (there.offset_m, there.turn);
-            }
-            (_, Some(after)) => (&self.path[next - 1], after),
+        let before = self.path[..next].last().unwrap_or(first);
+        let Some(after) = self.path.get(next) else {
+            return (last.offset_m, last.turn);
         };
         let part = (time_s - before.time_s) / (after.time_s - before.time_s);
         (
@@ -209,15 +206,10 @@ fn stations(list: &Value) -> Result<Vec<Station>, SceneError> {
                 before.time_s
             )));
         }
-        let [x, y, z] = STATION
-            .rotation_deg
-            .read(&table)?
-            .to_array()
-            .map(f64::to_radians);
         stations.push(Station {
             time_s,
             offset_m: STATION.position_m.read(&table)?,
-            turn: DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x),
+            turn: turn(STATION.rotation_deg.read(&table)?),
         });
     }
     match stations.is_empty() {
@@ -267,8 +259,8 @@ mod tests {
             }
         }
         assert_eq!(on_path(PathEnd::Stay, 99.0), 1.0);
-        // Four seconds a round: 6.5 is 2.5 of it, 1.5 s after the place at 2.
-        assert!((on_path(PathEnd::Repeat, 6.5) - 0.5).abs() < 0.2 + 1e-12);
+        // Four seconds a round: 6.5 is 1.5 of the second one, half a second after the place at 2.
+        assert!((on_path(PathEnd::Repeat, 6.5) - 0.5).abs() < 1e-12);
         assert!((on_path(PathEnd::Repeat, 5.5) - on_path(PathEnd::Stay, 1.5)).abs() < 1e-12);
         assert!((on_path(PathEnd::Return, 6.0) - on_path(PathEnd::Stay, 4.0)).abs() < 1e-12);
         assert!((on_path(PathEnd::Return, 10.0) - on_path(PathEnd::Stay, 2.0)).abs() < 1e-12);

@@ -217,12 +217,7 @@ fn anchor_row((number, anchor): (usize, &Anchor)) -> TableRow {
 
 fn object_row(object: &Object, anchors: &[Anchor], with_levels: bool) -> TableRow {
     let anchor = anchors
-        .get(
-            object
-                .motion
-                .as_ref()
-                .map_or(object.anchor, |motion| motion.anchor),
-        )
+        .get(object.stands_on())
         .map_or("nothing", |anchor| &anchor.name);
     let mut notes = mesh_notes(&object.mesh_report);
     if with_levels {
