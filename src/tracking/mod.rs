@@ -9,11 +9,13 @@
 )]
 mod apriltag;
 mod aruco;
+mod aruco_dictionary;
 mod belief;
 mod condition;
 mod conventions;
 mod detector;
 mod edge_fit;
+mod expected_picture;
 mod filter;
 mod flipped_pose;
 mod layout;
@@ -23,6 +25,7 @@ mod marker_template;
 mod pixel_pose;
 mod pose;
 mod printed_marker;
+mod prints;
 mod reading;
 mod refine;
 mod survey;
@@ -32,9 +35,10 @@ mod tracker;
 
 use glam::DAffine3;
 
-pub use aruco::{Quad, printed_cells, rejected_quads};
+pub use aruco::{Quad, rejected_quads};
 pub use detector::{Detection, Detector};
 pub use printed_marker::{Cell, PrintedMarker};
+pub use prints::printed_cells;
 pub use survey::Survey;
 pub use tracker::{Tracker, grey_from_rgba};
 
