@@ -78,11 +78,28 @@ pub enum Command {
         after_help = "Example:\n  gnomon cameras    # and then: gnomon record webcam:0 --out out/session"
     )]
     Cameras,
-    /// Reads a scene, says what is wrong with it or what is in it.
+    /// Reads a scene and the first frames of its recording, says what is wrong or what is in it.
     #[command(after_help = "Example:\n  gnomon check config/lamp.toml")]
     Check {
         /// Scene file (TOML)
         scene: PathBuf,
+    },
+    /// Prints what makes a shell complete gnomon's commands and options.
+    #[command(
+        after_help = "Example:\n  gnomon completions bash > ~/.local/share/bash-completion/completions/gnomon\n\n\
+                      `make install` does this for bash, fish and zsh."
+    )]
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Prints a page of the manual (roff): the program's, or a command's.
+    #[command(
+        after_help = "Example:\n  gnomon manual replay | man -l -\n\n`make install` installs all pages."
+    )]
+    Manual {
+        /// The command
+        command: Option<String>,
     },
     /// Measures speed against accuracy on this machine, and draws it.
     #[command(

@@ -16,7 +16,7 @@ use crate::app::input::live_capture::LiveCapture;
 use crate::app::input::live_input::LiveInput;
 use crate::app::input::mirror_watch::MirrorWatch;
 use crate::app::input::sightings::Sightings;
-use crate::app::input::source;
+use crate::app::input::source::{self, CalibrationNamed};
 use crate::app::input::usual_tracking::usual_tracking;
 use crate::app::stages::report::Report;
 use crate::app::stages::stats::{Stats, detector_in_words, peak_memory_mib};
@@ -79,7 +79,7 @@ pub fn track(request: &TrackRequest, stop: &AtomicBool) -> Result<Report> {
     let plan = TrackPlan::of(&request.input, &mut files)?;
     request.name_results(&mut files);
     files.check()?;
-    let (frames_in, intrinsics) = open(&plan.camera)?;
+    let (frames_in, intrinsics) = open(&plan.camera, request.input.calibration_named())?;
     let poser = plan.poser(intrinsics)?;
     let raw = request
         .markers
@@ -107,6 +107,15 @@ pub fn track(request: &TrackRequest, stop: &AtomicBool) -> Result<Report> {
         return Err(failure);
     }
     Ok(run.report(&ended, interrupts && stop.load(Ordering::Relaxed)))
+}
+
+impl TrackInput {
+    fn calibration_named(&self) -> CalibrationNamed {
+        match self {
+            Self::Scene(_) => CalibrationNamed::ByKey,
+            Self::RecordingWithScene(..) | Self::LoneMarkers { .. } => CalibrationNamed::ByOption,
+        }
+    }
 }
 
 impl TrackRequest {
@@ -215,17 +224,14 @@ impl TrackRun<'_> {
 }
 
 /// Opens a recording or begins to open a camera, with its calibration.
-fn open(camera: &CameraSettings) -> Result<(Frames, Intrinsics)> {
+fn open(camera: &CameraSettings, named: CalibrationNamed) -> Result<(Frames, Intrinsics)> {
     if !is_live(&camera.source) {
-        let (source, intrinsics) = source::open(camera)?;
+        let (source, intrinsics) = source::open_named(camera, named)?;
         return Ok((Frames::Recorded(source), intrinsics));
     }
     let input = LiveInput::of(camera)?;
     let Some(intrinsics) = input.calibration else {
-        bail!(
-            "{} carries no calibration: give one (--calibration FILE; in a scene, [camera] calibration)",
-            camera.source
-        );
+        bail!(named.missing(&camera.source));
     };
     let now = Arc::new(Stopwatch::clock());
     let capture = LiveCapture::start(&camera.source, &input.options(false), now, None);

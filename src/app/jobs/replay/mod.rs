@@ -197,6 +197,7 @@ impl ReplayRequest {
 /// A frame on its way to the files.
 struct DrawnFrame {
     index: u32,
+    time_secs: f64,
     rgba: Vec<u8>,
     layers: Option<Layers>,
 }
@@ -375,6 +376,7 @@ impl ReplayRun<'_> {
         Ok((
             DrawnFrame {
                 index: frame.index,
+                time_secs: frame.time_secs,
                 rgba,
                 layers,
             },
@@ -448,13 +450,14 @@ fn write_stage(
     let mut encode_ms = Vec::new();
     for DrawnFrame {
         index,
+        time_secs,
         rgba,
         layers,
     } in from_renderer
     {
         let (written, ms) = Stopwatch::time(|| -> Result<()> {
             if let Some(sink) = &mut sink {
-                sink.push(index, size_px, &rgba)?;
+                sink.push((index, time_secs), size_px, &rgba)?;
             }
             if let (Some(sink), Some(layers)) = (&mut sink, &layers) {
                 sink.push_layers(index, size_px, layers, &request.layers)?;
