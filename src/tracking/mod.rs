@@ -32,15 +32,17 @@ mod survey;
 mod template_match;
 mod tracked_anchor;
 mod tracker;
+mod wanted;
 
 use glam::DAffine3;
 
 pub use aruco::{Quad, rejected_quads};
 pub use detector::{Detection, Detector};
+pub use light::grey_from_rgba;
 pub use printed_marker::{Cell, PrintedMarker};
 pub use prints::printed_cells;
 pub use survey::Survey;
-pub use tracker::{Tracker, grey_from_rgba};
+pub use tracker::Tracker;
 
 /// How far a pose can be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,8 +2,8 @@
 
 mod degenerate;
 mod room;
-mod unlikely;
 pub mod sizes;
+mod unlikely;
 
 use crate::light::Light;
 use crate::scene::{Object, Scene};
