@@ -1,5 +1,5 @@
 // Surfaces and how they reflect one light, for all passes that shade.
-//!include "common.wgsl"
+//!include "area_lights.wgsl"
 
 @group(0) @binding(0) var<uniform> view: AnchorView;
 @group(1) @binding(0) var<uniform> light: CameraLight;
@@ -41,18 +41,21 @@ fn placed(corner: SurfaceCorner) -> Surface {
 }
 
 fn irradiance(surface: Surface, outside: bool) -> vec3f {
-    let arriving = incidence(light, surface.point_in_camera);
     let normal = unit(surface.normal_in_camera) * select(-1.0, 1.0, outside);
-    return arriving.irradiance * max(dot(normal, arriving.direction), 0.0);
+    return incidence(light, surface.point_in_camera, normal).irradiance;
 }
 
 // Radiance of a virtual surface towards the camera.
 fn radiance(surface: Surface, outside: bool) -> vec3f {
-    let arriving = incidence(light, surface.point_in_camera);
     let normal = unit(surface.normal_in_camera) * select(-1.0, 1.0, outside);
+    let arriving = incidence(light, surface.point_in_camera, normal);
     let to_camera = normalize(-surface.point_in_camera);
-    let reflected = reflectance(surface.material.rgb, surface.material.a, normal, arriving.direction, to_camera);
-    return arriving.irradiance * max(dot(normal, arriving.direction), 0.0) * reflected;
+    // The highlight of a light of some size is as much wider as the variances of its disc and of the slopes add up to (the
+    // halfway vector turns half as far as the light); a matt surface stays one.
+    let alpha = surface.material.a;
+    let roughness = select(0.0, min(sqrt(alpha * alpha + 0.125 * arriving.sine_squared), 1.0), alpha > 0.0);
+    let reflected = reflectance(surface.material.rgb, roughness, normal, arriving.direction, to_camera);
+    return arriving.irradiance * reflected;
 }
 
 // Where opposite normals meet there is none.

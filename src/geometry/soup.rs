@@ -9,6 +9,8 @@ pub(super) struct Side {
     pub normals: [Option<Vec3>; 3],
     /// Index into the list of materials.
     pub material: u32,
+    /// Number of the raw triangle that it is, or is a part of.
+    pub source: u32,
 }
 
 /// A triangle, seen from one side or, where the file has it in both orientations, from two.

@@ -8,7 +8,7 @@ use super::attachments::{kept, loaded, target};
 use super::background::{Background, PICTURE_FORMAT, VIDEO_GROUP};
 use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
-use super::gpu_scene::GpuScene;
+use super::gpu_scene::{DrawnLight, GpuScene};
 use super::light_sums::GAIN_FORMAT;
 use super::passes::Passes;
 use super::pipelines::{GroupLayout, PipelineDescription, overwritten, texels, untouched};
@@ -62,7 +62,7 @@ pub(super) struct Direct {
 }
 
 impl Direct {
-    pub fn new(gpu: &Gpu, background: &Background, glossy: bool) -> Self {
+    pub fn new(gpu: &Gpu, background: &Background, glossy: bool, shaped: bool) -> Self {
         let target =
             |label, format, usage| target(&gpu.device, label, background.size_px, format, 1, usage);
         let read = wgpu::TextureUsages::TEXTURE_BINDING;
@@ -72,6 +72,7 @@ impl Direct {
             // What a scene does not have costs nothing.
             constants: vec![
                 ("GLOSSY", f64::from(glossy)),
+                ("SHAPED", f64::from(shaped)),
                 ("DISTORTS", f64::from(background.distorts)),
             ],
         };
@@ -130,7 +131,13 @@ impl Direct {
         pass.set_pipeline(&self.nothing);
         pass.draw(0..3, 0..1);
         pass.set_bind_group(2, &frame.background.group, &[]);
-        gpu_scene.draw_surfaces(&mut pass, &self.depth_of_real, Role::Real, 0, pixels);
+        gpu_scene.draw_surfaces(
+            &mut pass,
+            &self.depth_of_real,
+            Role::Real,
+            DrawnLight::Whole(0),
+            pixels,
+        );
         let shading = [
             &self.light_on_virtual,
             &self.light_at_terminator,
@@ -160,7 +167,13 @@ impl Direct {
         let lit = Among::LitByReal;
         let by_virtual = gpu_scene.count_volumes(pass, volumes, lit, Role::Virtual, 0, pixels);
         if by_virtual {
-            gpu_scene.draw_surfaces(pass, &self.hidden_on_real, Role::Real, 0, pixels);
+            gpu_scene.draw_surfaces(
+                pass,
+                &self.hidden_on_real,
+                Role::Real,
+                DrawnLight::Whole(0),
+                pixels,
+            );
         }
         if (by_real || by_virtual) && !bounds.virtuals.is_empty() {
             set_scissor(pass, bounds.virtuals);
@@ -202,7 +215,13 @@ impl TechniquePasses for Direct {
         let mut pass = passes.begin("gain", None, &[gain], Some(kept(&self.depth_stencil)));
         set_scissor(&mut pass, pixels);
         pass.set_bind_group(2, &frame.background.group, &[]);
-        gpu_scene.draw_surfaces(&mut pass, &self.gain_on_real, Role::Real, 0, pixels);
+        gpu_scene.draw_surfaces(
+            &mut pass,
+            &self.gain_on_real,
+            Role::Real,
+            DrawnLight::Whole(0),
+            pixels,
+        );
     }
 }
 

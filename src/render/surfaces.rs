@@ -3,7 +3,7 @@
 
 use super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT};
 use super::gpu::Gpu;
-use super::pipelines::{PipelineDescription, added, overwritten, untouched};
+use super::pipelines::{PipelineDescription, added, overwritten, taken_off, untouched};
 use super::stencil::{ADDED, REAL_HIDES, SHADOW, VIRTUAL_SHADOW, depth_stencil_state, stencil};
 use super::uniforms::GEOMETRY_GROUPS;
 
@@ -15,6 +15,8 @@ pub(super) struct Surfaces {
     pub ambient_on_virtual: Sided,
     /// A light as it reaches real surfaces in the video.
     pub light_reaching_real: Sided,
+    /// A piece of a light that has reached real surfaces, taken off where real things hide it; the stencil's reference says so.
+    pub light_kept_from_real: Sided,
     /// A light where virtual things hide it from real surfaces.
     pub light_hidden_from_real: Sided,
     /// A light on virtual surfaces past all casters; the stencil's reference is 0, or 1 for surfaces that lie in no
@@ -78,7 +80,7 @@ pub(super) fn surface_description(
 }
 
 impl Surfaces {
-    pub fn new(gpu: &Gpu, samples: u32, glossy: bool) -> Self {
+    pub fn new(gpu: &Gpu, samples: u32, glossy: bool, shaped: bool) -> Self {
         let build = |fragment, stencil, targets: [wgpu::ColorTargetState; 2]| {
             let description = PipelineDescription {
                 shader: "surfaces.wgsl",
@@ -86,6 +88,7 @@ impl Surfaces {
                 fragment,
                 constants: vec![
                     ("GLOSSY", f64::from(glossy)),
+                    ("SHAPED", f64::from(shaped)),
                     ("MULTISAMPLED", f64::from(samples > 1)),
                 ],
                 groups: GEOMETRY_GROUPS.map(Some).to_vec(),
@@ -112,12 +115,18 @@ impl Surfaces {
         let taken = (wgpu::StencilOperation::Zero, VIRTUAL_SHADOW);
         let nothing = (wgpu::StencilOperation::Keep, 0);
         let reaching = stencil(equal, REAL_HIDES | ADDED, once);
+        let kept = stencil(equal, REAL_HIDES | ADDED, once);
         let hidden = stencil(other, VIRTUAL_SHADOW, taken);
         let unshadowed = stencil(at_most, SHADOW, nothing);
         Self {
             ambient_on_real: ambient("ambient_on_real"),
             ambient_on_virtual: ambient("ambient_on_virtual"),
             light_reaching_real: build("light_on_real", Some(reaching), [added(), untouched()]),
+            light_kept_from_real: build(
+                "light_on_real",
+                Some(kept),
+                [taken_off(format), untouched()],
+            ),
             light_hidden_from_real: build("light_on_real", Some(hidden), [untouched(), added()]),
             light_on_virtual: build("light_on_virtual", Some(unshadowed), [untouched(), added()]),
         }

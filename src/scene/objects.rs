@@ -7,7 +7,7 @@ use glam::{DAffine3, DVec3, Vec3};
 
 use super::anchors::unique_name;
 use super::error::{SceneError, suggestion};
-use super::mesh_file::{self, DEFAULT_ALBEDO, LoadedMesh};
+use super::mesh_file::{self, DEFAULT_ALBEDO, LoadedMesh, MeshReading, Up};
 use super::motion::{MotionKeys, motion};
 use super::named_files::FileKind;
 use super::placement::{POSITION, PlacementKeys, placement};
@@ -36,10 +36,14 @@ keys! {
     /// The shape of a thing.
     pub static SHAPE: ShapeKeys;
 
-    /// Its shape. Counter-clockwise seen from outside; materials from its MTL file (Kd is taken
-    /// as linear reflectance, Ns or Pr as roughness), textures are not read, polygons should be convex. A phantom is
+    /// Its shape. Counter-clockwise seen from outside; materials from its file or MTL file (Kd is taken
+    /// as linear reflectance, Ns or Pr as roughness; see docs/models.md). A phantom is
     /// always flat: normals in the file are passed over.
     mesh: Option<PathBuf>, FileKind::Mesh => Means(None, "none: a phantom may have rect_m");
+    /// Which axis of the mesh's file points up, along z of what it stands on.
+    up: Option<Up> => Means(None, "\"z\"");
+    /// What the longest side of the mesh is scaled to; the file's origin stays.
+    fit_m: Option<f64>, Numbers::above(0.0, 1e5).unit("m") => Means(None, "the numbers in the file are metres");
 }
 
 keys! {
@@ -51,7 +55,7 @@ keys! {
 }
 
 keys! {
-    /// What a thing stands on.
+    /// What a thing or a light stands on.
     pub static STANDING: StandingKeys;
 
     /// The board or marker that it stands on.
@@ -144,6 +148,8 @@ pub static PHANTOM_SECTION: Section = Section {
     shown: &[
         ("name", Example::Live("\"house\"")),
         ("mesh", Example::Live("\"models/house.obj\"")),
+        ("up", Example::Aside("\"y\"")),
+        ("fit_m", Example::Aside("0.1")),
         ("rect_m", Example::Aside("[-0.21, -0.1485, 0.21, 0.1485]")),
         ("on", Example::Live("\"table\"")),
         ("position_m", Example::Live("[-0.055, 0.035, 0.0]")),
@@ -176,6 +182,8 @@ pub static VIRTUAL_SECTION: Section = Section {
     shown: &[
         ("name", Example::Live("\"torus\"")),
         ("mesh", Example::Live("\"models/torus.obj\"")),
+        ("up", Example::Aside("\"y\"")),
+        ("fit_m", Example::Aside("0.1")),
         ("on", Example::Live("\"table\"")),
         ("position_m", Example::Live("[0.022, 0.0, 0.036]")),
         ("rotation_deg", Example::Live("[70, 0, 35]")),
@@ -240,6 +248,7 @@ fn table_top(table: &Table) -> Result<Object, SceneError> {
         mesh,
         report,
         materials,
+        material_names,
         ..
     } = rectangle(&rect, albedo)?;
     Ok(Object {
@@ -247,6 +256,9 @@ fn table_top(table: &Table) -> Result<Object, SceneError> {
         mesh,
         mesh_report: report,
         materials,
+        material_names,
+        textures: Vec::new(),
+        notes: Vec::new(),
         anchor: 0,
         motion: None,
         anchor_from_object: DAffine3::from_translation(DVec3::Z * height_m),
@@ -280,7 +292,14 @@ fn object(
         (Some(_), Some(rect)) => {
             return Err(rect.error("the thing has a mesh; allowed: mesh or rect_m, not both"));
         }
-        (Some(mesh), None) => mesh_file::load(&mesh, SHAPE.mesh.takes, normals)?,
+        (Some(mesh), None) => {
+            let reading = MeshReading {
+                normals,
+                up: SHAPE.up.read(table)?,
+                fit_m: SHAPE.fit_m.read(table)?,
+            };
+            mesh_file::load(&mesh, SHAPE.mesh.takes, reading)?
+        }
         (None, Some(rect)) => rectangle(&rect, DVec3::splat(DEFAULT_ALBEDO))?,
         (None, None) if kind == ThingKind::Phantom => {
             return Err(table.error(format!("\"{name}\": no shape; mesh or rect_m is expected")));
@@ -303,6 +322,9 @@ fn object(
         mesh,
         mesh_report: loaded.report,
         materials,
+        material_names: loaded.material_names,
+        textures: loaded.textures,
+        notes: loaded.notes,
         anchor,
         motion: motion(table, anchor)?,
         anchor_from_object,
@@ -311,7 +333,8 @@ fn object(
     })
 }
 
-fn anchor_index(on: &Value, anchors: &[Anchor]) -> Result<usize, SceneError> {
+/// The anchor of a name.
+pub fn anchor_index(on: &Value, anchors: &[Anchor]) -> Result<usize, SceneError> {
     let written = on.text()?;
     anchors
         .iter()
@@ -363,10 +386,10 @@ fn rectangle(value: &Value, albedo: DVec3) -> Result<LoadedMesh, SceneError> {
     Ok(LoadedMesh {
         mesh,
         report,
-        materials: vec![Material {
-            albedo,
-            roughness: None,
-        }],
+        materials: vec![Material::matt(albedo)],
+        material_names: vec![String::new()],
         is_given: vec![true],
+        textures: Vec::new(),
+        notes: Vec::new(),
     })
 }

@@ -235,8 +235,8 @@ fn expected_radiance(material: &Material, lights: &[Light], point: DVec3, normal
 
 fn hold_sphere(name: &str, roughness: Option<f64>, lights: &[Light]) {
     let material = Material {
-        albedo: ALBEDO,
         roughness,
+        ..Material::matt(ALBEDO)
     };
     let (picture, _) = render(
         &sphere_scene(material, lights.to_vec()),
@@ -297,10 +297,7 @@ fn lights_add_up_in_linear_light() {
     hold_sphere("two lights", None, &[first, second]);
 
     // The same without the twin: the pictures themselves add up.
-    let material = Material {
-        albedo: ALBEDO,
-        roughness: None,
-    };
+    let material = Material::matt(ALBEDO);
     let picture = |lights: &[Light]| {
         render(
             &sphere_scene(material, lights.to_vec()),
@@ -431,10 +428,7 @@ fn hold_gains(name: &str, real: &[Crate], seeming: &[Crate], light: Light) -> [u
     for (index, pixel) in pixels(SIZE_PX) {
         // The real boxes' own faces are no table.
         let (eye, _) = ray(&camera, pixel);
-        let sight = Light::Point {
-            position_m: eye,
-            intensity: DVec3::ONE,
-        };
+        let sight = Light::point(eye, DVec3::ONE);
         let seen = |point: DVec3| real.iter().any(|it| it.hides(point, &sight));
         if !clear[index] || everywhere(&camera, pixel, 1.5, seen) != Some(false) {
             continue;

@@ -27,6 +27,7 @@ use crate::app::files::poses_file::{GivenPoses, PosesText};
 use crate::app::files::result_kind::ResultKind;
 use crate::app::files::video_writer::Codec;
 use crate::app::input::mirror_watch::MirrorWatch;
+use crate::app::input::sightings::Sightings;
 use crate::app::input::source;
 use crate::app::scene_warnings;
 use crate::app::stages::budget_words::budget_words;
@@ -87,9 +88,10 @@ pub fn replay(request: &ReplayRequest, stop: &AtomicBool) -> Result<Report> {
     request.check_layers()?;
     let poser = match &request.poses_from {
         Some(path) => Poser::Given(GivenPoses::read(path, &scene.anchors)?),
-        None => Poser::Tracker(
-            Box::new(Tracker::new(&scene.tracking, &scene.anchors, intrinsics)?),
-            MirrorWatch::new(&scene.tracking, &scene.anchors),
+        None => Poser::tracker(
+            Tracker::new(&scene.tracking, &scene.anchors, intrinsics)?,
+            MirrorWatch::new(&scene.tracking, scene.families()),
+            Sightings::of_anchors(&scene.anchors),
         ),
     };
     let drawing = (request.out.is_some() || request.sheet.is_some())
@@ -410,7 +412,7 @@ impl ReplayRun<'_> {
             lost: names.zip(self.tally.lost.iter().copied()).collect(),
             detector: match &self.request.poses_from {
                 Some(path) => format!("none: poses from {}", path.display()),
-                None => detector_in_words(&self.scene.tracking),
+                None => detector_in_words(&self.scene.tracking, &self.scene.families()),
             },
             technique: Some(self.scene.chosen_technique().0.name()),
             adapter,
