@@ -4,8 +4,7 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec2, Vec3, Vec4, Vec4Swizzles as _};
 
-use super::mesh::RawTriangle;
-use super::soup::Face;
+use super::soup::{Face, RawTriangle};
 
 /// What a corner of a triangle has besides its place and normal.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -9,6 +9,7 @@ pub use super::looks::{CornerLook, RawLooks};
 use super::mend::{Mended, has_three_vertices, mend, restore_backs};
 use super::normals::{face_normal, made_normals};
 use super::orient::turned_triangles;
+pub use super::soup::RawTriangle;
 use super::soup::{EdgeUse, Face, Sets, Side, by_edge, edge_uses, unbalanced_edges};
 use super::winding::winding_number;
 
@@ -27,17 +28,6 @@ pub struct Mesh {
     pub looks: Vec<CornerLook>,
     /// Indices into `looks` for each corner of each triangle; empty with them.
     pub corner_looks: Vec<[u32; 3]>,
-}
-
-/// A triangle as a file has it, before welding.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RawTriangle {
-    /// Indices into the raw positions.
-    pub vertices: [u32; 3],
-    /// Normals that the file gives; they need not have unit length, and a zero one counts as missing.
-    pub normals: [Option<Vec3>; 3],
-    /// Index into the list of materials.
-    pub material: u32,
 }
 
 /// What [`Mesh::weld`] found and did.
@@ -211,6 +201,15 @@ impl Mesh {
             .iter_mut()
             .for_each(|looks| looks.swap(1, 2));
         self
+    }
+
+    /// The shape and its materials alone, without what textures and colours need.
+    pub fn without_looks(&self) -> Self {
+        Self {
+            looks: Vec::new(),
+            corner_looks: Vec::new(),
+            ..self.clone()
+        }
     }
 
     pub(super) fn without_unused_positions(mut self) -> Self {

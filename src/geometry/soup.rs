@@ -2,6 +2,17 @@
 
 use glam::{DVec3, Vec3};
 
+/// A triangle as a file has it, before welding.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RawTriangle {
+    /// Indices into the raw positions.
+    pub vertices: [u32; 3],
+    /// Normals that the file gives; they need not have unit length, and a zero one counts as missing.
+    pub normals: [Option<Vec3>; 3],
+    /// Index into the list of materials.
+    pub material: u32,
+}
+
 /// What one side of a face looks like.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Side {

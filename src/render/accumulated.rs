@@ -12,7 +12,7 @@ use super::light_sums::{BY_GAIN, LightSums};
 use super::passes::Passes;
 use super::screen_bounds::ScreenBounds;
 use super::shown::Shown;
-use super::surfaces::Surfaces;
+use super::surfaces::{SurfaceKinds, Surfaces};
 use super::technique::{FrameContext, TechniquePasses};
 use super::uniforms::GEOMETRY_GROUPS;
 use super::volumes::{Among, Volumes, set_scissor};
@@ -25,9 +25,9 @@ pub(super) struct Accumulated {
 }
 
 impl Accumulated {
-    pub fn new(gpu: &Gpu, background: &Background, samples: u32, glossy: bool) -> Self {
+    pub fn new(gpu: &Gpu, background: &Background, samples: u32, kinds: SurfaceKinds) -> Self {
         Self {
-            surfaces: Surfaces::new(gpu, samples, glossy),
+            surfaces: Surfaces::new(gpu, samples, kinds),
             volumes: Volumes::new(gpu, &GEOMETRY_GROUPS, samples, &[gpu.light_format; 2]),
             sums: LightSums::new(gpu, background, samples, BY_GAIN),
         }

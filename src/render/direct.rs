@@ -15,7 +15,7 @@ use super::pipelines::{GroupLayout, PipelineDescription, overwritten, texels, un
 use super::screen_bounds::ScreenBounds;
 use super::shown::Shown;
 use super::stencil::{SHADOW, VIRTUAL_SHADOW, depth_stencil_state, stencil};
-use super::surfaces::{Sided, surface_description};
+use super::surfaces::{Sided, SurfaceKinds, surface_description};
 use super::technique::{FrameContext, TechniquePasses};
 use super::uniforms::GEOMETRY_GROUPS;
 use super::volumes::{Among, Volumes, set_scissor};
@@ -62,16 +62,17 @@ pub(super) struct Direct {
 }
 
 impl Direct {
-    pub fn new(gpu: &Gpu, background: &Background, glossy: bool) -> Self {
+    pub fn new(gpu: &Gpu, background: &Background, kinds: SurfaceKinds) -> Self {
         let target =
             |label, format, usage| target(&gpu.device, label, background.size_px, format, 1, usage);
         let read = wgpu::TextureUsages::TEXTURE_BINDING;
         let ambient = target("ambient light", PICTURE_FORMAT, read);
         let surface = SurfacesOverVideo {
             gpu,
+            kinds,
             // What a scene does not have costs nothing.
             constants: vec![
-                ("GLOSSY", f64::from(glossy)),
+                ("GLOSSY", f64::from(kinds.glossy)),
                 ("DISTORTS", f64::from(background.distorts)),
             ],
         };
@@ -209,6 +210,7 @@ impl TechniquePasses for Direct {
 /// The common part of all pipelines that draw surfaces over the video.
 struct SurfacesOverVideo<'a> {
     gpu: &'a Gpu,
+    kinds: SurfaceKinds,
     constants: Vec<(&'static str, f64)>,
 }
 
@@ -229,6 +231,10 @@ impl SurfacesOverVideo<'_> {
             constants,
             targets: vec![written(PICTURE_FORMAT), written(PICTURE_FORMAT)],
             ..self.over_video(None)
+        };
+        let description = match fragment {
+            "depth_alone" => description,
+            _ => self.kinds.of_virtual(description),
         };
         Sided::new(self.gpu, &description)
     }

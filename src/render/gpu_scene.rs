@@ -16,9 +16,10 @@ use super::detail::chosen_levels;
 use super::gpu::Gpu;
 use super::indirect::Indirect;
 use super::insides::{Insides, insides};
+use super::materials::{materials_group, needs_looks};
 use super::screen_bounds::{ScreenBounds, screen_bounds};
 use super::shown::Shown;
-use super::surfaces::Sided;
+use super::surfaces::{Sided, SurfaceKinds};
 use super::uniforms::{AnchorView, CameraLight, LIGHT_GROUP, UniformRow, VIEW_GROUP};
 use super::volumes::{Among, Volumes, set_scissor};
 
@@ -37,8 +38,10 @@ pub(super) struct GpuScene {
     intrinsics: Intrinsics,
     /// Those that cast shadow volumes.
     lights: Vec<Light>,
-    /// Whether any virtual thing has a glossy layer.
-    pub glossy: bool,
+    /// What the virtual things' materials have.
+    pub kinds: SurfaceKinds,
+    /// The materials, where there are such as need it.
+    materials: Option<wgpu::BindGroup>,
     batches: Vec<SurfaceBatch>,
     things: Vec<AnchoredModel>,
     /// For each thing the level that is drawn.
@@ -65,7 +68,7 @@ pub(super) struct GpuScene {
 impl GpuScene {
     pub fn new(gpu: &Gpu, scene: &Scene, intrinsics: Intrinsics, lit_by: LitBy) -> Self {
         let device = &gpu.device;
-        let view_count = scene.anchors.len() + scene.virtuals.len();
+        let view_count = scene.node_count() + scene.virtuals.len();
         let views = UniformRow::new::<AnchorView>(device, "views", view_count);
         let camera_lights = UniformRow::new::<CameraLight>(device, "lights", scene.lights.len());
         let mut known_levels = KnownLevels::default();
@@ -75,6 +78,7 @@ impl GpuScene {
             virtual_corners,
         } = AnchorGeometry::new(device, scene, &mut known_levels);
         let world_virtuals = virtual_corners.iter().find(|(anchor, _)| *anchor == 0);
+        let looks = scene.virtuals.iter().any(needs_looks);
         Self {
             lit_by,
             standing: standing(scene),
@@ -95,12 +99,16 @@ impl GpuScene {
             things,
             view_group: gpu.bind_group(&VIEW_GROUP, [views.binding()]),
             light_group: gpu.bind_group(&LIGHT_GROUP, [camera_lights.binding()]),
-            camera_from_anchor: vec![None; scene.anchors.len()],
+            camera_from_anchor: vec![None; scene.node_count()],
             lights: lights(scene, lit_by),
-            glossy: scene.virtuals.iter().any(|object| {
-                let mut materials = object.materials.iter();
-                materials.any(|material| material.roughness.is_some())
-            }),
+            kinds: SurfaceKinds {
+                glossy: scene.virtuals.iter().any(|object| {
+                    let mut materials = object.materials.iter();
+                    materials.any(|material| material.roughness.is_some())
+                }),
+                looks,
+            },
+            materials: looks.then(|| materials_group(gpu, scene)),
             intrinsics,
             views,
             camera_lights,
@@ -475,6 +483,16 @@ impl GpuScene {
         pass.set_bind_group(0, &self.view_group, &[view]);
         pass.set_vertex_buffer(0, batch.corners.slice(..));
         pass.set_vertex_buffer(1, batch.indirect.slice(..));
+        if let Some(looks) = &batch.looks {
+            pass.set_vertex_buffer(2, looks.slice(..));
+        }
+        if let Some(materials) = self
+            .materials
+            .as_ref()
+            .filter(|_| batch.role == Role::Virtual)
+        {
+            pass.set_bind_group(3, materials, &[]);
+        }
         pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
     }
 }

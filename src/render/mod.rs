@@ -18,6 +18,7 @@ mod indirect;
 mod insides;
 mod layers;
 mod light_sums;
+mod materials;
 mod passes;
 mod pipelines;
 mod quality_controller;

@@ -197,6 +197,7 @@ impl UniformRow {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::materials::{MapOnGpu, MaterialOnGpu};
     use crate::render::shader;
     use crate::render::shafts::data::ShaftFrame;
     use crate::shafts::shadow_atlas::MappedSource;
@@ -239,6 +240,28 @@ mod tests {
         assert_twins!(&common, CameraLight, place_in_camera, power);
         let volumes = shader::source("volumes.wgsl", &[]).unwrap();
         assert_twins!(&volumes, CastingLight, place_in_anchor, end_in_anchor);
+        let materials = shader::source("materials.wgsl", &[]).unwrap();
+        let look = "struct Look { albedo: vec3f, roughness: f32, metallic: f32, emission: vec3f, occlusion: f32, \
+                    opacity: f32, normal: vec3f }\nfn unit(v: vec3f) -> vec3f { return v; }\n";
+        let materials = format!("{look}{materials}");
+        assert_twins!(&materials, MapOnGpu, linear, offset, place, size);
+        assert_twins!(
+            &materials,
+            MaterialOnGpu,
+            albedo,
+            roughness,
+            emission,
+            metallic,
+            opacity,
+            cutoff,
+            normal_scale,
+            occlusion_strength,
+            unlit,
+            padding_1,
+            padding_2,
+            padding_3,
+            maps
+        );
         let source = shader::source("mapped_source.wgsl", &[]).unwrap();
         assert_twins!(
             &source,

@@ -11,10 +11,10 @@ use super::obj::files::named_file;
 use super::plain_file::{self, MOST_MESH};
 use super::raw_model::RawModel;
 use super::reader::Value;
-use super::{obj, ply, stl, texture_file};
+use super::{gltf, obj, ply, stl, texture_file};
 use crate::geometry::mesh::{Mesh, MeshReport};
 use crate::light::Material;
-use crate::light::material::Map;
+use crate::light::material::{Coverage, Map};
 use crate::light::texture::Texture;
 
 /// Diffuse reflectance where neither the scene nor a mesh's file gives one.
@@ -106,6 +106,7 @@ fn read(
 ) -> Result<LoadedMesh, SceneError> {
     let format = MeshFormat::of(path, &bytes);
     let mut model = match format {
+        MeshFormat::Gltf => gltf::read(path, &bytes, note_read)?,
         MeshFormat::Obj => obj::read(path, &bytes, note_read)?,
         MeshFormat::Stl => stl::read(path, &bytes)?,
         MeshFormat::Ply => {
@@ -116,11 +117,12 @@ fn read(
             model
         }
         MeshFormat::Other(what) => {
-            let message = format!("{what} is not read; allowed: OBJ, PLY, STL");
+            let message = format!("{what} is not read; allowed: glTF, OBJ, PLY, STL");
             return Err(SceneError::of_file(path, message));
         }
     };
     drop(bytes);
+    note_coverage(&mut model, path, reading.normals);
     place(
         &mut model,
         path,
@@ -172,6 +174,8 @@ pub fn welded(mut model: RawModel, normals: Normals) -> Option<LoadedMesh> {
 /// What a mesh's file is, by its content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MeshFormat {
+    /// Khronos's, binary or not.
+    Gltf,
     /// Wavefront's, and whatever is nothing else.
     Obj,
     /// Of text or of bytes.
@@ -188,7 +192,9 @@ impl MeshFormat {
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         let head = String::from_utf8_lossy(&bytes[..bytes.len().min(512)]);
         let head = head.trim_start_matches('\u{feff}').trim_start();
-        if ply::is_ply(bytes) {
+        if bytes.starts_with(b"glTF") || extension == "glb" || extension == "gltf" {
+            Self::Gltf
+        } else if ply::is_ply(bytes) {
             Self::Ply
         } else if stl::is_binary(bytes) || stl::is_text(bytes) || extension == "stl" {
             Self::Stl
@@ -215,8 +221,34 @@ impl MeshFormat {
 
     /// Which axis points up, unless the scene says it.
     fn up(self) -> Up {
-        Up::Z
+        match self {
+            Self::Gltf => Up::Y,
+            Self::Obj | Self::Stl | Self::Ply | Self::Other(_) => Up::Z,
+        }
     }
+}
+
+/// Tells what becomes of materials that are not opaque.
+fn note_coverage(model: &mut RawModel, path: &Path, normals: Normals) {
+    let mut has = |is_meant: fn(&Coverage) -> bool, of_phantom, of_virtual| {
+        let mut coverages = model.materials.iter().map(|given| given.material.coverage);
+        if coverages.any(|coverage| is_meant(&coverage)) {
+            let is_phantom = normals == Normals::Flat;
+            model
+                .notes
+                .add_of(path, if is_phantom { of_phantom } else { of_virtual });
+        }
+    };
+    has(
+        |coverage| *coverage == Coverage::Blend,
+        "what is half transparent hides as if it were opaque: a phantom is there or not",
+        "what is half transparent is drawn, and casts its shadow, as if it were opaque",
+    );
+    has(
+        |coverage| matches!(coverage, Coverage::Mask { .. }),
+        "what is cut out by a picture's opacity is there all the same: a phantom has its whole triangles",
+        "what is cut out by a picture's opacity still casts the shadow of its whole triangles",
+    );
 }
 
 /// Turns a model upright and scales it.

@@ -21,9 +21,11 @@ mod dictionary;
 mod error;
 mod family;
 pub mod format;
+pub mod gltf;
 mod lights;
 mod load;
 pub mod mesh_file;
+mod motion;
 mod named_files;
 pub mod notes;
 pub mod obj;
@@ -53,6 +55,7 @@ pub use error::{SceneError, TextPlace};
 pub use family::{Codes, Family};
 pub use lights::unit_direction;
 pub use load::Reading;
+pub use motion::{Motion, PathEnd, Station};
 pub use named_files::{FileKind, NamedFile};
 pub use placement::Placement;
 pub use quality::Quality;
@@ -145,8 +148,11 @@ pub struct Object {
     pub textures: Vec<Arc<Texture>>,
     /// What of its file is passed over or taken for something else, one sentence each.
     pub notes: Vec<String>,
-    /// Index into [`Scene::anchors`].
+    /// The node that it stands still on: an anchor, or, beyond the anchors, one that moves with it
+    /// ([`Scene::camera_from_nodes`]).
     pub anchor: usize,
+    /// How it moves by itself.
+    pub motion: Option<Motion>,
     /// Placement with rotation and scale; its determinant is never 0.
     pub anchor_from_object: DAffine3,
     /// Whether it takes light away from others.

@@ -8,6 +8,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use super::anchors::unique_name;
 use super::error::{SceneError, suggestion};
 use super::mesh_file::{self, DEFAULT_ALBEDO, LoadedMesh, MeshReading, Up};
+use super::motion::{MotionKeys, motion};
 use super::named_files::FileKind;
 use super::placement::{POSITION, PlacementKeys, placement};
 use super::ranges::Numbers;
@@ -35,12 +36,12 @@ keys! {
     /// The shape of a thing.
     pub static SHAPE: ShapeKeys;
 
-    /// Its shape. Counter-clockwise seen from outside; materials from its file or MTL file (Kd is taken
-    /// as linear reflectance, Ns or Pr as roughness; see docs/models.md). A phantom is
+    /// Its shape: glTF, OBJ, PLY or STL. Counter-clockwise seen from outside; materials from its file or MTL file (Kd is
+    /// taken as linear reflectance, Ns or Pr as roughness; see docs/gltf.md). A phantom is
     /// always flat: normals in the file are passed over.
     mesh: Option<PathBuf>, FileKind::Mesh => Means(None, "none: a phantom may have rect_m");
     /// Which axis of the mesh's file points up, along z of what it stands on.
-    up: Option<Up> => Means(None, "\"z\"");
+    up: Option<Up> => Means(None, "\"z\"; glTF: \"y\"");
     /// What the longest side of the mesh is scaled to; the file's origin stays.
     fit_m: Option<f64>, Numbers::above(0.0, 1e5).unit("m") => Means(None, "the numbers in the file are metres");
 }
@@ -141,6 +142,7 @@ pub static PHANTOM_SECTION: Section = Section {
         RectangleKeys::ALL,
         StandingKeys::ALL,
         PlacementKeys::ALL,
+        MotionKeys::ALL,
         ThingKeys::ALL,
     ],
     shown: &[
@@ -153,6 +155,11 @@ pub static PHANTOM_SECTION: Section = Section {
         ("position_m", Example::Live("[-0.055, 0.035, 0.0]")),
         ("rotation_deg", Example::Live("[0, 0, 20]")),
         ("scale", Example::Live("1")),
+        ("turn_deg_per_s", Example::Aside("30")),
+        (
+            "path",
+            Example::Aside("[{ time_s = 0 }, { time_s = 2, position_m = [0.1, 0, 0] }]"),
+        ),
         ("material", Example::Live("{ albedo = [0.62, 0.55, 0.42] }")),
     ],
     is_aside: false,
@@ -168,6 +175,7 @@ pub static VIRTUAL_SECTION: Section = Section {
         ShapeKeys::ALL,
         StandingKeys::ALL,
         PlacementKeys::ALL,
+        MotionKeys::ALL,
         ThingKeys::ALL,
         VirtualKeys::ALL,
     ],
@@ -180,6 +188,11 @@ pub static VIRTUAL_SECTION: Section = Section {
         ("position_m", Example::Live("[0.022, 0.0, 0.036]")),
         ("rotation_deg", Example::Live("[70, 0, 35]")),
         ("scale", Example::Live("[1, 1, 1]")),
+        ("turn_deg_per_s", Example::Aside("30")),
+        (
+            "path",
+            Example::Aside("[{ time_s = 0 }, { time_s = 2, position_m = [0.1, 0, 0] }]"),
+        ),
         (
             "material",
             Example::Live("{ albedo = [0.75, 0.16, 0.12], roughness = 0.4 }"),
@@ -219,6 +232,11 @@ pub fn objects(root: &Table, anchors: &[Anchor]) -> Result<(Vec<Object>, Vec<Obj
             &mut name_lines,
         )?);
     }
+    // Each moving thing has a node of its own, after the anchors.
+    let moving = phantoms.iter_mut().chain(&mut virtuals);
+    for (index, thing) in moving.filter(|thing| thing.motion.is_some()).enumerate() {
+        thing.anchor = anchors.len() + index;
+    }
     Ok((phantoms, virtuals))
 }
 
@@ -242,6 +260,7 @@ fn table_top(table: &Table) -> Result<Object, SceneError> {
         textures: Vec::new(),
         notes: Vec::new(),
         anchor: 0,
+        motion: None,
         anchor_from_object: DAffine3::from_translation(DVec3::Z * height_m),
         casts: false,
         visible: TABLE.visible.read(table)?,
@@ -288,15 +307,16 @@ fn object(
         (None, None) => return Err(table.error(format!("\"{name}\": no shape; mesh is expected"))),
     };
     let mut materials = loaded.materials;
+    let mut mesh = loaded.mesh;
     if let Some(material) = MATERIAL_SECTION.table(table)? {
-        override_materials(&mut materials, &material)?;
+        override_materials(&mut materials, &mut mesh, &material)?;
     }
     // A mirror turns each triangle's winding; turning it back keeps the outside outside.
     let mirrored = anchor_from_object.matrix3.determinant() < 0.0;
     let mesh = if mirrored {
-        loaded.mesh.with_winding_reversed()
+        mesh.with_winding_reversed()
     } else {
-        loaded.mesh
+        mesh
     };
     Ok(Object {
         name,
@@ -307,6 +327,7 @@ fn object(
         textures: loaded.textures,
         notes: loaded.notes,
         anchor,
+        motion: motion(table, anchor)?,
         anchor_from_object,
         casts,
         visible,
@@ -327,17 +348,29 @@ fn anchor_index(on: &Value, anchors: &[Anchor]) -> Result<usize, SceneError> {
         })
 }
 
-/// Each key that the scene gives replaces that of every material of the mesh.
-fn override_materials(materials: &mut [Material], table: &Table) -> Result<(), SceneError> {
-    if let Some(albedo) = MATERIAL.albedo.read(table)? {
-        materials
-            .iter_mut()
-            .for_each(|material| material.albedo = albedo);
+/// Each key that the scene gives replaces that of every material of the mesh, with the picture that says it and, of the
+/// colour, the corners' colours.
+fn override_materials(
+    materials: &mut [Material],
+    mesh: &mut Mesh,
+    table: &Table,
+) -> Result<(), SceneError> {
+    let albedo = MATERIAL.albedo.read(table)?;
+    let roughness = MATERIAL.roughness.read(table)?;
+    for material in materials {
+        if let Some(albedo) = albedo {
+            material.albedo = albedo;
+            material.maps.color = None;
+        }
+        if let Some(roughness) = roughness {
+            material.roughness = Some(roughness);
+            material.maps.roughness = None;
+        }
     }
-    if let Some(roughness) = MATERIAL.roughness.read(table)? {
-        materials
-            .iter_mut()
-            .for_each(|material| material.roughness = Some(roughness));
+    if albedo.is_some() {
+        for look in &mut mesh.looks {
+            look.color = Vec3::ONE.extend(look.color.w);
+        }
     }
     Ok(())
 }

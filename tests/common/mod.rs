@@ -99,6 +99,7 @@ pub fn object(name: &str, mesh: Mesh, albedo: DVec3, world_from_object: DAffine3
         textures: Vec::new(),
         notes: Vec::new(),
         anchor: 0,
+        motion: None,
         anchor_from_object: world_from_object,
         casts: true,
         visible: true,

@@ -100,13 +100,13 @@ pub enum LightNotFound {
 }
 
 impl PicturedThings {
-    /// What a scene's phantoms are in a frame with these poses; `None` while the world is not seen.
+    /// What a scene's phantoms are in a frame where the nodes are there; `None` while the world is not seen.
     pub fn new(
         scene: &Scene,
         intrinsics: Intrinsics,
-        camera_from_anchor: &[Option<DAffine3>],
+        camera_from_node: &[Option<DAffine3>],
     ) -> Option<Self> {
-        let camera_from_world = camera_from_anchor.first().copied().flatten()?;
+        let camera_from_world = camera_from_node.first().copied().flatten()?;
         let world_from_camera = camera_from_world.inverse();
         let camera = PosedCamera {
             intrinsics,
@@ -116,8 +116,7 @@ impl PicturedThings {
         let mut reflectors = Vec::new();
         let mut vertices = Vec::new();
         for phantom in scene.phantoms.iter().filter(|phantom| phantom.visible) {
-            let Some(camera_from_anchor) =
-                camera_from_anchor.get(phantom.anchor).copied().flatten()
+            let Some(camera_from_anchor) = camera_from_node.get(phantom.anchor).copied().flatten()
             else {
                 continue;
             };
@@ -131,16 +130,15 @@ impl PicturedThings {
                 .collect();
             let corners = |triangle: &[u32; 3]| triangle.map(|index| positions[index as usize]);
             let triangles: Vec<[DVec3; 3]> = phantom.mesh.triangles.iter().map(corners).collect();
-            let materials = phantom.mesh.triangle_materials.iter();
-            reflectors.extend(triangles.iter().zip(materials).map(|(corners, &material)| {
-                Reflector {
-                    corners: corners.map(|corner| corner.as_vec3()),
-                    albedo: phantom
-                        .materials
-                        .get(material as usize)
-                        .map_or(DVec3::ZERO, |material| material.albedo),
-                }
-            }));
+            reflectors.extend(
+                triangles
+                    .iter()
+                    .enumerate()
+                    .map(|(number, corners)| Reflector {
+                        corners: corners.map(|corner| corner.as_vec3()),
+                        albedo: phantom.albedo(number),
+                    }),
+            );
             things.push((triangles, phantom.casts));
             if phantom.casts {
                 vertices.extend(positions.iter().filter_map(|&world_m| {
@@ -152,7 +150,7 @@ impl PicturedThings {
                 }));
             }
         }
-        let anchors = scene.anchors.iter().zip(camera_from_anchor);
+        let anchors = scene.anchors.iter().zip(camera_from_node);
         let prints = anchors.filter_map(|(anchor, pose)| {
             let anchor_from_world = (world_from_camera * (*pose)?).inverse();
             Some(

@@ -14,6 +14,7 @@ use toml_edit::{DocumentMut, Item, Table, Value};
 
 use crate::app::files::new_file::sync_folder;
 use crate::scene::format::{CAMERA, CAMERA_SECTION};
+use crate::scene::gltf::copies::with_files_named;
 use crate::scene::mesh_file::MeshFormat;
 use crate::scene::obj::libraries::{with_libraries_named, with_maps_named};
 use crate::scene::plain_file::{self, MOST_MESH};
@@ -162,11 +163,30 @@ impl Copies<'_> {
         Ok(Some(name))
     }
 
+    /// Copies a glTF file with its buffers and pictures into a folder of its own.
+    fn copy_gltf(&self, mesh: &Path, bytes: &[u8], folder: &str) -> Result<String> {
+        let parts = OwnNames::default();
+        let with_own_names = with_files_named(mesh, bytes, |part| {
+            let (number, is_new) = parts.number(part);
+            let name = format!("part-{number}");
+            if is_new {
+                self.put(format!("{folder}/{name}"), &read(part)?)?;
+            }
+            Ok::<_, anyhow::Error>(name)
+        })?;
+        let extension = match bytes.starts_with(b"glTF") {
+            true => "glb",
+            false => "gltf",
+        };
+        self.put(format!("{folder}/mesh.{extension}"), &with_own_names)
+    }
+
     /// Copies a mesh with its materials and their pictures into a folder of its own.
     fn copy_mesh(&self, mesh: &Path, folder: &str) -> Result<String> {
         let bytes = read(mesh)?;
         match MeshFormat::of(mesh, &bytes) {
             MeshFormat::Obj => {}
+            MeshFormat::Gltf => return self.copy_gltf(mesh, &bytes, folder),
             MeshFormat::Stl => return self.put(format!("{folder}/mesh.stl"), &bytes),
             MeshFormat::Ply => {
                 let pictures = OwnNames::default();

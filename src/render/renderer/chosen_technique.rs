@@ -34,18 +34,18 @@ impl ChosenTechnique {
         match (scene.chosen_technique().0, &scene.probe) {
             (ShadowTechnique::Shafts, Some(probe)) => {
                 let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Room);
-                let glossy = gpu_scene.glossy;
-                let shafts = Shafts::new(gpu, scene, probe, background, glossy, transport);
+                let kinds = gpu_scene.kinds;
+                let shafts = Shafts::new(gpu, scene, probe, background, kinds, transport);
                 (Self::Shafts(Box::new(shafts)), gpu_scene)
             }
             // (No scene that was read has shafts without a probe.)
             (ShadowTechnique::Volumes | ShadowTechnique::Shafts, _) => {
                 let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Lights);
-                let (samples, glossy) = (scene.shadows.samples, gpu_scene.glossy);
+                let (samples, kinds) = (scene.shadows.samples, gpu_scene.kinds);
                 let is_single = samples == 1 && scene.lights.len() == 1;
                 let technique = match is_single && !scene.shadows.without.has(Shortcut::Direct) {
-                    true => Self::Direct(Direct::new(gpu, background, glossy)),
-                    false => Self::Accumulated(Accumulated::new(gpu, background, samples, glossy)),
+                    true => Self::Direct(Direct::new(gpu, background, kinds)),
+                    false => Self::Accumulated(Accumulated::new(gpu, background, samples, kinds)),
                 };
                 (technique, gpu_scene)
             }
