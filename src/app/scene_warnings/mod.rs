@@ -30,10 +30,6 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
         let notes = probe.notes.iter();
         warnings.extend(notes.map(|note| format!("{}: {note}", probe.image.display())));
     }
-    for thing in scene.phantoms.iter().chain(&scene.virtuals) {
-        let notes = thing.notes.iter();
-        warnings.extend(notes.map(|note| format!("\"{}\": {note}", thing.name)));
-    }
     for (number, light) in scene.lights.iter().enumerate() {
         let Light::Point { position_m, .. } = light else {
             continue;
