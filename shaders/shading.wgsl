@@ -1,5 +1,5 @@
 // Surfaces and how they reflect one light, for all passes that shade.
-//!include "common.wgsl"
+//!include "area_lights.wgsl"
 //!if LOOKS
 //!include "materials.wgsl"
 //!end
@@ -97,17 +97,20 @@ fn placed(corner: SurfaceCorner) -> Surface {
 }
 
 fn irradiance(surface: Surface, outside: bool) -> vec3f {
-    let arriving = incidence(light, surface.point_in_camera);
     let normal = unit(surface.normal_in_camera) * select(-1.0, 1.0, outside);
-    return arriving.irradiance * max(dot(normal, arriving.direction), 0.0);
+    return incidence(light, surface.point_in_camera, normal).irradiance;
 }
 
 // Radiance of a virtual surface towards the camera.
 fn radiance(surface: Surface, look: Look) -> vec3f {
-    let arriving = incidence(light, surface.point_in_camera);
+    let arriving = incidence(light, surface.point_in_camera, look.normal);
     let to_camera = normalize(-surface.point_in_camera);
-    let reflected = reflectance(look, arriving.direction, to_camera);
-    return arriving.irradiance * max(dot(look.normal, arriving.direction), 0.0) * reflected;
+    // The highlight of a light of some size is as much wider as the variances of its disc and of the slopes add up to (the
+    // halfway vector turns half as far as the light); a matt surface stays one.
+    let alpha = look.roughness;
+    var widened = look;
+    widened.roughness = select(0.0, min(sqrt(alpha * alpha + 0.125 * arriving.sine_squared), 1.0), alpha > 0.0);
+    return arriving.irradiance * reflectance(widened, arriving.direction, to_camera);
 }
 
 // Where opposite normals meet there is none.

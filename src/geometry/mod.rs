@@ -22,6 +22,7 @@ pub mod mesh;
 pub mod normals;
 mod orient;
 pub mod outline_scale;
+pub mod penumbra;
 pub mod polygon;
 pub mod pose;
 pub mod ray_caster;

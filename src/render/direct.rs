@@ -8,7 +8,7 @@ use super::attachments::{kept, loaded, target};
 use super::background::{Background, PICTURE_FORMAT, VIDEO_GROUP};
 use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
-use super::gpu_scene::GpuScene;
+use super::gpu_scene::{DrawnLight, GpuScene};
 use super::light_sums::GAIN_FORMAT;
 use super::passes::Passes;
 use super::pipelines::{GroupLayout, PipelineDescription, overwritten, texels, untouched};
@@ -73,6 +73,7 @@ impl Direct {
             // What a scene does not have costs nothing.
             constants: vec![
                 ("GLOSSY", f64::from(kinds.glossy)),
+                ("SHAPED", f64::from(kinds.shaped)),
                 ("DISTORTS", f64::from(background.distorts)),
             ],
         };
@@ -131,7 +132,13 @@ impl Direct {
         pass.set_pipeline(&self.nothing);
         pass.draw(0..3, 0..1);
         pass.set_bind_group(2, &frame.background.group, &[]);
-        gpu_scene.draw_surfaces(&mut pass, &self.depth_of_real, Role::Real, 0, pixels);
+        gpu_scene.draw_surfaces(
+            &mut pass,
+            &self.depth_of_real,
+            Role::Real,
+            DrawnLight::Whole(0),
+            pixels,
+        );
         let shading = [
             &self.light_on_virtual,
             &self.light_at_terminator,
@@ -161,7 +168,13 @@ impl Direct {
         let lit = Among::LitByReal;
         let by_virtual = gpu_scene.count_volumes(pass, volumes, lit, Role::Virtual, 0, pixels);
         if by_virtual {
-            gpu_scene.draw_surfaces(pass, &self.hidden_on_real, Role::Real, 0, pixels);
+            gpu_scene.draw_surfaces(
+                pass,
+                &self.hidden_on_real,
+                Role::Real,
+                DrawnLight::Whole(0),
+                pixels,
+            );
         }
         if (by_real || by_virtual) && !bounds.virtuals.is_empty() {
             set_scissor(pass, bounds.virtuals);
@@ -203,7 +216,13 @@ impl TechniquePasses for Direct {
         let mut pass = passes.begin("gain", None, &[gain], Some(kept(&self.depth_stencil)));
         set_scissor(&mut pass, pixels);
         pass.set_bind_group(2, &frame.background.group, &[]);
-        gpu_scene.draw_surfaces(&mut pass, &self.gain_on_real, Role::Real, 0, pixels);
+        gpu_scene.draw_surfaces(
+            &mut pass,
+            &self.gain_on_real,
+            Role::Real,
+            DrawnLight::Whole(0),
+            pixels,
+        );
     }
 }
 

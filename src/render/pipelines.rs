@@ -155,6 +155,22 @@ pub(super) fn added(
     }
 }
 
+/// A colour target that what is drawn is taken off.
+pub(super) fn taken_off(format: wgpu::TextureFormat) -> wgpu::ColorTargetState {
+    let take = wgpu::BlendComponent {
+        src_factor: wgpu::BlendFactor::One,
+        dst_factor: wgpu::BlendFactor::One,
+        operation: wgpu::BlendOperation::ReverseSubtract,
+    };
+    wgpu::ColorTargetState {
+        blend: Some(wgpu::BlendState {
+            color: take,
+            alpha: take,
+        }),
+        ..format.into()
+    }
+}
+
 /// All pipelines that were built for one device, and the modules and layouts that they share.
 #[derive(Default)]
 pub(super) struct PipelineCache(Mutex<Built>);

@@ -11,7 +11,8 @@ macro_rules! files {
 }
 
 /// All files under `shaders/`.
-const FILES: [(&str, &str); 21] = files![
+const FILES: [(&str, &str); 22] = files![
+    "area_lights.wgsl",
     "background.wgsl",
     "common.wgsl",
     "composite.wgsl",

@@ -4,7 +4,7 @@
 use super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT, LOOK_LAYOUT};
 use super::gpu::Gpu;
 use super::materials::MATERIALS_GROUP;
-use super::pipelines::{PipelineDescription, added, overwritten, untouched};
+use super::pipelines::{PipelineDescription, added, overwritten, taken_off, untouched};
 use super::stencil::{ADDED, REAL_HIDES, SHADOW, VIRTUAL_SHADOW, depth_stencil_state, stencil};
 use super::uniforms::GEOMETRY_GROUPS;
 
@@ -16,6 +16,8 @@ pub(super) struct Surfaces {
     pub ambient_on_virtual: Sided,
     /// A light as it reaches real surfaces in the video.
     pub light_reaching_real: Sided,
+    /// A piece of a light that has reached real surfaces, taken off where real things hide it; the stencil's reference says so.
+    pub light_kept_from_real: Sided,
     /// A light where virtual things hide it from real surfaces.
     pub light_hidden_from_real: Sided,
     /// A light on virtual surfaces past all casters; the stencil's reference is 0, or 1 for surfaces that lie in no
@@ -23,11 +25,13 @@ pub(super) struct Surfaces {
     pub light_on_virtual: Sided,
 }
 
-/// What the materials of virtual surfaces have; what a scene does not have is left out when pipelines are built.
+/// What the materials of virtual surfaces and the lights on them have; what a scene does not have is left out when pipelines are built.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct SurfaceKinds {
     /// Whether any has a glossy layer.
     pub glossy: bool,
+    /// Whether any light is more than a point or a direction.
+    pub shaped: bool,
     /// Whether any has pictures, colours at corners, metal or emission (materials.wgsl).
     pub looks: bool,
 }
@@ -109,6 +113,7 @@ impl Surfaces {
                 fragment,
                 constants: vec![
                     ("GLOSSY", f64::from(kinds.glossy)),
+                    ("SHAPED", f64::from(kinds.shaped)),
                     ("MULTISAMPLED", f64::from(samples > 1)),
                 ],
                 groups: GEOMETRY_GROUPS.map(Some).to_vec(),
@@ -141,12 +146,18 @@ impl Surfaces {
         let taken = (wgpu::StencilOperation::Zero, VIRTUAL_SHADOW);
         let nothing = (wgpu::StencilOperation::Keep, 0);
         let reaching = stencil(equal, REAL_HIDES | ADDED, once);
+        let kept = stencil(equal, REAL_HIDES | ADDED, once);
         let hidden = stencil(other, VIRTUAL_SHADOW, taken);
         let unshadowed = stencil(at_most, SHADOW, nothing);
         Self {
             ambient_on_real: build("ambient_on_real", None, both()),
             ambient_on_virtual: build_virtual("ambient_on_virtual", None, both()),
             light_reaching_real: build("light_on_real", Some(reaching), [added(), untouched()]),
+            light_kept_from_real: build(
+                "light_on_real",
+                Some(kept),
+                [taken_off(format), untouched()],
+            ),
             light_hidden_from_real: build("light_on_real", Some(hidden), [untouched(), added()]),
             light_on_virtual: build_virtual(
                 "light_on_virtual",

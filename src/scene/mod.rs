@@ -25,8 +25,10 @@ pub mod gltf;
 mod lights;
 mod load;
 pub mod mesh_file;
+mod mip_36h12;
 mod motion;
 mod named_files;
+mod not_a_scene;
 pub mod notes;
 pub mod obj;
 mod objects;
@@ -52,8 +54,8 @@ mod vertex_colors;
 pub use camera::{CameraSettings, PixelFormat, WantedFormat};
 pub use dictionary::Dictionary;
 pub use error::{SceneError, TextPlace};
-pub use family::{Codes, Family};
-pub use lights::unit_direction;
+pub use family::{Codes, Drawing, Family, Ink};
+pub use lights::{SceneLight, unit_direction};
 pub use load::Reading;
 pub use motion::{Motion, PathEnd, Station};
 pub use named_files::{FileKind, NamedFile};
@@ -80,14 +82,28 @@ pub struct Scene {
     pub phantoms: Vec<Object>,
     /// What the picture alone shows.
     pub virtuals: Vec<Object>,
-    /// Lights in world space.
-    pub lights: Vec<Light>,
+    /// What shines.
+    pub lights: Vec<SceneLight>,
     /// Radiance of the constant surrounding light, linear RGB.
     pub ambient_radiance: DVec3,
     /// The light that a probe saw, and the room that sent it.
     pub probe: Option<ProbeScene>,
     /// How shadows are made.
     pub shadows: ShadowSettings,
+}
+
+impl Scene {
+    /// The families of all markers, as often as they have some.
+    pub fn families(&self) -> Vec<Family> {
+        let markers = self.anchors.iter().flat_map(|anchor| &anchor.markers);
+        markers.map(|marker| marker.family).collect()
+    }
+
+    /// The lights that stand in the world, in world space.
+    pub fn world_lights(&self) -> Vec<Light> {
+        let standing = self.lights.iter().filter(|light| light.anchor == 0);
+        standing.map(|light| light.light).collect()
+    }
 }
 
 /// A marker in its anchor's frame.
@@ -105,6 +121,19 @@ pub struct Marker {
     pub rotation_rad: f64,
 }
 
+impl Marker {
+    /// A marker in the middle of its anchor's frame.
+    pub fn alone(family: Family, id: u32, size_m: f64) -> Self {
+        Self {
+            family,
+            id,
+            size_m,
+            center_m: DVec2::ZERO,
+            rotation_rad: 0.0,
+        }
+    }
+}
+
 /// A board of markers or a lone marker, with its own frame (x right, y up as printed, z towards the viewer).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Anchor {
@@ -119,13 +148,7 @@ impl Anchor {
     pub fn lone(name: String, family: Family, id: u32, size_m: f64) -> Self {
         Self {
             name,
-            markers: vec![Marker {
-                family,
-                id,
-                size_m,
-                center_m: DVec2::ZERO,
-                rotation_rad: 0.0,
-            }],
+            markers: vec![Marker::alone(family, id, size_m)],
         }
     }
 }

@@ -56,7 +56,7 @@ keys! {
 }
 
 keys! {
-    /// What a thing stands on.
+    /// What a thing or a light stands on.
     pub static STANDING: StandingKeys;
 
     /// The board or marker that it stands on.
@@ -335,7 +335,8 @@ fn object(
     })
 }
 
-fn anchor_index(on: &Value, anchors: &[Anchor]) -> Result<usize, SceneError> {
+/// The anchor of a name.
+pub fn anchor_index(on: &Value, anchors: &[Anchor]) -> Result<usize, SceneError> {
     let written = on.text()?;
     anchors
         .iter()

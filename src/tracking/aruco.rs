@@ -6,16 +6,42 @@ use opencv::core::{Mat, Point2f, Vector};
 use opencv::prelude::*;
 
 use super::apriltag;
-use super::conventions::{corners_from_aruco, quarter_turns_between};
+use super::conventions::{corners_as_drawn, corners_from_aruco, quarter_turns_between};
+use super::light::Grey;
+use super::printed_marker::{Cell, PrintedMarker};
 use super::{Detection, TrackingError};
 use crate::capture::Frame;
-use crate::scene::{ArucoRefinement, Codes, Dictionary, Family, TrackingSettings};
+use crate::scene::{ArucoRefinement, Codes, Dictionary, Family, Ink, TrackingSettings};
 
-/// OpenCV's detector for some dictionaries, each with the turn of its pictures against the prints.
+/// OpenCV's detector for some dictionaries.
 pub(super) struct ArucoDetector {
-    dictionaries: Vec<(Family, usize, installed::DetectorDictionary)>,
+    searches: Vec<DictionarySearch>,
+    refinement: ArucoRefinement,
+    /// The picture's negative.
+    inverted: Vec<u8>,
+}
+
+/// A search for the markers of one dictionary.
+struct DictionarySearch {
+    family: Family,
+    /// The turn of the dictionary's pictures against the prints.
+    quarter_turns: usize,
+    refining: installed::DetectorDictionary,
+    /// The same without a refinement of corners, for pictures in which that fails.
+    plain: installed::DetectorDictionary,
+}
+
+/// A marker as OpenCV found it, and how its corners were refined.
+struct Found {
+    id: i32,
+    corners_px: Quad,
     refinement: ArucoRefinement,
 }
+
+/// Around a marker whose corners are refined alone so much of its size is looked at.
+const CROP_MARGIN: f64 = 0.5;
+/// A picture in which OpenCV fails is taken in parts; one of fewer pixels a side is left out.
+const SMALLEST_PART_PX: u32 = 64;
 
 impl ArucoDetector {
     pub(super) fn new(
@@ -24,29 +50,13 @@ impl ArucoDetector {
     ) -> Result<Self, TrackingError> {
         // OpenCV has one pool of threads for the whole process.
         opencv::core::set_num_threads(settings.threads as i32)?;
-        let dictionaries = families
+        let searches = families
             .iter()
-            .map(|&family| {
-                let codes = installed_codes(family.codes()).ok_or_else(|| {
-                    TrackingError::FamilyNotAvailable {
-                        family: family.name(),
-                        detector: "OpenCV's ArUco",
-                        allowed: Family::all_names().collect::<Vec<_>>().join(", "),
-                    }
-                })?;
-                let bits = settings.corrected_bits.min(family.correctable_bits()) as i32;
-                let dictionary = installed::DetectorDictionary::new(
-                    codes,
-                    family.border_cells() as i32,
-                    bits,
-                    settings.aruco_refinement,
-                )?;
-                Ok((family, quarter_turns(family, &dictionary)?, dictionary))
-            })
-            .collect::<Result<Vec<_>, TrackingError>>()?;
+            .map(|&family| DictionarySearch::new(settings, family));
         Ok(Self {
-            dictionaries,
+            searches: searches.collect::<Result<_, _>>()?,
             refinement: settings.aruco_refinement,
+            inverted: Vec::new(),
         })
     }
 
@@ -55,26 +65,28 @@ impl ArucoDetector {
         grey: &[u8],
         size_px: [u32; 2],
     ) -> Result<Vec<Detection>, TrackingError> {
-        let [width, height] = size_px;
-        let image = Mat::new_rows_cols_with_data(height as i32, width as i32, grey)?;
+        let is_inverted = |search: &DictionarySearch| search.family.ink() == Ink::WhiteOnBlack;
+        if self.searches.iter().any(is_inverted) {
+            self.inverted.clear();
+            self.inverted.extend(grey.iter().map(|level| 255 - level));
+        }
         let mut detections = Vec::new();
-        for (family, quarter_turns, dictionary) in &self.dictionaries {
-            let mut ids = Vector::<i32>::new();
-            let mut corners = Vector::<Vector<Point2f>>::new();
-            dictionary.detect(&image, &mut corners, &mut ids, &mut Vector::new())?;
-            for (id, corners) in ids.iter().zip(corners.iter()) {
-                let corners = corners
-                    .iter()
-                    .map(|corner| DVec2::new(f64::from(corner.x), f64::from(corner.y)))
-                    .collect::<Vec<_>>();
-                let (Ok(id), Ok(corners)) = (u32::try_from(id), <[DVec2; 4]>::try_from(corners))
-                else {
+        for search in &self.searches {
+            let levels = match is_inverted(search) {
+                true => &self.inverted,
+                false => grey,
+            };
+            let picture = Grey { levels, size_px };
+            for found in search.found_in(picture, self.refinement) {
+                let corners =
+                    corners_from_aruco(found.corners_px, search.quarter_turns, found.refinement);
+                let Ok(id) = u32::try_from(found.id) else {
                     continue;
                 };
                 detections.push(Detection {
-                    family: *family,
+                    family: search.family,
                     id,
-                    corners_px: corners_from_aruco(corners, *quarter_turns, self.refinement),
+                    corners_px: corners_as_drawn(corners, search.family.drawing()),
                     margin: 0.0,
                     corrected_bits: 0,
                 });
@@ -82,6 +94,154 @@ impl ArucoDetector {
         }
         Ok(detections)
     }
+}
+
+impl DictionarySearch {
+    fn new(settings: &TrackingSettings, family: Family) -> Result<Self, TrackingError> {
+        let codes =
+            installed_codes(family.codes()).ok_or_else(|| TrackingError::FamilyNotAvailable {
+                family: family.name(),
+                detector: "OpenCV's ArUco",
+                allowed: Family::all_names()
+                    .filter(|name| Family::from_name(name).is_some_and(|known| !known.has_ring()))
+                    .collect::<Vec<_>>()
+                    .join(", "),
+            })?;
+        let bits = settings.corrected_bits.min(family.correctable_bits()) as i32;
+        let border_cells = family.border_cells() as i32;
+        let dictionary =
+            |refinement| installed::DetectorDictionary::new(codes, border_cells, bits, refinement);
+        let refining = dictionary(settings.aruco_refinement)?;
+        Ok(Self {
+            family,
+            quarter_turns: quarter_turns(family, &refining)?,
+            refining,
+            plain: dictionary(ArucoRefinement::None)?,
+        })
+    }
+
+    /// The markers of a picture. OpenCV gives up a whole picture when one candidate in it is not to its taste; that
+    /// candidate alone is left out.
+    fn found_in(&self, picture: Grey<'_>, refinement: ArucoRefinement) -> Vec<Found> {
+        if let Ok(found) = found(&self.refining, picture, refinement) {
+            return found;
+        }
+        let refined = |plain: Found| {
+            let (part, corner_px) = around(picture, &plain.corners_px);
+            let size_px = part.size_px;
+            let picture = Grey {
+                levels: &part.levels,
+                size_px,
+            };
+            // One that fails alone is the candidate.
+            let again = found(&self.refining, picture, refinement).ok()?;
+            let again = again.into_iter().find(|again| again.id == plain.id);
+            Some(again.map_or(plain, |again| again.shifted(corner_px)))
+        };
+        let plain = self.plain_in(picture);
+        plain.into_iter().filter_map(refined).collect()
+    }
+
+    fn plain_in(&self, picture: Grey<'_>) -> Vec<Found> {
+        if let Ok(found) = found(&self.plain, picture, ArucoRefinement::None) {
+            return found;
+        }
+        let [width, height] = picture.size_px;
+        if width.max(height) <= SMALLEST_PART_PX {
+            return Vec::new();
+        }
+        // Parts of two thirds overlap, so that most markers are whole in one of them.
+        let mut all: Vec<Found> = Vec::new();
+        let part_px = [width, height].map(|px| (2 * px).div_ceil(3));
+        let starts_px = [width - part_px[0], height - part_px[1]];
+        for [x, y] in [[0, 0], [1, 0], [0, 1], [1, 1]] {
+            let from_px = [x * starts_px[0], y * starts_px[1]];
+            let part = cut(picture, from_px, part_px);
+            let part = Grey {
+                levels: &part.levels,
+                size_px: part_px,
+            };
+            let corner_px = DVec2::from(from_px.map(f64::from));
+            for found in self.plain_in(part) {
+                let found = found.shifted(corner_px);
+                if !all.iter().any(|known| known.is_same(&found)) {
+                    all.push(found);
+                }
+            }
+        }
+        all
+    }
+}
+
+impl Found {
+    fn shifted(mut self, by_px: DVec2) -> Self {
+        self.corners_px = self.corners_px.map(|corner| corner + by_px);
+        self
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        const SAME_PX: f64 = 5.0;
+        let mut corners = self.corners_px.iter().zip(&other.corners_px);
+        self.id == other.id && corners.all(|(a, b)| a.distance(*b) < SAME_PX)
+    }
+}
+
+/// A part of a picture.
+struct Part {
+    levels: Vec<u8>,
+    size_px: [u32; 2],
+}
+
+/// The part of a picture around a marker, and its upper left corner.
+fn around(picture: Grey<'_>, corners_px: &Quad) -> (Part, DVec2) {
+    let low = corners_px.iter().copied().fold(DVec2::MAX, DVec2::min);
+    let high = corners_px.iter().copied().fold(DVec2::MIN, DVec2::max);
+    let margin = CROP_MARGIN * (high - low).max_element() + 4.0;
+    let most = DVec2::from(picture.size_px.map(f64::from));
+    let from = (low - margin).floor().clamp(DVec2::ZERO, most - 1.0);
+    let to = (high + margin).ceil().clamp(from + 1.0, most);
+    let size_px = [(to.x - from.x) as u32, (to.y - from.y) as u32];
+    (cut(picture, [from.x as u32, from.y as u32], size_px), from)
+}
+
+fn cut(picture: Grey<'_>, [left, top]: [u32; 2], size_px: [u32; 2]) -> Part {
+    let width = picture.size_px[0] as usize;
+    let rows = picture.levels.chunks_exact(width);
+    let rows = rows.skip(top as usize).take(size_px[1] as usize);
+    let columns = left as usize..(left + size_px[0]) as usize;
+    Part {
+        levels: rows
+            .flat_map(|row| &row[columns.clone()])
+            .copied()
+            .collect(),
+        size_px,
+    }
+}
+
+fn found(
+    dictionary: &installed::DetectorDictionary,
+    picture: Grey<'_>,
+    refinement: ArucoRefinement,
+) -> opencv::Result<Vec<Found>> {
+    let [width, height] = picture.size_px.map(|px| px as i32);
+    let image = Mat::new_rows_cols_with_data(height, width, picture.levels)?;
+    let mut ids = Vector::<i32>::new();
+    let mut corners = Vector::<Vector<Point2f>>::new();
+    dictionary.detect(&image, &mut corners, &mut ids, &mut Vector::new())?;
+    let found = ids.iter().zip(corners.iter()).filter_map(|(id, corners)| {
+        Some(Found {
+            id,
+            corners_px: quad(corners)?,
+            refinement,
+        })
+    });
+    Ok(found.collect())
+}
+
+fn quad(corners: Vector<Point2f>) -> Option<Quad> {
+    let corners = corners.iter();
+    let corners = corners.map(|corner| DVec2::new(f64::from(corner.x), f64::from(corner.y)));
+    <Quad>::try_from(corners.collect::<Vec<_>>()).ok()
 }
 
 /// Corners of a quadrilateral in a picture, pixels.
@@ -100,41 +260,45 @@ pub fn rejected_quads(frame: &Frame, family: Family) -> Result<Vec<Quad>, Tracki
     let mut rejected = Vector::<Vector<Point2f>>::new();
     let image =
         Mat::new_rows_cols_with_data(frame.size_px[1] as i32, frame.size_px[0] as i32, &grey)?;
-    dictionary.detect(
+    let looked = dictionary.detect(
         &image,
         &mut Vector::new(),
         &mut Vector::new(),
         &mut rejected,
-    )?;
-    let quad = |corners: Vector<Point2f>| {
-        let corners = corners.iter();
-        let corners = corners.map(|corner| DVec2::new(f64::from(corner.x), f64::from(corner.y)));
-        <Quad>::try_from(corners.collect::<Vec<_>>()).ok()
-    };
-    Ok(rejected.iter().filter_map(quad).collect())
+    );
+    // They are shown to help; a picture that OpenCV gives up shows none.
+    Ok(match looked {
+        Ok(()) => rejected.iter().filter_map(quad).collect(),
+        Err(_) => Vec::new(),
+    })
 }
 
-/// The cells of a marker as printed, rows from the top, true for white; black border included, white rim not. AprilTag's
-/// families stand as AprilTag prints them, the others as OpenCV does.
+/// The cells of a marker as printed, rows from the top, true for white, of the square whose corners are found.
 ///
 /// # Errors
 /// A marker that the family does not have.
 pub fn printed_cells(family: Family, id: u32) -> Result<Vec<bool>, TrackingError> {
-    let no_such_marker = || TrackingError::NoSuchMarker {
-        family: family.name(),
-        id,
-        count: family.id_count(),
+    Ok(PrintedMarker::of(family, id)?.square())
+}
+
+/// A marker as OpenCV draws it, black on white; `None` for one that the family does not have.
+pub(super) fn installed_marker(
+    family: Family,
+    id: u32,
+) -> Result<Option<PrintedMarker>, TrackingError> {
+    let Some(codes) = installed_codes(family.codes()).filter(|_| id < family.id_count()) else {
+        return Ok(None);
     };
-    if family.is_april_tag() {
-        return apriltag::printed_cells(family, id).ok_or_else(no_such_marker);
-    }
-    let codes = installed_codes(family.codes())
-        .filter(|_| id < family.id_count())
-        .ok_or_else(no_such_marker)?;
     let border_cells = family.border_cells() as i32;
     let dictionary =
         installed::DetectorDictionary::new(codes, border_cells, 0, ArucoRefinement::None)?;
-    Ok(dictionary.cells(id as i32, family.cells_across() as usize)?)
+    let side = family.cells_across();
+    let white = dictionary.cells(id as i32, side as usize)?;
+    let cells = white.into_iter().map(|white| match white {
+        true => Cell::White,
+        false => Cell::Black,
+    });
+    Ok(Some(PrintedMarker::new(side, cells.collect())))
 }
 
 /// The turn of the installed dictionary against the prints; its own pictures are the prints of OpenCV's families.
@@ -147,8 +311,8 @@ fn quarter_turns(
     }
     let side = family.cells_across() as usize;
     let opencv = dictionary.cells(0, side)?;
-    apriltag::printed_cells(family, 0)
-        .and_then(|template| quarter_turns_between(&template, &opencv, side))
+    apriltag::printed_marker(family, 0)
+        .and_then(|template| quarter_turns_between(&template.square(), &opencv, side))
         .ok_or_else(|| {
             TrackingError::Library(format!("OpenCV's {} is not AprilTag's", family.name()))
         })
@@ -171,6 +335,12 @@ fn installed_codes(codes: Codes) -> Option<InstalledCodes> {
         Codes::Tag36h10 => 19,
         Codes::Tag36h11 => 20,
         Codes::ArucoOriginal => 16,
+        Codes::ArucoMip36h12 => return Some(InstalledCodes::Own(Dictionary::mip_36h12())),
+        Codes::Standard41h12
+        | Codes::Standard52h13
+        | Codes::Circle21h7
+        | Codes::Circle49h12
+        | Codes::Custom48h12 => return None,
         Codes::Aruco { cells, count } => {
             let of_size = [50, 100, 250, 1000]
                 .iter()
@@ -387,7 +557,7 @@ mod tests {
             let side = family.cells_across() as usize;
             let turn = quarter_turns(family, &dictionary).unwrap();
             for id in 0..family.id_count() {
-                let template = apriltag::printed_cells(family, id).unwrap();
+                let template = apriltag::printed_marker(family, id).unwrap().square();
                 let opencv = dictionary.cells(id as i32, side).unwrap();
                 assert_eq!(
                     quarter_turns_between(&template, &opencv, side),
@@ -395,13 +565,14 @@ mod tests {
                     "{family} {id}"
                 );
             }
-            assert!(apriltag::printed_cells(family, family.id_count()).is_none());
+            assert!(apriltag::printed_marker(family, family.id_count()).is_none());
         }
     }
 
     #[test]
     fn the_dictionaries_have_the_ids_that_they_claim() {
-        for family in Family::all_names().filter_map(Family::from_name) {
+        let families = Family::all_names().filter_map(Family::from_name);
+        for family in families.filter(|family| !family.has_ring()) {
             let dictionary = installed_dictionary(family);
             let side = family.cells_across() as usize;
             assert!(

@@ -24,4 +24,22 @@ impl<'a> Grey<'a> {
             f64::from(linear(self.levels[pixel]))
         })
     }
+
+    /// The grey level between four pixels' centres; `None` outside the picture.
+    pub(super) fn level(&self, place: DVec2) -> Option<f32> {
+        let [width, height] = self.size_px;
+        let (x, y) = (place.x.floor(), place.y.floor());
+        let inside =
+            x >= 0.0 && y >= 0.0 && x + 1.0 < f64::from(width) && y + 1.0 < f64::from(height);
+        if !inside {
+            return None;
+        }
+        let start = y as usize * width as usize + x as usize;
+        let at = |index: usize| f32::from(self.levels[index]);
+        let (right, down) = ((place.x - x) as f32, (place.y - y) as f32);
+        let upper = at(start) + right * (at(start + 1) - at(start));
+        let below = start + width as usize;
+        let lower = at(below) + right * (at(below + 1) - at(below));
+        Some(upper + down * (lower - upper))
+    }
 }

@@ -9,6 +9,7 @@
 )]
 mod apriltag;
 mod aruco;
+mod belief;
 mod condition;
 mod conventions;
 mod detector;
@@ -21,7 +22,10 @@ pub mod mapping;
 mod marker_template;
 mod pixel_pose;
 mod pose;
+mod printed_marker;
+mod reading;
 mod refine;
+mod survey;
 mod template_match;
 mod tracked_anchor;
 mod tracker;
@@ -30,6 +34,8 @@ use glam::DAffine3;
 
 pub use aruco::{Quad, printed_cells, rejected_quads};
 pub use detector::{Detection, Detector};
+pub use printed_marker::{Cell, PrintedMarker};
+pub use survey::Survey;
 pub use tracker::{Tracker, grey_from_rgba};
 
 /// How far a pose can be trusted.

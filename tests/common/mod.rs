@@ -120,7 +120,7 @@ pub fn scene(
         }],
         phantoms,
         virtuals,
-        lights,
+        lights: lights.into_iter().map(Into::into).collect(),
         ambient_radiance: DVec3::splat(ambient),
         shadows: ShadowSettings {
             technique: Technique::Auto,
@@ -299,7 +299,7 @@ impl Stage {
         let path = folder.path().join("scene.toml");
         std::fs::write(&path, toml).expect("a scene file");
         let mut scene = Scene::load(&path).unwrap_or_else(|error| panic!("{error}"));
-        scene.lights = lights;
+        scene.lights = lights.into_iter().map(Into::into).collect();
         scene.ambient_radiance = ambient_radiance;
         let objects = scene.phantoms.iter().chain(&scene.virtuals);
         let scales = objects.map(|object| object.anchor_from_object).collect();
@@ -485,15 +485,12 @@ pub fn linear_of_level(level: f64) -> f64 {
 }
 
 pub fn sun(direction: [f64; 3], irradiance: [f64; 3]) -> Light {
-    Light::Directional {
-        direction: DVec3::from_array(direction).normalize(),
-        irradiance: DVec3::from_array(irradiance),
-    }
+    Light::directional(
+        DVec3::from_array(direction).normalize(),
+        DVec3::from_array(irradiance),
+    )
 }
 
 pub fn lamp(position_m: [f64; 3], intensity: [f64; 3]) -> Light {
-    Light::Point {
-        position_m: DVec3::from_array(position_m),
-        intensity: DVec3::from_array(intensity),
-    }
+    Light::point(DVec3::from_array(position_m), DVec3::from_array(intensity))
 }

@@ -12,6 +12,7 @@ mod cli;
 mod job_files;
 mod live;
 mod live_panel;
+mod lost_gpu;
 mod markers;
 mod record;
 mod soak;

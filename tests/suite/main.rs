@@ -25,6 +25,7 @@ mod shading;
 mod shafts;
 mod stability;
 mod tracking;
+mod tracking_families;
 mod tracking_photographs;
 mod tracking_sessions;
 mod tracking_stability;

@@ -250,7 +250,7 @@ fn hold_scene(name: &str, scene: &Scene, material: &Material) {
 
 /// The same of a sphere whose normals are others.
 fn hold_bent(name: &str, scene: &Scene, material: &Material, bent: impl Fn(DVec3) -> DVec3) {
-    let lights = &scene.lights;
+    let lights = &scene.world_lights()[..];
     let (picture, _) = render(
         scene,
         PERFECT_LENS,
@@ -535,10 +535,7 @@ fn hold_gains(name: &str, real: &[Crate], seeming: &[Crate], light: Light) -> [u
     for (index, pixel) in pixels(SIZE_PX) {
         // The real boxes' own faces are no table.
         let (eye, _) = ray(&camera, pixel);
-        let sight = Light::Point {
-            position_m: eye,
-            intensity: DVec3::ONE,
-        };
+        let sight = Light::point(eye, DVec3::ONE);
         let seen = |point: DVec3| real.iter().any(|it| it.hides(point, &sight));
         if !clear[index] || everywhere(&camera, pixel, 1.5, seen) != Some(false) {
             continue;

@@ -455,13 +455,7 @@ impl PicturedThings {
 
 fn light_of(placed: &FarLight, strength: DVec3) -> Light {
     match placed.position_m() {
-        Some(position_m) => Light::Point {
-            position_m,
-            intensity: strength,
-        },
-        None => Light::Directional {
-            direction: -placed.towards,
-            irradiance: strength,
-        },
+        Some(position_m) => Light::point(position_m, strength),
+        None => Light::directional(-placed.towards, strength),
     }
 }

@@ -86,9 +86,9 @@ impl PeersStage {
             ],
             lights: lights_m
                 .iter()
-                .map(|&position_m| Light::Point {
-                    position_m,
-                    intensity: DVec3::splat(0.7 / lights_m.len() as f64),
+                .map(|&position_m| {
+                    let intensity = DVec3::splat(0.7 / lights_m.len() as f64);
+                    Light::point(position_m, intensity).into()
                 })
                 .collect(),
             ambient_radiance: DVec3::splat(0.05),

@@ -8,7 +8,7 @@ use super::super::gpu_scene::{GpuScene, LitBy};
 use super::super::shafts::Shafts;
 use super::super::technique::TechniquePasses;
 use crate::geometry::camera::Intrinsics;
-use crate::scene::{Scene, ShadowTechnique, Shortcut};
+use crate::scene::{Scene, SceneLight, ShadowTechnique, Shortcut};
 use crate::shafts::room::Room;
 use crate::shafts::room_transport::RoomTransport;
 
@@ -42,7 +42,11 @@ impl ChosenTechnique {
             (ShadowTechnique::Volumes | ShadowTechnique::Shafts, _) => {
                 let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Lights);
                 let (samples, kinds) = (scene.shadows.samples, gpu_scene.kinds);
-                let is_single = samples == 1 && scene.lights.len() == 1;
+                // (A lamp that moves along may be lost, and one of some size has soft shadows.)
+                let is_plain = |light: &SceneLight| light.anchor == 0 && !light.light.has_size();
+                let is_single = samples == 1
+                    && gpu_scene.surroundings_count() == 0
+                    && matches!(&scene.lights[..], [one] if is_plain(one));
                 let technique = match is_single && !scene.shadows.without.has(Shortcut::Direct) {
                     true => Self::Direct(Direct::new(gpu, background, kinds)),
                     false => Self::Accumulated(Accumulated::new(gpu, background, samples, kinds)),

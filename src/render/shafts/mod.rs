@@ -28,7 +28,7 @@ use super::attachments::{cleared, depth_stencil};
 use super::background::Background;
 use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
-use super::gpu_scene::GpuScene;
+use super::gpu_scene::{DrawnLight, GpuScene};
 use super::light_sums::{BY_GAIN, CompositeShader, LightSums};
 use super::passes::Passes;
 use super::screen_bounds::ScreenBounds;
@@ -260,7 +260,7 @@ impl Shafts {
             pass,
             &self.pipelines.light_on_virtual,
             Role::Virtual,
-            0,
+            DrawnLight::Whole(0),
             within,
         );
         gpu_scene.set_world(pass);

@@ -133,6 +133,8 @@ fn a_small_scene_has_the_defaults() {
             quality: None,
             technique: Technique::Auto,
             samples: 4,
+            light_samples: 64,
+            ambient_samples: 0,
             counting: VolumeCounting::Auto,
             max_silhouette_error_px: 0.5,
             frame_budget_ms: None,
@@ -282,10 +284,11 @@ frame_budget_ms = 16
     );
     assert_eq!(table.mesh_report.open_edges, 4);
     assert_eq!(
-        scene.lights,
+        scene.world_lights(),
         [Light::Directional {
             direction: -DVec3::Z,
-            irradiance: DVec3::splat(2.0)
+            irradiance: DVec3::splat(2.0),
+            angle_rad: 0.0
         }]
     );
     assert_eq!(scene.ambient_radiance, DVec3::splat(0.5));
@@ -296,6 +299,8 @@ frame_budget_ms = 16
             quality: Some(Quality::Accurate),
             technique: Technique::Volumes,
             samples: 1,
+            light_samples: 256,
+            ambient_samples: 0,
             counting: VolumeCounting::DepthFail,
             max_silhouette_error_px: 0.0,
             frame_budget_ms: Some(16.0),
@@ -486,7 +491,7 @@ fn a_family_may_be_a_file_beside_the_scene() {
     for (detector, name, id, message) in [
         ("aruco", "own.yml", 2, "own.yml"),
         ("aruco", "other.yml", 0, "other.yml"),
-        ("apriltag", "own.yml", 0, "detector = \"aruco\""),
+        ("apriltag", "own.yml", 0, "leave out tracking.detector"),
     ] {
         let error = scene(detector, name, id)
             .expect_err("a mistake")

@@ -13,7 +13,9 @@ use crate::app::scene_warnings::warnings;
 use crate::geometry::levels::{Level, levels};
 use crate::geometry::mesh::{CornerLook, MeshReport};
 use crate::geometry::outline_scale::largest_scale;
-use crate::light::Light;
+use crate::light::{Light, Shape};
+use crate::scene::SceneLight;
+use crate::scene::format::LightKind;
 use crate::scene::format::{SHADOWS, SHADOWS_SECTION};
 use crate::scene::{Anchor, DetectorKind, Object, Quality, Scene, ShadowSettings};
 use budget::budget_line;
@@ -36,6 +38,9 @@ pub fn summary(scene: &Scene) -> String {
             .unwrap_or("what the recording carries"),
     );
     let detector = match scene.tracking.detector {
+        DetectorKind::ByFamily => {
+            "by family: libapriltag for AprilTag's, OpenCV's ArUco for the others"
+        }
         DetectorKind::AprilTag => "libapriltag",
         DetectorKind::Aruco => "OpenCV's ArUco",
     };
@@ -67,7 +72,9 @@ pub fn summary(scene: &Scene) -> String {
     rows(
         &mut text,
         "lights",
-        scene.lights.iter().enumerate().map(light_row).collect(),
+        (0..scene.lights.len())
+            .map(|number| light_row(scene, number))
+            .collect(),
     );
     line(
         &mut text,
@@ -408,28 +415,62 @@ fn counted(count: usize, noun: &str) -> String {
     format!("{count} {}", if count == 1 { noun } else { &nouns })
 }
 
-fn light_row((number, light): (usize, &Light)) -> TableRow {
-    let (kind, place, power) = match light {
+fn light_row(scene: &Scene, number: usize) -> TableRow {
+    let SceneLight { anchor, light } = scene.lights[number];
+    let (place, power, size) = match light {
         Light::Point {
             position_m,
             intensity,
+            shape,
         } => (
-            "point",
-            format!("at {} m", vector(*position_m)),
-            format!("intensity {}", vector(*intensity)),
+            format!("at {} m", vector(position_m)),
+            format!("intensity {}", vector(intensity)),
+            shape_in_words(&shape),
         ),
         Light::Directional {
             direction,
             irradiance,
+            angle_rad,
         } => (
-            "directional",
-            format!("towards {}", vector(*direction)),
-            format!("irradiance {}", vector(*irradiance)),
+            format!("towards {}", vector(direction)),
+            format!("irradiance {}", vector(irradiance)),
+            match angle_rad > 0.0 {
+                true => format!("{}° wide", short(angle_rad.to_degrees())),
+                false => String::new(),
+            },
         ),
     };
+    let kind = LightKind::of(&light).name().to_owned();
+    let on = match anchor {
+        0 => String::new(),
+        _ => format!("on \"{}\"", scene.anchors[anchor].name),
+    };
     TableRow {
-        cells: vec![number.to_string(), kind.to_owned(), place, power],
+        cells: vec![number.to_string(), kind, place, power, size, on],
         ..TableRow::default()
+    }
+}
+
+fn shape_in_words(shape: &Shape) -> String {
+    match shape {
+        Shape::Point => String::new(),
+        Shape::Spot {
+            direction,
+            inner_rad,
+            outer_rad,
+        } => format!(
+            "towards {}, {}° to {}° off its axis",
+            vector(*direction),
+            short(inner_rad.to_degrees()),
+            short(outer_rad.to_degrees())
+        ),
+        Shape::Sphere { radius_m } => format!("radius {} m", short(*radius_m)),
+        Shape::Rect(rect) => format!(
+            "{} m by {} m, towards {}",
+            short(rect.size_m.x),
+            short(rect.size_m.y),
+            vector(rect.facing)
+        ),
     }
 }
 
