@@ -3,7 +3,7 @@
 # Mesa's layer that asks the desktop for its favourite card complains on machines without a desktop; gnomon chooses itself.
 export NODEVICE_SELECT = 1
 
-.PHONY: demo test test-camera soak charts reference bench bench-volumes bench-tracking setup setup-tests
+.PHONY: demo install uninstall test test-camera soak charts reference bench bench-volumes bench-tracking setup setup-tests
 
 demo: setup
 	cargo build --release
@@ -14,6 +14,32 @@ demo: setup
 	@echo "  out/lamp.png         some of its frames on one sheet"
 	@echo "  out/lamp_poses.csv   where the camera was"
 	@echo "  out/lamp_stats.json  how long each stage took"
+
+# The program, completions for shells, and its manual. `sudo make install` takes the program that was built before, as the
+# user's Rust is not root's. DESTDIR is for those who make packages.
+PREFIX = /usr/local
+BIN = $(DESTDIR)$(PREFIX)/bin
+SHARE = $(DESTDIR)$(PREFIX)/share
+BASH_COMPLETION = $(SHARE)/bash-completion/completions/gnomon
+FISH_COMPLETION = $(SHARE)/fish/vendor_completions.d/gnomon.fish
+ZSH_COMPLETION = $(SHARE)/zsh/site-functions/_gnomon
+MAN = $(SHARE)/man/man1
+PROGRAM = target/release/gnomon
+
+install:
+	@[ -x $(PROGRAM) ] && [ "$$(id -u)" = 0 ] || { scripts/setup && cargo build --release; }
+	install -d $(BIN) $(MAN) $(dir $(BASH_COMPLETION) $(FISH_COMPLETION) $(ZSH_COMPLETION))
+	install -m 755 $(PROGRAM) $(BIN)/gnomon
+	$(PROGRAM) completions bash > $(BASH_COMPLETION)
+	$(PROGRAM) completions fish > $(FISH_COMPLETION)
+	$(PROGRAM) completions zsh > $(ZSH_COMPLETION)
+	$(PROGRAM) manual > $(MAN)/gnomon.1
+	for command in $$($(PROGRAM) --help | sed -n '/^Commands:/,/^Options:/s/^  \([a-z]\{1,\}\) .*/\1/p' | grep -v help); do \
+	    $(PROGRAM) manual $$command > $(MAN)/gnomon-$$command.1 || exit; done
+	@command -v gnomon >/dev/null || echo "gnomon is in $(PREFIX)/bin, which is not on your PATH"
+
+uninstall:
+	rm -f $(BIN)/gnomon $(BASH_COMPLETION) $(FISH_COMPLETION) $(ZSH_COMPLETION) $(MAN)/gnomon.1 $(MAN)/gnomon-*.1
 
 test: setup-tests
 	cargo fmt --check

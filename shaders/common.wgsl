@@ -6,11 +6,22 @@ struct AnchorView {
 }
 
 struct CameraLight {
-    // A point in camera space (w = 1), or the direction towards distant light (w = 0).
+    // The middle in camera space (w = 1), or the direction towards distant light (w = 0).
     place_in_camera: vec4f,
-    // Radiant intensity of a point, irradiance of distant light.
+    // Radiant intensity (of a rectangle straight ahead), or irradiance of distant light. w: the radius of a sphere, metres, or
+    // the sine of half the width of distant light.
     power: vec4f,
+    // Of a spot and of a rectangle the direction straight ahead; w: which of the three below it is.
+    axis_in_camera: vec4f,
+    // From a rectangle's middle to those of two sides, metres; a spot's factor and summand (light::spot_ramp) in xy.
+    half_width: vec4f,
+    half_height: vec4f,
 }
+
+// A point, a sphere, distant light of a disc.
+const ROUND: f32 = 0.0;
+const SPOT: f32 = 1.0;
+const RECT: f32 = 2.0;
 
 const PI: f32 = 3.14159265358979;
 
@@ -18,17 +29,4 @@ const PI: f32 = 3.14159265358979;
 // bit for bit, or a lit surface would shadow itself.
 fn clip_from_point(view: AnchorView, point_in_anchor: vec4f) -> vec4f {
     return view.clip_from_anchor * point_in_anchor;
-}
-
-// Unit direction to the light and the irradiance that it gives to a surface facing it.
-struct Incidence {
-    direction: vec3f,
-    irradiance: vec3f,
-}
-
-fn incidence(light: CameraLight, point_in_camera: vec3f) -> Incidence {
-    let to_light = light.place_in_camera.xyz - point_in_camera * light.place_in_camera.w;
-    let distance_squared = dot(to_light, to_light);
-    let falloff = select(1.0, 1.0 / max(distance_squared, 1e-12), light.place_in_camera.w > 0.0);
-    return Incidence(to_light * inverseSqrt(max(distance_squared, 1e-12)), light.power.rgb * falloff);
 }

@@ -61,6 +61,21 @@ fn nothing() -> Shaded {
 }
 
 // No light reaches it that could be taken again.
+//!if LOOKS
+@fragment
+fn ambient_on_virtual(surface: Surface, @builtin(front_facing) outside: bool) -> Shaded {
+    let look = look(surface, outside);
+    if look.opacity == 0.0 {
+        discard;
+    }
+    return Shaded(vec4f(srgb_from_linear(ambient_radiance(surface, look)), 1.0), vec4f(NOT_VIRTUAL));
+}
+
+@vertex
+fn place_in_ambient_light(corner: SurfaceCorner) -> Surface {
+    return placed(corner);
+}
+//!else
 @fragment
 fn ambient_on_virtual(surface: AmbientSurface) -> Shaded {
     let ambient = surface.material.rgb / PI * surface.indirect;
@@ -77,15 +92,22 @@ struct AmbientSurface {
 fn place_in_ambient_light(@location(0) position: vec3f, @location(2) material: vec4f, @location(3) indirect: vec3f) -> AmbientSurface {
     return AmbientSurface(clip_from_point(view, vec4f(position, 1.0)), material, indirect);
 }
+//!end
 
 // Set when the shader is built.
 override SEEN: f32 = IN_OPEN_LIGHT;
 
 @fragment
 fn light_on_virtual(surface: Surface, @builtin(front_facing) outside: bool) -> Shaded {
-    let ambient = surface.material.rgb / PI * surface.indirect;
+    let look = look(surface, outside);
+//!if LOOKS
+    if look.opacity == 0.0 {
+        discard;
+    }
+//!end
+    let ambient = ambient_radiance(surface, look);
     return Shaded(
-        vec4f(srgb_from_linear(ambient + max(radiance(surface, outside), vec3f(0.0))), 1.0),
+        vec4f(srgb_from_linear(ambient + max(radiance(surface, look), vec3f(0.0))), 1.0),
         vec4f(srgb_from_linear(ambient), SEEN),
     );
 }

@@ -13,6 +13,15 @@ struct SampledSurface {
     @location(5) @interpolate(flat) first_point_in_camera: vec3f,
     @location(6) @interpolate(flat) first_normal_in_camera: vec3f,
     @location(7) @interpolate(flat) first_indirect: vec3f,
+//!if LOOKS
+    @location(8) @interpolate(perspective, centroid) uv: vec4f,
+    @location(9) @interpolate(perspective, centroid) color: vec4f,
+    @location(10) @interpolate(perspective, centroid) tangent_in_camera: vec4f,
+    @location(11) @interpolate(flat) number: u32,
+    @location(12) @interpolate(flat) first_uv: vec4f,
+    @location(13) @interpolate(flat) first_color: vec4f,
+    @location(14) @interpolate(flat) first_tangent: vec4f,
+//!end
 }
 
 @vertex
@@ -28,6 +37,15 @@ fn place_sampled(corner: SurfaceCorner, @builtin(vertex_index) index: u32) -> Sa
         placed.point_in_camera,
         placed.normal_in_camera,
         placed.indirect,
+//!if LOOKS
+        placed.uv,
+        placed.color,
+        placed.tangent_in_camera,
+        placed.number,
+        placed.uv,
+        placed.color,
+        placed.tangent_in_camera,
+//!end
     );
 }
 
@@ -40,5 +58,17 @@ fn surface(sampled: SampledSurface) -> Surface {
         sampled.material,
         // (What is at the corners is never below 0, but rounding may be.)
         max(recovered(sampled.indirect, sampled.first_indirect, one), vec3f(0.0)),
+//!if LOOKS
+        vec4f(
+            recovered(vec3f(sampled.uv.xy, 0.0), vec3f(sampled.first_uv.xy, 0.0), one).xy,
+            recovered(vec3f(sampled.uv.zw, 0.0), vec3f(sampled.first_uv.zw, 0.0), one).xy,
+        ),
+        vec4f(
+            recovered(sampled.color.rgb, sampled.first_color.rgb, one),
+            recovered(vec3f(sampled.color.a), vec3f(sampled.first_color.a), one).x,
+        ),
+        vec4f(recovered(sampled.tangent_in_camera.xyz, sampled.first_tangent.xyz, one), sampled.first_tangent.w),
+        sampled.number,
+//!end
     );
 }

@@ -1,5 +1,8 @@
 // Surfaces and how they reflect one light, for all passes that shade.
-//!include "common.wgsl"
+//!include "area_lights.wgsl"
+//!if LOOKS
+//!include "materials.wgsl"
+//!end
 
 @group(0) @binding(0) var<uniform> view: AnchorView;
 @group(1) @binding(0) var<uniform> light: CameraLight;
@@ -13,6 +16,13 @@ struct SurfaceCorner {
     // Albedo, and the roughness of a glossy layer or 0.
     @location(2) material: vec4f,
     @location(3) indirect: vec3f,
+//!if LOOKS
+    // Both sets of texture coordinates.
+    @location(4) uv: vec4f,
+    @location(5) color: vec4f,
+    @location(6) tangent: vec4f,
+    @location(7) number: u32,
+//!end
 }
 
 struct Surface {
@@ -22,6 +32,46 @@ struct Surface {
     @location(2) @interpolate(flat) material: vec4f,
     // Irradiance from the surroundings, lights aside (light::bounce).
     @location(3) indirect: vec3f,
+//!if LOOKS
+    @location(4) uv: vec4f,
+    @location(5) color: vec4f,
+    @location(6) tangent_in_camera: vec4f,
+    @location(7) @interpolate(flat) number: u32,
+//!end
+}
+
+// What a surface is made of at a place.
+struct Look {
+    albedo: vec3f,
+    // 0: Lambert alone.
+    roughness: f32,
+    metallic: f32,
+    emission: vec3f,
+    // Part of the surroundings' light that arrives.
+    occlusion: f32,
+    // 0 where there is nothing.
+    opacity: f32,
+    // Unit length, on the side that is seen.
+    normal: vec3f,
+}
+
+fn look(surface: Surface, outside: bool) -> Look {
+    let side = select(-1.0, 1.0, outside);
+    let normal = unit(surface.normal_in_camera);
+//!if LOOKS
+    return material_at(surface.number, surface.uv, surface.color, surface.tangent_in_camera, normal, side);
+//!else
+    return Look(surface.material.rgb, surface.material.a, 0.0, vec3f(0.0), 1.0, 1.0, normal * side);
+//!end
+}
+
+// Radiance of a virtual surface without lights.
+fn ambient_radiance(surface: Surface, look: Look) -> vec3f {
+//!if LOOKS
+    return look.albedo / PI * surface.indirect * look.occlusion + look.emission;
+//!else
+    return look.albedo / PI * surface.indirect;
+//!end
 }
 
 @vertex
@@ -37,22 +87,30 @@ fn placed(corner: SurfaceCorner) -> Surface {
         (view.camera_from_anchor * vec4f(corner.normal, 0.0)).xyz,
         corner.material,
         corner.indirect,
+//!if LOOKS
+        corner.uv,
+        corner.color,
+        vec4f((view.camera_from_anchor * vec4f(corner.tangent.xyz, 0.0)).xyz, corner.tangent.w),
+        corner.number,
+//!end
     );
 }
 
 fn irradiance(surface: Surface, outside: bool) -> vec3f {
-    let arriving = incidence(light, surface.point_in_camera);
     let normal = unit(surface.normal_in_camera) * select(-1.0, 1.0, outside);
-    return arriving.irradiance * max(dot(normal, arriving.direction), 0.0);
+    return incidence(light, surface.point_in_camera, normal).irradiance;
 }
 
 // Radiance of a virtual surface towards the camera.
-fn radiance(surface: Surface, outside: bool) -> vec3f {
-    let arriving = incidence(light, surface.point_in_camera);
-    let normal = unit(surface.normal_in_camera) * select(-1.0, 1.0, outside);
+fn radiance(surface: Surface, look: Look) -> vec3f {
+    let arriving = incidence(light, surface.point_in_camera, look.normal);
     let to_camera = normalize(-surface.point_in_camera);
-    let reflected = reflectance(surface.material.rgb, surface.material.a, normal, arriving.direction, to_camera);
-    return arriving.irradiance * max(dot(normal, arriving.direction), 0.0) * reflected;
+    // The highlight of a light of some size is as much wider as the variances of its disc and of the slopes add up to (the
+    // halfway vector turns half as far as the light); a matt surface stays one.
+    let alpha = look.roughness;
+    var widened = look;
+    widened.roughness = select(0.0, min(sqrt(alpha * alpha + 0.125 * arriving.sine_squared), 1.0), alpha > 0.0);
+    return arriving.irradiance * reflectance(widened, arriving.direction, to_camera);
 }
 
 // Where opposite normals meet there is none.
@@ -61,9 +119,11 @@ fn unit(normal: vec3f) -> vec3f {
 }
 
 // The BRDF; its CPU twin is `light::reflectance`. Lambert under a dielectric GGX layer (Walter et al. 2007, with Schlick's
-// Fresnel term and the height-correlated Smith term); roughness 0 means Lambert alone.
-fn reflectance(albedo: vec3f, roughness: f32, normal: vec3f, to_light: vec3f, to_camera: vec3f) -> vec3f {
-    let diffuse = albedo / PI;
+// Fresnel term and the height-correlated Smith term); roughness 0 means Lambert alone; a metal is the layer in its colour.
+fn reflectance(look: Look, to_light: vec3f, to_camera: vec3f) -> vec3f {
+    let normal = look.normal;
+    let roughness = look.roughness;
+    let diffuse = look.albedo / PI;
     let cos_light = dot(normal, to_light);
     if !GLOSSY || roughness <= 0.0 || cos_light <= 0.0 {
         return diffuse;
@@ -80,7 +140,15 @@ fn reflectance(albedo: vec3f, roughness: f32, normal: vec3f, to_light: vec3f, to
     let specular = distribution * visibility * fresnel(dot(to_light, halfway));
     // What the layer lets in and out again; the mean keeps a white material white.
     let let_through = (1.0 - fresnel(cos_light)) * (1.0 - fresnel(cos_camera)) / (1.0 - MEAN_FRESNEL);
-    return diffuse * let_through + specular;
+    let dielectric = diffuse * let_through + specular;
+//!if LOOKS
+    let way = 1.0 - clamp(dot(to_light, halfway), 0.0, 1.0);
+    let way_squared = way * way;
+    let metal = look.albedo + (1.0 - look.albedo) * way_squared * way_squared * way;
+    return mix(dielectric, distribution * visibility * metal, look.metallic);
+//!else
+    return dielectric;
+//!end
 }
 
 // Cosine-weighted mean of `fresnel` over the hemisphere.

@@ -9,9 +9,15 @@ fn ambient_on_real(sampled: SampledSurface) -> LightSums {
 }
 
 @fragment
-fn ambient_on_virtual(sampled: SampledSurface) -> LightSums {
+fn ambient_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: bool) -> LightSums {
     let surface = surface(sampled);
-    return LightSums(vec4f(0.0), vec4f(surface.material.rgb / PI * surface.indirect, 1.0));
+    let look = look(surface, outside);
+//!if LOOKS
+    if look.opacity == 0.0 {
+        discard;
+    }
+//!end
+    return LightSums(vec4f(0.0), vec4f(ambient_radiance(surface, look), 1.0));
 }
 
 // Once where the light reaches the surface in the video, and once where virtual things then hide it.
@@ -25,5 +31,5 @@ fn light_on_real(sampled: SampledSurface, @builtin(front_facing) outside: bool) 
 @fragment
 fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: bool) -> LightSums {
     let surface = surface(sampled);
-    return LightSums(vec4f(0.0), vec4f(radiance(surface, outside), 0.0));
+    return LightSums(vec4f(0.0), vec4f(radiance(surface, look(surface, outside)), 0.0));
 }

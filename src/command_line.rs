@@ -13,7 +13,7 @@ use gnomon::app::jobs::probe::exposure_of;
 use gnomon::calibration::{Target, TargetMarkers};
 use gnomon::light::probe_maps::Circle;
 use gnomon::scene::format::{ANCHOR_NAME, AnyKey as _, CAMERA, PRINTED, PROBE, TRACKING};
-use gnomon::scene::{Family, PixelFormat, Shortcut, WantedFormat};
+use gnomon::scene::{Family, Ink, PixelFormat, Shortcut, WantedFormat};
 
 /// Virtual things on a real table, lit and shadowed as if they stood there.
 #[derive(Parser)]
@@ -78,11 +78,28 @@ pub enum Command {
         after_help = "Example:\n  gnomon cameras    # and then: gnomon record webcam:0 --out out/session"
     )]
     Cameras,
-    /// Reads a scene, says what is wrong with it or what is in it.
+    /// Reads a scene and the first frames of its recording, says what is wrong or what is in it.
     #[command(after_help = "Example:\n  gnomon check config/lamp.toml")]
     Check {
         /// Scene file (TOML)
         scene: PathBuf,
+    },
+    /// Prints what makes a shell complete gnomon's commands and options.
+    #[command(
+        after_help = "Example:\n  gnomon completions bash > ~/.local/share/bash-completion/completions/gnomon\n\n\
+                      `make install` does this for bash, fish and zsh."
+    )]
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Prints a page of the manual (roff): the program's, or a command's.
+    #[command(
+        after_help = "Example:\n  gnomon manual replay | man -l -\n\n`make install` installs all pages."
+    )]
+    Manual {
+        /// The command
+        command: Option<String>,
     },
     /// Measures speed against accuracy on this machine, and draws it.
     #[command(
@@ -200,7 +217,7 @@ pub struct TrackArgs {
     /// Write the poses (CSV; - for stdout, as for every text)
     #[arg(long, value_name = "FILE")]
     pub poses: Option<PathBuf>,
-    /// Write every marker that the detector sees, with its corners (CSV, or -)
+    /// Write every marker that the detector reads or that tracking follows, with its corners and who saw it (CSV, or -)
     #[arg(long, value_name = "FILE")]
     pub markers: Option<PathBuf>,
     /// Write times per stage, frames and memory (JSON, or -)
@@ -480,7 +497,7 @@ pub enum ProbeKindArg {
 /// Markers that no scene describes.
 #[derive(Args)]
 pub struct FamilyArgs {
-    /// Family of the markers: tag16h5, tag25h9, tag36h10, tag36h11, DICT_4X4_50, …, or a dictionary's file (.yml)
+    /// Family of the markers: tag36h11, tagStandard41h12, DICT_4X4_50, …, or a dictionary's file (.yml)
     #[arg(long, value_name = "NAME", default_value = "tag36h11", value_parser = family_of, requires = "size_mm")]
     pub family: Family,
     #[arg(
@@ -489,6 +506,9 @@ pub struct FamilyArgs {
         value_parser = |text: &str| PRINTED.border_cells.of_option(text)
     )]
     pub border_cells: u32,
+    /// Markers printed white on black
+    #[arg(long, requires = "size_mm")]
+    pub inverted: bool,
 }
 
 impl TargetArgs {
@@ -615,12 +635,19 @@ impl RecordingArgs {
 
 impl FamilyArgs {
     pub fn family(&self) -> Result<Family> {
-        self.family.with_border(self.border_cells).with_context(|| {
-            format!(
-                "--border-cells {}: no marker is printed so",
-                self.border_cells
-            )
-        })
+        let bordered = self
+            .family
+            .with_border(self.border_cells)
+            .with_context(|| {
+                format!(
+                    "--border-cells {}: {} is not printed so",
+                    self.border_cells, self.family
+                )
+            })?;
+        Ok(bordered.with_ink(match self.inverted {
+            true => Ink::WhiteOnBlack,
+            false => Ink::BlackOnWhite,
+        }))
     }
 }
 

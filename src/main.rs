@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context as _, Result, bail};
-use clap::Parser;
+use clap::{CommandFactory as _, Parser};
 
 use gnomon::app::chart::{self, chart};
 use gnomon::app::files::new_file::{exit_without_traces, is_stdout};
@@ -40,6 +40,8 @@ use command_line::{
 const INTERRUPTED: i32 = 130;
 
 fn main() -> ExitCode {
+    #[cfg(target_os = "linux")]
+    leave_out_device_selection();
     match run(Cli::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -67,12 +69,64 @@ fn run(cli: Cli) -> Result<()> {
         Command::Check { scene } => {
             let scene = Scene::load(&scene)?;
             talk::give(&check::summary(&scene));
-            if let Some(warning) = first_look(&scene) {
+            for warning in first_look(&scene)? {
                 talk::give(&check::warning_line(&warning));
             }
             Ok(())
         }
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "gnomon", &mut script);
+            talk::give(&String::from_utf8_lossy(&script));
+            Ok(())
+        }
+        Command::Manual { command } => give_manual(command.as_deref()),
     }
+}
+
+/// A page of the manual in roff: the program's, or a command's.
+fn give_manual(name: Option<&str>) -> Result<()> {
+    let mut program = Cli::command();
+    program.build();
+    let page = match name {
+        None => program,
+        Some(name) => {
+            let named = |command: &&clap::Command| command.get_name() == name;
+            let found = program.get_subcommands().find(named).cloned();
+            let page = found.with_context(|| {
+                format!("no command is called {name}; `gnomon --help` lists them")
+            })?;
+            page.display_name(format!("gnomon-{name}"))
+        }
+    };
+    let mut roff = Vec::new();
+    clap_mangen::Man::new(page).render(&mut roff)?;
+    talk::give(&String::from_utf8_lossy(&roff));
+    Ok(())
+}
+
+/// Starts the program again without Mesa's layer that asks the desktop for its favourite card: where there is no desktop it
+/// complains on stderr, whatever comes of the job, and gnomon chooses the adapter itself.
+#[cfg(target_os = "linux")]
+fn leave_out_device_selection() {
+    use std::os::unix::process::CommandExt as _;
+    const SWITCH: &str = "NODEVICE_SELECT";
+    let desktop = std::env::var_os("XDG_RUNTIME_DIR");
+    let has_desktop = desktop.is_some_and(|folder| Path::new(&folder).is_absolute());
+    if has_desktop || std::env::var_os(SWITCH).is_some() {
+        return;
+    }
+    let Ok(program) = std::env::current_exe() else {
+        return;
+    };
+    let mut words = std::env::args_os();
+    let name = words.next().unwrap_or_default();
+    // Comes back only where it cannot be started; then this one goes on, with the complaint.
+    let _ = std::process::Command::new(program)
+        .arg0(name)
+        .args(words)
+        .env(SWITCH, "1")
+        .exec();
 }
 
 fn run_live(args: LiveArgs) -> Result<()> {

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Runs gnomon on a real V4L2 camera: a small machine in software emulation (../shared/virtual-camera/with-camera) plays
-# recordings/lamp into /dev/video9. In YUYV and in MJPEG the camera is listed, tracked and recorded, and the session is
-# replayed; then the feed is killed while gnomon records, and comes back. Emulation is slow: some minutes in all.
+# recordings/lamp into /dev/video9. In each format that ffmpeg can feed it the camera is listed, tracked and recorded, and the session is
+# replayed; then the feed is killed while gnomon records, and comes back. Emulation is slow: a quarter of an hour in all.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 with_camera=${WITH_CAMERA:-../shared/virtual-camera/with-camera}
@@ -41,7 +41,7 @@ check_session() {
 
 "$gnomon" track config/lamp.toml --poses "$out/lamp.csv" 2>/dev/null
 
-for format in yuyv422 mjpeg; do
+for format in yuyv422 mjpeg yuv420p uyvy422 yvyu422 nv12 gray; do
     echo "== $format"
     bash "$with_camera" -o "$out/$format" -t 900 -r 3 -f "$format" "$video" -- tools/test_camera_inside.sh steady ||
         fail "$format (see $out/$format)"

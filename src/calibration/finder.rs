@@ -15,7 +15,7 @@ use opencv::{boxed_ref::BoxedRef, calib3d, imgproc};
 
 use super::{CalibrateError, Target, TargetCorner, TargetMarkers};
 use crate::geometry::homography::{best_homography, mapped};
-use crate::scene::{DetectorKind, TrackingSettings};
+use crate::scene::TrackingSettings;
 use crate::tracking::{Detector, TrackingError};
 
 /// Finds one target; built once, used by one thread at a time.
@@ -43,11 +43,6 @@ impl TargetFinder {
     pub fn new(target: Target) -> Result<Self, CalibrateError> {
         let detector = |markers: &TargetMarkers| {
             let settings = TrackingSettings {
-                detector: if markers.family.is_april_tag() {
-                    DetectorKind::AprilTag
-                } else {
-                    DetectorKind::Aruco
-                },
                 decimation: 1.0,
                 ..TrackingSettings::default()
             };

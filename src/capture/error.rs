@@ -47,15 +47,34 @@ pub enum CaptureError {
         /// Another candidate.
         second: PathBuf,
     },
-    /// OpenCV does not know the file as a video.
+    /// FFmpeg does not know the file as a video.
     #[error(
-        "{}: cannot be opened as a video; it is of an unknown format, or it was cut off before its index was written \
-         (ffmpeg -i FILE says more)",
+        "{}: cannot be opened as a video; it is of an unknown format, or it was cut off before its index was written{said}",
         path.display()
     )]
     NotAVideo {
         /// The file.
         path: PathBuf,
+        /// What FFmpeg says, after a colon, or nothing.
+        said: String,
+    },
+    /// There is no ffmpeg to decode it.
+    #[error("{}: videos are read by ffmpeg, which cannot be started: {error} (Debian: sudo apt install ffmpeg)", path.display())]
+    FfmpegMissing {
+        /// The video.
+        path: PathBuf,
+        /// What the system says.
+        error: std::io::Error,
+    },
+    /// A frame's pixels cannot be converted.
+    #[error("{}: frame {frame}: {message}", path.display())]
+    Pixels {
+        /// The video.
+        path: PathBuf,
+        /// Index of the frame.
+        frame: u32,
+        /// What is wrong with them.
+        message: String,
     },
     /// Not one frame could be decoded.
     #[error("{}: not one frame can be decoded", path.display())]
@@ -113,6 +132,15 @@ pub enum Notice {
         /// Width and height of the first frame.
         expected_px: [u32; 2],
     },
+    /// Frames of which parts could not be decoded and were guessed.
+    Corrupt {
+        /// The video.
+        path: PathBuf,
+        /// Index of the first such frame.
+        first: u32,
+        /// How many there are.
+        count: u32,
+    },
     /// A video that gives fewer frames than its header says.
     EndedEarly {
         /// The video.
@@ -132,6 +160,7 @@ impl Notice {
         match self {
             Self::Broken { count, .. } => *count,
             Self::OtherSize { .. } => 1,
+            Self::Corrupt { .. } => 0,
             Self::EndedEarly {
                 ended_at,
                 announced,
@@ -169,6 +198,11 @@ impl fmt::Display for Notice {
             } => write!(
                 f,
                 "{}: frame {frame} is {width} x {height}, the first one was {first_width} x {first_height}; left out",
+                path.display()
+            ),
+            Self::Corrupt { path, first, count } => write!(
+                f,
+                "{}: {count} frames, the first of them {first}, have errors in them; what could not be decoded was guessed",
                 path.display()
             ),
             Self::EndedEarly {

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::{CaptureError, Notice};
 use super::pixels::{self, read_picture};
+use super::video::Place;
 
 /// Images carry no time of their own.
 pub(super) const ASSUMED_FPS: f64 = 30.0;
@@ -12,6 +13,14 @@ pub(super) const ASSUMED_FPS: f64 = 30.0;
 const EXTENSIONS: [&str; 9] = [
     "png", "jpg", "jpeg", "bmp", "tif", "tiff", "webp", "ppm", "pgm",
 ];
+
+/// A picture's place in a folder.
+pub(super) fn place_of(index: u32) -> Place {
+    Place {
+        index,
+        time_secs: f64::from(index) / ASSUMED_FPS,
+    }
+}
 
 pub(super) fn is_image(file: &Path) -> bool {
     super::has_extension(file, &EXTENSIONS)

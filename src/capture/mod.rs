@@ -24,14 +24,14 @@ pub use error::{CaptureError, Notice};
 
 use images::ImageFrames;
 use times::FrameTimes;
-use video::VideoFrames;
+use video::{Place, VideoFrames};
 
 /// A picture with its place in the recording; the pixels are as the camera gave them (distorted, sRGB).
 #[derive(Debug, Clone)]
 pub struct Frame {
     /// Number of the frame in its recording, from 0.
     pub index: u32,
-    /// Time since the recording's start, seconds.
+    /// Time since the recording's first frame by the recording's own time stamps, seconds.
     pub time_secs: f64,
     /// Width and height in pixels.
     pub size_px: [u32; 2],
@@ -219,14 +219,15 @@ impl FrameSource {
     pub fn next_frame(&mut self) -> Result<Option<Frame>, CaptureError> {
         let picture = match &mut self.pictures {
             PictureSource::Video(video) => video.next_picture(&mut self.notices)?,
-            PictureSource::Images(images) => images.next_picture(&mut self.notices)?,
+            PictureSource::Images(images) => images
+                .next_picture(&mut self.notices)?
+                .map(|(index, rgba)| (images::place_of(index), rgba)),
         };
-        let Some((index, rgba)) = picture else {
+        let Some((Place { index, time_secs }, rgba)) = picture else {
             return Ok(None);
         };
         self.good_frames += 1;
-        let nominal_secs = f64::from(index) / self.nominal_fps();
-        let time_secs = self.times.time_secs(index).unwrap_or(nominal_secs);
+        let time_secs = self.times.time_secs(index).unwrap_or(time_secs);
         let mut frame = Frame {
             index,
             time_secs,
@@ -239,6 +240,16 @@ impl FrameSource {
         Ok(Some(frame))
     }
 
+    /// What is done to the pictures' colours that a user should know.
+    pub fn remark(&self) -> Option<String> {
+        match &self.pictures {
+            PictureSource::Video(video) => video
+                .remark()
+                .map(|remark| format!("{}: {remark}", self.path.display())),
+            PictureSource::Images(_) => None,
+        }
+    }
+
     /// What went wrong so far without ending the recording; whole once [`FrameSource::next_frame`] gave `None`.
     pub fn notices(&self) -> &[Notice] {
         &self.notices
@@ -247,13 +258,6 @@ impl FrameSource {
     /// Frames handed out so far.
     pub fn good_frames(&self) -> u32 {
         self.good_frames
-    }
-
-    fn nominal_fps(&self) -> f64 {
-        match &self.pictures {
-            PictureSource::Video(video) => video.fps(),
-            PictureSource::Images(_) => images::ASSUMED_FPS,
-        }
     }
 }
 

@@ -7,6 +7,10 @@ use super::error::CaptureError;
 use crate::scene::plain_file;
 
 const HEADER: &str = "frame,time_s";
+/// Thirty years; what is beyond is no time, and its differences are lost to rounding.
+const LATEST_SECS: f64 = 1e9;
+/// No camera is as fast.
+const MOST_FPS: f64 = 1e5;
 
 /// Times by frame; empty where the recording says nothing.
 #[derive(Debug, Default)]
@@ -50,18 +54,37 @@ impl FrameTimes {
             {
                 return Err((number, "frames and times must both increase".to_owned()));
             }
+            if secs.abs() > LATEST_SECS {
+                let message =
+                    format!("{secs} s is no time of a recording; at most {LATEST_SECS} are read");
+                return Err((number, message));
+            }
             last = Some((frame, secs));
             secs_by_frame.insert(frame, secs);
         }
-        Ok(Self { secs_by_frame })
+        let times = Self { secs_by_frame };
+        // Two frames of one moment are told apart by a hair; a recording of such frames has no times.
+        match times.mean_fps().filter(|fps| *fps > MOST_FPS) {
+            Some(fps) if times.secs_by_frame.len() > 2 => {
+                let message =
+                    format!("these times come to {fps:e} frames per second, which no camera takes");
+                Err((text.lines().count(), message))
+            }
+            _ => Ok(times),
+        }
     }
 
     pub(super) fn time_secs(&self, frame: u32) -> Option<f64> {
         self.secs_by_frame.get(&frame).copied()
     }
 
-    /// The mean rate; `None` with less than two times.
+    /// The mean rate; `None` with less than two times, or where it is no camera's.
     pub(super) fn fps(&self) -> Option<f64> {
+        self.mean_fps()
+            .filter(|fps| (1e-3..=MOST_FPS).contains(fps))
+    }
+
+    fn mean_fps(&self) -> Option<f64> {
         let (first_frame, first_secs) = self.secs_by_frame.first_key_value()?;
         let (last_frame, last_secs) = self.secs_by_frame.last_key_value()?;
         (last_frame > first_frame)
@@ -97,6 +120,9 @@ mod tests {
             ("frame,time_s\n0,0\n1,NaN\n", 3),
             ("frame,time_s\n0,1\n1,1\n", 3),
             ("frame,time_s\n1,0\n0,1\n", 3),
+            ("frame,time_s\n0,0\n1,1e300\n", 3),
+            ("frame,time_s\n0,-1e300\n1,1\n", 2),
+            ("frame,time_s\n0,0\n1,1e-300\n2,1e-299\n", 4),
         ] {
             assert_eq!(FrameTimes::parse(text).unwrap_err().0, line, "{text:?}");
         }

@@ -46,9 +46,11 @@ const NORMAL_WEIGHT: f32 = 0.05;
 const MEAN_TO_MAX: f64 = 1.0 / 12.0;
 
 /// Ever coarser versions of a mesh, each with about half the triangles of the one before; the mesh itself is not among
-/// them. Any soup of triangles will do: a version that is no good is left out.
+/// them. Any soup of triangles will do: a version that is no good is left out. A mesh with texture coordinates or colours has
+/// none.
 pub fn levels(mesh: &Mesh) -> Vec<Level> {
-    if mesh.triangles.len() < WORTH_IT {
+    // Texture coordinates have seams where a simplified surface would tear or smear what lies on it.
+    if mesh.triangles.len() < WORTH_IT || !mesh.looks.is_empty() {
         return Vec::new();
     }
     chain(mesh, FEWEST)

@@ -589,6 +589,7 @@ mod tests {
         let front = Side {
             normals: [None; 3],
             material: 0,
+            source: 0,
         };
         Face {
             vertices,

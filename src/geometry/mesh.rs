@@ -4,9 +4,12 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 
+use super::looks::looks_of_faces;
+pub use super::looks::{CornerLook, RawLooks};
 use super::mend::{Mended, has_three_vertices, mend, restore_backs};
 use super::normals::{face_normal, made_normals};
 use super::orient::turned_triangles;
+pub use super::soup::RawTriangle;
 use super::soup::{EdgeUse, Face, Sets, Side, by_edge, edge_uses, unbalanced_edges};
 use super::winding::winding_number;
 
@@ -21,17 +24,10 @@ pub struct Mesh {
     pub corner_normals: Vec<[Vec3; 3]>,
     /// Index of each triangle's material, in the list that came with the mesh.
     pub triangle_materials: Vec<u32>,
-}
-
-/// A triangle as a file has it, before welding.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RawTriangle {
-    /// Indices into the raw positions.
-    pub vertices: [u32; 3],
-    /// Normals that the file gives; they need not have unit length, and a zero one counts as missing.
-    pub normals: [Option<Vec3>; 3],
-    /// Index into the list of materials.
-    pub material: u32,
+    /// What corners have for textures and colours; empty where nothing asks for it.
+    pub looks: Vec<CornerLook>,
+    /// Indices into `looks` for each corner of each triangle; empty with them.
+    pub corner_looks: Vec<[u32; 3]>,
 }
 
 /// What [`Mesh::weld`] found and did.
@@ -74,16 +70,32 @@ impl Mesh {
         raw: &[RawTriangle],
         crease_rad: f64,
     ) -> (Self, MeshReport) {
+        Self::weld_with_looks(raw_positions, raw, &RawLooks::default(), crease_rad)
+    }
+
+    /// [`Mesh::weld`] of triangles whose corners have texture coordinates, colours or tangents. Places are merged whatever
+    /// these are, and where a triangle is cut they are interpolated.
+    ///
+    /// # Panics
+    /// If a triangle names a vertex that `raw_positions` does not have, or a look that is not in `looks`.
+    pub fn weld_with_looks(
+        raw_positions: &[Vec3],
+        raw: &[RawTriangle],
+        looks: &RawLooks,
+        crease_rad: f64,
+    ) -> (Self, MeshReport) {
         let mut welder = Welder::new(raw_positions.len());
         let faces: Vec<Face> = raw
             .iter()
-            .map(|triangle| Face {
+            .zip(0..)
+            .map(|(triangle, source)| Face {
                 vertices: triangle
                     .vertices
                     .map(|vertex| welder.index(raw_positions, vertex)),
                 front: Side {
                     normals: triangle.normals,
                     material: triangle.material,
+                    source,
                 },
                 back: None,
             })
@@ -101,7 +113,13 @@ impl Mesh {
         let turned_triangles = orient(&positions, &mut faces);
         let restored = restore_backs(&positions, &mut faces);
 
-        let mesh = Self::from_faces(positions, &faces, crease_rad);
+        let (looks, corner_looks) =
+            looks_of_faces(looks, (raw_positions, raw), (&positions, &faces));
+        let mesh = Self {
+            looks,
+            corner_looks,
+            ..Self::from_faces(positions, &faces, crease_rad)
+        };
         let dropped_duplicates = duplicates - restored;
         let uses = edge_uses(mesh.triangles.iter().copied());
         let open_edges = unbalanced_edges(&uses);
@@ -141,6 +159,7 @@ impl Mesh {
             triangles,
             corner_normals,
             triangle_materials: faces.iter().map(|face| face.front.material).collect(),
+            ..Self::default()
         }
         .without_unused_positions()
     }
@@ -178,7 +197,19 @@ impl Mesh {
         self.corner_normals
             .iter_mut()
             .for_each(|normals| normals.swap(1, 2));
+        self.corner_looks
+            .iter_mut()
+            .for_each(|looks| looks.swap(1, 2));
         self
+    }
+
+    /// The shape and its materials alone, without what textures and colours need.
+    pub fn without_looks(&self) -> Self {
+        Self {
+            looks: Vec::new(),
+            corner_looks: Vec::new(),
+            ..self.clone()
+        }
     }
 
     pub(super) fn without_unused_positions(mut self) -> Self {

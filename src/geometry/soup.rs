@@ -2,6 +2,17 @@
 
 use glam::{DVec3, Vec3};
 
+/// A triangle as a file has it, before welding.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RawTriangle {
+    /// Indices into the raw positions.
+    pub vertices: [u32; 3],
+    /// Normals that the file gives; they need not have unit length, and a zero one counts as missing.
+    pub normals: [Option<Vec3>; 3],
+    /// Index into the list of materials.
+    pub material: u32,
+}
+
 /// What one side of a face looks like.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Side {
@@ -9,6 +20,8 @@ pub(super) struct Side {
     pub normals: [Option<Vec3>; 3],
     /// Index into the list of materials.
     pub material: u32,
+    /// Number of the raw triangle that it is, or is a part of.
+    pub source: u32,
 }
 
 /// A triangle, seen from one side or, where the file has it in both orientations, from two.

@@ -341,10 +341,7 @@ mod tests {
     fn a_lit_table_lights_what_faces_it_by_its_form_factor() {
         // Distant light of irradiance E straight down on a wide table of albedo a: a surface facing down gets a E, one
         // that stands upright half of it.
-        let light = Light::Directional {
-            direction: DVec3::NEG_Z,
-            irradiance: DVec3::splat(2.0),
-        };
+        let light = Light::directional(DVec3::NEG_Z, DVec3::splat(2.0));
         let table = Surroundings::new(square(500.0, 0.0, 0.5).to_vec(), vec![light], DVec3::ZERO);
         let above = DVec3::new(0.3, 0.2, 0.5);
         let down = irradiance_at(&table, above, DVec3::NEG_Z).x;
@@ -381,10 +378,7 @@ mod tests {
     #[test]
     fn what_moves_takes_what_it_hides() {
         // The same plate, once as part of the standing surroundings and once as a mover, black both times.
-        let light = Light::Point {
-            position_m: DVec3::new(0.2, 0.1, 2.0),
-            intensity: DVec3::splat(3.0),
-        };
+        let light = Light::point(DVec3::new(0.2, 0.1, 2.0), DVec3::splat(3.0));
         let floor = square(2.0, 0.0, 0.8).to_vec();
         let plate = square(0.3, 0.0, 0.0);
         let lift = DAffine3::from_translation(DVec3::new(0.1, 0.0, 0.5));

@@ -4,66 +4,253 @@ pub mod bounce;
 pub mod brightest;
 pub mod chromaticities;
 pub mod contrast;
+pub mod form_factor;
+pub mod material;
+pub mod pieces;
 pub mod prefiltered;
 pub mod probe;
 pub mod probe_maps;
 pub mod radiance_picture;
 pub mod response;
+pub mod texture;
 
 use std::f64::consts::PI;
 
-use glam::DVec3;
+use glam::{DAffine3, DVec2, DVec3};
 
-/// A light without extent, in world space.
+pub use material::Material;
+
+/// A light that shines by itself, in one space (as a rule the world's).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Light {
-    /// Radiant intensity (W/sr up to the camera's exposure) from a point in metres.
+    /// Light from a place: a point, or what is around it.
     Point {
-        /// Metres.
+        /// Its middle, metres.
         position_m: DVec3,
-        /// W/sr, linear RGB.
+        /// W/sr up to the camera's exposure, linear RGB: of a spot and of a rectangle along the axis, of a sphere as it is from
+        /// afar.
         intensity: DVec3,
+        /// What shines there.
+        shape: Shape,
     },
-    /// Irradiance (W/m² up to the camera's exposure) on a plane across the unit direction in which the light travels.
+    /// Light from infinitely far away.
     Directional {
         /// Unit direction in which the light travels.
         direction: DVec3,
-        /// W/m², linear RGB.
+        /// Irradiance on a plane across it, W/m² up to the camera's exposure, linear RGB.
         irradiance: DVec3,
+        /// Width of the disc that it comes from, radians; 0: it comes from one direction.
+        angle_rad: f64,
     },
 }
 
-/// How a surface reflects light.
+/// What shines at a [`Light::Point`]'s place.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Material {
-    /// Diffuse reflectance, linear RGB in [0, 1].
-    pub albedo: DVec3,
-    /// α of the GGX layer of a dielectric in (0, 1]; `None`: Lambert alone.
-    pub roughness: Option<f64>,
+pub enum Shape {
+    /// A point, to all sides alike.
+    Point,
+    /// A point, within a cone.
+    Spot {
+        /// Unit direction of the axis.
+        direction: DVec3,
+        /// Angle to the axis up to which the light is whole, radians.
+        inner_rad: f64,
+        /// Angle to the axis from which on there is none, radians; more than `inner_rad`.
+        outer_rad: f64,
+    },
+    /// A sphere of one radiance.
+    Sphere {
+        /// Metres.
+        radius_m: f64,
+    },
+    /// One side of a rectangle of one radiance.
+    Rect(Rect),
 }
 
-/// Irradiance that an unhidden light gives to a point with a unit normal, both in world space.
+/// A rectangle that shines to one side.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rect {
+    /// Unit direction that it faces.
+    pub facing: DVec3,
+    /// Unit direction of its width, across `facing`.
+    pub along: DVec3,
+    /// Width and height, metres.
+    pub size_m: DVec2,
+}
+
+impl Rect {
+    /// A rectangle that faces a unit direction and whose height goes along `up`, but for what of that lies along `facing`; where
+    /// all of it does, along y or else x. `size_m`: width and height.
+    pub fn upright(facing: DVec3, up: DVec3, size_m: DVec2) -> Self {
+        let ups = [up.normalize_or_zero(), DVec3::Y, DVec3::X];
+        let sides = ups.map(|up| up.cross(facing));
+        let along = sides.iter().find(|side| side.length() > 1e-6);
+        Self {
+            facing,
+            along: along.map_or(DVec3::X, |side| side.normalize()),
+            size_m,
+        }
+    }
+
+    /// Unit direction of its height.
+    pub fn up(&self) -> DVec3 {
+        self.facing.cross(self.along)
+    }
+
+    /// Vectors from its middle to the middles of two of its sides, metres.
+    pub fn half_sides_m(&self) -> [DVec3; 2] {
+        [
+            self.along * (0.5 * self.size_m.x),
+            self.up() * (0.5 * self.size_m.y),
+        ]
+    }
+}
+
+impl Light {
+    /// A point that shines to all sides; metres, and W/sr in linear RGB.
+    pub fn point(position_m: DVec3, intensity: DVec3) -> Self {
+        Self::Point {
+            position_m,
+            intensity,
+            shape: Shape::Point,
+        }
+    }
+
+    /// Light from one direction; a unit vector, and W/m² in linear RGB.
+    pub fn directional(direction: DVec3, irradiance: DVec3) -> Self {
+        Self::Directional {
+            direction,
+            irradiance,
+            angle_rad: 0.0,
+        }
+    }
+
+    /// The same light in another space, to which a rigid motion leads.
+    pub fn moved(self, there_from_here: &DAffine3) -> Self {
+        let turned = |way: DVec3| there_from_here.transform_vector3(way);
+        match self {
+            Self::Point {
+                position_m,
+                intensity,
+                shape,
+            } => Self::Point {
+                position_m: there_from_here.transform_point3(position_m),
+                intensity,
+                shape: match shape {
+                    Shape::Point | Shape::Sphere { .. } => shape,
+                    Shape::Spot {
+                        direction,
+                        inner_rad,
+                        outer_rad,
+                    } => Shape::Spot {
+                        direction: turned(direction),
+                        inner_rad,
+                        outer_rad,
+                    },
+                    Shape::Rect(rect) => Shape::Rect(Rect {
+                        facing: turned(rect.facing),
+                        along: turned(rect.along),
+                        ..rect
+                    }),
+                },
+            },
+            Self::Directional {
+                direction,
+                irradiance,
+                angle_rad,
+            } => Self::Directional {
+                direction: turned(direction),
+                irradiance,
+                angle_rad,
+            },
+        }
+    }
+
+    /// Whether its shadows have soft edges, however narrow.
+    pub fn has_size(&self) -> bool {
+        match *self {
+            Self::Point { shape, .. } => match shape {
+                Shape::Point | Shape::Spot { .. } => false,
+                Shape::Sphere { .. } | Shape::Rect(_) => true,
+            },
+            Self::Directional { angle_rad, .. } => angle_rad > 0.0,
+        }
+    }
+}
+
+/// Irradiance that an unhidden light gives to a point with a unit normal, both in the light's space: exactly, also near a large
+/// light, and of the part that is above the horizon.
 pub fn irradiance(light: &Light, point: DVec3, normal: DVec3) -> DVec3 {
     match *light {
         Light::Point {
             position_m,
             intensity,
+            shape,
         } => {
             let to_light = position_m - point;
             let distance_squared = to_light.length_squared().max(1e-12);
-            let cosine = normal.dot(to_light) / distance_squared.sqrt();
-            intensity * (cosine.max(0.0) / distance_squared)
+            let to_light = to_light / distance_squared.sqrt();
+            let of_point = normal.dot(to_light).max(0.0) / distance_squared;
+            intensity
+                * match shape {
+                    Shape::Point => of_point,
+                    Shape::Spot { direction, .. } => {
+                        of_point * spot_part(&shape, -to_light.dot(direction))
+                    }
+                    Shape::Sphere { radius_m } => {
+                        let area = PI * radius_m * radius_m;
+                        let sine_squared = radius_m * radius_m / distance_squared;
+                        form_factor::disc(normal.dot(to_light), sine_squared) / area
+                    }
+                    Shape::Rect(rect) => {
+                        form_factor::rect(&rect, position_m - point, normal)
+                            / (rect.size_m.x * rect.size_m.y)
+                    }
+                }
         }
         Light::Directional {
             direction,
             irradiance,
-        } => irradiance * (-normal.dot(direction)).max(0.0),
+            angle_rad,
+        } => {
+            let cosine = -normal.dot(direction);
+            irradiance
+                * match angle_rad > 0.0 {
+                    true => {
+                        let sine_squared = (0.5 * angle_rad).sin().powi(2);
+                        form_factor::disc(cosine, sine_squared) / (PI * sine_squared)
+                    }
+                    false => cosine.max(0.0),
+                }
+        }
     }
 }
 
-/// The BRDF of a material for unit directions to the light and to the camera; the twin of `reflectance` in
-/// shading.wgsl. Lambert under a dielectric GGX layer (Walter et al. 2007, Schlick's Fresnel term, height-correlated
-/// Smith term), coupled so that both ways of light are equal and none is made (Ashikhmin & Shirley 2000, section 3).
+/// Part of a spot's intensity at an angle to its axis, of which the cosine is given; 1 for what is no spot. As lamps of glTF
+/// fall off (KHR_lights_punctual, "Inner and Outer Cone Angles").
+pub fn spot_part(shape: &Shape, cosine: f64) -> f64 {
+    let Shape::Spot {
+        inner_rad,
+        outer_rad,
+        ..
+    } = *shape
+    else {
+        return 1.0;
+    };
+    let [scale, offset] = spot_ramp(inner_rad, outer_rad);
+    (cosine * scale + offset).clamp(0.0, 1.0).powi(2)
+}
+
+/// Factor and summand that make a number from 0 at the outer angle to 1 at the inner of a cosine.
+pub fn spot_ramp(inner_rad: f64, outer_rad: f64) -> [f64; 2] {
+    let scale = 1.0 / (inner_rad.cos() - outer_rad.cos()).max(1e-6);
+    [scale, -outer_rad.cos() * scale]
+}
+
+/// The BRDF of a material for unit directions to the light and to the camera, without its pictures; the twin of
+/// `reflectance` in shading.wgsl. What is no metal is Lambert under a dielectric GGX layer (Walter et al. 2007, Schlick's
+/// Fresnel term, height-correlated Smith term), coupled so that both ways of light are equal and none is made (Ashikhmin &
+/// Shirley 2000, section 3); a metal is the layer alone, in its colour.
 pub fn reflectance(material: &Material, normal: DVec3, to_light: DVec3, to_camera: DVec3) -> DVec3 {
     let diffuse = material.albedo / PI;
     let cos_light = normal.dot(to_light);
@@ -78,11 +265,14 @@ pub fn reflectance(material: &Material, normal: DVec3, to_light: DVec3, to_camer
     let distribution = alpha_squared / (PI * spread * spread);
     let smith = |cosine: f64| (cosine * cosine * (1.0 - alpha_squared) + alpha_squared).sqrt();
     let visibility = 0.5 / (cos_light * smith(cos_camera) + cos_camera * smith(cos_light));
-    let specular = distribution * visibility * fresnel(to_light.dot(halfway));
+    let lobe = distribution * visibility;
+    let way = to_light.dot(halfway);
+    let metal = lobe * (material.albedo + (DVec3::ONE - material.albedo) * grazing(way));
     // What the layer lets in and out again; the mean keeps a white material white.
     let let_through =
         (1.0 - fresnel(cos_light)) * (1.0 - fresnel(cos_camera)) / (1.0 - MEAN_FRESNEL);
-    diffuse * let_through + specular
+    let dielectric = diffuse * let_through + lobe * fresnel(way);
+    dielectric.lerp(metal, material.metallic)
 }
 
 /// Cosine-weighted mean of [`fresnel`] over the hemisphere: F₀ + (1 − F₀) / 21.
@@ -90,7 +280,12 @@ const MEAN_FRESNEL: f64 = 0.04 + 0.96 / 21.0;
 
 /// Schlick's approximation for a dielectric of index 1.5.
 fn fresnel(cosine: f64) -> f64 {
-    0.04 + 0.96 * (1.0 - cosine.clamp(0.0, 1.0)).powi(5)
+    0.04 + 0.96 * grazing(cosine)
+}
+
+/// Schlick's weight of grazing light.
+fn grazing(cosine: f64) -> f64 {
+    (1.0 - cosine.clamp(0.0, 1.0)).powi(5)
 }
 
 #[cfg(test)]
@@ -99,18 +294,12 @@ mod tests {
 
     #[test]
     fn light_falls_off_with_the_square_of_distance_and_the_cosine() {
-        let lamp = Light::Point {
-            position_m: DVec3::new(0.0, 0.0, 2.0),
-            intensity: DVec3::splat(8.0),
-        };
+        let lamp = Light::point(DVec3::new(0.0, 0.0, 2.0), DVec3::splat(8.0));
         assert!((irradiance(&lamp, DVec3::ZERO, DVec3::Z).x - 2.0).abs() < 1e-12);
         let tilted = DVec3::new(0.8, 0.0, 0.6);
         assert!((irradiance(&lamp, DVec3::ZERO, tilted).x - 1.2).abs() < 1e-12);
         assert_eq!(irradiance(&lamp, DVec3::ZERO, DVec3::NEG_Z), DVec3::ZERO);
-        let sun = Light::Directional {
-            direction: DVec3::NEG_Z,
-            irradiance: DVec3::splat(3.0),
-        };
+        let sun = Light::directional(DVec3::NEG_Z, DVec3::splat(3.0));
         assert!((irradiance(&sun, DVec3::splat(7.0), tilted).x - 1.8).abs() < 1e-12);
     }
 
@@ -118,8 +307,8 @@ mod tests {
     fn no_material_reflects_more_than_arrives_and_light_may_be_turned_round() {
         for alpha in [0.1, 0.3, 1.0] {
             let material = Material {
-                albedo: DVec3::ONE,
                 roughness: Some(alpha),
+                ..Material::matt(DVec3::ONE)
             };
             let at = |polar: f64, azimuth: f64| {
                 let (sine, cosine) = polar.sin_cos();

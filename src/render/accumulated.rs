@@ -7,12 +7,12 @@ use super::attachments::{depth_stencil, loaded};
 use super::background::Background;
 use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
-use super::gpu_scene::GpuScene;
+use super::gpu_scene::{DrawnLight, GpuScene};
 use super::light_sums::{BY_GAIN, LightSums};
 use super::passes::Passes;
 use super::screen_bounds::ScreenBounds;
 use super::shown::Shown;
-use super::surfaces::Surfaces;
+use super::surfaces::{SurfaceKinds, Surfaces};
 use super::technique::{FrameContext, TechniquePasses};
 use super::uniforms::GEOMETRY_GROUPS;
 use super::volumes::{Among, Volumes, set_scissor};
@@ -25,9 +25,9 @@ pub(super) struct Accumulated {
 }
 
 impl Accumulated {
-    pub fn new(gpu: &Gpu, background: &Background, samples: u32, glossy: bool) -> Self {
+    pub fn new(gpu: &Gpu, background: &Background, samples: u32, kinds: SurfaceKinds) -> Self {
         Self {
-            surfaces: Surfaces::new(gpu, samples, glossy),
+            surfaces: Surfaces::new(gpu, samples, kinds),
             volumes: Volumes::new(gpu, &GEOMETRY_GROUPS, samples, &[gpu.light_format; 2]),
             sums: LightSums::new(gpu, background, samples, BY_GAIN),
         }
@@ -42,41 +42,100 @@ impl Accumulated {
         is_first: bool,
     ) {
         let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
-        let (surfaces, volumes) = (&self.surfaces, &self.volumes);
+        let surfaces = &self.surfaces;
         set_scissor(pass, pixels);
+        let whole = DrawnLight::Whole(light);
         if is_first {
             let ambient = [
                 (&surfaces.ambient_on_real, Role::Real),
                 (&surfaces.ambient_on_virtual, Role::Virtual),
             ];
             for (pipelines, role) in ambient {
-                gpu_scene.draw_surfaces(pass, pipelines, role, light, pixels);
+                gpu_scene.draw_surfaces(pass, pipelines, role, whole, pixels);
             }
         }
-        if gpu_scene.light_count() == 0 {
-            return;
+        let pieces = gpu_scene.pieces_of(light);
+        match pieces.len() {
+            0 => {}
+            1 => self.draw_sharp(pass, frame, pieces.start),
+            _ => {
+                let reaching = &surfaces.light_reaching_real;
+                gpu_scene.draw_surfaces(pass, reaching, Role::Real, whole, pixels);
+                for piece in pieces {
+                    self.draw_piece(pass, frame, piece);
+                }
+            }
         }
-        if gpu_scene.count_volumes(pass, volumes, Among::All, Role::Real, light, pixels) {
+    }
+
+    /// Draws a light that is one piece.
+    fn draw_sharp(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>, piece: usize) {
+        let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
+        let (surfaces, volumes) = (&self.surfaces, &self.volumes);
+        if gpu_scene.count_volumes(pass, volumes, Among::All, Role::Real, piece, pixels) {
             volumes.keep(pass, Role::Real, pixels);
         }
         gpu_scene.draw_surfaces(
             pass,
             &surfaces.light_reaching_real,
             Role::Real,
-            light,
+            DrawnLight::Piece(piece),
             pixels,
         );
+        self.draw_taken(pass, frame, piece);
+        gpu_scene.draw_virtuals_facing(pass, &surfaces.light_on_virtual, piece, pixels);
+    }
+
+    /// Draws one of several pieces of a light, of which all has reached the real surfaces already.
+    fn draw_piece(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>, piece: usize) {
+        self.draw_hidden(pass, frame, piece);
+        let on_virtual = &self.surfaces.light_on_virtual;
+        frame
+            .gpu_scene
+            .draw_virtuals_facing(pass, on_virtual, piece, frame.bounds.pixels);
+    }
+
+    /// Draws what is hidden of a piece from real surfaces, which all of it has reached.
+    fn draw_hidden(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>, piece: usize) {
+        let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
+        let (surfaces, volumes) = (&self.surfaces, &self.volumes);
+        volumes.forget(pass, pixels);
+        if gpu_scene.count_volumes(pass, volumes, Among::All, Role::Real, piece, pixels) {
+            volumes.keep(pass, Role::Real, pixels);
+            gpu_scene.draw_surfaces(
+                pass,
+                &surfaces.light_kept_from_real,
+                Role::Real,
+                DrawnLight::HiddenPiece(piece),
+                pixels,
+            );
+        }
+        self.draw_taken(pass, frame, piece);
+    }
+
+    /// Draws what real and virtual things hide of the ambient light from real surfaces, all of which has reached them. (What of
+    /// it reaches virtual ones is gathered: indirect.rs.)
+    fn draw_surroundings(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>) {
+        set_scissor(pass, frame.bounds.pixels);
+        for piece in frame.gpu_scene.pieces_of_surroundings() {
+            self.draw_hidden(pass, frame, piece);
+        }
+    }
+
+    /// Draws what virtual things take of a piece from real surfaces; what real ones hide of it is known.
+    fn draw_taken(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>, piece: usize) {
+        let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
+        let (surfaces, volumes) = (&self.surfaces, &self.volumes);
         let lit = Among::LitByReal;
-        if gpu_scene.count_volumes(pass, volumes, lit, Role::Virtual, light, pixels) {
+        if gpu_scene.count_volumes(pass, volumes, lit, Role::Virtual, piece, pixels) {
             gpu_scene.draw_surfaces(
                 pass,
                 &surfaces.light_hidden_from_real,
                 Role::Real,
-                light,
+                DrawnLight::Taken(piece),
                 pixels,
             );
         }
-        gpu_scene.draw_virtuals_facing(pass, &surfaces.light_on_virtual, light, pixels);
     }
 }
 
@@ -93,8 +152,9 @@ impl TechniquePasses for Accumulated {
     fn draw(&mut self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) {
         let sums = &self.sums;
         let count = frame.gpu_scene.light_count().max(1);
+        let surroundings = frame.gpu_scene.pieces_of_surroundings();
         for light in 0..count {
-            let (first, last) = (light == 0, light + 1 == count);
+            let (first, last) = (light == 0, light + 1 == count && surroundings.is_empty());
             let load = match first {
                 true => wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
                 false => wgpu::LoadOp::Load,
@@ -106,6 +166,16 @@ impl TechniquePasses for Accumulated {
                 Some(depth_stencil(&sums.depth_stencil, first, last)),
             );
             self.draw_light(&mut pass, frame, light, first);
+        }
+        if !surroundings.is_empty() {
+            let load = wgpu::LoadOp::Load;
+            let mut pass = passes.begin(
+                "surroundings",
+                Some(GpuSpan::Light.part(false, true)),
+                &[loaded(&sums.reaching, load), loaded(&sums.change, load)],
+                Some(depth_stencil(&sums.depth_stencil, false, true)),
+            );
+            self.draw_surroundings(&mut pass, frame);
         }
         sums.composite(passes, frame);
     }

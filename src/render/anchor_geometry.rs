@@ -12,11 +12,13 @@ use wgpu::util::DeviceExt as _;
 use crate::geometry::bounds::Bounds;
 use crate::geometry::coincidence::{IN_ONE_PLACE_M, may_coincide};
 use crate::geometry::levels::{Level, levels};
-use crate::geometry::mesh::Mesh;
+use crate::geometry::mesh::{CornerLook, Mesh};
 use crate::geometry::outline_scale::largest_scale;
 use crate::geometry::shadow_volume::Caster;
 use crate::geometry::solid::holes;
 use crate::scene::{Object, Scene, Shortcut};
+
+use super::materials::needs_looks;
 
 /// The kind of model that a surface belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,6 +45,24 @@ pub(super) const CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::Vertex
     attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x4],
 };
 
+/// What a corner has where any material of the scene's virtual things needs more, as `SurfaceCorner` in shading.wgsl reads it.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+struct CornerOfMaterial {
+    uv: [f32; 4],
+    color: [f32; 4],
+    tangent: [f32; 4],
+    /// Number of the material among all of the virtual things'.
+    material: u32,
+}
+
+/// Vertex layout of [`CornerOfMaterial`].
+pub(super) const LOOK_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
+    array_stride: size_of::<CornerOfMaterial>() as u64,
+    step_mode: wgpu::VertexStepMode::Vertex,
+    attributes: &wgpu::vertex_attr_array![4 => Float32x4, 5 => Float32x4, 6 => Float32x4, 7 => Uint32],
+};
+
 /// Vertex layout of [`SurfaceBatch::indirect`].
 pub(super) const INDIRECT_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
     array_stride: size_of::<Vec3>() as u64,
@@ -59,6 +79,8 @@ pub(super) struct SurfaceBatch {
     /// For each corner the irradiance that no light gives it.
     pub indirect: wgpu::Buffer,
     pub indices: wgpu::Buffer,
+    /// For each corner a [`CornerOfMaterial`], where the scene needs them.
+    pub looks: Option<wgpu::Buffer>,
 }
 
 /// One thing, in its anchor's space.
@@ -141,12 +163,16 @@ impl AnchorGeometry {
         };
         let things = scene.phantoms.iter().chain(&scene.virtuals);
         let surfaces: Vec<_> = things.map(triangles_in_anchor).collect();
+        let needs_looks = scene.virtuals.iter().any(needs_looks);
         for (role, objects) in [
             (Role::Real, &scene.phantoms),
             (Role::Virtual, &scene.virtuals),
         ] {
             for anchor in 0..scene.node_count() {
-                let mut shared = SharedCorners::default();
+                let mut shared = SharedCorners {
+                    looks: (needs_looks && role == Role::Virtual).then(Vec::new),
+                    ..SharedCorners::default()
+                };
                 let there = objects
                     .iter()
                     .enumerate()
@@ -161,6 +187,9 @@ impl AnchorGeometry {
                         true => known.of(&object.mesh),
                         false => &[],
                     };
+                    let before = objects.iter().take(index);
+                    shared.first_material =
+                        before.map(|object| object.materials.len() as u32).sum();
                     let thing = thing(device, (role, tie), object, coarser, &mut shared);
                     geometry.things.extend(thing);
                 }
@@ -232,7 +261,7 @@ fn thing(
             receivers = mesh.triangles.iter().map(|t| t.map(corner)).collect();
             let first = shared.triangles.len();
             let corners = corners(object, mesh);
-            shared.add(&corners);
+            shared.add(object, mesh, &corners);
             let of_casting = || {
                 let caster = Caster::new(positions, mesh.triangles.clone());
                 LevelCaster {
@@ -273,21 +302,37 @@ fn thing(
 struct SharedCorners {
     corners: Vec<SurfaceCorner>,
     triangles: Vec<[u32; 3]>,
-    index_of: HashMap<[u32; 10], u32>,
+    /// By place, normal and material, and by what else the corner has.
+    index_of: HashMap<([u32; 10], [u32; 13]), u32>,
+    /// What corners have besides, where any virtual thing needs it.
+    looks: Option<Vec<CornerOfMaterial>>,
+    /// Number of the first material of the thing at hand.
+    first_material: u32,
 }
 
 impl SharedCorners {
     /// Adds triangles, three corners each.
-    fn add(&mut self, corners: &[SurfaceCorner]) {
-        let indices: Vec<u32> = corners.iter().map(|corner| self.index(*corner)).collect();
+    fn add(&mut self, object: &Object, mesh: &Mesh, corners: &[SurfaceCorner]) {
+        let with_looks = self.looks.is_some();
+        let first_material = self.first_material;
+        let look = |number: usize| match with_looks {
+            true => corner_of_material(object, mesh, (number / 3, number % 3), first_material),
+            false => CornerOfMaterial::zeroed(),
+        };
+        let numbered = corners.iter().enumerate();
+        let indices: Vec<u32> = numbered
+            .map(|(number, corner)| self.index(*corner, look(number)))
+            .collect();
         self.triangles.extend(indices.as_chunks::<3>().0);
     }
 
-    fn index(&mut self, corner: SurfaceCorner) -> u32 {
+    fn index(&mut self, corner: SurfaceCorner, look: CornerOfMaterial) -> u32 {
         let next = self.corners.len() as u32;
-        let index = *self.index_of.entry(bytemuck::cast(corner)).or_insert(next);
+        let key = (bytemuck::cast(corner), bytemuck::cast(look));
+        let index = *self.index_of.entry(key).or_insert(next);
         if index == next {
             self.corners.push(corner);
+            self.looks.iter_mut().for_each(|looks| looks.push(look));
         }
         index
     }
@@ -319,12 +364,47 @@ impl SharedCorners {
                 bytemuck::cast_slice(&vec![ambient; self.corners.len()]),
                 wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
             ),
+            looks: self.looks.as_ref().map(|looks| {
+                let contents = bytemuck::cast_slice(looks);
+                buffer("surface looks", contents, wgpu::BufferUsages::VERTEX)
+            }),
             indices: buffer(
                 "surface triangles",
                 bytemuck::cast_slice(&self.triangles),
                 wgpu::BufferUsages::INDEX,
             ),
         }
+    }
+}
+
+/// What a corner of a triangle has for its material.
+fn corner_of_material(
+    object: &Object,
+    mesh: &Mesh,
+    (triangle, corner): (usize, usize),
+    first_material: u32,
+) -> CornerOfMaterial {
+    let look = mesh.corner_looks.get(triangle);
+    let look = look.map_or(CornerLook::default(), |corners| {
+        mesh.looks[corners[corner] as usize]
+    });
+    let [first, second] = look.uv;
+    let tangent = object
+        .anchor_from_object
+        .transform_vector3(look.tangent.truncate().as_dvec3())
+        .normalize_or_zero()
+        .as_vec3();
+    let mirrored = object.anchor_from_object.matrix3.determinant() < 0.0;
+    let side = if mirrored {
+        -look.tangent.w
+    } else {
+        look.tangent.w
+    };
+    CornerOfMaterial {
+        uv: [first.x, first.y, second.x, second.y],
+        color: look.color.to_array(),
+        tangent: tangent.extend(side).to_array(),
+        material: first_material + mesh.triangle_materials[triangle],
     }
 }
 

@@ -7,22 +7,24 @@ use crate::geometry::camera::Intrinsics;
 use crate::geometry::counting::{self, Counting};
 use crate::geometry::reach::PixelRect;
 use crate::geometry::shadow_volume::{Casting, LightPlace};
-use crate::light::Light;
 use crate::scene::{self, ShadowSettings, Shortcut};
 
 use super::anchor_geometry::{AnchoredModel, LevelCaster, Role};
 use super::gpu::Gpu;
 use super::insides::Insides;
+use super::lights::Piece;
 use super::screen_bounds::{ScreenBounds, light_place};
 use super::uniforms::{CastingLight, LIGHT_GROUP, NEAR_M, UniformRow};
 use super::volumes::{CountedVolume, IndexBuffer, MadeFor, Volume};
 
 /// The shadows of a scene's things.
 pub(super) struct Casters {
-    /// For each light those of each thing; what does not cast has an empty one.
+    /// For each slot of a light's piece those of each thing; what does not cast has an empty one.
     shadows: Vec<Vec<Shadow>>,
-    /// For each light, that light as each thing meets it.
+    /// For each slot, that piece as each thing meets it.
     lights: UniformRow,
+    /// Slots that `lights` has room for.
+    capacity: usize,
     light_group: wgpu::BindGroup,
     /// Whether depth-pass may be taken.
     depth_pass: bool,
@@ -73,25 +75,28 @@ impl LitSides {
 }
 
 impl Casters {
-    pub fn new(
-        gpu: &Gpu,
-        thing_count: usize,
-        light_count: usize,
-        shadows: &ShadowSettings,
-    ) -> Self {
-        let lights = UniformRow::new::<CastingLight>(
-            &gpu.device,
-            "casting lights",
-            light_count * thing_count,
-        );
-        let of_light = |_| (0..thing_count).map(|_| Shadow::default()).collect();
+    pub fn new(gpu: &Gpu, thing_count: usize, shadows: &ShadowSettings) -> Self {
+        let (lights, light_group) = casting_lights(gpu, thing_count);
         Self {
-            shadows: (0..light_count).map(of_light).collect(),
-            light_group: gpu.bind_group(&LIGHT_GROUP, [lights.binding()]),
+            shadows: Vec::new(),
+            capacity: 1,
+            light_group,
             lights,
             depth_pass: shadows.counting == scene::VolumeCounting::Auto
                 && !shadows.without.has(Shortcut::DepthPass),
             forgets: shadows.without.has(Shortcut::Kept),
+        }
+    }
+
+    /// Makes room for the pieces of lights.
+    pub fn reserve(&mut self, gpu: &Gpu, thing_count: usize, slot_count: usize) {
+        while self.shadows.len() < slot_count {
+            let of_things = (0..thing_count).map(|_| Shadow::default());
+            self.shadows.push(of_things.collect());
+        }
+        if slot_count > self.capacity {
+            self.capacity = slot_count.next_power_of_two();
+            (self.lights, self.light_group) = casting_lights(gpu, self.capacity * thing_count);
         }
     }
 
@@ -101,7 +106,7 @@ impl Casters {
         &mut self,
         gpu: &Gpu,
         (things, levels): (&[AnchoredModel], &[usize]),
-        lights: &[Light],
+        pieces: &[Piece],
         camera_from_anchor: &[Option<DAffine3>],
         intrinsics: &Intrinsics,
         (bounds, within): (&ScreenBounds, PixelRect),
@@ -122,7 +127,10 @@ impl Casters {
                 ))
             })
             .collect();
-        for (index, (light, shadows)) in lights.iter().zip(&mut self.shadows).enumerate() {
+        for (index, Piece { light, slot, .. }) in pieces.iter().enumerate() {
+            let Some(shadows) = self.shadows.get_mut(*slot) else {
+                continue;
+            };
             for (number, (thing, shadow)) in things.iter().zip(shadows).enumerate() {
                 let reach = &bounds.shadows[index][number];
                 shadow.scissor = None;
@@ -141,9 +149,9 @@ impl Casters {
                 let end = reach
                     .end
                     .map(|end| end.in_space(&placed.anchor_from_world.inverse()));
-                let slot = index * things.len() + number;
+                let place = slot * things.len() + number;
                 self.lights
-                    .write(&gpu.queue, slot, &CastingLight::new(light, end));
+                    .write(&gpu.queue, place, &CastingLight::new(light, end));
                 let counting = match self.depth_pass && !placed.sees_past(end) {
                     true => counting::counting(&thing.bounds, light, &placed.near),
                     false => Counting::DepthFail,
@@ -174,34 +182,35 @@ impl Casters {
         }
     }
 
-    /// The volumes of a role and light, for [`super::volumes::Volumes::count`].
+    /// The volumes of a role and the piece of a slot, for [`super::volumes::Volumes::count`].
     pub fn counted<'a>(
         &'a self,
         things: &'a [AnchoredModel],
         role: Role,
-        light: usize,
+        slot: usize,
         insides: &'a [Insides],
         view_offset: impl Fn(&AnchoredModel) -> u32 + 'a,
     ) -> impl Iterator<Item = CountedVolume<'a>> {
-        let shadows = things.iter().zip(&self.shadows[light]).enumerate();
+        let shadows = self.shadows.get(slot).map_or(&[][..], Vec::as_slice);
+        let shadows = things.iter().zip(shadows).enumerate();
         shadows
             .filter(move |(_, (thing, _))| thing.role == role)
             .filter_map(move |(number, (thing, shadow))| {
-                let slot = light * things.len() + number;
+                let place = slot * things.len() + number;
                 Some(CountedVolume {
                     volume: &shadow.volume,
                     counting: shadow.counting?,
                     insides: insides[number],
                     scissor: shadow.scissor?,
-                    offsets: [view_offset(thing), self.lights.offset(slot)],
+                    offsets: [view_offset(thing), self.lights.offset(place)],
                     vertices: &thing.levels[shadow.level].caster.as_ref()?.vertices,
                 })
             })
     }
 
     /// The surface of a virtual thing; `None` where it casts nothing that is seen.
-    pub fn lit(&self, number: usize, light: usize) -> Option<&Lit> {
-        let shadow = self.shadows.get(light)?.get(number)?;
+    pub fn lit(&self, number: usize, slot: usize) -> Option<&Lit> {
+        let shadow = self.shadows.get(slot)?.get(number)?;
         shadow.scissor.map(|_| &shadow.lit)
     }
 
@@ -209,6 +218,12 @@ impl Casters {
     pub fn light_group(&self) -> &wgpu::BindGroup {
         &self.light_group
     }
+}
+
+fn casting_lights(gpu: &Gpu, count: usize) -> (UniformRow, wgpu::BindGroup) {
+    let lights = UniformRow::new::<CastingLight>(&gpu.device, "casting lights", count);
+    let group = gpu.bind_group(&LIGHT_GROUP, [lights.binding()]);
+    (lights, group)
 }
 
 impl Shadow {

@@ -6,10 +6,12 @@ use crate::geometry::bounds::Bounds;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::levels::is_close_enough;
 use crate::geometry::outline_scale::{OutlineView, outline_px_per_m, shadow_px_per_m};
+use crate::geometry::penumbra::penumbra_px;
 use crate::geometry::shadow_volume::LightPlace;
 use crate::light::Light;
 
 use super::anchor_geometry::{AnchoredModel, ModelLevel, Role};
+use super::lights::sized_place;
 use super::screen_bounds::light_place;
 use super::uniforms::NEAR_M;
 
@@ -37,18 +39,7 @@ pub(super) fn chosen_levels(
     let Some(camera_from_world) = camera_from_anchor.first().copied().flatten() else {
         return vec![0; things.len()];
     };
-    let world_from_camera = camera_from_world.inverse();
-    let placed = things
-        .iter()
-        .map(|thing| {
-            let world_from_thing = world_from_camera * camera_from_anchor[thing.anchor]?;
-            let place = |point: DVec3| world_from_thing.transform_point3(point);
-            Some(PlacedBounds {
-                bounds: Bounds::around(thing.bounds.corners().map(place))?,
-                world_from_thing,
-            })
-        })
-        .collect();
+    let placed = placed(things, camera_from_anchor, &camera_from_world.inverse());
     let place = |light| light_place(light, &DAffine3::IDENTITY);
     let choice = LevelChoice {
         view: OutlineView {
@@ -66,6 +57,58 @@ pub(super) fn chosen_levels(
     indices
         .map(|index| choice.level(index, before(index)))
         .collect()
+}
+
+/// The width of the widest soft edge that a light's shadows have in the picture, pixels.
+pub(super) fn widest_penumbra_px(
+    things: &[AnchoredModel],
+    light: &Light,
+    camera_from_anchor: &[Option<DAffine3>],
+    intrinsics: &Intrinsics,
+) -> f64 {
+    let Some(camera_from_world) = camera_from_anchor.first().copied().flatten() else {
+        return 0.0;
+    };
+    let view = OutlineView {
+        intrinsics: *intrinsics,
+        camera_from_world,
+        near_m: f64::from(NEAR_M),
+    };
+    let placed = placed(things, camera_from_anchor, &camera_from_world.inverse());
+    let standing = || {
+        let all = things.iter().zip(&placed);
+        all.filter_map(|(thing, placed)| Some((thing, placed.as_ref()?)))
+    };
+    let light = sized_place(light);
+    let mut widest_px: f64 = 0.0;
+    for (receiver, at) in standing() {
+        let place = |point: DVec3| at.world_from_thing.transform_point3(point);
+        let triangles = receiver.receivers.iter();
+        let triangles: Vec<[DVec3; 3]> = triangles.map(|corners| corners.map(place)).collect();
+        for (_, caster) in standing().filter(|(thing, _)| thing.casts) {
+            if may_shade(light.place, &caster.bounds, &at.bounds) {
+                let width_px = penumbra_px(&caster.bounds, &light, &triangles, &view);
+                widest_px = widest_px.max(width_px);
+            }
+        }
+    }
+    widest_px
+}
+
+fn placed(
+    things: &[AnchoredModel],
+    camera_from_anchor: &[Option<DAffine3>],
+    world_from_camera: &DAffine3,
+) -> Vec<Option<PlacedBounds>> {
+    let placed = things.iter().map(|thing| {
+        let world_from_thing = *world_from_camera * camera_from_anchor[thing.anchor]?;
+        let place = |point: DVec3| world_from_thing.transform_point3(point);
+        Some(PlacedBounds {
+            bounds: Bounds::around(thing.bounds.corners().map(place))?,
+            world_from_thing,
+        })
+    });
+    placed.collect()
 }
 
 /// All that the choice of levels depends on.

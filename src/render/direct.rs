@@ -8,14 +8,14 @@ use super::attachments::{kept, loaded, target};
 use super::background::{Background, PICTURE_FORMAT, VIDEO_GROUP};
 use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
-use super::gpu_scene::GpuScene;
+use super::gpu_scene::{DrawnLight, GpuScene};
 use super::light_sums::GAIN_FORMAT;
 use super::passes::Passes;
 use super::pipelines::{GroupLayout, PipelineDescription, overwritten, texels, untouched};
 use super::screen_bounds::ScreenBounds;
 use super::shown::Shown;
 use super::stencil::{SHADOW, VIRTUAL_SHADOW, depth_stencil_state, stencil};
-use super::surfaces::{Sided, surface_description};
+use super::surfaces::{Sided, SurfaceKinds, surface_description};
 use super::technique::{FrameContext, TechniquePasses};
 use super::uniforms::GEOMETRY_GROUPS;
 use super::volumes::{Among, Volumes, set_scissor};
@@ -62,16 +62,18 @@ pub(super) struct Direct {
 }
 
 impl Direct {
-    pub fn new(gpu: &Gpu, background: &Background, glossy: bool) -> Self {
+    pub fn new(gpu: &Gpu, background: &Background, kinds: SurfaceKinds) -> Self {
         let target =
             |label, format, usage| target(&gpu.device, label, background.size_px, format, 1, usage);
         let read = wgpu::TextureUsages::TEXTURE_BINDING;
         let ambient = target("ambient light", PICTURE_FORMAT, read);
         let surface = SurfacesOverVideo {
             gpu,
+            kinds,
             // What a scene does not have costs nothing.
             constants: vec![
-                ("GLOSSY", f64::from(glossy)),
+                ("GLOSSY", f64::from(kinds.glossy)),
+                ("SHAPED", f64::from(kinds.shaped)),
                 ("DISTORTS", f64::from(background.distorts)),
             ],
         };
@@ -130,7 +132,13 @@ impl Direct {
         pass.set_pipeline(&self.nothing);
         pass.draw(0..3, 0..1);
         pass.set_bind_group(2, &frame.background.group, &[]);
-        gpu_scene.draw_surfaces(&mut pass, &self.depth_of_real, Role::Real, 0, pixels);
+        gpu_scene.draw_surfaces(
+            &mut pass,
+            &self.depth_of_real,
+            Role::Real,
+            DrawnLight::Whole(0),
+            pixels,
+        );
         let shading = [
             &self.light_on_virtual,
             &self.light_at_terminator,
@@ -160,7 +168,13 @@ impl Direct {
         let lit = Among::LitByReal;
         let by_virtual = gpu_scene.count_volumes(pass, volumes, lit, Role::Virtual, 0, pixels);
         if by_virtual {
-            gpu_scene.draw_surfaces(pass, &self.hidden_on_real, Role::Real, 0, pixels);
+            gpu_scene.draw_surfaces(
+                pass,
+                &self.hidden_on_real,
+                Role::Real,
+                DrawnLight::Whole(0),
+                pixels,
+            );
         }
         if (by_real || by_virtual) && !bounds.virtuals.is_empty() {
             set_scissor(pass, bounds.virtuals);
@@ -202,13 +216,20 @@ impl TechniquePasses for Direct {
         let mut pass = passes.begin("gain", None, &[gain], Some(kept(&self.depth_stencil)));
         set_scissor(&mut pass, pixels);
         pass.set_bind_group(2, &frame.background.group, &[]);
-        gpu_scene.draw_surfaces(&mut pass, &self.gain_on_real, Role::Real, 0, pixels);
+        gpu_scene.draw_surfaces(
+            &mut pass,
+            &self.gain_on_real,
+            Role::Real,
+            DrawnLight::Whole(0),
+            pixels,
+        );
     }
 }
 
 /// The common part of all pipelines that draw surfaces over the video.
 struct SurfacesOverVideo<'a> {
     gpu: &'a Gpu,
+    kinds: SurfaceKinds,
     constants: Vec<(&'static str, f64)>,
 }
 
@@ -229,6 +250,10 @@ impl SurfacesOverVideo<'_> {
             constants,
             targets: vec![written(PICTURE_FORMAT), written(PICTURE_FORMAT)],
             ..self.over_video(None)
+        };
+        let description = match fragment {
+            "depth_alone" => description,
+            _ => self.kinds.of_virtual(description),
         };
         Sided::new(self.gpu, &description)
     }

@@ -1,25 +1,31 @@
 //! What stands where in a frame: the scene's surfaces, casters and lights on the GPU, and how passes draw them.
 
+use std::ops::Range;
+
 use glam::{DAffine3, Vec3};
 use rayon::prelude::*;
 
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
-use crate::light::Light;
-use crate::scene::{Scene, ShadowSettings, Shortcut};
+use crate::light::{Light, Shape};
+use crate::scene::{Scene, SceneLight, ShadowSettings, Shortcut};
 
 use super::anchor_geometry::{
     AnchorGeometry, AnchoredModel, KnownLevels, Role, SurfaceBatch, VirtualCorners,
 };
 use super::casters::{Casters, LitSides};
-use super::detail::chosen_levels;
+use super::detail::{chosen_levels, widest_penumbra_px};
 use super::gpu::Gpu;
 use super::indirect::Indirect;
 use super::insides::{Insides, insides};
+use super::lights::Lights;
+use super::materials::{materials_group, needs_looks};
 use super::screen_bounds::{ScreenBounds, screen_bounds};
 use super::shown::Shown;
-use super::surfaces::Sided;
-use super::uniforms::{AnchorView, CameraLight, LIGHT_GROUP, UniformRow, VIEW_GROUP};
+use super::stencil::REAL_HIDES;
+use super::surfaces::{Sided, SurfaceKinds};
+use super::surroundings::hidden_surroundings;
+use super::uniforms::{AnchorView, UniformRow, VIEW_GROUP};
 use super::volumes::{Among, Volumes, set_scissor};
 
 /// The origin of a scene's light.
@@ -31,14 +37,29 @@ pub(super) enum LitBy {
     Room,
 }
 
+/// The light in group 1 while surfaces are drawn.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum DrawnLight {
+    /// All of a light.
+    Whole(usize),
+    /// A piece of one.
+    Piece(usize),
+    /// What virtual things take where they hide a piece.
+    Taken(usize),
+    /// A piece where real things hide it: the stencil's reference says that.
+    HiddenPiece(usize),
+}
+
 /// The scene as the present frame has it.
 pub(super) struct GpuScene {
     lit_by: LitBy,
     intrinsics: Intrinsics,
     /// Those that cast shadow volumes.
-    lights: Vec<Light>,
-    /// Whether any virtual thing has a glossy layer.
-    pub glossy: bool,
+    lights: Lights,
+    /// What the virtual things' materials and the lights have.
+    pub kinds: SurfaceKinds,
+    /// The materials, where there are such as need it.
+    materials: Option<wgpu::BindGroup>,
     batches: Vec<SurfaceBatch>,
     things: Vec<AnchoredModel>,
     /// For each thing the level that is drawn.
@@ -53,9 +74,7 @@ pub(super) struct GpuScene {
     virtual_corners: Vec<(usize, VirtualCorners)>,
     /// The camera as what stands on each anchor meets it, and after that as each virtual thing does.
     views: UniformRow,
-    camera_lights: UniformRow,
     view_group: wgpu::BindGroup,
-    light_group: wgpu::BindGroup,
     camera_from_anchor: Vec<Option<DAffine3>>,
     /// Where things stand and which are there: phantoms, then virtual ones.
     standing: Vec<(DAffine3, bool)>,
@@ -67,7 +86,6 @@ impl GpuScene {
         let device = &gpu.device;
         let view_count = scene.node_count() + scene.virtuals.len();
         let views = UniformRow::new::<AnchorView>(device, "views", view_count);
-        let camera_lights = UniformRow::new::<CameraLight>(device, "lights", scene.lights.len());
         let mut known_levels = KnownLevels::default();
         let AnchorGeometry {
             batches,
@@ -75,11 +93,12 @@ impl GpuScene {
             virtual_corners,
         } = AnchorGeometry::new(device, scene, &mut known_levels);
         let world_virtuals = virtual_corners.iter().find(|(anchor, _)| *anchor == 0);
+        let looks = scene.virtuals.iter().any(needs_looks);
         Self {
             lit_by,
             standing: standing(scene),
             known_levels,
-            casters: Casters::new(gpu, things.len(), scene.lights.len(), &scene.shadows),
+            casters: Casters::new(gpu, things.len(), &scene.shadows),
             indirect: match lit_by {
                 LitBy::Lights => {
                     world_virtuals.and_then(|(_, corners)| Indirect::new(scene, corners))
@@ -94,23 +113,32 @@ impl GpuScene {
             batches,
             things,
             view_group: gpu.bind_group(&VIEW_GROUP, [views.binding()]),
-            light_group: gpu.bind_group(&LIGHT_GROUP, [camera_lights.binding()]),
             camera_from_anchor: vec![None; scene.node_count()],
-            lights: lights(scene, lit_by),
-            glossy: scene.virtuals.iter().any(|object| {
-                let mut materials = object.materials.iter();
-                materials.any(|material| material.roughness.is_some())
-            }),
+            lights: Lights::new(
+                gpu,
+                lights(scene, lit_by),
+                hidden_surroundings(scene, lit_by),
+            ),
+            kinds: SurfaceKinds {
+                glossy: scene.virtuals.iter().any(|object| {
+                    let mut materials = object.materials.iter();
+                    materials.any(|material| material.roughness.is_some())
+                }),
+                shaped: scene.lights.iter().any(|light| is_shaped(&light.light)),
+                looks,
+            },
+            materials: looks.then(|| materials_group(gpu, scene)),
             intrinsics,
             views,
-            camera_lights,
         }
     }
 
     /// Takes another state of the same scene: lights otherwise, things elsewhere, shown or hidden. What surroundings
     /// reflect stays as it was gathered, where the same corners are there to get it.
     pub fn follow(&mut self, gpu: &Gpu, scene: &Scene) {
-        self.lights = lights(scene, self.lit_by);
+        let surroundings = hidden_surroundings(scene, self.lit_by);
+        self.lights.follow(lights(scene, self.lit_by), surroundings);
+        self.kinds.shaped = scene.lights.iter().any(|light| is_shaped(&light.light));
         let standing = standing(scene);
         if self.standing == standing {
             return;
@@ -120,7 +148,7 @@ impl GpuScene {
             things,
             virtual_corners,
         } = AnchorGeometry::new(&gpu.device, scene, &mut self.known_levels);
-        self.casters = Casters::new(gpu, things.len(), scene.lights.len(), &scene.shadows);
+        self.casters = Casters::new(gpu, things.len(), &scene.shadows);
         let world_virtuals = virtual_corners.iter().find(|(anchor, _)| *anchor == 0);
         self.indirect = self
             .indirect
@@ -142,7 +170,22 @@ impl GpuScene {
 
     /// Number of lights.
     pub fn light_count(&self) -> usize {
-        self.lights.len()
+        self.lights.count()
+    }
+
+    /// The pieces of a light, of which each casts its shadows.
+    pub fn pieces_of(&self, light: usize) -> Range<usize> {
+        self.lights.pieces_of(light)
+    }
+
+    /// From how many directions light from all around may be hidden.
+    pub fn surroundings_count(&self) -> usize {
+        self.lights.surroundings_count()
+    }
+
+    /// The pieces of the light from all around that virtual things hide.
+    pub fn pieces_of_surroundings(&self) -> Range<usize> {
+        self.lights.pieces_of_surroundings()
     }
 
     /// Triangles of the levels that the present frame's things are drawn in.
@@ -178,11 +221,8 @@ impl GpuScene {
         if let (Some(indirect), Some(buffer)) = (&mut self.indirect, world_virtuals) {
             indirect.update(queue, &buffer, camera_from_anchor, &camera_from_world);
         }
-        for (index, light) in self.lights.iter().enumerate() {
-            let light = CameraLight::new(light, &camera_from_world);
-            self.camera_lights.write(queue, index, &light);
-        }
         self.choose_levels(camera_from_anchor);
+        self.cut_lights(gpu, &camera_from_world);
         let placed = self.things.iter().zip(&self.levels);
         self.insides = placed
             .map(|(thing, &level)| {
@@ -201,15 +241,33 @@ impl GpuScene {
             .collect();
     }
 
+    /// Cuts the lights of some size into as many pieces as their shadows need.
+    fn cut_lights(&mut self, gpu: &Gpu, camera_from_world: &DAffine3) {
+        let most = self.shadows.light_samples as usize;
+        let pieces = |light: &Light| {
+            if !light.has_size() {
+                return 1;
+            }
+            let (things, poses) = (&self.things, &self.camera_from_anchor);
+            let width_px = widest_penumbra_px(things, light, poses, &self.intrinsics);
+            match width_px > 1.0 {
+                true => (2 * (0.5 * width_px).ceil() as usize).clamp(2, most),
+                false => 1,
+            }
+        };
+        self.lights.cut(gpu, camera_from_world, pieces);
+    }
+
     /// Chooses the levels of detail of a frame, which go by those of the frame before it.
     pub fn choose_levels(&mut self, camera_from_anchor: &[Option<DAffine3>]) {
         let before = match self.shadows.without.has(Shortcut::Kept) {
             true => vec![0; self.levels.len()],
             false => std::mem::take(&mut self.levels),
         };
+        self.lights.place(camera_from_anchor);
         self.levels = chosen_levels(
             &self.things,
-            &self.lights,
+            &self.lights.shining(),
             camera_from_anchor,
             &self.intrinsics,
             self.max_silhouette_error_px,
@@ -241,7 +299,7 @@ impl GpuScene {
     /// What passes draw from here on stands in the world.
     pub fn set_world(&self, pass: &mut wgpu::RenderPass<'_>) {
         pass.set_bind_group(0, &self.view_group, &[self.views.offset(0)]);
-        pass.set_bind_group(1, &self.light_group, &[self.camera_lights.offset(0)]);
+        self.lights.set_whole(pass, 0);
     }
 
     /// Draws the real surfaces of all anchors but the world.
@@ -251,7 +309,8 @@ impl GpuScene {
         pipelines: &Sided,
         within: PixelRect,
     ) {
-        self.set_light(pass, 0);
+        pass.set_stencil_reference(0);
+        self.lights.set_whole(pass, 0);
         for batch in self.placed(Role::Real).filter(|batch| batch.anchor != 0) {
             for (number, thing) in self.of_batch(batch) {
                 self.set_thing(pass, batch, thing);
@@ -275,7 +334,7 @@ impl GpuScene {
     pub fn cast_shadows(&mut self, gpu: &Gpu, shown: Shown) -> Option<ScreenBounds> {
         let bounds = screen_bounds(
             &self.things,
-            &self.lights,
+            self.lights.pieces(),
             &self.camera_from_anchor,
             &self.intrinsics,
             self.shadows.without,
@@ -288,26 +347,37 @@ impl GpuScene {
 
     /// Makes the shadow volumes that reach the pixels `within`.
     pub fn cast(&mut self, gpu: &Gpu, bounds: &ScreenBounds, within: PixelRect) {
+        self.casters
+            .reserve(gpu, self.things.len(), self.lights.slot_count());
         self.casters.update(
             gpu,
             (&self.things, &self.levels),
-            &self.lights,
+            self.lights.pieces(),
             &self.camera_from_anchor,
             &self.intrinsics,
             (bounds, within),
         );
     }
 
-    /// Draws all surfaces of a role, with the light in group 1 if the pipeline wants one.
+    /// Draws all surfaces of a role, with a light in group 1 if the pipeline wants one.
     pub fn draw_surfaces(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         pipelines: &Sided,
         role: Role,
-        light: usize,
+        light: DrawnLight,
         within: PixelRect,
     ) {
-        self.set_light(pass, light);
+        pass.set_stencil_reference(0);
+        match light {
+            DrawnLight::Whole(light) => self.lights.set_whole(pass, light),
+            DrawnLight::Piece(piece) => self.lights.set_piece(pass, piece),
+            DrawnLight::Taken(piece) => self.lights.set_taken(pass, piece),
+            DrawnLight::HiddenPiece(piece) => {
+                self.lights.set_piece(pass, piece);
+                pass.set_stencil_reference(REAL_HIDES);
+            }
+        }
         for batch in self.placed(role) {
             for (number, thing) in self.of_batch(batch) {
                 self.set_thing(pass, batch, thing);
@@ -321,14 +391,14 @@ impl GpuScene {
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         [open, terminator, back_facing]: [&Sided; 3],
-        light: usize,
+        piece: usize,
         within: PixelRect,
     ) {
-        self.set_light(pass, light);
+        self.set_piece(pass, piece);
         for batch in self.placed(Role::Virtual) {
             for (number, thing) in self.of_batch(batch) {
                 self.set_thing(pass, batch, thing);
-                let Some(surface) = self.casters.lit(number, light) else {
+                let Some(surface) = self.casters.lit(number, self.slot(piece)) else {
                     self.draw_whole(pass, open, number, thing, within);
                     continue;
                 };
@@ -350,14 +420,14 @@ impl GpuScene {
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         pipelines: &Sided,
-        light: usize,
+        piece: usize,
         within: PixelRect,
     ) {
-        self.set_light(pass, light);
+        self.set_piece(pass, piece);
         for batch in self.placed(Role::Virtual) {
             for (number, thing) in self.of_batch(batch) {
                 self.set_thing(pass, batch, thing);
-                match self.casters.lit(number, light) {
+                match self.casters.lit(number, self.slot(piece)) {
                     Some(surface) => {
                         self.draw_sides(pass, pipelines, number, &surface.facing, within);
                         pass.set_stencil_reference(1);
@@ -421,12 +491,13 @@ impl GpuScene {
         volumes: &Volumes,
         among: Among,
         role: Role,
-        light: usize,
+        piece: usize,
         within: PixelRect,
     ) -> bool {
         let groups = [&self.view_group, self.casters.light_group()];
         let (things, insides) = (&self.things, &self.insides);
-        let counted = self.casters.counted(things, role, light, insides, |thing| {
+        let slot = self.slot(piece);
+        let counted = self.casters.counted(things, role, slot, insides, |thing| {
             self.views.offset(self.view_of(thing))
         });
         volumes.count(pass, among, role, groups, within, counted)
@@ -452,9 +523,17 @@ impl GpuScene {
         things.filter(move |(_, thing)| (thing.role, thing.anchor) == kind)
     }
 
-    fn set_light(&self, pass: &mut wgpu::RenderPass<'_>, light: usize) {
+    fn set_piece(&self, pass: &mut wgpu::RenderPass<'_>, piece: usize) {
         pass.set_stencil_reference(0);
-        pass.set_bind_group(1, &self.light_group, &[self.camera_lights.offset(light)]);
+        self.lights.set_piece(pass, piece);
+    }
+
+    /// The slot of a piece.
+    fn slot(&self, piece: usize) -> usize {
+        self.lights
+            .pieces()
+            .get(piece)
+            .map_or(0, |piece| piece.slot)
     }
 
     /// Where in `views` a thing's is.
@@ -475,15 +554,33 @@ impl GpuScene {
         pass.set_bind_group(0, &self.view_group, &[view]);
         pass.set_vertex_buffer(0, batch.corners.slice(..));
         pass.set_vertex_buffer(1, batch.indirect.slice(..));
+        if let Some(looks) = &batch.looks {
+            pass.set_vertex_buffer(2, looks.slice(..));
+        }
+        if let Some(materials) = self
+            .materials
+            .as_ref()
+            .filter(|_| batch.role == Role::Virtual)
+        {
+            pass.set_bind_group(3, materials, &[]);
+        }
         pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
     }
 }
 
 /// The lights of a scene that cast shadow volumes.
-fn lights(scene: &Scene, lit_by: LitBy) -> Vec<Light> {
+fn lights(scene: &Scene, lit_by: LitBy) -> Vec<SceneLight> {
     match lit_by {
         LitBy::Lights => scene.lights.clone(),
         LitBy::Room => Vec::new(),
+    }
+}
+
+/// Whether a light is more than a point or a direction.
+pub(super) fn is_shaped(light: &Light) -> bool {
+    match light {
+        Light::Point { shape, .. } => *shape != Shape::Point,
+        Light::Directional { angle_rad, .. } => *angle_rad > 0.0,
     }
 }
 

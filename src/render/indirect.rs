@@ -47,7 +47,7 @@ impl Indirect {
             .filter_map(|anchor| Some((anchor, Mover::new(&on_anchor(anchor))?)))
             .collect();
         let surroundings =
-            Surroundings::new(on_anchor(0), scene.lights.clone(), scene.ambient_radiance);
+            Surroundings::new(on_anchor(0), scene.world_lights(), scene.ambient_radiance);
         let (points, point_of_corner) = points(corners, triangles);
         let budget = if movers.is_empty() {
             STANDING_BUDGET

@@ -54,6 +54,16 @@ pub(super) const fn sampler(binding: u32) -> wgpu::BindGroupLayoutEntry {
     entry(binding, wgpu::ShaderStages::FRAGMENT, ty)
 }
 
+/// Entry of a stack of textures that fragments read through a filtering sampler.
+pub(super) const fn filtered_array(binding: u32) -> wgpu::BindGroupLayoutEntry {
+    let ty = wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Float { filterable: true },
+        view_dimension: wgpu::TextureViewDimension::D2Array,
+        multisampled: false,
+    };
+    entry(binding, wgpu::ShaderStages::FRAGMENT, ty)
+}
+
 const fn texture(binding: u32, filterable: bool, multisampled: bool) -> wgpu::BindGroupLayoutEntry {
     let ty = wgpu::BindingType::Texture {
         sample_type: wgpu::TextureSampleType::Float { filterable },
@@ -140,6 +150,22 @@ pub(super) fn added(
         blend: Some(wgpu::BlendState {
             color: add,
             alpha: add,
+        }),
+        ..format.into()
+    }
+}
+
+/// A colour target that what is drawn is taken off.
+pub(super) fn taken_off(format: wgpu::TextureFormat) -> wgpu::ColorTargetState {
+    let take = wgpu::BlendComponent {
+        src_factor: wgpu::BlendFactor::One,
+        dst_factor: wgpu::BlendFactor::One,
+        operation: wgpu::BlendOperation::ReverseSubtract,
+    };
+    wgpu::ColorTargetState {
+        blend: Some(wgpu::BlendState {
+            color: take,
+            alpha: take,
         }),
         ..format.into()
     }

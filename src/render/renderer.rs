@@ -11,7 +11,10 @@ use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
 use crate::light::Material;
-use crate::scene::{Object, Scene, ShadowSettings, ShadowTechnique, Shortcut, Shortcuts};
+use crate::light::texture::Texture;
+use crate::scene::{
+    Object, Scene, SceneLight, ShadowSettings, ShadowTechnique, Shortcut, Shortcuts,
+};
 use crate::shafts::room::Room;
 use crate::shafts::room_transport::RoomTransport;
 
@@ -20,7 +23,7 @@ use super::background::{Background, PICTURE_FORMAT};
 use super::fade::{self, Fade};
 use super::gpu::{Gpu, RenderError};
 use super::gpu_clock::{GpuClock, GpuTimes};
-use super::gpu_scene::GpuScene;
+use super::gpu_scene::{GpuScene, is_shaped};
 use super::layers::LayerPasses;
 use super::passes::{Passes, RecordedPasses};
 use super::quality_controller::{QualityController, Setting};
@@ -62,17 +65,22 @@ pub struct Renderer {
 struct Shape {
     technique: ShadowTechnique,
     shadows: ShadowSettings,
-    lights: usize,
+    /// Of each light what it stands on, whether it has a size and whether it has a shape.
+    lights: Vec<(usize, bool, bool)>,
     ambient_radiance: DVec3,
     nodes: usize,
     /// Of each thing its name, its anchor, its mesh's triangles and whether it casts.
     things: Vec<(String, usize, usize, bool)>,
     materials: Vec<Material>,
+    textures: Vec<Arc<Texture>>,
 }
 
 impl Shape {
     fn of(scene: &Scene) -> Self {
         let things = || scene.phantoms.iter().chain(&scene.virtuals);
+        let kind = |SceneLight { anchor, light }: &SceneLight| {
+            (*anchor, light.has_size(), is_shaped(light))
+        };
         let shape = |thing: &Object| {
             let triangles = thing.mesh.triangles.len();
             (thing.name.clone(), thing.anchor, triangles, thing.casts)
@@ -80,11 +88,12 @@ impl Shape {
         Self {
             technique: scene.chosen_technique().0,
             shadows: scene.shadows,
-            lights: scene.lights.len(),
+            lights: scene.lights.iter().map(kind).collect(),
             ambient_radiance: scene.ambient_radiance,
             nodes: scene.node_count(),
             things: things().map(shape).collect(),
             materials: things().flat_map(|thing| thing.materials.clone()).collect(),
+            textures: things().flat_map(|thing| thing.textures.clone()).collect(),
         }
     }
 }

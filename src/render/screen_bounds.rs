@@ -10,6 +10,7 @@ use crate::light::Light;
 use crate::scene::{Shortcut, Shortcuts};
 
 use super::anchor_geometry::{AnchoredModel, Role};
+use super::lights::Piece;
 
 const UNSEEN: ShadowReach = ShadowReach {
     pixels: PixelRect::NONE,
@@ -23,7 +24,7 @@ pub(super) struct ScreenBounds {
     pub pixels: PixelRect,
     /// Where virtual things can be.
     pub virtuals: PixelRect,
-    /// For each light and each thing; empty for those that cast none.
+    /// For each piece of a light and each thing; empty for those that cast none.
     pub shadows: Vec<Vec<ShadowReach>>,
 }
 
@@ -50,7 +51,7 @@ impl ScreenBounds {
 /// What virtual things and their shadows can change, and how far all shadows reach; `None` where nothing is placed.
 pub(super) fn screen_bounds(
     things: &[AnchoredModel],
-    lights: &[Light],
+    pieces: &[Piece],
     camera_from_anchor: &[Option<DAffine3>],
     intrinsics: &Intrinsics,
     without: Shortcuts,
@@ -78,7 +79,7 @@ pub(super) fn screen_bounds(
         .collect();
     let receivers = Bounds::around(placed.iter().flat_map(|(_, _, corners)| *corners))?;
 
-    let mut shadows = vec![vec![UNSEEN; things.len()]; lights.len()];
+    let mut shadows = vec![vec![UNSEEN; things.len()]; pieces.len()];
     let mut virtuals = PixelRect::NONE;
     let mut pixels = PixelRect::NONE;
     for (index, thing, corners) in &placed {
@@ -86,8 +87,8 @@ pub(super) fn screen_bounds(
             let covered = reach::covered(corners, &camera_from_world, intrinsics);
             virtuals = virtuals.union(scissored(covered));
         }
-        for (light, shadows) in lights.iter().zip(&mut shadows).filter(|_| thing.casts) {
-            let light = light_place(light, &DAffine3::IDENTITY);
+        for (piece, shadows) in pieces.iter().zip(&mut shadows).filter(|_| thing.casts) {
+            let light = light_place(&piece.light, &DAffine3::IDENTITY);
             let reached =
                 reach::shadowed(corners, light, &receivers, &camera_from_world, intrinsics);
             let shadow = ShadowReach {

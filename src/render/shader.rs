@@ -11,7 +11,8 @@ macro_rules! files {
 }
 
 /// All files under `shaders/`.
-const FILES: [(&str, &str); 20] = files![
+const FILES: [(&str, &str); 22] = files![
+    "area_lights.wgsl",
     "background.wgsl",
     "common.wgsl",
     "composite.wgsl",
@@ -21,6 +22,7 @@ const FILES: [(&str, &str); 20] = files![
     "fullscreen.wgsl",
     "layers.wgsl",
     "light_sums.wgsl",
+    "materials.wgsl",
     "mapped_source.wgsl",
     "partly_covered.wgsl",
     "pixel_sums.wgsl",
@@ -193,6 +195,7 @@ mod tests {
                 &["MULTISAMPLED"],
                 &["ENCODED"],
                 &["MULTISAMPLED", "ENCODED"],
+                &["LOOKS"],
             ] {
                 let text = source(name, flags).unwrap();
                 assert_eq!(error(name, &text), None, "{flags:?}");

@@ -1,9 +1,10 @@
 //! Draws real and virtual surfaces: depth and ambient light first, then each light where the stencil says so.
 //! Reads the stencil (stencil.rs). Writes depth, `reaching` and `change` (see light_sums.wgsl).
 
-use super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT};
+use super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT, LOOK_LAYOUT};
 use super::gpu::Gpu;
-use super::pipelines::{PipelineDescription, added, overwritten, untouched};
+use super::materials::MATERIALS_GROUP;
+use super::pipelines::{PipelineDescription, added, overwritten, taken_off, untouched};
 use super::stencil::{ADDED, REAL_HIDES, SHADOW, VIRTUAL_SHADOW, depth_stencil_state, stencil};
 use super::uniforms::GEOMETRY_GROUPS;
 
@@ -15,11 +16,37 @@ pub(super) struct Surfaces {
     pub ambient_on_virtual: Sided,
     /// A light as it reaches real surfaces in the video.
     pub light_reaching_real: Sided,
+    /// A piece of a light that has reached real surfaces, taken off where real things hide it; the stencil's reference says so.
+    pub light_kept_from_real: Sided,
     /// A light where virtual things hide it from real surfaces.
     pub light_hidden_from_real: Sided,
     /// A light on virtual surfaces past all casters; the stencil's reference is 0, or 1 for surfaces that lie in no
     /// shadow but perhaps their own.
     pub light_on_virtual: Sided,
+}
+
+/// What the materials of virtual surfaces and the lights on them have; what a scene does not have is left out when pipelines are built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct SurfaceKinds {
+    /// Whether any has a glossy layer.
+    pub glossy: bool,
+    /// Whether any light is more than a point or a direction.
+    pub shaped: bool,
+    /// Whether any has pictures, colours at corners, metal or emission (materials.wgsl).
+    pub looks: bool,
+}
+
+impl SurfaceKinds {
+    /// The description of a pipeline as it draws virtual surfaces.
+    pub fn of_virtual(self, mut description: PipelineDescription) -> PipelineDescription {
+        if self.looks {
+            description.flags.push("LOOKS");
+            description.vertex_buffers.push(LOOK_LAYOUT);
+            description.groups.resize(3, None);
+            description.groups.push(Some(MATERIALS_GROUP));
+        }
+        description
+    }
 }
 
 /// Pipelines for both sides of triangles, for outsides alone and for insides alone.
@@ -78,14 +105,15 @@ pub(super) fn surface_description(
 }
 
 impl Surfaces {
-    pub fn new(gpu: &Gpu, samples: u32, glossy: bool) -> Self {
-        let build = |fragment, stencil, targets: [wgpu::ColorTargetState; 2]| {
-            let description = PipelineDescription {
+    pub fn new(gpu: &Gpu, samples: u32, kinds: SurfaceKinds) -> Self {
+        let described =
+            |fragment, stencil, targets: [wgpu::ColorTargetState; 2]| PipelineDescription {
                 shader: "surfaces.wgsl",
                 vertex: "place_sampled",
                 fragment,
                 constants: vec![
-                    ("GLOSSY", f64::from(glossy)),
+                    ("GLOSSY", f64::from(kinds.glossy)),
+                    ("SHAPED", f64::from(kinds.shaped)),
                     ("MULTISAMPLED", f64::from(samples > 1)),
                 ],
                 groups: GEOMETRY_GROUPS.map(Some).to_vec(),
@@ -93,14 +121,20 @@ impl Surfaces {
                 samples,
                 ..surface_description(gpu, stencil)
             };
-            Sided::new(gpu, &description)
+        let build =
+            |fragment, stencil, targets| Sided::new(gpu, &described(fragment, stencil, targets));
+        let build_virtual = |fragment, stencil, targets| {
+            Sided::new(
+                gpu,
+                &kinds.of_virtual(described(fragment, stencil, targets)),
+            )
         };
         let format = gpu.light_format;
         let (added, untouched) = (
             || added(format, wgpu::BlendFactor::One),
             || untouched(format),
         );
-        let ambient = |fragment| build(fragment, None, [overwritten(format), overwritten(format)]);
+        let both = || [overwritten(format), overwritten(format)];
         let (equal, other) = (
             wgpu::CompareFunction::Equal,
             wgpu::CompareFunction::NotEqual,
@@ -112,14 +146,24 @@ impl Surfaces {
         let taken = (wgpu::StencilOperation::Zero, VIRTUAL_SHADOW);
         let nothing = (wgpu::StencilOperation::Keep, 0);
         let reaching = stencil(equal, REAL_HIDES | ADDED, once);
+        let kept = stencil(equal, REAL_HIDES | ADDED, once);
         let hidden = stencil(other, VIRTUAL_SHADOW, taken);
         let unshadowed = stencil(at_most, SHADOW, nothing);
         Self {
-            ambient_on_real: ambient("ambient_on_real"),
-            ambient_on_virtual: ambient("ambient_on_virtual"),
+            ambient_on_real: build("ambient_on_real", None, both()),
+            ambient_on_virtual: build_virtual("ambient_on_virtual", None, both()),
             light_reaching_real: build("light_on_real", Some(reaching), [added(), untouched()]),
+            light_kept_from_real: build(
+                "light_on_real",
+                Some(kept),
+                [taken_off(format), untouched()],
+            ),
             light_hidden_from_real: build("light_on_real", Some(hidden), [untouched(), added()]),
-            light_on_virtual: build("light_on_virtual", Some(unshadowed), [untouched(), added()]),
+            light_on_virtual: build_virtual(
+                "light_on_virtual",
+                Some(unshadowed),
+                [untouched(), added()],
+            ),
         }
     }
 }

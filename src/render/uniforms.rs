@@ -6,7 +6,7 @@ use glam::{DAffine3, Mat4, Vec4};
 use crate::geometry::bounds::HalfSpace;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::shadow_volume::LightPlace;
-use crate::light::Light;
+use crate::light::{Light, Shape, spot_ramp};
 
 use super::pipelines::{GroupLayout, uniform};
 
@@ -56,31 +56,74 @@ const MOST_TIES: usize = 63;
 pub(super) struct CameraLight {
     pub place_in_camera: Vec4,
     pub power: Vec4,
+    pub axis_in_camera: Vec4,
+    pub half_width: Vec4,
+    pub half_height: Vec4,
 }
+
+/// Values of `axis_in_camera.w`, as in common.wgsl.
+const ROUND: f32 = 0.0;
+const SPOT: f32 = 1.0;
+const RECT: f32 = 2.0;
 
 impl CameraLight {
     pub fn new(light: &Light, camera_from_world: &DAffine3) -> Self {
-        let (place, weight, power) = match *light {
+        let round = Self {
+            place_in_camera: Vec4::ZERO,
+            power: Vec4::ZERO,
+            axis_in_camera: Vec4::ZERO.with_w(ROUND),
+            half_width: Vec4::ZERO,
+            half_height: Vec4::ZERO,
+        };
+        match light.moved(camera_from_world) {
             Light::Point {
                 position_m,
                 intensity,
-            } => (
-                camera_from_world.transform_point3(position_m),
-                1.0,
-                intensity,
-            ),
+                shape,
+            } => {
+                let at = Self {
+                    place_in_camera: position_m.as_vec3().extend(1.0),
+                    power: intensity.as_vec3().extend(0.0),
+                    ..round
+                };
+                match shape {
+                    Shape::Point => at,
+                    Shape::Sphere { radius_m } => Self {
+                        power: at.power.with_w(radius_m as f32),
+                        ..at
+                    },
+                    Shape::Spot {
+                        direction,
+                        inner_rad,
+                        outer_rad,
+                    } => {
+                        let [scale, offset] = spot_ramp(inner_rad, outer_rad);
+                        Self {
+                            axis_in_camera: direction.as_vec3().extend(SPOT),
+                            half_width: Vec4::new(scale as f32, offset as f32, 0.0, 0.0),
+                            ..at
+                        }
+                    }
+                    Shape::Rect(rect) => {
+                        let [half_width, half_height] = rect.half_sides_m();
+                        Self {
+                            axis_in_camera: rect.facing.as_vec3().extend(RECT),
+                            half_width: half_width.as_vec3().extend(0.0),
+                            half_height: half_height.as_vec3().extend(0.0),
+                            ..at
+                        }
+                    }
+                }
+            }
             Light::Directional {
                 direction,
                 irradiance,
-            } => (
-                -camera_from_world.transform_vector3(direction),
-                0.0,
-                irradiance,
-            ),
-        };
-        Self {
-            place_in_camera: place.as_vec3().extend(weight),
-            power: power.as_vec3().extend(0.0),
+                angle_rad,
+            } => Self {
+                place_in_camera: -direction.as_vec3().extend(0.0),
+                power: irradiance.as_vec3().extend((0.5 * angle_rad).sin() as f32),
+                ..round
+            },
         }
     }
 }
@@ -197,6 +240,7 @@ impl UniformRow {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::materials::{MapOnGpu, MaterialOnGpu};
     use crate::render::shader;
     use crate::render::shafts::data::ShaftFrame;
     use crate::shafts::shadow_atlas::MappedSource;
@@ -236,9 +280,39 @@ mod tests {
     fn every_uniform_has_the_layout_of_its_wgsl_twin() {
         let common = shader::source("common.wgsl", &[]).unwrap();
         assert_twins!(&common, AnchorView, clip_from_anchor, camera_from_anchor);
-        assert_twins!(&common, CameraLight, place_in_camera, power);
+        assert_twins!(
+            &common,
+            CameraLight,
+            place_in_camera,
+            power,
+            axis_in_camera,
+            half_width,
+            half_height
+        );
         let volumes = shader::source("volumes.wgsl", &[]).unwrap();
         assert_twins!(&volumes, CastingLight, place_in_anchor, end_in_anchor);
+        let materials = shader::source("materials.wgsl", &[]).unwrap();
+        let look = "struct Look { albedo: vec3f, roughness: f32, metallic: f32, emission: vec3f, occlusion: f32, \
+                    opacity: f32, normal: vec3f }\nfn unit(v: vec3f) -> vec3f { return v; }\n";
+        let materials = format!("{look}{materials}");
+        assert_twins!(&materials, MapOnGpu, linear, offset, place, size);
+        assert_twins!(
+            &materials,
+            MaterialOnGpu,
+            albedo,
+            roughness,
+            emission,
+            metallic,
+            opacity,
+            cutoff,
+            normal_scale,
+            occlusion_strength,
+            unlit,
+            padding_1,
+            padding_2,
+            padding_3,
+            maps
+        );
         let source = shader::source("mapped_source.wgsl", &[]).unwrap();
         assert_twins!(
             &source,

@@ -31,6 +31,7 @@ pub(super) struct Volumes {
     among_lit: Counters,
     keep_real: wgpu::RenderPipeline,
     keep_virtual: wgpu::RenderPipeline,
+    forget: wgpu::RenderPipeline,
 }
 
 struct Counters {
@@ -250,11 +251,23 @@ impl Volumes {
                 ..common.clone()
             })
         };
+        let always = wgpu::CompareFunction::Always;
+        let zero = (wgpu::StencilOperation::Zero, u32::MAX);
+        let forget = gpu.pipeline(&PipelineDescription {
+            depth_stencil: Some(depth_stencil_state(
+                gpu.depth_format,
+                false,
+                always,
+                stencil::stencil(always, u32::MAX, zero),
+            )),
+            ..common.clone()
+        });
         Self {
             among_all: Counters::new(gpu, &counting, Among::All),
             among_lit: Counters::new(gpu, &counting, Among::LitByReal),
             keep_real: keep(Role::Real),
             keep_virtual: keep(Role::Virtual),
+            forget,
         }
     }
 
@@ -296,6 +309,13 @@ impl Volumes {
         }
         set_scissor(pass, within);
         any
+    }
+
+    /// Leaves a stencil of zeros.
+    pub fn forget(&self, pass: &mut wgpu::RenderPass<'_>, within: PixelRect) {
+        pass.set_pipeline(&self.forget);
+        set_scissor(pass, within);
+        pass.draw(0..3, 0..1);
     }
 
     /// Makes the role's own bit of what was counted, and leaves the count at 0.

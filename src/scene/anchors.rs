@@ -12,7 +12,7 @@ use super::reader::{Table, Value};
 use super::schema::key::Missing::{Is, Means};
 use super::schema::section::{Example, Section, Times};
 use super::schema::values::{InWords, Written};
-use super::{Anchor, DetectorKind, Family, Marker};
+use super::{Anchor, DetectorKind, Drawing, Family, Ink, Marker};
 
 /// A print is measured with a caliper, to 0.01 mm.
 const PRINT: Digits = Digits::Decimals(5);
@@ -33,11 +33,15 @@ keys! {
     /// How markers are printed.
     pub static PRINTED: PrintedKeys;
 
-    /// AprilTag: "tag16h5", "tag25h9", "tag36h10", "tag36h11". ArUco: "DICT_4X4_50" … "DICT_7X7_1000" (4 to 7 cells; 50,
-    /// 100, 250 or 1000 markers) and "DICT_ARUCO_ORIGINAL". Or a dictionary's file, as OpenCV's writeDictionary writes it.
+    /// AprilTag: "tag16h5", "tag25h9", "tag36h10", "tag36h11", "tagStandard41h12", "tagStandard52h13", "tagCircle21h7",
+    /// "tagCircle49h12", "tagCustom48h12"; "DICT_APRILTAG_36h11" and its like are OpenCV's drawings, which stand on their
+    /// heads. ArUco: "DICT_4X4_50" … "DICT_7X7_1000" (4 to 7 cells; 50, 100, 250 or 1000 markers), "DICT_ARUCO_ORIGINAL"
+    /// and "DICT_ARUCO_MIP_36h12". Or a dictionary's file, as OpenCV's writeDictionary writes it.
     family: Written, InWords::file("a family, or a file (.yml)", FileKind::Dictionary) => Means(Written, "\"tag36h11\"");
     /// Width of the black border: 2 as on Kalibr's AprilGrids. A marker of another border is another marker.
     border_cells: u32, Whole::between(*Family::BORDERS.start(), *Family::BORDERS.end()).unit("cells") => Is(1);
+    /// Printed white on black, each cell of the other colour.
+    inverted: bool => Is(false);
 }
 
 keys! {
@@ -186,9 +190,18 @@ impl AnchorReader {
             None => Family::TAG36H11,
         };
         let border_cells = PRINTED.border_cells.read(table)?;
-        family
-            .with_border(border_cells)
-            .ok_or_else(|| table.error("no marker is printed so"))
+        let ink = match PRINTED.inverted.read(table)? {
+            true => Ink::WhiteOnBlack,
+            false => Ink::BlackOnWhite,
+        };
+        let bordered = family.with_border(border_cells);
+        Ok(bordered
+            .ok_or_else(|| {
+                table.error(format!(
+                    "{family} has a ring of one cell; allowed: border_cells = 1"
+                ))
+            })?
+            .with_ink(ink))
     }
 
     fn named_family(&self, value: &Value) -> Result<Family, SceneError> {
@@ -203,12 +216,17 @@ impl AnchorReader {
                 ))
             })?
         };
-        if !family.is_april_tag() && self.detector == DetectorKind::AprilTag {
-            return Err(value.error(
-                "libapriltag does not know this family; set tracking.detector = \"aruco\" for it",
-            ));
+        let unknown = match self.detector {
+            DetectorKind::ByFamily => return Ok(family),
+            DetectorKind::AprilTag => (!family.is_april_tag()).then_some("libapriltag"),
+            DetectorKind::Aruco => family.has_ring().then_some("OpenCV's ArUco"),
+        };
+        match unknown {
+            Some(detector) => Err(value.error(format!(
+                "{detector} does not know this family; leave out tracking.detector, and the one that does is taken"
+            ))),
+            None => Ok(family),
         }
-        Ok(family)
     }
 
     fn id(&mut self, table: &Table, family: Family, anchor: &str) -> Result<u32, SceneError> {
@@ -220,7 +238,9 @@ impl AnchorReader {
                 error.message += &format!(" (the ids of {})", family.name());
                 error
             })?;
-        match self.owners.insert((family, id), (anchor.to_owned(), value.line())) {
+        // However it is drawn, it is one marker to a detector.
+        let seen_as = family.drawn_as(Drawing::Own);
+        match self.owners.insert((seen_as, id), (anchor.to_owned(), value.line())) {
             Some((owner, line)) => Err(value.error(format!(
                 "marker {id} of {family} is taken by \"{owner}\" on line {line}; allowed: each marker once"
             ))),

@@ -19,8 +19,16 @@ choices! {
         Yuyv = "YUYV",
         /// 4:2:0, a plane of brightness and one of colour.
         Nv12 = "NV12",
+        /// 4:2:2 as YUYV, its two colours the other way round.
+        Yvyu = "YVYU",
+        /// 4:2:2, colour and brightness in turn.
+        Uyvy = "UYVY",
+        /// 4:2:0, a plane of brightness and two of colour; also called I420.
+        Yu12 = "YU12",
         /// Brightness alone.
         Grey = "GREY",
+        /// Brightness alone, in 16 bits.
+        Y16 = "Y16",
         /// 8-bit red, green, blue.
         Rgb = "RGB",
         /// 8-bit blue, green, red.

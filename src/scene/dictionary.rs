@@ -2,9 +2,10 @@
 
 use std::collections::HashMap;
 use std::path::Path;
-use std::sync::Mutex;
+use std::sync::{LazyLock, Mutex};
 
 use super::error::SceneError;
+use super::mip_36h12::CODES;
 use super::plain_file;
 
 /// Markers of one size, each told from all others and from their turns.
@@ -26,6 +27,17 @@ const MOST_MARKERS: usize = 4096;
 static READ: Mutex<Vec<&'static Dictionary>> = Mutex::new(Vec::new());
 
 impl Dictionary {
+    /// ArUco's MIP 36h12, which not every OpenCV has.
+    pub fn mip_36h12() -> &'static Self {
+        static MIP_36H12: LazyLock<Dictionary> = LazyLock::new(|| Dictionary {
+            name: "DICT_ARUCO_MIP_36h12".to_owned(),
+            cells: 6,
+            codes: CODES.to_vec(),
+            least_distance: 12,
+        });
+        &MIP_36H12
+    }
+
     /// Reads a file in YAML: `nmarkers`, `markersize`, and `marker_0`, `marker_1` … with a 1 for each white cell.
     ///
     /// # Errors
@@ -167,6 +179,11 @@ fn quarter_turn(code: u64, cells: u32) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn mip_36h12_is_as_far_apart_as_its_name_says() {
+        assert_eq!(least_distance(&CODES, 6), 12);
+    }
 
     const THREE: &str = "%YAML:1.0\n---\nnmarkers: 2\nmarkersize: 3\nmarker_0: \"110100000\"\nmarker_1: \"111001011\"\n";
 

@@ -8,8 +8,9 @@ pub use super::anchors::{
 };
 pub use super::camera::{CAMERA, CAMERA_SECTION};
 pub use super::lights::{
-    AMBIENT, AMBIENT_SECTION, DIRECTIONAL_LIGHT, DIRECTIONAL_LIGHT_SECTION, LIGHT, LIGHT_SECTION,
-    LightKind, POINT_LIGHT, POINT_LIGHT_SECTION,
+    AIMED_LIGHT, AMBIENT, AMBIENT_SECTION, DIRECTIONAL_LIGHT, DIRECTIONAL_LIGHT_SECTION, LIGHT,
+    LIGHT_SECTION, LightKind, POINT_LIGHT, POINT_LIGHT_SECTION, RECT_LIGHT, RECT_LIGHT_SECTION,
+    SPHERE_LIGHT, SPHERE_LIGHT_SECTION, SPOT_LIGHT, SPOT_LIGHT_SECTION,
 };
 pub use super::motion::{MOTION, STATION, STATION_SECTION};
 pub use super::objects::{
@@ -23,7 +24,7 @@ pub use super::shadows::{DIFFERENCE, SHADOWS, SHADOWS_SECTION, SHAFTS};
 pub use super::tracking::{TRACKING, TRACKING_SECTION};
 
 /// What may stand at the outermost level, in the reference's order; a light of each kind.
-pub const SECTIONS: [&Section; 13] = [
+pub const SECTIONS: [&Section; 16] = [
     &CAMERA_SECTION,
     &TRACKING_SECTION,
     &BOARD_SECTION,
@@ -32,6 +33,9 @@ pub const SECTIONS: [&Section; 13] = [
     &VIRTUAL_SECTION,
     &POINT_LIGHT_SECTION,
     &DIRECTIONAL_LIGHT_SECTION,
+    &SPOT_LIGHT_SECTION,
+    &SPHERE_LIGHT_SECTION,
+    &RECT_LIGHT_SECTION,
     &AMBIENT_SECTION,
     &TABLE_SECTION,
     &SHADOWS_SECTION,

@@ -1,15 +1,18 @@
 //! `[[light]]` and `[ambient]`: what shines.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
+use super::Anchor;
 use super::error::SceneError;
+use super::objects::{STANDING, StandingKeys, anchor_index};
 use super::placement::POSITION;
 use super::ranges::{Digits, Numbers};
 use super::reader::Table;
 use super::schema::key::Missing::Is;
+use super::schema::key::{Key, Required};
 use super::schema::section::{Example, Section, Times};
 use super::schema::values::Vectors;
-use crate::light::Light;
+use crate::light::{Light, Rect, Shape};
 
 /// As many as the shadow masks have room for.
 const MOST_LIGHTS: usize = 16;
@@ -17,13 +20,43 @@ const POWER: Numbers = Numbers::between(0.0, 1e9);
 /// Of any length but zero; written to 0.01° of a unit vector.
 const DIRECTION: Numbers = Numbers::between(f64::MIN, f64::MAX).digits(Digits::Decimals(4));
 
+/// Lengths of what shines.
+const EXTENT: Numbers = Numbers::above(0.0, 1e4).unit("m");
+const CONE: Numbers = Numbers::above(0.0, 90.0)
+    .unit("degrees")
+    .digits(Digits::Decimals(2));
+
 choices! {
     /// What a light is.
     pub enum LightKind, "kind of light" {
         /// It shines from a point to all sides.
         Point = "point",
-        /// It comes from infinitely far away.
+        /// It comes from infinitely far away: the sun.
         Directional = "directional",
+        /// It shines from a point within a cone.
+        Spot = "spot",
+        /// A sphere shines: a frosted bulb.
+        Sphere = "sphere",
+        /// One side of a rectangle shines: a panel, a window.
+        Rect = "rect",
+    }
+}
+
+/// A light of a scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SceneLight {
+    /// Index into [`Scene::anchors`] of the anchor that it stands on and moves with.
+    ///
+    /// [`Scene::anchors`]: super::Scene::anchors
+    pub anchor: usize,
+    /// The light in that anchor's space.
+    pub light: Light,
+}
+
+impl From<Light> for SceneLight {
+    /// The light where it stands in the world.
+    fn from(light: Light) -> Self {
+        Self { anchor: 0, light }
     }
 }
 
@@ -32,17 +65,18 @@ keys! {
     pub static LIGHT: LightKeys;
     required {
         /// What it is.
-        kind: LightKind => "\"point\" or \"directional\" is expected";
+        kind: LightKind => "\"point\", \"directional\", \"spot\", \"sphere\" or \"rect\" is expected";
     }
 }
 
 keys! {
-    /// What points have.
+    /// What lights at a place have.
     pub static POINT_LIGHT: PointLightKeys;
     required {
-        /// Where it stands in the world.
+        /// Where it stands, its middle.
         position_m: DVec3, Vectors::three(POSITION) => "three numbers in metres are expected";
-        /// Radiant intensity, W/sr up to the camera's exposure, linear RGB.
+        /// Radiant intensity, W/sr up to the camera's exposure, linear RGB: of a spot and a rectangle straight ahead, of a
+        /// sphere as it is from afar, so that a larger one of the same intensity gives the same light.
         intensity: DVec3, Vectors::one_or_three(POWER) => "a number or three (W/sr, linear RGB) are expected";
     }
 }
@@ -56,6 +90,48 @@ keys! {
         /// Irradiance on a plane across it, W/m² up to the camera's exposure, linear RGB.
         irradiance: DVec3, Vectors::one_or_three(POWER) => "a number or three (W/m², linear RGB) are expected";
     }
+    /// Width of the disc that it comes from, as it is seen; the sun's is 0.53. 0: its shadows are sharp.
+    angle_deg: f64, Numbers::between(0.0, 90.0).unit("degrees").digits(Digits::Decimals(2)) => Is(0.0);
+}
+
+keys! {
+    /// What is turned some way has.
+    pub static AIMED_LIGHT: AimedLightKeys;
+    required {
+        /// The way that it shines straight ahead, of any length but zero.
+        direction: DVec3, Vectors::three(DIRECTION) => "three numbers are expected: the way that it shines";
+    }
+}
+
+keys! {
+    /// What spots have.
+    pub static SPOT_LIGHT: SpotLightKeys;
+    required {
+        /// Angle to the axis from which on there is no light.
+        outer_deg: f64, CONE => "an angle in degrees is expected: from the axis to where its light ends";
+    }
+    /// Angle to the axis up to which the light is whole; less than outer_deg.
+    inner_deg: f64, Numbers::between(0.0, 90.0).unit("degrees").digits(Digits::Decimals(2)) => Is(0.0);
+}
+
+keys! {
+    /// What spheres have.
+    pub static SPHERE_LIGHT: SphereLightKeys;
+    required {
+        /// Its radius.
+        radius_m: f64, EXTENT => "a length in metres is expected";
+    }
+}
+
+keys! {
+    /// What rectangles have.
+    pub static RECT_LIGHT: RectLightKeys;
+    required {
+        /// Its width and its height.
+        size_m: [f64; 2], EXTENT => "two lengths in metres are expected: width and height";
+    }
+    /// The way that its height goes, but for what of it lies along the direction; where all of it does, y stands for it.
+    up: DVec3, Vectors::three(DIRECTION) => Is(DVec3::Z);
 }
 
 keys! {
@@ -66,15 +142,20 @@ keys! {
     radiance: DVec3, Vectors::one_or_three(POWER) => Is(DVec3::ZERO);
 }
 
-/// `[[light]]` of either kind, as it may be before its kind is known.
+/// `[[light]]` of any kind, as it may be before its kind is known.
 pub static LIGHT_SECTION: Section = Section {
     name: "light",
     says: "Lights, up to 16 in all.",
     times: Times::Any,
     groups: &[
         LightKeys::ALL,
+        StandingKeys::ALL,
         PointLightKeys::ALL,
         DirectionalLightKeys::ALL,
+        AimedLightKeys::ALL,
+        SpotLightKeys::ALL,
+        SphereLightKeys::ALL,
+        RectLightKeys::ALL,
     ],
     shown: &[],
     is_aside: false,
@@ -85,9 +166,10 @@ pub static POINT_LIGHT_SECTION: Section = Section {
     name: "light",
     says: "Light from a point; up to 16 lights in all, default none.",
     times: Times::Any,
-    groups: &[LightKeys::ALL, PointLightKeys::ALL],
+    groups: &[LightKeys::ALL, StandingKeys::ALL, PointLightKeys::ALL],
     shown: &[
         ("kind", Example::Live("\"point\"")),
+        ("on", Example::Live("\"table\"")),
         ("position_m", Example::Live("[-0.26, 0.24, 0.46]")),
         ("intensity", Example::Live("[1.15, 1.06, 0.9]")),
     ],
@@ -99,11 +181,77 @@ pub static DIRECTIONAL_LIGHT_SECTION: Section = Section {
     name: "light",
     says: "Light from infinitely far away.",
     times: Times::Any,
-    groups: &[LightKeys::ALL, DirectionalLightKeys::ALL],
+    groups: &[LightKeys::ALL, StandingKeys::ALL, DirectionalLightKeys::ALL],
     shown: &[
         ("kind", Example::Live("\"directional\"")),
         ("direction", Example::Live("[0.3, -0.2, -1.0]")),
         ("irradiance", Example::Live("0.4")),
+        ("angle_deg", Example::Live("0.53")),
+    ],
+    is_aside: false,
+};
+
+/// `[[light]]`, a spot.
+pub static SPOT_LIGHT_SECTION: Section = Section {
+    name: "light",
+    says: "Light from a point within a cone; between the two angles it fades as lamps of glTF do.",
+    times: Times::Any,
+    groups: &[
+        LightKeys::ALL,
+        StandingKeys::ALL,
+        PointLightKeys::ALL,
+        AimedLightKeys::ALL,
+        SpotLightKeys::ALL,
+    ],
+    shown: &[
+        ("kind", Example::Live("\"spot\"")),
+        ("position_m", Example::Live("[0.3, 0.1, 0.6]")),
+        ("intensity", Example::Live("0.3")),
+        ("direction", Example::Live("[-0.3, -0.1, -0.6]")),
+        ("outer_deg", Example::Live("30")),
+        ("inner_deg", Example::Live("20")),
+    ],
+    is_aside: false,
+};
+
+/// `[[light]]`, a sphere.
+pub static SPHERE_LIGHT_SECTION: Section = Section {
+    name: "light",
+    says: "A sphere that shines to all sides.",
+    times: Times::Any,
+    groups: &[
+        LightKeys::ALL,
+        StandingKeys::ALL,
+        PointLightKeys::ALL,
+        SphereLightKeys::ALL,
+    ],
+    shown: &[
+        ("kind", Example::Live("\"sphere\"")),
+        ("position_m", Example::Live("[0.2, 0.3, 0.5]")),
+        ("intensity", Example::Live("0.2")),
+        ("radius_m", Example::Live("0.04")),
+    ],
+    is_aside: false,
+};
+
+/// `[[light]]`, a rectangle.
+pub static RECT_LIGHT_SECTION: Section = Section {
+    name: "light",
+    says: "A rectangle that shines to one side.",
+    times: Times::Any,
+    groups: &[
+        LightKeys::ALL,
+        StandingKeys::ALL,
+        PointLightKeys::ALL,
+        AimedLightKeys::ALL,
+        RectLightKeys::ALL,
+    ],
+    shown: &[
+        ("kind", Example::Live("\"rect\"")),
+        ("position_m", Example::Live("[-1.2, 0.0, 0.9]")),
+        ("intensity", Example::Live("0.6")),
+        ("direction", Example::Live("[1, 0, -0.5]")),
+        ("size_m", Example::Live("[0.8, 1.2]")),
     ],
     is_aside: false,
 };
@@ -119,37 +267,104 @@ pub static AMBIENT_SECTION: Section = Section {
 };
 
 /// Reads the lights.
-pub fn lights(root: &Table) -> Result<Vec<Light>, SceneError> {
+pub fn lights(root: &Table, anchors: &[Anchor]) -> Result<Vec<SceneLight>, SceneError> {
     let tables = LIGHT_SECTION.tables(root)?;
     if let Some(extra) = tables.get(MOST_LIGHTS) {
         return Err(extra.error(format!(
             "light: too many; allowed: up to {MOST_LIGHTS} lights"
         )));
     }
-    tables.iter().map(light).collect()
+    let read = |table: &Table| {
+        let kind = LIGHT.kind.read(table)?;
+        table.allow(&kind.section().names())?;
+        let on = STANDING.on.value(table);
+        Ok(SceneLight {
+            anchor: on.map_or(Ok(0), |on| anchor_index(&on, anchors))?,
+            light: light(table, kind)?,
+        })
+    };
+    tables.iter().map(read).collect()
 }
 
-fn light(table: &Table) -> Result<Light, SceneError> {
-    match LIGHT.kind.read(table)? {
-        LightKind::Point => {
-            table.allow(&POINT_LIGHT_SECTION.names())?;
-            Ok(Light::Point {
-                position_m: POINT_LIGHT.position_m.read(table)?,
-                intensity: POINT_LIGHT.intensity.read(table)?,
-            })
+impl LightKind {
+    /// The table of a light of this kind.
+    pub fn section(self) -> &'static Section {
+        match self {
+            Self::Point => &POINT_LIGHT_SECTION,
+            Self::Directional => &DIRECTIONAL_LIGHT_SECTION,
+            Self::Spot => &SPOT_LIGHT_SECTION,
+            Self::Sphere => &SPHERE_LIGHT_SECTION,
+            Self::Rect => &RECT_LIGHT_SECTION,
         }
+    }
+
+    /// The kind of a light.
+    pub fn of(light: &Light) -> Self {
+        match light {
+            Light::Directional { .. } => Self::Directional,
+            Light::Point { shape, .. } => match shape {
+                Shape::Point => Self::Point,
+                Shape::Spot { .. } => Self::Spot,
+                Shape::Sphere { .. } => Self::Sphere,
+                Shape::Rect(_) => Self::Rect,
+            },
+        }
+    }
+}
+
+fn light(table: &Table, kind: LightKind) -> Result<Light, SceneError> {
+    let shape = match kind {
         LightKind::Directional => {
-            table.allow(&DIRECTIONAL_LIGHT_SECTION.names())?;
-            let direction = unit_direction(DIRECTIONAL_LIGHT.direction.read(table)?);
-            if direction == DVec3::ZERO {
-                let value = DIRECTIONAL_LIGHT.direction.require(table)?;
-                return Err(value.error("no direction; allowed: any length but zero"));
-            }
-            Ok(Light::Directional {
-                direction,
+            return Ok(Light::Directional {
+                direction: direction(table, &DIRECTIONAL_LIGHT.direction)?,
                 irradiance: DIRECTIONAL_LIGHT.irradiance.read(table)?,
-            })
+                angle_rad: DIRECTIONAL_LIGHT.angle_deg.read(table)?.to_radians(),
+            });
         }
+        LightKind::Point => Shape::Point,
+        LightKind::Spot => spot(table)?,
+        LightKind::Sphere => Shape::Sphere {
+            radius_m: SPHERE_LIGHT.radius_m.read(table)?,
+        },
+        LightKind::Rect => {
+            let facing = direction(table, &AIMED_LIGHT.direction)?;
+            let [width, height] = RECT_LIGHT.size_m.read(table)?;
+            let up = RECT_LIGHT.up.read(table)?;
+            Shape::Rect(Rect::upright(facing, up, DVec2::new(width, height)))
+        }
+    };
+    Ok(Light::Point {
+        position_m: POINT_LIGHT.position_m.read(table)?,
+        intensity: POINT_LIGHT.intensity.read(table)?,
+        shape,
+    })
+}
+
+fn spot(table: &Table) -> Result<Shape, SceneError> {
+    let outer_deg = SPOT_LIGHT.outer_deg.read(table)?;
+    let inner_deg = SPOT_LIGHT.inner_deg.read(table)?;
+    if inner_deg >= outer_deg {
+        let inner = SPOT_LIGHT.inner_deg.value(table);
+        let message = format!("not inside outer_deg; allowed: 0 to less than {outer_deg} degrees");
+        return Err(inner.map_or_else(
+            || table.error(message.clone()),
+            |it| it.error(message.clone()),
+        ));
+    }
+    Ok(Shape::Spot {
+        direction: direction(table, &AIMED_LIGHT.direction)?,
+        inner_rad: inner_deg.to_radians(),
+        outer_rad: outer_deg.to_radians(),
+    })
+}
+
+fn direction(table: &Table, key: &Key<DVec3, Required>) -> Result<DVec3, SceneError> {
+    let direction = unit_direction(key.read(table)?);
+    match direction == DVec3::ZERO {
+        true => Err(key
+            .require(table)?
+            .error("no direction; allowed: any length but zero")),
+        false => Ok(direction),
     }
 }
 

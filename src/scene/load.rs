@@ -8,7 +8,9 @@ use super::error::SceneError;
 use super::named_files::NamedFile;
 use super::plain_file::{self, MOST_TEXT};
 use super::reader::{Document, Table};
-use super::{Scene, anchors, camera, format, lights, objects, probe, shadows, tracking};
+use super::{
+    Scene, anchors, camera, format, lights, not_a_scene, objects, probe, shadows, tracking,
+};
 
 /// What reading a scene's text gave.
 #[derive(Debug)]
@@ -30,6 +32,9 @@ impl Scene {
 
     /// The text of a scene file.
     pub fn read_text(path: &Path) -> Result<String, SceneError> {
+        if let Some(found) = not_a_scene::what_else(path) {
+            return Err(SceneError::of_file(path, found));
+        }
         let bytes = plain_file::read(path, MOST_TEXT).map_err(|error| {
             SceneError::of_file(path, format!("the scene cannot be read: {error}"))
         })?;
@@ -72,7 +77,7 @@ impl Scene {
         let camera = camera::camera(&root)?;
         let tracking = tracking::tracking(&root)?;
         let anchors = anchors::anchors(&root, tracking.detector)?;
-        let lights = lights::lights(&root)?;
+        let lights = lights::lights(&root, &anchors)?;
         let ambient_radiance = lights::ambient_radiance(&root)?;
         let probe = probe::probe(&root)?;
         let shadows = shadows::shadows(&root, probe.as_ref())?;

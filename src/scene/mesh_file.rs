@@ -1,32 +1,39 @@
-//! Reads OBJ meshes with their MTL materials. Textures are not read, a polygon is cut into a fan (so it should be
-//! convex), and Kd is taken as it stands: linear reflectance.
+//! The meshes that a scene names, of whatever format, as the renderer takes them: turned upright, in metres, welded.
 
-use std::cell::RefCell;
-use std::io::Cursor;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
 use super::error::SceneError;
-use super::material_libraries::libraries;
 use super::named_files::FileKind;
-use super::obj_scan::{ScanError, ScannedObj, scan_mtl, scan_obj};
-use super::plain_file::{self, MOST_MESH, MOST_TEXT};
+use super::obj::files::named_file;
+use super::plain_file::{self, MOST_MESH};
+use super::raw_model::RawModel;
 use super::reader::Value;
-use crate::geometry::mesh::{Mesh, MeshReport, RawTriangle};
+use super::{gltf, obj, ply, stl, texture_file};
+use crate::geometry::mesh::{Mesh, MeshReport};
 use crate::light::Material;
-
-/// Diffuse reflectance where neither the scene nor a mesh's MTL file gives one.
-pub const DEFAULT_ALBEDO: f64 = 0.5;
+use crate::light::material::{Coverage, Map};
+use crate::light::texture::Texture;
 
 /// A mesh, what was done to it, and its materials (never none).
 #[derive(Debug)]
 pub struct LoadedMesh {
+    /// Its triangles, welded.
     pub mesh: Mesh,
+    /// What was done to it.
     pub report: MeshReport,
+    /// What it is made of.
     pub materials: Vec<Material>,
-    /// For each of them whether an MTL file gives it.
+    /// What the file calls them; empty where it has no name.
+    pub material_names: Vec<String>,
+    /// For each of them whether a file gives it.
     pub is_given: Vec<bool>,
+    /// What the materials' maps name.
+    pub textures: Vec<Arc<Texture>>,
+    /// What of the file is passed over or taken for something else, one sentence each.
+    pub notes: Vec<String>,
 }
 
 /// Where a mesh's normals come from.
@@ -35,20 +42,51 @@ pub enum Normals {
     /// From the triangles alone.
     Flat,
     /// From the file, and where it has none made within a crease angle.
-    GivenOrMade { crease_rad: f64 },
+    GivenOrMade {
+        /// The largest angle between faces that look like one surface.
+        crease_rad: f64,
+    },
 }
 
-/// Smoothest surface that is kept apart from a mirror.
-const LEAST_ROUGHNESS: f64 = 0.01;
+choices! {
+    /// Which of a file's axes points up; its other axes follow by a turn about x.
+    pub enum Up, "axis" {
+        /// As glTF has it, and most programs write OBJ.
+        Y = "y",
+        /// As this program has it, and CAD programs.
+        Z = "z",
+    }
+}
+
+/// How a mesh's file is taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeshReading {
+    /// Where its normals come from.
+    pub normals: Normals,
+    /// Which of its axes points up; `None`: as its format has it.
+    pub up: Option<Up>,
+    /// What its longest side is scaled to, metres; `None`: its numbers are metres.
+    pub fit_m: Option<f64>,
+}
+
+impl MeshReading {
+    /// As the file has it.
+    pub const fn plain(normals: Normals) -> Self {
+        Self {
+            normals,
+            up: None,
+            fit_m: None,
+        }
+    }
+}
 
 /// Reads the mesh that a scene's value names.
-pub fn load(value: &Value, kind: FileKind, normals: Normals) -> Result<LoadedMesh, SceneError> {
+pub fn load(value: &Value, kind: FileKind, reading: MeshReading) -> Result<LoadedMesh, SceneError> {
     let path = value.existing_path(kind)?;
     let bytes = plain_file::read(&path, MOST_MESH)
         .map_err(|error| value.error(format!("the mesh cannot be read: {error}")))?;
-    // Only names and comments may be in another encoding, and nothing depends on them.
     let note_read = |path: &Path| value.note_consulted(path);
-    read(&path, &String::from_utf8_lossy(&bytes), normals, &note_read).map_err(|mut error| {
+    read(&path, bytes, reading, &note_read).map_err(|mut error| {
         error.message += &format!(" (a mesh of {})", value.location());
         error
     })
@@ -57,311 +95,224 @@ pub fn load(value: &Value, kind: FileKind, normals: Normals) -> Result<LoadedMes
 /// `note_read` is told of every file that is looked for besides.
 fn read(
     path: &Path,
-    text: &str,
-    normals: Normals,
+    bytes: Vec<u8>,
+    reading: MeshReading,
     note_read: &dyn Fn(&Path),
 ) -> Result<LoadedMesh, SceneError> {
-    let misread = |ScanError { span, message }| SceneError::at(path, text, span, message);
-    if text.trim().is_empty() {
-        return Err(SceneError::of_file(
-            path,
-            "the file is empty; an OBJ mesh is expected",
-        ));
-    }
-    let scanned = scan_obj(text).map_err(misread)?;
-    if scanned.corner_has_normal.is_empty() {
-        return Err(SceneError::of_file(
-            path,
-            "no faces; an OBJ mesh with f records is expected",
-        ));
-    }
-    let (models, mtl_materials) = read_with_tobj(path, &scanned, note_read)?;
+    let format = MeshFormat::of(path, &bytes);
+    let mut model = match format {
+        MeshFormat::Gltf => gltf::read(path, &bytes, note_read)?,
+        MeshFormat::Obj => obj::read(path, &bytes, note_read)?,
+        MeshFormat::Stl => stl::read(path, &bytes)?,
+        MeshFormat::Ply => {
+            let (mut model, texture) = ply::read(path, &bytes)?;
+            if let Some((name, line)) = texture {
+                add_picture(&mut model, path, &name, line, note_read);
+            }
+            model
+        }
+        MeshFormat::Other(what) => {
+            let message = format!("{what} is not read; allowed: glTF, OBJ, PLY, STL");
+            return Err(SceneError::of_file(path, message));
+        }
+    };
+    drop(bytes);
+    note_coverage(&mut model, path, reading.normals);
+    place(
+        &mut model,
+        path,
+        reading.up.unwrap_or(format.up()),
+        reading.fit_m,
+    )?;
+    welded(model, reading.normals)
+        .ok_or_else(|| SceneError::of_file(path, "no triangle has an area; a mesh is expected"))
+}
 
-    let mut builder = Builder::default();
-    for model in &models {
-        builder.add(
-            &model.mesh,
-            &scanned.corner_has_normal,
-            &mtl_materials,
-            normals,
-        );
-    }
+/// A model's mesh; `None` where no triangle has an area.
+pub fn welded(mut model: RawModel, normals: Normals) -> Option<LoadedMesh> {
     let crease_rad = match normals {
-        Normals::Flat => 0.0,
+        Normals::Flat => {
+            let triangles = model.triangles.iter_mut();
+            triangles.for_each(|triangle| triangle.normals = [None; 3]);
+            0.0
+        }
         Normals::GivenOrMade { crease_rad } => crease_rad,
     };
-    let (mesh, report) = Mesh::weld(&builder.positions, &builder.triangles, crease_rad);
-    if mesh.triangles.is_empty() {
-        return Err(SceneError::of_file(
-            path,
-            "no triangle has an area; an OBJ mesh is expected",
-        ));
+    // Corners need texture coordinates for pictures alone.
+    let is_plain = model
+        .materials
+        .iter()
+        .all(|it| it.material.maps.used().next().is_none())
+        && model
+            .looks
+            .looks
+            .iter()
+            .all(|look| look.color == glam::Vec4::ONE);
+    if is_plain {
+        model.looks = Default::default();
     }
-    Ok(LoadedMesh {
+    let (mesh, report) =
+        Mesh::weld_with_looks(&model.positions, &model.triangles, &model.looks, crease_rad);
+    let notes = model.notes.told();
+    let materials = || model.materials.iter();
+    (!mesh.triangles.is_empty()).then(|| LoadedMesh {
         mesh,
         report,
-        materials: builder.materials,
-        is_given: builder.is_given,
+        materials: materials().map(|given| given.material).collect(),
+        material_names: materials().map(|given| given.name.clone()).collect(),
+        is_given: materials().map(|given| given.is_given).collect(),
+        textures: model.textures,
+        notes,
     })
 }
 
-fn read_with_tobj(
-    path: &Path,
-    scanned: &ScannedObj,
-    note_read: &dyn Fn(&Path),
-) -> Result<(Vec<tobj::Model>, Vec<tobj::Material>), SceneError> {
-    let options = tobj::LoadOptions {
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-        ..Default::default()
+/// What a mesh's file is, by its content.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MeshFormat {
+    /// Khronos's, binary or not.
+    Gltf,
+    /// Wavefront's, and whatever is nothing else.
+    Obj,
+    /// Of text or of bytes.
+    Stl,
+    /// Of text or of bytes.
+    Ply,
+    /// One that is not read, in words.
+    Other(&'static str),
+}
+
+impl MeshFormat {
+    /// Tells by the bytes, and where they do not by the name.
+    pub fn of(path: &Path, bytes: &[u8]) -> Self {
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        let head = String::from_utf8_lossy(&bytes[..bytes.len().min(512)]);
+        let head = head.trim_start_matches('\u{feff}').trim_start();
+        if bytes.starts_with(b"glTF") || extension == "glb" || extension == "gltf" {
+            Self::Gltf
+        } else if ply::is_ply(bytes) {
+            Self::Ply
+        } else if stl::is_binary(bytes) || stl::is_text(bytes) || extension == "stl" {
+            Self::Stl
+        } else if head.starts_with("Kaydara FBX") || head.starts_with("; FBX") {
+            Self::Other("an FBX file")
+        } else if head.starts_with("PK\u{3}\u{4}") {
+            Self::Other("a ZIP file (3MF, USDZ or what was downloaded; unpack it)")
+        } else if head.starts_with("BLENDER") {
+            Self::Other("a Blender file")
+        } else if head.starts_with('<') {
+            Self::Other("an XML file (COLLADA, X3D)")
+        } else if head.starts_with("OFF") {
+            Self::Other("an OFF file")
+        } else if head.starts_with("PXR-USDC") || head.starts_with("#usda") {
+            Self::Other("a USD file")
+        } else if head.starts_with("ISO-10303") {
+            Self::Other("a STEP file")
+        } else if head.starts_with("#VRML") {
+            Self::Other("a VRML file")
+        } else {
+            Self::Obj
+        }
+    }
+
+    /// Which axis points up, unless the scene says it.
+    fn up(self) -> Up {
+        match self {
+            Self::Gltf => Up::Y,
+            Self::Obj | Self::Stl | Self::Ply | Self::Other(_) => Up::Z,
+        }
+    }
+}
+
+/// Tells what becomes of materials that are not opaque.
+fn note_coverage(model: &mut RawModel, path: &Path, normals: Normals) {
+    let mut has = |is_meant: fn(&Coverage) -> bool, of_phantom, of_virtual| {
+        let mut coverages = model.materials.iter().map(|given| given.material.coverage);
+        if coverages.any(|coverage| is_meant(&coverage)) {
+            let is_phantom = normals == Normals::Flat;
+            model
+                .notes
+                .add_of(path, if is_phantom { of_phantom } else { of_virtual });
+        }
     };
-    let mtl_error = RefCell::new(None);
+    has(
+        |coverage| *coverage == Coverage::Blend,
+        "what is half transparent hides as if it were opaque: a phantom is there or not",
+        "what is half transparent is drawn, and casts its shadow, as if it were opaque",
+    );
+    has(
+        |coverage| matches!(coverage, Coverage::Mask { .. }),
+        "what is cut out by a picture's opacity is there all the same: a phantom has its whole triangles",
+        "what is cut out by a picture's opacity still casts the shadow of its whole triangles",
+    );
+}
+
+/// Turns a model upright and scales it.
+fn place(model: &mut RawModel, path: &Path, up: Up, fit_m: Option<f64>) -> Result<(), SceneError> {
+    let upright = |vector: Vec3| match up {
+        Up::Y => Vec3::new(vector.x, -vector.z, vector.y),
+        Up::Z => vector,
+    };
+    for position in &mut model.positions {
+        *position = upright(*position);
+    }
+    for normal in model.triangles.iter_mut().flat_map(|it| &mut it.normals) {
+        *normal = normal.map(upright);
+    }
+    for look in &mut model.looks.looks {
+        look.tangent = upright(look.tangent.truncate()).extend(look.tangent.w);
+    }
+    let Some(fit_m) = fit_m else { return Ok(()) };
+    let corners = || {
+        let vertices = model
+            .triangles
+            .iter()
+            .flat_map(|triangle| triangle.vertices);
+        vertices.map(|vertex| model.positions[vertex as usize].as_dvec3())
+    };
+    let least = corners().fold(DVec3::INFINITY, DVec3::min);
+    let most = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let longest = (most - least).max_element();
+    if !(longest > 0.0) {
+        let message = "no triangle has an area; a mesh is expected";
+        return Err(SceneError::of_file(path, message));
+    }
+    let scale = fit_m / longest;
+    for position in &mut model.positions {
+        *position = (position.as_dvec3() * scale).as_vec3();
+    }
+    Ok(())
+}
+
+/// The picture that a PLY file names for all of it.
+fn add_picture(
+    model: &mut RawModel,
+    path: &Path,
+    name: &str,
+    line: usize,
+    note_read: &dyn Fn(&Path),
+) {
     let folder = path.parent().unwrap_or(Path::new(""));
-    let load_mtl = |names: &Path| {
-        let (mut materials, mut numbers) = tobj::load_mtl_buf(&mut Cursor::new(""))?;
-        for library in libraries(folder, &names.to_string_lossy()) {
-            note_read(&library);
-            match checked_mtl(&library) {
-                Ok(text) => {
-                    let (more, names) = tobj::load_mtl_buf(&mut Cursor::new(text))?;
-                    let known = materials.len();
-                    numbers.extend(
-                        names
-                            .into_iter()
-                            .map(|(name, number)| (name, known + number)),
-                    );
-                    materials.extend(more);
-                }
-                Err(error) => {
-                    mtl_error.borrow_mut().get_or_insert(error);
-                }
+    let picture = named_file(folder, name);
+    note_read(&picture.clone().unwrap_or_else(|| folder.join(name)));
+    let texture = match &picture {
+        Some(picture) => texture_file::read(picture),
+        None => Err("is not there".to_owned()),
+    };
+    match texture {
+        Ok(texture) => {
+            model.textures = vec![Arc::new(texture)];
+            for given in &mut model.materials {
+                given.material.maps.color = Some(Map::of(0));
+                given.material.albedo = DVec3::ONE;
+                given.is_given = true;
             }
         }
-        Ok((materials, numbers))
-    };
-    let loaded = tobj::load_obj_buf(&mut Cursor::new(&scanned.text), &options, load_mtl);
-    if let Some(error) = mtl_error.into_inner() {
-        return Err(error);
-    }
-    let (models, materials) =
-        loaded.map_err(|error| SceneError::of_file(path, format!("not a mesh: {error}")))?;
-    let materials = materials
-        .map_err(|error| SceneError::of_file(path, format!("a material file of it: {error}")))?;
-    Ok((models, materials))
-}
-
-/// An MTL file's text; empty where there is no such file, for meshes often travel without.
-fn checked_mtl(path: &PathBuf) -> Result<String, SceneError> {
-    let bytes = match plain_file::read(path, MOST_TEXT) {
-        Ok(bytes) => bytes,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(String::new()),
-        Err(error) => {
-            return Err(SceneError::of_file(
-                path,
-                format!("the material file cannot be read: {error}"),
-            ));
+        Err(message) => {
+            let message = format!("line {line}: the picture \"{name}\" {message}; not used");
+            model.notes.add_of(path, message);
         }
-    };
-    let text = String::from_utf8_lossy(&bytes).into_owned();
-    match scan_mtl(&text) {
-        Ok(()) => Ok(text),
-        Err(ScanError { span, message }) => Err(SceneError::at(path, &text, span, message)),
-    }
-}
-
-/// Puts tobj's models, one for each run of a material, back together.
-#[derive(Default)]
-struct Builder {
-    positions: Vec<Vec3>,
-    triangles: Vec<RawTriangle>,
-    materials: Vec<Material>,
-    /// tobj's number of each of `materials`.
-    material_ids: Vec<Option<usize>>,
-    is_given: Vec<bool>,
-}
-
-impl Builder {
-    fn add(
-        &mut self,
-        mesh: &tobj::Mesh,
-        corner_has_normal: &[[bool; 3]],
-        mtl_materials: &[tobj::Material],
-        normals: Normals,
-    ) {
-        if mesh.indices.is_empty() {
-            return;
-        }
-        let material = self.material(mesh.material_id, mtl_materials);
-        let first = self.positions.len() as u32;
-        self.positions
-            .extend(mesh.positions.chunks_exact(3).map(Vec3::from_slice));
-        for (number, corners) in mesh.indices.chunks_exact(3).enumerate() {
-            let has_normal = corner_has_normal
-                .get(self.triangles.len())
-                .copied()
-                .unwrap_or_default();
-            let given = |corner: usize| {
-                if normals == Normals::Flat || !has_normal[corner] {
-                    return None;
-                }
-                let index = *mesh.normal_indices.get(3 * number + corner)? as usize;
-                mesh.normals
-                    .get(3 * index..3 * index + 3)
-                    .map(Vec3::from_slice)
-            };
-            self.triangles.push(RawTriangle {
-                vertices: [corners[0], corners[1], corners[2]].map(|corner| first + corner),
-                normals: std::array::from_fn(given),
-                material,
-            });
-        }
-    }
-
-    fn material(&mut self, id: Option<usize>, mtl_materials: &[tobj::Material]) -> u32 {
-        let known = self.material_ids.iter().position(|known| *known == id);
-        let index = known.unwrap_or_else(|| {
-            self.material_ids.push(id);
-            let mtl = id.and_then(|id| mtl_materials.get(id));
-            self.is_given.push(mtl.is_some());
-            self.materials.push(material(mtl));
-            self.materials.len() - 1
-        });
-        index as u32
-    }
-}
-
-/// The material that an MTL file describes. Its gloss comes from `Pr` (squared, as is usual) or else from `Ns`, unless
-/// `Ks` is black: roughness² = 2 / (Ns + 2), which gives Blinn's lobe and GGX's the same width.
-fn material(mtl: Option<&tobj::Material>) -> Material {
-    let albedo = mtl
-        .and_then(|mtl| mtl.diffuse)
-        .map(|kd| DVec3::from_array(kd.map(f64::from)));
-    let roughness = mtl.and_then(|mtl| {
-        let pr = mtl
-            .unknown_param
-            .get("Pr")
-            .and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
-        let shiny = mtl
-            .specular
-            .is_none_or(|ks| ks.iter().any(|&channel| channel > 0.0));
-        let ns = mtl
-            .shininess
-            .filter(|_| shiny)
-            .map(|ns| (2.0 / (f64::from(ns) + 2.0)).sqrt());
-        pr.map(|pr| pr * pr).or(ns)
-    });
-    Material {
-        albedo: albedo.unwrap_or(DVec3::splat(DEFAULT_ALBEDO)),
-        roughness: roughness.map(|roughness| roughness.clamp(LEAST_ROUGHNESS, 1.0)),
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geometry::cuboid::SIDES;
-
-    const SMOOTH: Normals = Normals::GivenOrMade { crease_rad: 0.5 };
-
-    fn failure(text: &str) -> String {
-        read(Path::new("bad.obj"), text, SMOOTH, &|_| ())
-            .unwrap_err()
-            .to_string()
-    }
-
-    #[test]
-    fn normals_come_from_the_file_where_it_has_them() {
-        let text =
-            "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvn 0 3 4\nvn 0 0 0\nf 1//1 2//2 3\nf 2 4 3//-2\n";
-        let loaded = read(Path::new("a.obj"), text, SMOOTH, &|_| ()).unwrap();
-        let given = Vec3::new(0.0, 0.6, 0.8);
-        assert_eq!(
-            loaded.mesh.corner_normals,
-            [[given, Vec3::Z, Vec3::Z], [Vec3::Z, Vec3::Z, given]]
-        );
-        assert_eq!(
-            loaded.materials,
-            [Material {
-                albedo: DVec3::splat(0.5),
-                roughness: None
-            }]
-        );
-        let flat = read(Path::new("a.obj"), text, Normals::Flat, &|_| ()).unwrap();
-        assert_eq!(flat.mesh.corner_normals, [[Vec3::Z; 3]; 2]);
-    }
-
-    #[test]
-    fn groups_and_loose_quads_weld_into_a_closed_box() {
-        let mut text = String::new();
-        for side in SIDES {
-            for corner in side {
-                text += &format!("v {} {} {}\n", corner & 1, corner >> 1 & 1, corner >> 2);
-            }
-            text += "g side\nf -4 -3 -2 -1\n";
-        }
-        let loaded = read(Path::new("box.obj"), &text, SMOOTH, &|_| ()).unwrap();
-        assert_eq!(
-            loaded.report,
-            MeshReport {
-                merged_vertices: 16,
-                components: 1,
-                closed: true,
-                ..MeshReport::default()
-            }
-        );
-        assert!((loaded.mesh.signed_volume_m3() - 1.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn bad_meshes_say_what_is_expected() {
-        assert!(failure(" \n").contains("bad.obj: the file is empty"));
-        assert!(failure("v 0 0 0\n").contains("bad.obj: no faces"));
-        assert!(failure("v 0 0 0\nf 1 1 1\n").contains("no triangle has an area"));
-        assert!(
-            failure("v 0 0 0\nv 1 0 0\nv 0 NaN 0\nf 1 2 3\n")
-                .starts_with("bad.obj:3:5: v: NaN is not a finite number")
-        );
-    }
-
-    #[test]
-    fn materials_come_from_the_mtl_file() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.obj");
-        let mtl = folder.path().join("a.mtl");
-        let text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl matt\nf 1 2 3\nusemtl shiny\nf 1 4 2\nusemtl none\nf 1 3 4\n";
-        let plain = Material {
-            albedo: DVec3::splat(0.5),
-            roughness: None,
-        };
-        assert_eq!(
-            read(&path, text, SMOOTH, &|_| ()).unwrap().materials,
-            [plain],
-            "a missing file is no mistake"
-        );
-
-        std::fs::write(
-            &mtl,
-            "newmtl matt\nKd .25 .5 1\nKs 0 0 0\nNs 96\nnewmtl shiny\nKs 1 1 1\nNs 98\n",
-        )
-        .unwrap();
-        let loaded = read(&path, text, SMOOTH, &|_| ()).unwrap();
-        assert_eq!(loaded.mesh.triangle_materials, [0, 1, 2]);
-        assert_eq!(
-            loaded.materials[0],
-            Material {
-                albedo: DVec3::new(0.25, 0.5, 1.0),
-                roughness: None
-            }
-        );
-        assert!((loaded.materials[1].roughness.unwrap() - 0.02_f64.sqrt()).abs() < 1e-6);
-        assert_eq!(loaded.materials[2], plain);
-
-        std::fs::write(&mtl, "newmtl matt\nKd .25 .5\n").unwrap();
-        let message = read(&path, text, SMOOTH, &|_| ()).unwrap_err().to_string();
-        assert!(
-            message.contains("a.mtl:2:1: Kd: 2 numbers; 3 are expected"),
-            "{message}"
-        );
-    }
-}
+mod tests;

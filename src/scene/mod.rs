@@ -1,11 +1,13 @@
 //! A scene: what is tracked, what is real, what is virtual, what lights them; one TOML file, parsed into types that cannot be wrong.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use glam::{DAffine3, DVec2, DVec3, Vec3};
 
 use crate::geometry::mesh::{Mesh, MeshReport};
 use crate::light::probe::Probe;
+use crate::light::texture::Texture;
 use crate::light::{Light, Material};
 pub use crate::shafts::difference::Difference;
 
@@ -19,33 +21,41 @@ mod dictionary;
 mod error;
 mod family;
 pub mod format;
+pub mod gltf;
 mod lights;
 mod load;
-pub mod material_libraries;
-mod mesh_file;
+pub mod mesh_file;
+mod mip_36h12;
 mod motion;
 mod named_files;
-mod obj_scan;
+mod not_a_scene;
+pub mod notes;
+pub mod obj;
 mod objects;
 mod placement;
 pub mod plain_file;
+pub mod ply;
 mod probe;
 pub mod probe_file;
 mod quality;
 pub mod radiance_file;
 mod ranges;
+pub mod raw_model;
 mod reader;
 mod reference;
 mod shadows;
 mod shortcuts;
+mod stl;
+mod texture_file;
 mod tracking;
 mod transport;
+mod vertex_colors;
 
 pub use camera::{CameraSettings, PixelFormat, WantedFormat};
 pub use dictionary::Dictionary;
 pub use error::{SceneError, TextPlace};
-pub use family::{Codes, Family};
-pub use lights::unit_direction;
+pub use family::{Codes, Drawing, Family, Ink};
+pub use lights::{SceneLight, unit_direction};
 pub use load::Reading;
 pub use motion::{Motion, PathEnd, Station};
 pub use named_files::{FileKind, NamedFile};
@@ -72,14 +82,28 @@ pub struct Scene {
     pub phantoms: Vec<Object>,
     /// What the picture alone shows.
     pub virtuals: Vec<Object>,
-    /// Lights in world space.
-    pub lights: Vec<Light>,
+    /// What shines.
+    pub lights: Vec<SceneLight>,
     /// Radiance of the constant surrounding light, linear RGB.
     pub ambient_radiance: DVec3,
     /// The light that a probe saw, and the room that sent it.
     pub probe: Option<ProbeScene>,
     /// How shadows are made.
     pub shadows: ShadowSettings,
+}
+
+impl Scene {
+    /// The families of all markers, as often as they have some.
+    pub fn families(&self) -> Vec<Family> {
+        let markers = self.anchors.iter().flat_map(|anchor| &anchor.markers);
+        markers.map(|marker| marker.family).collect()
+    }
+
+    /// The lights that stand in the world, in world space.
+    pub fn world_lights(&self) -> Vec<Light> {
+        let standing = self.lights.iter().filter(|light| light.anchor == 0);
+        standing.map(|light| light.light).collect()
+    }
 }
 
 /// A marker in its anchor's frame.
@@ -97,6 +121,19 @@ pub struct Marker {
     pub rotation_rad: f64,
 }
 
+impl Marker {
+    /// A marker in the middle of its anchor's frame.
+    pub fn alone(family: Family, id: u32, size_m: f64) -> Self {
+        Self {
+            family,
+            id,
+            size_m,
+            center_m: DVec2::ZERO,
+            rotation_rad: 0.0,
+        }
+    }
+}
+
 /// A board of markers or a lone marker, with its own frame (x right, y up as printed, z towards the viewer).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Anchor {
@@ -111,13 +148,7 @@ impl Anchor {
     pub fn lone(name: String, family: Family, id: u32, size_m: f64) -> Self {
         Self {
             name,
-            markers: vec![Marker {
-                family,
-                id,
-                size_m,
-                center_m: DVec2::ZERO,
-                rotation_rad: 0.0,
-            }],
+            markers: vec![Marker::alone(family, id, size_m)],
         }
     }
 }
@@ -134,6 +165,12 @@ pub struct Object {
     pub mesh_report: MeshReport,
     /// As many as `mesh.triangle_materials` names; never empty.
     pub materials: Vec<Material>,
+    /// What its file calls them; empty texts where it does not, or no texts.
+    pub material_names: Vec<String>,
+    /// What the materials' maps name.
+    pub textures: Vec<Arc<Texture>>,
+    /// What of its file is passed over or taken for something else, one sentence each.
+    pub notes: Vec<String>,
     /// The node that it stands still on: an anchor, or, beyond the anchors, one that moves with it
     /// ([`Scene::camera_from_nodes`]).
     pub anchor: usize,

@@ -10,9 +10,9 @@ pub enum FileKind {
     Recording,
     /// The camera's calibration.
     Calibration,
-    /// A phantom's or a virtual thing's mesh (OBJ).
+    /// A phantom's or a virtual thing's mesh (glTF, OBJ, PLY or STL).
     Mesh,
-    /// A mesh of the room (OBJ).
+    /// A mesh of the room (glTF, OBJ, PLY or STL).
     RoomMesh,
     /// A light probe's picture.
     Probe,
@@ -36,7 +36,7 @@ impl FileKind {
         match self {
             Self::Recording => "a session, a video or a folder of pictures",
             Self::Calibration => "a calibration's file",
-            Self::Mesh | Self::RoomMesh => "an OBJ file",
+            Self::Mesh | Self::RoomMesh => "a glTF, OBJ, PLY or STL file",
             Self::Probe => "a picture in linear radiance, .hdr or .exr",
             Self::Dictionary => "a dictionary of markers, .yml",
         }

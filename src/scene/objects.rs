@@ -7,11 +7,12 @@ use glam::{DAffine3, DVec3, Vec3};
 
 use super::anchors::unique_name;
 use super::error::{SceneError, suggestion};
-use super::mesh_file::{self, DEFAULT_ALBEDO, LoadedMesh};
+use super::mesh_file::{self, LoadedMesh, MeshReading, Up};
 use super::motion::{MotionKeys, motion};
 use super::named_files::FileKind;
 use super::placement::{POSITION, PlacementKeys, placement};
 use super::ranges::Numbers;
+use super::raw_model::DEFAULT_ALBEDO;
 use super::reader::{Table, Value};
 use super::schema::key::Missing::{Is, Means};
 use super::schema::section::{Example, Section, Times};
@@ -36,10 +37,14 @@ keys! {
     /// The shape of a thing.
     pub static SHAPE: ShapeKeys;
 
-    /// Its shape. Counter-clockwise seen from outside; materials from its MTL file (Kd is taken
-    /// as linear reflectance, Ns or Pr as roughness), textures are not read, polygons should be convex. A phantom is
+    /// Its shape: glTF, OBJ, PLY or STL. Counter-clockwise seen from outside; materials from its file or MTL file (Kd is
+    /// taken as linear reflectance, Ns or Pr as roughness; see docs/gltf.md). A phantom is
     /// always flat: normals in the file are passed over.
     mesh: Option<PathBuf>, FileKind::Mesh => Means(None, "none: a phantom may have rect_m");
+    /// Which axis of the mesh's file points up, along z of what it stands on.
+    up: Option<Up> => Means(None, "\"z\"; glTF: \"y\"");
+    /// What the longest side of the mesh is scaled to; the file's origin stays.
+    fit_m: Option<f64>, Numbers::above(0.0, 1e5).unit("m") => Means(None, "the numbers in the file are metres");
 }
 
 keys! {
@@ -51,7 +56,7 @@ keys! {
 }
 
 keys! {
-    /// What a thing stands on.
+    /// What a thing or a light stands on.
     pub static STANDING: StandingKeys;
 
     /// The board or marker that it stands on.
@@ -144,6 +149,8 @@ pub static PHANTOM_SECTION: Section = Section {
     shown: &[
         ("name", Example::Live("\"house\"")),
         ("mesh", Example::Live("\"models/house.obj\"")),
+        ("up", Example::Aside("\"y\"")),
+        ("fit_m", Example::Aside("0.1")),
         ("rect_m", Example::Aside("[-0.21, -0.1485, 0.21, 0.1485]")),
         ("on", Example::Live("\"table\"")),
         ("position_m", Example::Live("[-0.055, 0.035, 0.0]")),
@@ -176,6 +183,8 @@ pub static VIRTUAL_SECTION: Section = Section {
     shown: &[
         ("name", Example::Live("\"torus\"")),
         ("mesh", Example::Live("\"models/torus.obj\"")),
+        ("up", Example::Aside("\"y\"")),
+        ("fit_m", Example::Aside("0.1")),
         ("on", Example::Live("\"table\"")),
         ("position_m", Example::Live("[0.022, 0.0, 0.036]")),
         ("rotation_deg", Example::Live("[70, 0, 35]")),
@@ -240,6 +249,7 @@ fn table_top(table: &Table) -> Result<Object, SceneError> {
         mesh,
         report,
         materials,
+        material_names,
         ..
     } = rectangle(&rect, albedo)?;
     Ok(Object {
@@ -247,6 +257,9 @@ fn table_top(table: &Table) -> Result<Object, SceneError> {
         mesh,
         mesh_report: report,
         materials,
+        material_names,
+        textures: Vec::new(),
+        notes: Vec::new(),
         anchor: 0,
         motion: None,
         anchor_from_object: DAffine3::from_translation(DVec3::Z * height_m),
@@ -280,7 +293,14 @@ fn object(
         (Some(_), Some(rect)) => {
             return Err(rect.error("the thing has a mesh; allowed: mesh or rect_m, not both"));
         }
-        (Some(mesh), None) => mesh_file::load(&mesh, SHAPE.mesh.takes, normals)?,
+        (Some(mesh), None) => {
+            let reading = MeshReading {
+                normals,
+                up: SHAPE.up.read(table)?,
+                fit_m: SHAPE.fit_m.read(table)?,
+            };
+            mesh_file::load(&mesh, SHAPE.mesh.takes, reading)?
+        }
         (None, Some(rect)) => rectangle(&rect, DVec3::splat(DEFAULT_ALBEDO))?,
         (None, None) if kind == ThingKind::Phantom => {
             return Err(table.error(format!("\"{name}\": no shape; mesh or rect_m is expected")));
@@ -288,21 +308,25 @@ fn object(
         (None, None) => return Err(table.error(format!("\"{name}\": no shape; mesh is expected"))),
     };
     let mut materials = loaded.materials;
+    let mut mesh = loaded.mesh;
     if let Some(material) = MATERIAL_SECTION.table(table)? {
-        override_materials(&mut materials, &material)?;
+        override_materials(&mut materials, &mut mesh, &material)?;
     }
     // A mirror turns each triangle's winding; turning it back keeps the outside outside.
     let mirrored = anchor_from_object.matrix3.determinant() < 0.0;
     let mesh = if mirrored {
-        loaded.mesh.with_winding_reversed()
+        mesh.with_winding_reversed()
     } else {
-        loaded.mesh
+        mesh
     };
     Ok(Object {
         name,
         mesh,
         mesh_report: loaded.report,
         materials,
+        material_names: loaded.material_names,
+        textures: loaded.textures,
+        notes: loaded.notes,
         anchor,
         motion: motion(table, anchor)?,
         anchor_from_object,
@@ -311,7 +335,8 @@ fn object(
     })
 }
 
-fn anchor_index(on: &Value, anchors: &[Anchor]) -> Result<usize, SceneError> {
+/// The anchor of a name.
+pub fn anchor_index(on: &Value, anchors: &[Anchor]) -> Result<usize, SceneError> {
     let written = on.text()?;
     anchors
         .iter()
@@ -325,17 +350,29 @@ fn anchor_index(on: &Value, anchors: &[Anchor]) -> Result<usize, SceneError> {
         })
 }
 
-/// Each key that the scene gives replaces that of every material of the mesh.
-fn override_materials(materials: &mut [Material], table: &Table) -> Result<(), SceneError> {
-    if let Some(albedo) = MATERIAL.albedo.read(table)? {
-        materials
-            .iter_mut()
-            .for_each(|material| material.albedo = albedo);
+/// Each key that the scene gives replaces that of every material of the mesh, with the picture that says it and, of the
+/// colour, the corners' colours.
+fn override_materials(
+    materials: &mut [Material],
+    mesh: &mut Mesh,
+    table: &Table,
+) -> Result<(), SceneError> {
+    let albedo = MATERIAL.albedo.read(table)?;
+    let roughness = MATERIAL.roughness.read(table)?;
+    for material in materials {
+        if let Some(albedo) = albedo {
+            material.albedo = albedo;
+            material.maps.color = None;
+        }
+        if let Some(roughness) = roughness {
+            material.roughness = Some(roughness);
+            material.maps.roughness = None;
+        }
     }
-    if let Some(roughness) = MATERIAL.roughness.read(table)? {
-        materials
-            .iter_mut()
-            .for_each(|material| material.roughness = Some(roughness));
+    if albedo.is_some() {
+        for look in &mut mesh.looks {
+            look.color = Vec3::ONE.extend(look.color.w);
+        }
     }
     Ok(())
 }
@@ -363,10 +400,10 @@ fn rectangle(value: &Value, albedo: DVec3) -> Result<LoadedMesh, SceneError> {
     Ok(LoadedMesh {
         mesh,
         report,
-        materials: vec![Material {
-            albedo,
-            roughness: None,
-        }],
+        materials: vec![Material::matt(albedo)],
+        material_names: vec![String::new()],
         is_given: vec![true],
+        textures: Vec::new(),
+        notes: Vec::new(),
     })
 }

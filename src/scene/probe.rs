@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 
 use super::anchors::unique_name;
 use super::error::SceneError;
-use super::mesh_file::{self, Normals};
+use super::mesh_file::{self, MeshReading, Normals};
 use super::named_files::FileKind;
 use super::objects::ALBEDO;
 use super::placement::{ANGLE, POSITION, PlacementKeys, placement};
@@ -195,7 +195,7 @@ fn piece(table: &Table, name_lines: &mut HashMap<String, usize>) -> Result<RoomP
 }
 
 fn mesh_piece(value: &Value, albedo: Option<DVec3>) -> Result<RoomPiece, SceneError> {
-    let loaded = mesh_file::load(value, FileKind::RoomMesh, Normals::Flat)?;
+    let loaded = mesh_file::load(value, FileKind::RoomMesh, MeshReading::plain(Normals::Flat))?;
     let mesh = loaded.mesh;
     let triangles = mesh.triangles.iter().zip(&mesh.triangle_materials);
     let triangles = triangles.map(|(triangle, &material)| {

@@ -84,6 +84,11 @@ settings! {
     technique: Technique => Is(Technique::Auto);
     /// Samples per pixel.
     samples: u32, Whole::one_of("number of samples", &[1, 4]) => ByQuality { fast: 1, balanced: 4, accurate: 4 };
+    /// A light of some size casts its soft shadows from as many places as they are wide in pixels, up to this many.
+    light_samples: u32, Whole::between(1, 1024) => ByQuality { fast: 16, balanced: 64, accurate: 256 };
+    /// From so many directions virtual things hide the ambient light of real ones; 0: they hide none of it. Takes no part in
+    /// shafts, whose probe is the ambient light.
+    ambient_samples: u32, Whole::between(0, 1024) => Is(0);
     /// How volumes are counted.
     counting: VolumeCounting => Is(VolumeCounting::Auto);
     /// By less than this many pixels a coarser version of a thing may move its silhouette, as the camera and the lights

@@ -10,9 +10,11 @@ use super::schema::settings::Settings as _;
 choices! {
     /// Which library finds the markers.
     pub enum DetectorKind, "detector" {
+        /// libapriltag for AprilTag's families, OpenCV's ArUco for the others.
+        ByFamily = "family",
         /// libapriltag: AprilTag's families alone.
         AprilTag = "apriltag",
-        /// OpenCV's ArUco: every family.
+        /// OpenCV's ArUco: every family but AprilTag 3's with rings.
         Aruco = "aruco",
     }
 }
@@ -47,7 +49,7 @@ settings! {
     pub struct TrackingSettings, TRACKING: TrackingKeys;
 
     /// The library that finds the markers.
-    detector: DetectorKind => Is(DetectorKind::AprilTag);
+    detector: DetectorKind => Is(DetectorKind::ByFamily);
     /// libapriltag searches pictures shrunk by this; 1 is full resolution and finds smaller markers.
     decimation: f64, Numbers::between(1.0, 8.0) => Is(2.0);
     /// libapriltag: standard deviation of the blur before the search, pixels.

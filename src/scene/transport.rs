@@ -1,11 +1,12 @@
 //! A scene as the floors below take it: what reflects light, what hides it, and the room around.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::{Object, ProbeScene, Scene};
 use crate::geometry::bounds::Bounds;
-use crate::geometry::mesh::Mesh;
+use crate::geometry::mesh::{CornerLook, Mesh};
 use crate::light::bounce::Reflector;
+use crate::light::material::Encoding;
 use crate::shafts::casters::Occluder;
 use crate::shafts::patches::RoomTriangle;
 use crate::shafts::room::Room;
@@ -28,11 +29,73 @@ impl Object {
         let positions = self.positions_in_anchor(mesh);
         mesh.triangles
             .iter()
-            .zip(&mesh.triangle_materials)
-            .map(move |(triangle, &material)| Reflector {
+            .enumerate()
+            .map(move |(number, triangle)| Reflector {
                 corners: triangle.map(|index| positions[index as usize]),
-                albedo: self.materials[material as usize].albedo,
+                albedo: self.albedo(number),
             })
+    }
+
+    /// Mean diffuse reflectance of a triangle: its material's, its picture's in its middle and halfway to its corners,
+    /// and its corners' colours.
+    ///
+    /// # Panics
+    /// If there is no such triangle.
+    pub fn albedo(&self, triangle: usize) -> DVec3 {
+        let material = &self.materials[self.mesh.triangle_materials[triangle] as usize];
+        let Some(looks) = self.mesh.corner_looks.get(triangle) else {
+            return material.albedo;
+        };
+        let looks = looks.map(|look| &self.mesh.looks[look as usize]);
+        let texture = material.maps.color.and_then(|map| {
+            let texture = self.textures.get(map.texture as usize)?;
+            Some((map, texture))
+        });
+        let at = |weights: [f32; 3]| {
+            let look = CornerLook::blended(looks, weights);
+            let picture = texture.map_or(DVec3::ONE, |(map, texture)| {
+                let uv = look.uv[map.uv_set as usize & 1];
+                texture.sample(&map, uv, Encoding::Srgb).truncate()
+            });
+            picture * look.color.truncate().as_dvec3()
+        };
+        let places = [
+            [1.0 / 3.0; 3],
+            [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0],
+            [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0],
+            [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0],
+        ];
+        material.albedo * places.map(at).into_iter().sum::<DVec3>() / 4.0
+    }
+
+    /// The mean of [`Object::albedo`] over each material's surface.
+    pub fn mean_albedos(&self) -> Vec<DVec3> {
+        let mesh = &self.mesh;
+        if mesh.looks.is_empty() {
+            return self
+                .materials
+                .iter()
+                .map(|material| material.albedo)
+                .collect();
+        }
+        let mut sums = vec![(DVec3::ZERO, 0.0); self.materials.len()];
+        for (number, triangle) in mesh.triangles.iter().enumerate() {
+            let [a, b, c] = triangle.map(|index| mesh.positions[index as usize].as_dvec3());
+            let area = (b - a).cross(c - a).length();
+            let sum = &mut sums[mesh.triangle_materials[number] as usize];
+            sum.0 += self.albedo(number) * area;
+            sum.1 += area;
+        }
+        let of_materials = sums.into_iter().zip(&self.materials);
+        of_materials
+            .map(|((sum, area), material)| {
+                if area > 0.0 {
+                    sum / area
+                } else {
+                    material.albedo
+                }
+            })
+            .collect()
     }
 
     /// The smallest box around it, in its anchor's space; `None` without triangles.
@@ -104,7 +167,11 @@ impl Scene {
     pub fn occluders(&self) -> Vec<Occluder<'_>> {
         let virtuals = self.virtuals.iter().map(|object| Occluder {
             mesh: &object.mesh,
-            materials: &object.materials,
+            albedos: object
+                .mean_albedos()
+                .iter()
+                .map(|albedo| albedo.as_vec3())
+                .collect(),
             anchor: object.anchor,
             anchor_from_object: object.anchor_from_object,
             casts: object.casts,

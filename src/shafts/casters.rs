@@ -8,7 +8,6 @@ use rayon::prelude::*;
 use crate::geometry::levels::levels;
 use crate::geometry::mesh::Mesh;
 use crate::geometry::ray_caster::RayCaster;
-use crate::light::Material;
 
 use super::bounding::{Aabb, Ball};
 use super::room_transport::RoomTransport;
@@ -30,12 +29,12 @@ const PART_OF_DISTANCE: f32 = 0.3;
 const MOST_PARTS: u32 = 10;
 
 /// A virtual thing as a scene has it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Occluder<'a> {
     /// Its triangles, in its own space.
     pub mesh: &'a Mesh,
-    /// What `mesh.triangle_materials` names.
-    pub materials: &'a [Material],
+    /// Mean diffuse reflectances of what `mesh.triangle_materials` names.
+    pub albedos: Vec<Vec3>,
     /// Number of its anchor.
     pub anchor: usize,
     /// Where it stands there.
@@ -152,11 +151,12 @@ impl ShaftCasters {
 impl SimplifiedCaster {
     fn new(thing: &Occluder<'_>) -> Self {
         let size = Aabb::around(thing.mesh.positions.iter().copied()).diagonal();
-        let coarser = levels(thing.mesh);
+        let shape = thing.mesh.without_looks();
+        let coarser = levels(&shape);
         let coarse_enough = coarser
             .into_iter()
             .rfind(|level| level.max_error_m <= COARSE_PART * f64::from(size));
-        let mesh = coarse_enough.map_or_else(|| thing.mesh.clone(), |level| level.mesh);
+        let mesh = coarse_enough.map_or(shape, |level| level.mesh);
         let corners = mesh
             .triangles
             .iter()
@@ -164,7 +164,7 @@ impl SimplifiedCaster {
         let albedos = mesh
             .triangle_materials
             .iter()
-            .map(|&material| thing.materials[material as usize].albedo.as_vec3());
+            .map(|&material| thing.albedos[material as usize]);
         Self {
             casts: thing.casts,
             coarse: corners.zip(albedos).collect(),

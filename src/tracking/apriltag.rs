@@ -6,9 +6,10 @@ use std::sync::LazyLock;
 
 use glam::DVec2;
 
-use super::conventions::corners_from_apriltag;
+use super::conventions::{corners_as_drawn, corners_from_apriltag};
+use super::printed_marker::{Cell, PrintedMarker};
 use super::{Detection, TrackingError};
-use crate::scene::{Codes, Family, TrackingSettings};
+use crate::scene::{Codes, Family, Ink, TrackingSettings};
 
 /// More corrected bits cost libapriltag gigabytes of tables.
 const MAX_CORRECTED_BITS: u32 = 3;
@@ -18,16 +19,17 @@ const LOG_OFFSET: f64 = 64.0;
 
 /// A detector for some families; built once, used by one thread at a time.
 pub(super) struct AprilTagDetector {
-    /// One for each width of border.
+    /// One for each width of border, ink and drawing.
     searches: Vec<BorderSearch>,
     min_margin: f64,
-    /// The picture with [`between_corner_squares`] applied.
-    parted: Vec<u8>,
+    /// The picture with other levels.
+    levelled: Vec<u8>,
 }
 
 /// libapriltag's detector with the families of one border.
 struct BorderSearch {
     raw: NonNull<RawDetector>,
+    /// In the order in which libapriltag got them.
     families: Vec<Family>,
 }
 
@@ -47,20 +49,18 @@ impl AprilTagDetector {
             });
         }
         let mut searches = Vec::new();
-        for border_cells in Family::BORDERS {
-            let of_border = families
-                .iter()
-                .copied()
-                .filter(|family| family.border_cells() == border_cells)
-                .collect::<Vec<_>>();
-            if !of_border.is_empty() {
-                searches.push(BorderSearch::new(settings, of_border)?);
-            }
+        let mut rest = families.to_vec();
+        while let Some(first) = rest.first().copied() {
+            let kind = |family: &Family| (family.border_cells(), family.ink(), family.drawing());
+            let alike = |family: &Family| kind(family) == kind(&first);
+            let (of_kind, others) = rest.into_iter().partition(alike);
+            searches.push(BorderSearch::new(settings, of_kind)?);
+            rest = others;
         }
         Ok(Self {
             searches,
             min_margin: settings.min_margin,
-            parted: Vec::new(),
+            levelled: Vec::new(),
         })
     }
 
@@ -71,15 +71,14 @@ impl AprilTagDetector {
     ) -> Result<Vec<Detection>, TrackingError> {
         let mut detections = Vec::new();
         for search in &mut self.searches {
-            let picture = if search.has_wide_borders() {
-                self.parted.clear();
-                self.parted.extend(
-                    grey.iter()
-                        .map(|&level| between_corner_squares()[usize::from(level)]),
-                );
-                &self.parted
-            } else {
-                grey
+            let picture = match search.levels() {
+                Some(levels) => {
+                    self.levelled.clear();
+                    let levelled = grey.iter().map(|&level| levels[usize::from(level)]);
+                    self.levelled.extend(levelled);
+                    &self.levelled
+                }
+                None => grey,
             };
             detections.extend(search.detect(picture, size_px, self.min_margin)?);
         }
@@ -146,8 +145,18 @@ impl BorderSearch {
         Ok(search)
     }
 
-    fn has_wide_borders(&self) -> bool {
-        self.families.iter().any(|family| family.border_cells() > 1)
+    /// The levels in which its markers are black on white and come apart; `None` for the picture's own.
+    fn levels(&self) -> Option<[u8; 256]> {
+        let first = self.families.first()?;
+        let wide = (first.border_cells() > 1).then(between_corner_squares);
+        let inverts = first.ink() == Ink::WhiteOnBlack;
+        if wide.is_none() && !inverts {
+            return None;
+        }
+        Some(std::array::from_fn(|level| {
+            let level = if inverts { 255 - level } else { level };
+            wide.map_or(level as u8, |wide| wide[level])
+        }))
     }
 
     fn detect(
@@ -187,7 +196,7 @@ impl BorderSearch {
                 Some(Detection {
                     family,
                     id: u32::try_from(raw.id).ok()?,
-                    corners_px: corners_from_apriltag(corners),
+                    corners_px: corners_as_drawn(corners_from_apriltag(corners), family.drawing()),
                     margin: f64::from(raw.margin),
                     corrected_bits: u32::try_from(raw.hamming).ok()?,
                 })
@@ -204,8 +213,8 @@ impl Drop for BorderSearch {
     }
 }
 
-/// The cells of an AprilTag as printed, rows from the top, true for white; black border included, white rim not.
-pub(super) fn printed_cells(family: Family, id: u32) -> Option<Vec<bool>> {
+/// An AprilTag as libapriltag draws it, black on white; `None` for a marker that the family does not have.
+pub(super) fn printed_marker(family: Family, id: u32) -> Option<PrintedMarker> {
     let mut picture = [0_u8; 256];
     // SAFETY: the name ends in 0 and the capacity is the picture's.
     let side = unsafe {
@@ -218,12 +227,12 @@ pub(super) fn printed_cells(family: Family, id: u32) -> Option<Vec<bool>> {
         )
     };
     let side = usize::try_from(side).ok()?;
-    let inner = side.checked_sub(2)?;
-    Some(
-        (0..inner * inner)
-            .map(|k| picture[(k / inner + 1) * side + k % inner + 1] != 0)
-            .collect(),
-    )
+    let cells = picture[..side * side].iter().map(|cell| match cell {
+        0 => Cell::Black,
+        1 => Cell::White,
+        _ => Cell::Open,
+    });
+    Some(PrintedMarker::new(family.cells_across(), cells.collect()))
 }
 
 fn c_name(codes: Codes) -> Option<&'static CStr> {
@@ -232,7 +241,12 @@ fn c_name(codes: Codes) -> Option<&'static CStr> {
         Codes::Tag25h9 => Some(c"tag25h9"),
         Codes::Tag36h10 => Some(c"tag36h10"),
         Codes::Tag36h11 => Some(c"tag36h11"),
-        Codes::Aruco { .. } | Codes::ArucoOriginal | Codes::Own(_) => None,
+        Codes::Standard41h12 => Some(c"tagStandard41h12"),
+        Codes::Standard52h13 => Some(c"tagStandard52h13"),
+        Codes::Circle21h7 => Some(c"tagCircle21h7"),
+        Codes::Circle49h12 => Some(c"tagCircle49h12"),
+        Codes::Custom48h12 => Some(c"tagCustom48h12"),
+        Codes::Aruco { .. } | Codes::ArucoOriginal | Codes::ArucoMip36h12 | Codes::Own(_) => None,
     }
 }
 

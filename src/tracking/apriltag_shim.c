@@ -11,8 +11,13 @@
 #include <apriltag/tag25h9.h>
 #include <apriltag/tag36h10.h>
 #include <apriltag/tag36h11.h>
+#include <apriltag/tagCircle21h7.h>
+#include <apriltag/tagCircle49h12.h>
+#include <apriltag/tagCustom48h12.h>
+#include <apriltag/tagStandard41h12.h>
+#include <apriltag/tagStandard52h13.h>
 
-#define FAMILIES 4
+#define FAMILIES 9
 #define MOST_BORDER_CELLS 2
 
 static const struct {
@@ -24,6 +29,11 @@ static const struct {
     {"tag25h9", tag25h9_create, tag25h9_destroy},
     {"tag36h10", tag36h10_create, tag36h10_destroy},
     {"tag36h11", tag36h11_create, tag36h11_destroy},
+    {"tagStandard41h12", tagStandard41h12_create, tagStandard41h12_destroy},
+    {"tagStandard52h13", tagStandard52h13_create, tagStandard52h13_destroy},
+    {"tagCircle21h7", tagCircle21h7_create, tagCircle21h7_destroy},
+    {"tagCircle49h12", tagCircle49h12_create, tagCircle49h12_destroy},
+    {"tagCustom48h12", tagCustom48h12_create, tagCustom48h12_destroy},
 };
 
 struct gnomon_detection {
@@ -156,7 +166,8 @@ int32_t gnomon_apriltag_detect(struct gnomon_apriltag *self, const uint8_t *grey
     return (int32_t)count;
 }
 
-// Writes the picture of a marker as printed, one byte a cell (0 black, else white), its white rim included.
+// Writes the picture of a marker as printed, one byte a cell: 0 black, 1 white, 2 for what the family leaves open. With
+// it comes what lies around the square whose corners are found: a white rim, or the codes around a ring.
 // Returns the cells a side, or -1.
 int32_t gnomon_apriltag_picture(const char *name, int32_t border_cells, uint32_t id, uint8_t *cells,
                                 size_t capacity) {
@@ -167,7 +178,22 @@ int32_t gnomon_apriltag_picture(const char *name, int32_t border_cells, uint32_t
     image_u8_t *image = id < family->ncodes ? apriltag_to_image(family, (int)id) : NULL;
     if (image && image->width == image->height && (size_t)image->width * (size_t)image->height <= capacity) {
         side = image->width;
-        for (int32_t y = 0; y < side; y++) memcpy(cells + y * side, image->buf + y * image->stride, (size_t)side);
+        // With a ring, the ring itself, the black around it and the bits are all that is laid down.
+        int32_t beyond = (side - family->width_at_border) / 2;
+        int32_t first = beyond - 1, last = side - beyond;
+        for (int32_t y = 0; y < side; y++)
+            for (int32_t x = 0; x < side; x++) {
+                int32_t from_edge = x - first;
+                if (y - first < from_edge) from_edge = y - first;
+                if (last - x < from_edge) from_edge = last - x;
+                if (last - y < from_edge) from_edge = last - y;
+                bool is_laid_down = !family->reversed_border || from_edge == 0 || from_edge == 1;
+                cells[y * side + x] = is_laid_down ? image->buf[y * image->stride + x] != 0 : 2;
+            }
+        for (uint32_t bit = 0; family->reversed_border && bit < family->nbits; bit++) {
+            int32_t x = (int32_t)family->bit_x[bit] + beyond, y = (int32_t)family->bit_y[bit] + beyond;
+            cells[y * side + x] = image->buf[y * image->stride + x] != 0;
+        }
     }
     if (image) { // What image_u8_destroy does; Debian's library does not export it.
         free(image->buf);

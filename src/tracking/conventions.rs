@@ -8,13 +8,22 @@
 
 use glam::DVec2;
 
-use crate::scene::ArucoRefinement;
+use crate::scene::{ArucoRefinement, Drawing};
 
 /// Corners as printed from those of libapriltag.
 pub(super) fn corners_from_apriltag(corners: [DVec2; 4]) -> [DVec2; 4] {
     let [bottom_left, bottom_right, top_right, top_left] =
         corners.map(|corner| corner - DVec2::splat(0.5));
     [top_left, top_right, bottom_right, bottom_left]
+}
+
+/// Corners of a drawing from those of the family's own.
+pub(super) fn corners_as_drawn(corners: [DVec2; 4], drawing: Drawing) -> [DVec2; 4] {
+    let [top_left, top_right, bottom_right, bottom_left] = corners;
+    match drawing {
+        Drawing::Own => corners,
+        Drawing::OpenCv => [bottom_right, bottom_left, top_left, top_right],
+    }
 }
 
 /// Corners as printed from those of OpenCV, whose picture of the marker is the print turned by `quarter_turns`

@@ -62,13 +62,21 @@ const MIN_SIDE_PX: u32 = 16;
 
 /// A detector for some families, built once and used by one thread at a time.
 pub struct Detector {
-    backend: Backend,
+    april_tag: Option<AprilTagDetector>,
+    aruco: Option<ArucoDetector>,
     /// What a thorough search looks with, built when there is one for the first time.
     thorough: Thorough,
     /// A picture in another encoding.
     encoded_anew: Vec<u8>,
     /// Whether corners are fitted again in linear light.
-    refines: bool,
+    refines: Refines,
+}
+
+/// Whose corners are fitted again.
+#[derive(Clone, Copy)]
+struct Refines {
+    april_tag: bool,
+    aruco: bool,
 }
 
 /// What a slower search does.
@@ -87,13 +95,6 @@ enum Thorough {
     Ready(AprilTagDetector),
 }
 
-enum Backend {
-    /// Without a family there is nothing to look for.
-    Idle,
-    AprilTag(AprilTagDetector),
-    Aruco(ArucoDetector),
-}
-
 impl Detector {
     /// A detector for `families`, each of which may be named more than once.
     pub fn new(settings: &TrackingSettings, families: &[Family]) -> Result<Self, TrackingError> {
@@ -101,37 +102,33 @@ impl Detector {
         let mut families = families.to_vec();
         families.sort_unstable();
         families.dedup();
-        if families.is_empty() {
-            return Ok(Self {
-                backend: Backend::Idle,
-                thorough: Thorough::Never,
-                encoded_anew: Vec::new(),
-                refines: false,
-            });
-        }
-        let (backend, refines, thorough) = match settings.detector {
-            DetectorKind::AprilTag => {
-                let full = TrackingSettings {
-                    decimation: 1.0,
-                    ..settings.clone()
-                };
-                (
-                    Backend::AprilTag(AprilTagDetector::new(settings, &families)?),
-                    settings.refine_edges,
-                    Thorough::Later(Box::new(full), families),
-                )
-            }
-            DetectorKind::Aruco => (
-                Backend::Aruco(ArucoDetector::new(settings, &families)?),
-                settings.refine_edges && settings.aruco_refinement != ArucoRefinement::None,
-                Thorough::Never,
-            ),
+        let (tags, others): (Vec<Family>, Vec<Family>) =
+            families
+                .into_iter()
+                .partition(|family| match settings.detector {
+                    DetectorKind::ByFamily => family.is_april_tag(),
+                    DetectorKind::AprilTag => true,
+                    DetectorKind::Aruco => false,
+                });
+        let april_tag = (!tags.is_empty()).then(|| AprilTagDetector::new(settings, &tags));
+        let aruco = (!others.is_empty()).then(|| ArucoDetector::new(settings, &others));
+        let full = TrackingSettings {
+            decimation: 1.0,
+            ..settings.clone()
         };
+        let refines_aruco = settings.aruco_refinement != ArucoRefinement::None;
         Ok(Self {
-            backend,
-            thorough,
+            thorough: match tags.is_empty() {
+                true => Thorough::Never,
+                false => Thorough::Later(Box::new(full), tags),
+            },
+            april_tag: april_tag.transpose()?,
+            aruco: aruco.transpose()?,
             encoded_anew: Vec::new(),
-            refines,
+            refines: Refines {
+                april_tag: settings.refine_edges,
+                aruco: settings.refine_edges && refines_aruco,
+            },
         })
     }
 
@@ -144,12 +141,11 @@ impl Detector {
         if !holds_markers(grey, size_px)? {
             return Ok(Vec::new());
         }
-        let detections = match &mut self.backend {
-            Backend::Idle => Vec::new(),
-            Backend::AprilTag(detector) => detector.detect(grey, size_px)?,
-            Backend::Aruco(detector) => detector.detect(grey, size_px)?,
+        let tags = match &mut self.april_tag {
+            Some(detector) => detector.detect(grey, size_px)?,
+            None => Vec::new(),
         };
-        Ok(self.finished(detections, grey, size_px))
+        self.finished(tags, grey, size_px)
     }
 
     /// As [`detect`](Self::detect), but at full resolution. OpenCV's ArUco finds no more than it does anyway.
@@ -192,39 +188,52 @@ impl Detector {
         if !holds_markers(grey, size_px)? {
             return Ok(Vec::new());
         }
-        let mut detections = detector.detect(grey, size_px)?;
+        let mut tags = detector.detect(grey, size_px)?;
         if effort == SearchEffort::LightToo {
             self.encoded_anew.clear();
             let as_light = grey.iter().map(|&level| LIGHT[usize::from(level)]);
             self.encoded_anew.extend(as_light);
             for found in detector.detect(&self.encoded_anew, size_px)? {
-                if !detections.iter().any(|known| known.is_same(&found)) {
-                    detections.push(found);
+                if !tags.iter().any(|known| known.is_same(&found)) {
+                    tags.push(found);
                 }
             }
         }
-        Ok(self.finished(detections, grey, size_px))
+        self.finished(tags, grey, size_px)
     }
 
+    /// libapriltag's detections with OpenCV's beside them, their corners fitted again, in order.
     fn finished(
-        &self,
-        mut detections: Vec<Detection>,
+        &mut self,
+        tags: Vec<Detection>,
         grey: &[u8],
         size_px: [u32; 2],
-    ) -> Vec<Detection> {
-        detections.retain(|detection| detection.corners_px.iter().all(|corner| corner.is_finite()));
-        if self.refines {
-            let picture = Grey {
-                levels: grey,
-                size_px,
-            };
-            for detection in &mut detections {
-                detection.corners_px = refined(picture, detection.corners_px);
-            }
+    ) -> Result<Vec<Detection>, TrackingError> {
+        let others = match &mut self.aruco {
+            Some(detector) => detector.detect(grey, size_px)?,
+            None => Vec::new(),
+        };
+        let picture = Grey {
+            levels: grey,
+            size_px,
+        };
+        let mut detections = Vec::with_capacity(tags.len() + others.len());
+        for (found, refines) in [(tags, self.refines.april_tag), (others, self.refines.aruco)] {
+            let is_finite = |corners: &[DVec2; 4]| corners.iter().all(|corner| corner.is_finite());
+            let finite = found
+                .into_iter()
+                .filter(|found| is_finite(&found.corners_px));
+            detections.extend(finite.map(|mut detection| {
+                if refines {
+                    let lighter_outside = detection.family.is_lighter_outside();
+                    detection.corners_px = refined(picture, detection.corners_px, lighter_outside);
+                }
+                detection
+            }));
         }
         // Threads may find them in any order.
         detections.sort_by(Detection::by_id_and_place);
-        detections
+        Ok(detections)
     }
 }
 

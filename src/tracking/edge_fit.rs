@@ -259,6 +259,7 @@ mod tests {
     use super::*;
     use crate::scene::{Family, Marker};
     use crate::tracking::marker_template::MarkerTemplate;
+    use crate::tracking::printed_marker::{Cell, PrintedMarker};
 
     const SIDE: u32 = 64;
 
@@ -310,8 +311,8 @@ mod tests {
             rotation_rad: 0.0,
         };
         // Black, two columns of it, then white.
-        let white = (0..16).map(|k| k % 4 > 1).collect();
-        let template = MarkerTemplate::new(&marker, white);
+        let cells = (0..16).map(|k| if k % 4 > 1 { Cell::White } else { Cell::Black });
+        let template = MarkerTemplate::new(&marker, PrintedMarker::new(4, cells.collect()));
         template
             .edges
             .into_iter()

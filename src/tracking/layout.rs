@@ -2,14 +2,14 @@
 
 use glam::{DAffine3, DVec2};
 
-use super::aruco::printed_cells;
 use super::marker_template::MarkerTemplate;
 use super::pixel_pose::pixel_of;
 use super::pose::{self, CornerObservation, Solutions};
+use super::printed_marker::PrintedMarker;
 use super::{Detection, LossReason, TrackingError};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::matrix::Matrix;
-use crate::scene::{Anchor, Family};
+use crate::scene::{Anchor, Family, Marker};
 
 /// A board's pose that leaves more than this is looked through for a marker that does not fit, pixels.
 const SUSPICIOUS_RMS_PX: f64 = 1.5;
@@ -17,9 +17,13 @@ const SUSPICIOUS_RMS_PX: f64 = 1.5;
 /// How near the corners of one of several markers with one id lie to where the rest of the board puts them, pixels.
 const SAME_MARKER_PX: f64 = 3.0;
 
+/// The part of its side by which a marker may lie off a pose that is roughly right.
+const SAME_PART: f64 = 0.25;
+
 /// The markers of an anchor.
 pub(super) struct Layout {
-    markers: Vec<(Family, u32)>,
+    markers: Vec<Marker>,
+    quarter_turns: u32,
     /// The markers' templates, in the same order.
     pub(super) templates: Vec<MarkerTemplate>,
 }
@@ -38,27 +42,116 @@ struct SeenMarker {
     observations: [CornerObservation; 4],
 }
 
+/// How a picture's detections agree with an anchor's pose.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Agreement {
+    /// Markers that were seen where the pose puts them.
+    pub(super) fitting: usize,
+    /// Markers that were seen elsewhere alone.
+    pub(super) elsewhere: usize,
+    /// Whether one was seen there and elsewhere too.
+    pub(super) doubled: bool,
+}
+
+impl Agreement {
+    /// Whether as much is seen that speaks against the pose as for it.
+    pub(super) fn is_contradicted(&self) -> bool {
+        self.elsewhere > 0 && self.elsewhere >= self.fitting
+    }
+}
+
 impl Layout {
     pub(super) fn new(anchor: &Anchor) -> Result<Self, TrackingError> {
-        let templates = anchor.markers.iter().map(|marker| {
+        Self::of(anchor.markers.clone(), 0)
+    }
+
+    fn of(markers: Vec<Marker>, quarter_turns: u32) -> Result<Self, TrackingError> {
+        let templates = markers.iter().map(|marker| {
             Ok(MarkerTemplate::new(
                 marker,
-                printed_cells(marker.family, marker.id)?,
+                PrintedMarker::of(marker.family, marker.id)?,
             ))
         });
         Ok(Self {
-            markers: anchor
-                .markers
-                .iter()
-                .map(|marker| (marker.family, marker.id))
-                .collect(),
             templates: templates.collect::<Result<_, TrackingError>>()?,
+            markers,
+            quarter_turns,
         })
+    }
+
+    /// The layout with each of its markers turned once more about its own middle.
+    pub(super) fn turned_once_more(&self) -> Result<Self, TrackingError> {
+        let turned = self.markers.iter().map(|marker| Marker {
+            rotation_rad: marker.rotation_rad + std::f64::consts::FRAC_PI_2,
+            ..*marker
+        });
+        Self::of(turned.collect(), (self.quarter_turns + 1) % 4)
+    }
+
+    /// By how many quarter turns, counter-clockwise, its markers are turned against what the scene says.
+    pub(super) fn quarter_turns(&self) -> u32 {
+        self.quarter_turns
+    }
+
+    /// The family of a template's marker.
+    pub(super) fn family_of(&self, template: usize) -> Family {
+        self.markers[template].family
+    }
+
+    /// How many of its markers the detections show.
+    pub(super) fn shown(&self, detections: &[Detection]) -> usize {
+        let is_shown = |&(family, id): &(Family, u32)| {
+            let mut seen = detections.iter();
+            seen.any(|seen| (seen.family, seen.id) == (family, id))
+        };
+        self.markers().filter(is_shown).count()
+    }
+
+    /// Whether a detection is one of its markers, and where a pose puts that.
+    pub(super) fn is_at(
+        &self,
+        intrinsics: &Intrinsics,
+        pose: &DAffine3,
+        detection: &Detection,
+    ) -> bool {
+        let mut markers = self.markers().zip(&self.templates);
+        markers.any(|(marker, template)| {
+            marker == (detection.family, detection.id)
+                && is_near(intrinsics, pose, template, &detection.corners_px)
+        })
+    }
+
+    /// How the detections agree with a pose from which the markers of `seen` were seen where it puts them.
+    pub(super) fn agreement(
+        &self,
+        intrinsics: &Intrinsics,
+        pose: &DAffine3,
+        seen: &[bool],
+        detections: &[Detection],
+    ) -> Agreement {
+        let mut agreement = Agreement::default();
+        for (k, (marker, template)) in self.markers().zip(&self.templates).enumerate() {
+            let of_marker = detections
+                .iter()
+                .filter(|detection| (detection.family, detection.id) == marker);
+            let (mut near, mut far) = (0, 0);
+            for detection in of_marker {
+                match is_near(intrinsics, pose, template, &detection.corners_px) {
+                    true => near += 1,
+                    false => far += 1,
+                }
+            }
+            let fits = near > 0 || seen.get(k) == Some(&true);
+            agreement.fitting += usize::from(fits);
+            agreement.elsewhere += usize::from(!fits && far > 0);
+            agreement.doubled |= fits && far > 0;
+        }
+        agreement
     }
 
     /// The family and id of each template's marker.
     pub(super) fn markers(&self) -> impl Iterator<Item = (Family, u32)> {
-        self.markers.iter().copied()
+        self.markers.iter().map(|marker| (marker.family, marker.id))
     }
 
     /// How far the two poses put the same corner from each other at most, pixels; infinite behind the camera.
@@ -134,6 +227,22 @@ impl Layout {
             markers: seen.len(),
         })
     }
+}
+
+/// Whether corners lie where a pose puts those of a marker, as far as a pose that is roughly right would.
+fn is_near(
+    intrinsics: &Intrinsics,
+    pose: &DAffine3,
+    template: &MarkerTemplate,
+    corners_px: &[DVec2; 4],
+) -> bool {
+    let side_px = corners_px[0].distance(corners_px[2]) / std::f64::consts::SQRT_2;
+    let within_px = SAME_MARKER_PX.max(SAME_PART * side_px);
+    let mut corners = template.corners_m().into_iter().zip(corners_px);
+    corners.all(|(corner_m, seen_px)| {
+        let place_px = pixel_of(intrinsics, pose, corner_m);
+        place_px.is_some_and(|place_px| place_px.distance(*seen_px) <= within_px)
+    })
 }
 
 impl SeenMarker {

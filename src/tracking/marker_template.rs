@@ -1,7 +1,11 @@
 //! What a printed marker looks like: its cells, and the edges between black and white ones, in its anchor's plane.
 
+use std::cell::OnceCell;
+
 use glam::DVec2;
 
+use super::expected_picture::ExpectedPicture;
+use super::printed_marker::{Cell, PrintedMarker};
 use crate::scene::Marker;
 
 /// Rows of cells that an edge knows: the one that it bounds, and one to either side.
@@ -11,11 +15,13 @@ pub(super) const COLUMNS: usize = 4;
 
 /// A marker as printed, placed in the plane of its anchor.
 pub(super) struct MarkerTemplate {
-    /// Cells a side of the black square.
+    /// Cells a side of the square whose corners are found.
     pub side: i32,
-    /// White cells of the black square, rows from the top.
-    white: Vec<bool>,
-    /// Top left corner of the black square, metres.
+    /// The cells.
+    pub printed: PrintedMarker,
+    /// What a blurred picture of them is, once one was read.
+    pub expected: OnceCell<ExpectedPicture>,
+    /// Top left corner of that square, metres.
     corner_m: DVec2,
     /// A step of one cell to the right, metres.
     right_m: DVec2,
@@ -39,22 +45,24 @@ pub(super) struct TemplateEdge {
 }
 
 impl MarkerTemplate {
-    /// `white` are the cells of the black square, rows from the top, its border included; their number is a square.
-    pub fn new(marker: &Marker, white: Vec<bool>) -> Self {
-        let side = white.len().isqrt();
+    /// A marker's template in its anchor's plane.
+    pub fn new(marker: &Marker, printed: PrintedMarker) -> Self {
+        let side = printed.side();
         let turn = DVec2::from_angle(marker.rotation_rad);
         let half_m = marker.size_m / 2.0;
-        let cell_m = marker.size_m / side as f64;
+        let cell_m = marker.size_m / f64::from(side);
         let mut template = Self {
-            side: side as i32,
-            white,
+            side,
+            printed,
+            expected: OnceCell::new(),
             corner_m: marker.center_m + turn.rotate(DVec2::new(-half_m, half_m)),
             right_m: turn.rotate(DVec2::new(cell_m, 0.0)),
             down_m: turn.rotate(DVec2::new(0.0, -cell_m)),
             edges: Vec::new(),
         };
-        for line in 0..=template.side {
-            for row in 0..template.side {
+        let rim = template.printed.rim();
+        for line in -rim..=side + rim {
+            for row in -rim..side + rim {
                 template.edges.extend(template.edge(line, row, false));
                 template.edges.extend(template.edge(line, row, true));
             }
@@ -62,24 +70,27 @@ impl MarkerTemplate {
         template
     }
 
-    /// Whether a cell is white; all around the black square is.
-    pub fn is_white(&self, column: i32, row: i32) -> bool {
-        let inside = (0..self.side).contains(&column) && (0..self.side).contains(&row);
-        !inside || self.white[(row * self.side + column) as usize]
+    /// Whether a cell is white; `None` where the print says nothing.
+    pub fn is_white(&self, column: i32, row: i32) -> Option<bool> {
+        match self.printed.cell(column, row) {
+            Cell::White => Some(true),
+            Cell::Black => Some(false),
+            Cell::Open => None,
+        }
     }
 
-    /// A place in cells from the black square's top left corner, in the anchor's plane, metres.
+    /// A place in cells from the square's top left corner, in the anchor's plane, metres.
     pub fn point_m(&self, column: f64, row: f64) -> DVec2 {
         self.corner_m + self.right_m * column + self.down_m * row
     }
 
-    /// The middle of the black square, metres.
+    /// The middle of the square, metres.
     pub fn center_m(&self) -> DVec2 {
         let middle = 0.5 * f64::from(self.side);
         self.point_m(middle, middle)
     }
 
-    /// Corners of the black square: top left, top right, bottom right, bottom left; metres.
+    /// Corners of the square: top left, top right, bottom right, bottom left; metres.
     pub fn corners_m(&self) -> [DVec2; 4] {
         let side = f64::from(self.side);
         [(0.0, 0.0), (side, 0.0), (side, side), (0.0, side)]
@@ -92,10 +103,17 @@ impl MarkerTemplate {
             false => self.is_white(across, along),
             true => self.is_white(along, across),
         };
-        let brightens = white(line, row);
-        if white(line - 1, row) == brightens {
+        let brightens = white(line, row)?;
+        if white(line - 1, row)? == brightens {
             return None;
         }
+        // What the print leaves open is taken to go on as what is beside it.
+        let middle = [!brightens, brightens];
+        let around = |r: usize, c: usize| {
+            let at = |c: usize| white(line - 2 + c as i32, row - 1 + r as i32);
+            let near = if c < 2 { 1 } else { 2 };
+            at(c).or(at(near)).unwrap_or(middle[near - 1])
+        };
         let (across, along) = (f64::from(line), f64::from(row) + 0.5);
         Some(TemplateEdge {
             point_m: match level {
@@ -106,10 +124,7 @@ impl MarkerTemplate {
             along_m: if level { self.right_m } else { self.down_m },
             brightens,
             around: std::array::from_fn(|r| {
-                std::array::from_fn(|c| {
-                    let is_white = white(line - 2 + c as i32, row - 1 + r as i32);
-                    f32::from(u8::from(is_white))
-                })
+                std::array::from_fn(|c| f32::from(u8::from(around(r, c))))
             }),
         })
     }
@@ -129,7 +144,8 @@ mod tests {
             center_m: DVec2::new(1.0, 2.0),
             rotation_rad,
         };
-        MarkerTemplate::new(&marker, (0..9).map(|k| k == 4).collect())
+        let cell = |k| if k == 4 { Cell::White } else { Cell::Black };
+        MarkerTemplate::new(&marker, PrintedMarker::new(3, (0..9).map(cell).collect()))
     }
 
     #[test]
@@ -141,7 +157,7 @@ mod tests {
             let step = 0.25 * edge.across_m;
             let white = |point_m: DVec2| {
                 let cell = ((point_m - template.corner_m) * DVec2::new(10.0, -10.0)).floor();
-                template.is_white(cell.x as i32, cell.y as i32)
+                template.is_white(cell.x as i32, cell.y as i32).unwrap()
             };
             assert_eq!(white(edge.point_m + step), edge.brightens);
             assert_eq!(white(edge.point_m - step), !edge.brightens);

@@ -61,6 +61,13 @@ pub(super) struct PixelPose {
     pub(super) edges: Vec<MeasuredEdge>,
 }
 
+impl PixelPose {
+    /// How many markers were seen.
+    pub(super) fn markers(&self) -> usize {
+        self.seen.iter().filter(|&&seen| seen).count()
+    }
+}
+
 /// An edge of a marker as one picture shows it.
 pub(super) struct MeasuredEdge {
     template: usize,

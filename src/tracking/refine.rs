@@ -34,9 +34,13 @@ impl Line {
     }
 }
 
-/// The corners of a black square on white, in order around it, moved to where its edges meet. A corner one of whose
-/// edges cannot be found stays.
-pub(super) fn refined(picture: Grey<'_>, corners_px: [DVec2; 4]) -> [DVec2; 4] {
+/// The corners of a square, in order around it, moved to where its edges meet; `lighter_outside` for a black one on
+/// white. A corner one of whose edges cannot be found stays.
+pub(super) fn refined(
+    picture: Grey<'_>,
+    corners_px: [DVec2; 4],
+    lighter_outside: bool,
+) -> [DVec2; 4] {
     let middle = corners_px.iter().sum::<DVec2>() / 4.0;
     let edges: [Option<Line>; 4] = std::array::from_fn(|edge| {
         edge_line(
@@ -44,6 +48,7 @@ pub(super) fn refined(picture: Grey<'_>, corners_px: [DVec2; 4]) -> [DVec2; 4] {
             corners_px[edge],
             corners_px[(edge + 1) % 4],
             middle,
+            lighter_outside,
         )
     });
     std::array::from_fn(|corner| {
@@ -59,9 +64,16 @@ pub(super) fn refined(picture: Grey<'_>, corners_px: [DVec2; 4]) -> [DVec2; 4] {
 }
 
 /// The line through an edge, fitted to where along its normals the light rises.
-fn edge_line(picture: Grey<'_>, from: DVec2, to: DVec2, middle: DVec2) -> Option<Line> {
+fn edge_line(
+    picture: Grey<'_>,
+    from: DVec2,
+    to: DVec2,
+    middle: DVec2,
+    lighter_outside: bool,
+) -> Option<Line> {
     let along = (to - from).try_normalize()?;
-    let outward = if along.perp().dot(from - middle) > 0.0 {
+    let is_outward = along.perp().dot(from - middle) > 0.0;
+    let lightward = if is_outward == lighter_outside {
         along.perp()
     } else {
         -along.perp()
@@ -74,8 +86,8 @@ fn edge_line(picture: Grey<'_>, from: DVec2, to: DVec2, middle: DVec2) -> Option
     for sample in 0..samples {
         let share = LEFT_OUT + (1.0 - 2.0 * LEFT_OUT) * (sample as f64 + 0.5) / samples as f64;
         let place = from.lerp(to, share);
-        if let Some(offset) = rise(picture, place, outward, reach_px) {
-            places.push(place + outward * offset);
+        if let Some(offset) = rise(picture, place, lightward, reach_px) {
+            places.push(place + lightward * offset);
         }
     }
     (places.len() * 2 >= samples)
@@ -83,10 +95,10 @@ fn edge_line(picture: Grey<'_>, from: DVec2, to: DVec2, middle: DVec2) -> Option
         .flatten()
 }
 
-/// Where around a place the light rises most, pixels along `outward`: the centroid of the squared gradient.
-fn rise(picture: Grey<'_>, place: DVec2, outward: DVec2, reach_px: f64) -> Option<f64> {
+/// Where around a place the light rises most, pixels along `lightward`: the centroid of the squared gradient.
+fn rise(picture: Grey<'_>, place: DVec2, lightward: DVec2, reach_px: f64) -> Option<f64> {
     let steps = (reach_px / STEP_PX).round() as i32;
-    let at = |step: i32| picture.light(place + outward * (f64::from(step) * STEP_PX));
+    let at = |step: i32| picture.light(place + lightward * (f64::from(step) * STEP_PX));
     let (mut weights, mut moments) = (0.0, 0.0);
     let (mut inside, mut here) = (at(-steps - 1)?, at(-steps)?);
     for step in -steps..=steps {
@@ -178,7 +190,7 @@ mod tests {
             // As a detector that sees encoded values would start: a little inside.
             let middle = truth.iter().sum::<DVec2>() / 4.0;
             let start = truth.map(|corner| corner.lerp(middle, 0.02));
-            for (found, truth) in refined(grey, start).iter().zip(truth) {
+            for (found, truth) in refined(grey, start, true).iter().zip(truth) {
                 assert!(
                     found.distance(truth) < 0.06,
                     "blur {blur_px}: {found} for {truth}"
@@ -202,7 +214,8 @@ mod tests {
                     levels: &levels,
                     size_px: [80, 80]
                 },
-                corners
+                corners,
+                true
             ),
             corners
         );

@@ -9,8 +9,9 @@ use super::layout::{Layout, Located};
 use super::light::Grey;
 use super::pixel_pose::{PixelPose, fit_pose, pixel_of};
 use super::pose::{CornerObservation, refine};
+use super::reading::{agreement, least_to_follow};
 use super::template_match::{REACHES, find_shift};
-use super::{Alternative, AnchorPose, LossReason, Status};
+use super::{Alternative, AnchorPose, Detection, LossReason, Status, TrackingError};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::matrix::Matrix;
 use crate::geometry::pose::{PoseStep, difference, moved, rotation_between};
@@ -48,6 +49,8 @@ pub(super) struct TrackedAnchor {
     condition: Condition,
     last: Option<Observation>,
     smoothing: Option<Smoothing>,
+    /// The marker that is asked for its code first.
+    asked_first: usize,
 }
 
 /// What is shown of an anchor, where poses are smoothed.
@@ -85,6 +88,7 @@ impl TrackedAnchor {
                 filter: None,
                 shown: DAffine3::IDENTITY,
             }),
+            asked_first: 0,
         }
     }
 
@@ -104,10 +108,7 @@ impl TrackedAnchor {
             .as_ref()
             .is_some_and(|observation| !recent(observation))
         {
-            self.last = None;
-            if let Some(smoothing) = &mut self.smoothing {
-                smoothing.filter = None;
-            }
+            self.lose();
         }
     }
 
@@ -152,13 +153,88 @@ impl TrackedAnchor {
             shifts.iter().any(Option::is_some).then_some(shifts)
         })?;
         let start = self.shifted(intrinsics, predicted, &near)?;
-        fit_pose(
+        let fitted = fit_pose(
             picture,
             intrinsics,
             &self.layout.templates,
             start,
             &mut self.condition,
-        )
+        )?;
+        self.is_read(picture, intrinsics, &fitted).then_some(fitted)
+    }
+
+    /// Whether one of the markers that were seen can be read where the pose puts it: what moves along with a marker's
+    /// edges is not yet the marker. Each frame asks another one first.
+    fn is_read(&mut self, picture: Grey<'_>, intrinsics: &Intrinsics, fitted: &PixelPose) -> bool {
+        let templates = &self.layout.templates;
+        let count = templates.len();
+        let (mut asked, mut read) = (false, false);
+        self.asked_first = (self.asked_first + 1) % count.max(1);
+        for k in (0..count).map(|k| (k + self.asked_first) % count) {
+            if !fitted.seen[k] {
+                continue;
+            }
+            let template = &templates[k];
+            let pose = &fitted.camera_from_anchor;
+            let place =
+                |cells: DVec2| pixel_of(intrinsics, pose, template.point_m(cells.x, cells.y));
+            if let Some(agreement) = agreement(picture, template, place) {
+                asked = true;
+                read = agreement >= least_to_follow(self.layout.family_of(k));
+                if read {
+                    break;
+                }
+            }
+        }
+        // What the picture's border cuts cannot be asked.
+        read || !asked
+    }
+
+    /// Turns all its markers alike where they are seen so: a board that no pose explains as the scene has it, but one
+    /// does once each of its markers is turned.
+    pub(super) fn turn_to_fit(
+        &mut self,
+        intrinsics: &Intrinsics,
+        detections: &[Detection],
+    ) -> Result<(), TrackingError> {
+        if self.last.is_some() || self.layout.shown(detections) < 2 {
+            return Ok(());
+        }
+        if self.explains(&self.layout, intrinsics, detections) {
+            return Ok(());
+        }
+        let mut turned = self.layout.turned_once_more()?;
+        for _ in 0..3 {
+            if self.explains(&turned, intrinsics, detections) {
+                self.layout = turned;
+                return Ok(());
+            }
+            turned = turned.turned_once_more()?;
+        }
+        Ok(())
+    }
+
+    /// Whether a pose puts all markers of a layout where they are seen.
+    fn explains(&self, layout: &Layout, intrinsics: &Intrinsics, detections: &[Detection]) -> bool {
+        let Ok(located) = layout.locate(intrinsics, detections) else {
+            return false;
+        };
+        let pose = &located.solutions.best.camera_from_anchor;
+        let agreement = layout.agreement(intrinsics, pose, &[], detections);
+        agreement.elsewhere == 0 && agreement.fitting > 1
+    }
+
+    /// Forgets where it was: what is seen speaks against it.
+    pub(super) fn lose(&mut self) {
+        self.last = None;
+        if let Some(smoothing) = &mut self.smoothing {
+            smoothing.filter = None;
+        }
+    }
+
+    /// Whether it was there within what is remembered.
+    pub(super) fn was_just_seen(&self) -> bool {
+        self.last.is_some()
     }
 
     /// The pose that explains by how much each marker lies from where `pose` puts it.
@@ -264,7 +340,7 @@ impl TrackedAnchor {
                 Status::Ambiguous
             },
             loss_reason: (!believed).then_some(LossReason::TwoPoses),
-            markers: fitted.seen.iter().filter(|&&seen| seen).count() as u32,
+            markers: fitted.markers() as u32,
             camera_from_anchor: Some(camera_from_anchor),
             covariance: Some(covariance.0),
             // An edge tells one coordinate of a corner's two.

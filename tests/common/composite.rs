@@ -90,7 +90,7 @@ pub struct Expected<'a> {
     world: &'a World,
     view: View,
     world_from_camera: DAffine3,
-    lights: &'a [Light],
+    lights: Vec<Light>,
     /// Irradiance from all around.
     ambient: DVec3,
     /// Of the virtual things.
@@ -229,7 +229,7 @@ fn is_close_to_virtual(stage: &Stage) -> bool {
         .iter()
         .filter(|triangle| triangle.role == VIRTUAL);
     seeming.any(|triangle| {
-        stage.scene.lights.iter().any(|light| match light {
+        stage.scene.lights.iter().any(|light| match &light.light {
             Light::Point { position_m, .. } => {
                 let [a, b, c] = triangle.corners;
                 let places = [a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0];
@@ -244,7 +244,8 @@ fn is_close_to_virtual(stage: &Stage) -> bool {
 
 impl<'a> Expected<'a> {
     pub fn new(stage: &'a Stage, view: View) -> Self {
-        let exact = stage.world.cast(&stage.scene.lights, &view, 0.0);
+        let lights = stage.scene.world_lights();
+        let exact = stage.world.cast(&lights, &view, 0.0);
         Self::of_exact(stage, view, &exact)
     }
 
@@ -256,7 +257,7 @@ impl<'a> Expected<'a> {
             world: &stage.world,
             view,
             world_from_camera: view.camera_from_world.inverse(),
-            lights: &stage.scene.lights,
+            lights: stage.scene.world_lights(),
             ambient: ambient * PI,
             albedos: (stage.scene.virtuals.iter())
                 .map(|object| object.materials[0].albedo)

@@ -428,7 +428,7 @@ pub fn degenerate_camera(random: &mut Random, case: &Case) -> (DAffine3, &'stati
             )
         }
         _ => (
-            random_camera(random, &case.places, &case.stage.scene.lights),
+            random_camera(random, &case.places, &case.stage.scene.world_lights()),
             "anywhere",
         ),
     }

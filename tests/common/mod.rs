@@ -41,10 +41,7 @@ pub fn project_file(path: &str) -> std::path::PathBuf {
 }
 
 /// The material of things whose colour does not matter.
-pub const GREY: Material = Material {
-    albedo: DVec3::splat(0.5),
-    roughness: None,
-};
+pub const GREY: Material = Material::matt(DVec3::splat(0.5));
 
 /// A mesh with flat normals and one material.
 pub fn flat_mesh(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Mesh {
@@ -61,6 +58,7 @@ pub fn flat_mesh(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Mesh {
         triangles,
         corner_normals,
         triangle_materials,
+        ..Mesh::default()
     }
 }
 
@@ -96,10 +94,10 @@ pub fn object(name: &str, mesh: Mesh, albedo: DVec3, world_from_object: DAffine3
         name: name.to_owned(),
         mesh,
         mesh_report: MeshReport::default(),
-        materials: vec![Material {
-            albedo,
-            roughness: None,
-        }],
+        materials: vec![Material::matt(albedo)],
+        material_names: Vec::new(),
+        textures: Vec::new(),
+        notes: Vec::new(),
         anchor: 0,
         motion: None,
         anchor_from_object: world_from_object,
@@ -122,7 +120,7 @@ pub fn scene(
         }],
         phantoms,
         virtuals,
-        lights,
+        lights: lights.into_iter().map(Into::into).collect(),
         ambient_radiance: DVec3::splat(ambient),
         shadows: ShadowSettings {
             technique: Technique::Auto,
@@ -301,7 +299,7 @@ impl Stage {
         let path = folder.path().join("scene.toml");
         std::fs::write(&path, toml).expect("a scene file");
         let mut scene = Scene::load(&path).unwrap_or_else(|error| panic!("{error}"));
-        scene.lights = lights;
+        scene.lights = lights.into_iter().map(Into::into).collect();
         scene.ambient_radiance = ambient_radiance;
         let objects = scene.phantoms.iter().chain(&scene.virtuals);
         let scales = objects.map(|object| object.anchor_from_object).collect();
@@ -487,15 +485,12 @@ pub fn linear_of_level(level: f64) -> f64 {
 }
 
 pub fn sun(direction: [f64; 3], irradiance: [f64; 3]) -> Light {
-    Light::Directional {
-        direction: DVec3::from_array(direction).normalize(),
-        irradiance: DVec3::from_array(irradiance),
-    }
+    Light::directional(
+        DVec3::from_array(direction).normalize(),
+        DVec3::from_array(irradiance),
+    )
 }
 
 pub fn lamp(position_m: [f64; 3], intensity: [f64; 3]) -> Light {
-    Light::Point {
-        position_m: DVec3::from_array(position_m),
-        intensity: DVec3::from_array(intensity),
-    }
+    Light::point(DVec3::from_array(position_m), DVec3::from_array(intensity))
 }

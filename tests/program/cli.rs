@@ -742,3 +742,146 @@ fn control_characters_of_files_are_spelt_out() {
         assert!(!said.contains(['\u{1b}', '\u{7}']), "{said:?}");
     }
 }
+
+#[test]
+fn what_is_no_scene_is_taken_for_what_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let lamp = project_file("recordings/lamp");
+    let video = lamp.join("video.mp4").display().to_string();
+    let picture = project_file("docs/lamp.png").display().to_string();
+    let session = folder.path().join("session");
+    std::fs::create_dir(&session).unwrap();
+    std::fs::write(session.join("scene.toml"), "").unwrap();
+    for (path, says) in [
+        (video.as_str(), "a video, not a scene"),
+        (picture.as_str(), "a picture, not a scene"),
+        (lamp.to_str().unwrap(), "a folder, not a scene"),
+        ("session", "its scene is session/scene.toml"),
+    ] {
+        for command in ["replay", "check"] {
+            let output = gnomon(folder.path())
+                .args([command, path])
+                .output()
+                .unwrap();
+            let said = stderr(&output);
+            assert!(!output.status.success() && said.contains(says), "{said}");
+            assert!(
+                said.lines().count() == 1 && !said.contains("\\u{"),
+                "{said}"
+            );
+        }
+    }
+}
+
+/// What `check` says on stdout, which must not be refused.
+fn checked(folder: &Path, scene: &str) -> String {
+    let output = gnomon(folder).args(["check", scene]).output().unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn check_and_replay_agree_on_what_cannot_be_played() {
+    let folder = tempfile::tempdir().unwrap();
+    let video = project_file("recordings/lamp/video.mp4");
+    let scene = lamp_scene_with(folder.path(), &video);
+    let good = text(PathBuf::from(&scene));
+    let calibration = text(project_file("recordings/lamp/camera.toml"));
+    let smaller = folder.path().join("smaller.toml");
+    let size_line = (calibration.lines())
+        .find(|line| line.starts_with("size_px"))
+        .unwrap();
+    std::fs::write(
+        &smaller,
+        calibration.replace(size_line, "size_px = [320, 240]"),
+    )
+    .unwrap();
+    let calibration_line = (good.lines())
+        .find(|line| line.starts_with("calibration"))
+        .unwrap();
+    assert!(!checked(folder.path(), &scene).contains("warning"));
+    for (line, says) in [
+        ("", "carries no calibration: give one (calibration ="),
+        ("calibration = \"smaller.toml\"", "320"),
+        ("calibration = \"none.toml\"", "none.toml"),
+    ] {
+        std::fs::write(&scene, good.replace(calibration_line, line)).unwrap();
+        for job in [vec!["check", &scene], vec!["replay", &scene, "--out", "o"]] {
+            let output = gnomon(folder.path()).args(&job).output().unwrap();
+            let said = stderr(&output);
+            assert!(!output.status.success(), "{job:?} {line}");
+            assert!(said.contains(says), "{job:?} {line}: {said}");
+        }
+    }
+}
+
+#[test]
+fn check_warns_of_what_shows_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = lamp_scene_with(folder.path(), &project_file("recordings/lamp"));
+    let good = text(PathBuf::from(&scene));
+    let without_lights = good.split("[[light]]").next().unwrap();
+    let dark: String = without_lights
+        .lines()
+        .filter(|line| !line.starts_with("ambient"))
+        .map(|line| format!("{line}\n"))
+        .collect();
+    let torus = good.find("[[virtual]]").unwrap();
+    let (before, after) = good.split_at(torus);
+    let position = after
+        .lines()
+        .find(|line| line.starts_with("position_m"))
+        .unwrap();
+    let away = format!(
+        "{before}{}",
+        after.replace(position, "position_m = [40.0, 0.0, 0.0]")
+    );
+    for (written, says) in [
+        (
+            good.replace("size_m = 0.045", "size_m = 45.0"),
+            "was 0.045 meant?",
+        ),
+        (
+            good.replace("tag36h11", "tag25h9"),
+            "no marker of the scene is found",
+        ),
+        (away, "out of view"),
+        (dark, "nothing lights the scene"),
+    ] {
+        assert_ne!(written, good, "{says}");
+        std::fs::write(&scene, &written).unwrap();
+        let said = checked(folder.path(), &scene);
+        assert!(said.contains(says), "{says}: {said}");
+    }
+}
+
+#[test]
+fn shells_and_man_get_what_they_need() {
+    let folder = tempfile::tempdir().unwrap();
+    for (arguments, part) in [
+        (["completions", "bash"], "--poses-from"),
+        (["completions", "zsh"], "#compdef gnomon"),
+        (["completions", "fish"], "complete -c gnomon"),
+        (["manual", "replay"], ".TH gnomon\\-replay 1"),
+        (["manual", "replay"], "poses\\-from"),
+    ] {
+        let output = gnomon(folder.path()).args(arguments).output().unwrap();
+        assert!(output.status.success() && output.stderr.is_empty());
+        let given = String::from_utf8(output.stdout).unwrap();
+        assert!(given.contains(part), "{arguments:?} lacks {part}: {given}");
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_machine_without_a_desktop_complains_of_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = gnomon(folder.path())
+        .args(["replay", &config("lamp"), "--frames", "0", "--out", "o"])
+        .env_remove("XDG_RUNTIME_DIR")
+        .env_remove("NODEVICE_SELECT")
+        .output()
+        .unwrap();
+    let said = stderr(&output);
+    assert!(output.status.success() && !said.contains("error"), "{said}");
+}

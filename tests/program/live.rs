@@ -26,7 +26,7 @@ use gnomon::app::truth::TruePoses;
 use gnomon::app::window::Wake;
 use gnomon::capture::{Frame, FrameSource};
 use gnomon::geometry::light_placing::{LightFreedom, PosedCamera};
-use gnomon::light::Light;
+use gnomon::light::{Light, Shape};
 use gnomon::render::{Renderer, Shown};
 use gnomon::scene::{CameraSettings, Placement, Scene};
 use gnomon::tracking::Status;
@@ -292,6 +292,7 @@ fn what_is_edited_is_drawn_as_if_it_had_always_been_so() {
         light: Light::Point {
             position_m: DVec3::new(0.2, 0.2, 0.5),
             intensity: DVec3::splat(0.8),
+            shape: Shape::Point,
         },
     };
     session.edit_scene(SceneCommand::Commit(moved_torus()), &state);
@@ -342,7 +343,7 @@ fn a_saved_scene_wakes_the_window_and_shows_at_once_and_a_mistake_keeps_the_last
     .unwrap();
     let is_taken = |session: &LiveSession| {
         let light = session.scene().unwrap().lights[0];
-        matches!(light, Light::Point { position_m, .. } if position_m.x == 0.3)
+        matches!(light.light, Light::Point { position_m, .. } if position_m.x == 0.3)
     };
     // No frame comes any more, and the window looks at nothing unless it is woken.
     while !is_taken(&session) {
@@ -536,7 +537,7 @@ fn a_light_is_found_by_clicks_on_corners_and_their_shadows() {
     );
     assert!(session.clicks().is_none(), "{:?}", session.notices);
     let written = Scene::load(&path).unwrap();
-    let Light::Point { position_m, .. } = written.lights[0] else {
+    let Light::Point { position_m, .. } = written.lights[0].light else {
         panic!("a lamp");
     };
     let off_m = position_m.distance(true_m);

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use crate::common::prints::{BENT_CAMERA, CHESSBOARD, Photographer, Print, good_poses};
 use crate::common::signals::{self, Signal};
-use gnomon::app::files::video_writer::{Codec, Naming, VideoWriter};
+use gnomon::app::files::video_writer::{Codec, Naming, Pace, VideoWriter};
 use gnomon::capture::{FrameSource, load_calibration};
 
 const SOON: Duration = Duration::from_secs(90);
@@ -163,7 +163,14 @@ fn film(path: &Path) {
     const FRAMES_A_VIEW: usize = 12;
     let print = Print::chessboard();
     let size_px = BENT_CAMERA.size_px;
-    let mut writer = VideoWriter::create(path, Codec::Ffv1, size_px, FPS, Naming::AtOnce).unwrap();
+    let mut writer = VideoWriter::create(
+        path,
+        Codec::Ffv1,
+        size_px,
+        Pace::Even { fps: FPS },
+        Naming::AtOnce,
+    )
+    .unwrap();
     for pose in good_poses(print) {
         let grey = Photographer::bent().photograph(print, &pose, 1.0);
         let rgba: Vec<u8> = grey
@@ -171,7 +178,7 @@ fn film(path: &Path) {
             .flat_map(|level| [level, level, level, 255])
             .collect();
         for _ in 0..FRAMES_A_VIEW {
-            writer.push(size_px, &rgba).unwrap();
+            writer.push(size_px, 0.0, &rgba).unwrap();
         }
     }
     writer.finish().unwrap();

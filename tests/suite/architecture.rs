@@ -39,7 +39,7 @@ const LARGE_JOBS: [&str; 2] = ["live", "chart"];
 const WINDOWS: &[&str] = &["app/window/", "app/live/", "app/jobs/calibrate/watched/"];
 
 /// A word of code, and the only places (below `src/`) where it may stand.
-const HOMES: [(&str, &[&str]); 15] = [
+const HOMES: [(&str, &[&str]); 17] = [
     // The window shows a texture of the renderer's.
     ("wgpu", &["render/", "app/window/screen.rs"]),
     ("eframe", WINDOWS),
@@ -57,6 +57,8 @@ const HOMES: [(&str, &[&str]); 15] = [
         ],
     ),
     ("nokhwa", &["capture/"]),
+    ("v4l", &["capture/"]),
+    ("yuv", &["capture/"]),
     ("zune_jpeg", &["capture/"]),
     // What is kept of rooms on disk.
     ("dirs", &["app/"]),

@@ -10,7 +10,7 @@ use glam::DVec3;
 use gnomon::app::authoring::{Edit, EditError, NewVirtual, SceneDocument, SceneNews, SceneWatch};
 use gnomon::app::stopwatch::Stopwatch;
 use gnomon::app::truth::{draw, key_frames};
-use gnomon::light::Light;
+use gnomon::light::{Light, Shape};
 use gnomon::render::Renderer;
 use gnomon::scene::{
     Difference, Placement, Quality, Scene, ShadowChange, ShadowSettings, ShaftSettings, Shortcuts,
@@ -124,6 +124,7 @@ mod edits {
         let sun = Light::Directional {
             direction: DVec3::new(0.6, 0.0, -0.8),
             irradiance: DVec3::new(0.5, 0.5, 0.25),
+            angle_rad: 0.0,
         };
         changed_to(
             &Edit::Light {
@@ -219,6 +220,7 @@ mod edits {
         let dark = Light::Point {
             position_m: DVec3::Z,
             intensity: DVec3::NEG_ONE,
+            shape: Shape::Point,
         };
         refused(
             &mut document,
@@ -275,25 +277,29 @@ mod edits {
         };
         assert_eq!(a.lights.len(), b.lights.len(), "{what}");
         for (a, b) in a.lights.iter().zip(&b.lights) {
-            let alike = match (a, b) {
+            let alike = match (&a.light, &b.light) {
                 (
                     Light::Point {
                         position_m: p,
                         intensity: i,
+                        shape: Shape::Point,
                     },
                     Light::Point {
                         position_m: q,
                         intensity: j,
+                        shape: Shape::Point,
                     },
                 ) => (*p - *q).abs().max_element() <= 0.51e-4 && near(*i, *j),
                 (
                     Light::Directional {
                         direction: d,
                         irradiance: i,
+                        angle_rad: 0.0,
                     },
                     Light::Directional {
                         direction: e,
                         irradiance: j,
+                        angle_rad: 0.0,
                     },
                 ) => d.angle_between(*e) < 2e-4 && near(*i, *j),
                 _ => false,
@@ -350,11 +356,13 @@ mod edits {
                 Light::Point {
                     position_m: vector(random, 1.0),
                     intensity: vector(random, 3.0).abs(),
+                    shape: Shape::Point,
                 }
             } else {
                 Light::Directional {
                     direction: random.direction(),
                     irradiance: DVec3::splat(random.between(0.0, 2.0)),
+                    angle_rad: 0.0,
                 }
             }
         };
@@ -381,6 +389,8 @@ mod edits {
                 from: scene.shadows,
                 to: ShadowSettings {
                     without: Shortcuts::NONE,
+                    light_samples: [16, 64, 100][random.below(3)],
+                    ambient_samples: [0, 32, 50][random.below(3)],
                     technique: if random.chance(0.5) {
                         Technique::Auto
                     } else {

@@ -50,7 +50,7 @@ fn random_scenes_look_the_same_counted_either_way() {
     for seed in 0..80 {
         let mut random = Random::new(1000 + seed);
         let (mut stage, places, intrinsics) = random_stage(&mut random, seed % 2 == 0);
-        let lights = stage.scene.lights.clone();
+        let lights = stage.scene.world_lights();
         let cameras: Vec<DAffine3> = (0..6)
             .map(|_| random_camera(&mut random, &places, &lights))
             .collect();
@@ -115,11 +115,11 @@ fn one_light_and_one_sample_need_no_sums() {
     for seed in 0..12 {
         let mut random = Random::new(500 + seed);
         let (mut stage, places, intrinsics) = random_stage(&mut random, seed % 2 == 0);
-        let light = stage.scene.lights[0];
+        let light = stage.scene.lights[0].light;
         let camera = random_camera(&mut random, &places, &[light]);
         let mut shoot = |lights: Vec<Light>| {
             stage.scene.shadows.samples = 1;
-            stage.scene.lights = lights;
+            stage.scene.lights = lights.into_iter().map(Into::into).collect();
             let mut renderer = stage.renderer(intrinsics);
             stage.shoot(&mut renderer, camera)
         };

@@ -8,7 +8,7 @@ use gnomon::app::truth::key_frames;
 use gnomon::capture::{Frame, load_calibration};
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::geometry::light_placing::{FarLight, LightFreedom, PosedCamera};
-use gnomon::light::Light;
+use gnomon::light::{Light, Shape};
 use gnomon::scene::Scene;
 
 /// The light that is known, and the surroundings.
@@ -24,8 +24,9 @@ impl Known {
             Light::Point {
                 position_m,
                 intensity,
+                shape: Shape::Point,
             },
-        ] = scene.lights[..]
+        ] = scene.world_lights()[..]
         else {
             panic!("one lamp is expected")
         };
@@ -97,6 +98,7 @@ fn judge(known: &Known, found: FoundLight) -> Judged {
     let Light::Point {
         position_m,
         intensity,
+        shape: Shape::Point,
     } = found.light
     else {
         panic!("a lamp is expected")

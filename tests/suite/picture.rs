@@ -236,7 +236,7 @@ fn hold_random(count: u64) {
         for camera in 0..CAMERAS {
             let view = View {
                 intrinsics,
-                camera_from_world: random_camera(&mut random, &places, &stage.scene.lights),
+                camera_from_world: random_camera(&mut random, &places, &stage.scene.world_lights()),
             };
             let verdict = judge(&stage, &mut renderer, view);
             let samples = stage.scene.shadows.samples;
@@ -514,7 +514,7 @@ fn hold_sequence(random: &mut Random, case: &mut Case, run: &mut Run, seed: u64)
             }
             _ => {
                 let count = case.stage.scene.lights.len();
-                case.stage.scene.lights[random.below(count)] = random_lamp(random);
+                case.stage.scene.lights[random.below(count)] = random_lamp(random).into();
                 "a light moved"
             }
         };

@@ -2,12 +2,14 @@
 //! its loss takes from a real one, that nothing is darkened twice, and how the recorded picture passes.
 
 use crate::common::{flat_mesh, gpu, grey_frame, lamp, look_at, object, scene, sun};
-use glam::{DAffine3, DVec2, DVec3, Vec3};
+use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
 use gnomon::app::truth::ray_cast::pixels;
 use gnomon::capture::Frame;
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::geometry::cuboid::cuboid;
-use gnomon::geometry::mesh::Mesh;
+use gnomon::geometry::mesh::{CornerLook, Mesh};
+use gnomon::light::material::{Encoding, Map, Maps};
+use gnomon::light::texture::Texture;
 use gnomon::light::{Light, Material, irradiance, reflectance};
 use gnomon::render::{Layers, Renderer, Shown};
 use gnomon::scene::{Object, Scene};
@@ -235,11 +237,22 @@ fn expected_radiance(material: &Material, lights: &[Light], point: DVec3, normal
 
 fn hold_sphere(name: &str, roughness: Option<f64>, lights: &[Light]) {
     let material = Material {
-        albedo: ALBEDO,
         roughness,
+        ..Material::matt(ALBEDO)
     };
+    hold_scene(name, &sphere_scene(material, lights.to_vec()), &material);
+}
+
+/// Holds a scene's sphere against what the twins say of a material.
+fn hold_scene(name: &str, scene: &Scene, material: &Material) {
+    hold_bent(name, scene, material, |normal| normal);
+}
+
+/// The same of a sphere whose normals are others.
+fn hold_bent(name: &str, scene: &Scene, material: &Material, bent: impl Fn(DVec3) -> DVec3) {
+    let lights = &scene.world_lights()[..];
     let (picture, _) = render(
-        &sphere_scene(material, lights.to_vec()),
+        scene,
         PERFECT_LENS,
         sphere_camera(),
         grey_frame(SIZE_PX).rgba,
@@ -248,7 +261,8 @@ fn hold_sphere(name: &str, roughness: Option<f64>, lights: &[Light]) {
     let mut worst = 0.0_f64;
     let mut brightest = 0;
     for &(index, point, normal) in &points {
-        let expected = expected_radiance(&material, lights, point, normal);
+        let normal = bent(normal);
+        let expected = material.emission + expected_radiance(material, lights, point, normal);
         for channel in 0..3 {
             let level = picture[4 * index + channel];
             worst = worst.max((f64::from(level) - srgb_levels(expected[channel])).abs());
@@ -291,16 +305,106 @@ fn point_light_near_a_sphere() {
 }
 
 #[test]
+fn metal_is_its_layer_in_its_color_and_emission_adds() {
+    for (name, metallic, lights) in [
+        ("metal", 1.0, vec![sun([-0.5, 0.6, -1.0], [1.0, 0.9, 0.8])]),
+        (
+            "half metal",
+            0.5,
+            vec![sun([-0.5, 0.6, -1.0], [0.8, 0.7, 0.8])],
+        ),
+        (
+            "metal under two lights",
+            1.0,
+            vec![
+                sun([-0.5, 0.6, -1.0], [0.8, 0.9, 0.8]),
+                sun([0.8, 0.5, -0.3], [0.3, 0.4, 0.6]),
+            ],
+        ),
+    ] {
+        let material = Material {
+            roughness: Some(0.4),
+            metallic,
+            emission: DVec3::new(0.02, 0.05, 0.1),
+            ..Material::matt(ALBEDO)
+        };
+        hold_scene(name, &sphere_scene(material, lights), &material);
+    }
+}
+
+#[test]
+fn pictures_and_colors_multiply_the_material() {
+    // One colour everywhere, so that it is known whatever the texture coordinates.
+    let texture = |name: &str, texel: [u8; 4]| {
+        std::sync::Arc::new(Texture {
+            name: name.to_owned(),
+            size_px: [4, 2],
+            rgba: texel.repeat(8),
+        })
+    };
+    let textures = vec![
+        texture("color", [188, 230, 255, 255]),
+        texture("metal and roughness", [0, 204, 102, 255]),
+        texture("normal", [140, 128, 255, 255]),
+    ];
+    let seen = Material {
+        roughness: Some(0.5),
+        metallic: 0.5,
+        maps: Maps {
+            color: Some(Map::of(0)),
+            roughness: Some(Map::of(1)),
+            metallic: Some(Map::of(1)),
+            normal: Some(Map::of(2)),
+            ..Maps::NONE
+        },
+        ..Material::matt(ALBEDO)
+    };
+    let tint = DVec3::new(0.9, 1.0, 0.8);
+    let texel = textures[0].texel([0, 0], Encoding::Srgb).truncate();
+    let expected = Material {
+        roughness: Some(0.5 * 0.8 * 0.8),
+        metallic: 0.5 * 0.4,
+        ..Material::matt(ALBEDO * texel * tint)
+    };
+    for lights in [
+        vec![sun([-0.5, 0.6, -1.0], [2.6, 2.4, 2.0])],
+        vec![
+            sun([-0.5, 0.6, -1.0], [2.3, 2.2, 1.0]),
+            sun([0.8, 0.5, -0.3], [0.5, 0.9, 1.4]),
+        ],
+    ] {
+        let mut scene = sphere_scene(seen, lights);
+        let sphere = &mut scene.virtuals[0];
+        sphere.textures.clone_from(&textures);
+        let corner = |place: &Vec3| CornerLook {
+            uv: [Vec2::new(3.0 * place.x, 5.0 * place.y); 2],
+            color: tint.as_vec3().extend(1.0),
+            tangent: place
+                .cross(Vec3::new(0.3, 0.5, 0.8))
+                .normalize_or_zero()
+                .extend(1.0),
+        };
+        sphere.mesh.looks = sphere.mesh.positions.iter().map(corner).collect();
+        sphere.mesh.corner_looks.clone_from(&sphere.mesh.triangles);
+        // The normal map leans towards u by x and towards v by y, of -1 to 1.
+        let bent = |normal: DVec3| {
+            let along_u = normal.cross(DVec3::new(0.3, 0.5, 0.8)).normalize();
+            let along_v = normal.cross(along_u);
+            let [x, y] = [140.0, 128.0].map(|byte: f64| byte / 255.0 * 2.0 - 1.0);
+            (along_u * x + along_v * y + normal).normalize()
+        };
+        hold_bent("textured", &scene, &expected, bent);
+    }
+}
+
+#[test]
 fn lights_add_up_in_linear_light() {
     let first = sun([-0.5, 0.6, -1.0], [1.3, 1.2, 1.0]);
     let second = sun([0.8, 0.5, -0.3], [0.5, 0.9, 1.4]);
     hold_sphere("two lights", None, &[first, second]);
 
     // The same without the twin: the pictures themselves add up.
-    let material = Material {
-        albedo: ALBEDO,
-        roughness: None,
-    };
+    let material = Material::matt(ALBEDO);
     let picture = |lights: &[Light]| {
         render(
             &sphere_scene(material, lights.to_vec()),
@@ -431,10 +535,7 @@ fn hold_gains(name: &str, real: &[Crate], seeming: &[Crate], light: Light) -> [u
     for (index, pixel) in pixels(SIZE_PX) {
         // The real boxes' own faces are no table.
         let (eye, _) = ray(&camera, pixel);
-        let sight = Light::Point {
-            position_m: eye,
-            intensity: DVec3::ONE,
-        };
+        let sight = Light::point(eye, DVec3::ONE);
         let seen = |point: DVec3| real.iter().any(|it| it.hides(point, &sight));
         if !clear[index] || everywhere(&camera, pixel, 1.5, seen) != Some(false) {
             continue;

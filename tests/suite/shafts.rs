@@ -257,8 +257,8 @@ fn gloss_in_a_room_of_one_brightness_is_what_the_brdf_makes_of_it() {
     ball.casts = false;
     for roughness in [0.05, 0.3, 1.0] {
         let material = Material {
-            albedo: DVec3::new(0.6, 0.3, 0.1),
             roughness: Some(roughness),
+            ..Material::matt(DVec3::new(0.6, 0.3, 0.1))
         };
         scene.virtuals[0].materials = vec![material];
         let (frame, poses) = frame();

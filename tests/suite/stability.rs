@@ -33,7 +33,7 @@ fn bar(name: &str, stage: &Stage, view: &View) -> Layers {
 /// Holds the composite with one and four samples, each light's bits, and the gain of the layers; `least_shadowed` real
 /// pixels must lie in a virtual shadow, or the row would show nothing.
 fn hold(name: &str, stage: &Stage, view: &View, least_shadowed: usize) -> Layers {
-    let lights = &stage.scene.lights;
+    let lights = &stage.scene.world_lights();
     let mut renderer = stage.renderer(view.intrinsics);
     let (picture, layers) = stage.shoot(&mut renderer, view.camera_from_world);
     let exact = stage.world.cast(lights, view, 0.0);
@@ -89,7 +89,7 @@ fn hold_row(folder: &Path, name: &str) -> (Layers, Vec<u8>) {
     let lifted = row
         .stage
         .world
-        .cast(&row.stage.scene.lights, &row.view, 1e-4);
+        .cast(&row.stage.scene.world_lights(), &row.view, 1e-4);
     let pixels = 0..row.exact.len();
     let counted = pixels
         .filter(|&index| lifted.role(index) == REAL && lifted.bits[0][index] & FACES_AWAY == 0);

@@ -476,7 +476,7 @@ fn wrong_settings_say_what_is_allowed() {
     };
     let default = TrackingSettings::default;
     let message = error(
-        default(),
+        settings(DetectorKind::AprilTag),
         &[
             Family::TAG36H11,
             Family::of(Codes::Aruco {

@@ -31,7 +31,7 @@ fn hold_random(broken: bool) {
     for seed in seeds {
         let mut random = Random::new(2 * seed + u64::from(broken));
         let (stage, places, intrinsics) = random_stage(&mut random, broken);
-        let lights = &stage.scene.lights;
+        let lights = &stage.scene.world_lights();
         let mut renderer = stage.renderer(intrinsics);
         for camera in 0..CAMERAS {
             let view = View {
@@ -86,7 +86,7 @@ fn hold_light(
     found_bits: &[u8],
 ) -> (usize, usize, Option<String>) {
     let exact_bits = &exact.bits[light];
-    let light = &stage.scene.lights[light];
+    let light = &stage.scene.lights[light].light;
     let (mut held, mut dark, mut wrong, mut first) = (0, 0, 0, None);
     for (index, center) in pixels(exact.size_px) {
         let (bits, found) = (exact_bits[index], found_bits[index]);

@@ -8,14 +8,14 @@ use crate::scene::{Object, Placement, Scene, ShadowChange};
 /// One change of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Edit {
-    /// Another place, direction or strength of a light; its kind may change.
+    /// Another place, direction, strength or size of a light; its kind may change, what it stands on does not.
     Light {
         /// Index into [`Scene::lights`].
         index: usize,
-        /// What it becomes.
+        /// What it becomes, in the space of what it stands on.
         light: Light,
     },
-    /// One more light.
+    /// One more light, in the world.
     AddLight(Light),
     /// A light less, by its index into [`Scene::lights`].
     RemoveLight(usize),
@@ -87,10 +87,10 @@ impl Edit {
     pub fn show_in(&self, scene: &mut Scene) -> bool {
         match self {
             Self::Light { index, light } => match scene.lights.get_mut(*index) {
-                Some(shown) => *shown = *light,
+                Some(shown) => shown.light = *light,
                 None => return false,
             },
-            Self::AddLight(light) => scene.lights.push(*light),
+            Self::AddLight(light) => scene.lights.push((*light).into()),
             Self::RemoveLight(index) if *index < scene.lights.len() => {
                 scene.lights.remove(*index);
             }

@@ -130,16 +130,15 @@ impl PicturedThings {
                 .collect();
             let corners = |triangle: &[u32; 3]| triangle.map(|index| positions[index as usize]);
             let triangles: Vec<[DVec3; 3]> = phantom.mesh.triangles.iter().map(corners).collect();
-            let materials = phantom.mesh.triangle_materials.iter();
-            reflectors.extend(triangles.iter().zip(materials).map(|(corners, &material)| {
-                Reflector {
-                    corners: corners.map(|corner| corner.as_vec3()),
-                    albedo: phantom
-                        .materials
-                        .get(material as usize)
-                        .map_or(DVec3::ZERO, |material| material.albedo),
-                }
-            }));
+            reflectors.extend(
+                triangles
+                    .iter()
+                    .enumerate()
+                    .map(|(number, corners)| Reflector {
+                        corners: corners.map(|corner| corner.as_vec3()),
+                        albedo: phantom.albedo(number),
+                    }),
+            );
             things.push((triangles, phantom.casts));
             if phantom.casts {
                 vertices.extend(positions.iter().filter_map(|&world_m| {
@@ -456,13 +455,7 @@ impl PicturedThings {
 
 fn light_of(placed: &FarLight, strength: DVec3) -> Light {
     match placed.position_m() {
-        Some(position_m) => Light::Point {
-            position_m,
-            intensity: strength,
-        },
-        None => Light::Directional {
-            direction: -placed.towards,
-            irradiance: strength,
-        },
+        Some(position_m) => Light::point(position_m, strength),
+        None => Light::directional(-placed.towards, strength),
     }
 }

@@ -277,7 +277,8 @@ impl<'a> Spliced<'a> {
         self.changes.extend(value.span().map(|span| (span, text)));
     }
 
-    fn insert_key(&mut self, body: Body, key: &str, text: &str) {
+    /// Adds a key.
+    pub fn insert_key(&mut self, body: Body, key: &str, text: &str) {
         let change = match (body, body.last_value_end()) {
             (Body::Headed(table), last) => {
                 let at = self.line_end_at(last.unwrap_or_else(|| body.head_end()));

@@ -6,7 +6,8 @@ use toml_edit::{Document, Item, Value};
 use super::edit::{Edit, NewVirtual};
 use super::numbers::number_of;
 use super::spliced::{Body, Spliced, bodies, parsed};
-use crate::light::Light;
+use crate::light::{Light, Shape};
+use crate::scene::format::{AIMED_LIGHT, RECT_LIGHT, SPHERE_LIGHT, SPOT_LIGHT};
 use crate::scene::format::{
     AMBIENT, AMBIENT_SECTION, BOARD, BOARD_SECTION, DIRECTIONAL_LIGHT, LIGHT, LIGHT_SECTION,
     LightKind, MARKER, MARKER_SECTION, ON_BOARD, PHANTOM_SECTION, PLACEMENT, POINT_LIGHT,
@@ -48,7 +49,7 @@ pub fn with_edit(text: &str, scene: &Scene, edit: &Edit) -> Result<String, Unfit
             let (Some(body), Some(old)) = written else {
                 return Err(no_light(*index));
             };
-            set_light(&mut spliced, body, old, light);
+            set_light(&mut spliced, body, &old.light, light);
         }
         Edit::AddLight(light) => {
             add_table(&mut spliced, &document, &LIGHT_SECTION, &light_keys(light));
@@ -228,13 +229,39 @@ fn no_light(index: usize) -> Unfit {
     Unfit::Missing(format!("light {index}"))
 }
 
+/// Of a light of another kind the first three keys become those that are alike (kind, where it is, how strong it is), and the
+/// rest goes or comes.
 fn set_light(spliced: &mut Spliced, body: Body, old: &Light, new: &Light) {
+    let (old_keys, new_keys) = (light_keys(old), light_keys(new));
+    if LightKind::of(old) == LightKind::of(new) {
+        set_same_kind(spliced, body, (old, new), &old_keys[3..]);
+        return;
+    }
+    for (old_key, _) in &old_keys[3..] {
+        spliced.remove_key(body, old_key);
+    }
+    for ((old_key, _), (new_key, text)) in old_keys.iter().zip(&new_keys).take(3) {
+        spliced.rename(body, old_key, new_key, text.clone());
+    }
+    for (key, text) in new_keys.into_iter().skip(3) {
+        spliced.insert_key(body, key, &text);
+    }
+}
+
+/// Writes what has changed; `old_rest` are the keys of the old light's size.
+fn set_same_kind(
+    spliced: &mut Spliced,
+    body: Body,
+    (old, new): (&Light, &Light),
+    old_rest: &[NewKey],
+) {
     match (old, new) {
         (
-            Light::Point { .. },
+            _,
             Light::Point {
                 position_m,
                 intensity,
+                ..
             },
         ) => {
             set_vector(spliced, body, &POINT_LIGHT.position_m, *position_m);
@@ -248,6 +275,7 @@ fn set_light(spliced: &mut Spliced, body: Body, old: &Light, new: &Light) {
             Light::Directional {
                 direction,
                 irradiance,
+                ..
             },
         ) => {
             // Written with any length, so it is as it was unless it points elsewhere.
@@ -256,34 +284,67 @@ fn set_light(spliced: &mut Spliced, body: Body, old: &Light, new: &Light) {
             }
             set_vector(spliced, body, &DIRECTIONAL_LIGHT.irradiance, *irradiance);
         }
-        (Light::Point { .. }, Light::Directional { .. })
-        | (Light::Directional { .. }, Light::Point { .. }) => {
-            // Each key becomes the one that is alike: kind, where it is, how strong it is.
-            for ((old_key, _), (new_key, text)) in light_keys(old).into_iter().zip(light_keys(new))
-            {
-                spliced.rename(body, old_key, new_key, text);
-            }
+        (Light::Point { .. }, Light::Directional { .. }) => {}
+    }
+    let rest = light_keys(new).into_iter().skip(3);
+    for (key, text) in rest {
+        if !old_rest.contains(&(key, text.clone())) {
+            spliced.set(body, key, text);
         }
     }
 }
 
-fn light_keys(light: &Light) -> [NewKey; 3] {
+/// The keys of a light: three that all have, then those of its size.
+fn light_keys(light: &Light) -> Vec<NewKey> {
+    let kind = new_key(&LIGHT.kind, &LightKind::of(light));
     match light {
         Light::Point {
             position_m,
             intensity,
-        } => [
-            new_key(&LIGHT.kind, &LightKind::Point),
-            new_key(&POINT_LIGHT.position_m, position_m),
-            new_key(&POINT_LIGHT.intensity, intensity),
-        ],
+            shape,
+        } => {
+            let mut keys = vec![
+                kind,
+                new_key(&POINT_LIGHT.position_m, position_m),
+                new_key(&POINT_LIGHT.intensity, intensity),
+            ];
+            keys.extend(shape_keys(shape));
+            keys
+        }
         Light::Directional {
             direction,
             irradiance,
-        } => [
-            new_key(&LIGHT.kind, &LightKind::Directional),
-            new_key(&DIRECTIONAL_LIGHT.direction, direction),
-            new_key(&DIRECTIONAL_LIGHT.irradiance, irradiance),
+            angle_rad,
+        } => {
+            let width = new_key(&DIRECTIONAL_LIGHT.angle_deg, &angle_rad.to_degrees());
+            let mut keys = vec![
+                kind,
+                new_key(&DIRECTIONAL_LIGHT.direction, direction),
+                new_key(&DIRECTIONAL_LIGHT.irradiance, irradiance),
+            ];
+            keys.extend((*angle_rad > 0.0).then_some(width));
+            keys
+        }
+    }
+}
+
+fn shape_keys(shape: &Shape) -> Vec<NewKey> {
+    match shape {
+        Shape::Point => Vec::new(),
+        Shape::Spot {
+            direction,
+            inner_rad,
+            outer_rad,
+        } => vec![
+            new_key(&AIMED_LIGHT.direction, direction),
+            new_key(&SPOT_LIGHT.outer_deg, &outer_rad.to_degrees()),
+            new_key(&SPOT_LIGHT.inner_deg, &inner_rad.to_degrees()),
+        ],
+        Shape::Sphere { radius_m } => vec![new_key(&SPHERE_LIGHT.radius_m, radius_m)],
+        Shape::Rect(rect) => vec![
+            new_key(&AIMED_LIGHT.direction, &rect.facing),
+            new_key(&RECT_LIGHT.size_m, &rect.size_m.to_array()),
+            new_key(&RECT_LIGHT.up, &rect.up()),
         ],
     }
 }

@@ -11,7 +11,7 @@ use serde_json::Value;
 use crate::app::truth::affine;
 use crate::app::truth::ray_cast::{Triangle, View, World};
 use crate::geometry::camera::Intrinsics;
-use crate::light::Light;
+use crate::light::{Light, Shape};
 use crate::render::{REAL, VIRTUAL};
 use crate::scene::{Object, Scene};
 
@@ -100,6 +100,7 @@ impl KnownScene {
                 .map(|lamp| Light::Point {
                     position_m: DVec3::from_array(lamp.position),
                     intensity: DVec3::from_array(lamp.intensity),
+                    shape: Shape::Point,
                 })
                 .collect(),
             intrinsics: Intrinsics {
@@ -139,7 +140,7 @@ impl KnownScene {
         for (object, thing) in objects.zip(placed) {
             object.anchor_from_object = thing.world_from_object * object.anchor_from_object;
         }
-        scene.lights.clone_from(&self.lights);
+        scene.lights = self.lights.iter().map(|&light| light.into()).collect();
         scene.ambient_radiance = DVec3::splat(AMBIENT);
         Ok(scene)
     }

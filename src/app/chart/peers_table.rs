@@ -86,9 +86,9 @@ impl PeersStage {
             ],
             lights: lights_m
                 .iter()
-                .map(|&position_m| Light::Point {
-                    position_m,
-                    intensity: DVec3::splat(0.7 / lights_m.len() as f64),
+                .map(|&position_m| {
+                    let intensity = DVec3::splat(0.7 / lights_m.len() as f64);
+                    Light::point(position_m, intensity).into()
                 })
                 .collect(),
             ambient_radiance: DVec3::splat(0.05),
@@ -152,10 +152,10 @@ fn object(name: &str, mesh: Mesh, albedo: DVec3, anchor: usize, position_m: DVec
         name: name.to_owned(),
         mesh,
         mesh_report,
-        materials: vec![Material {
-            albedo,
-            roughness: None,
-        }],
+        materials: vec![Material::matt(albedo)],
+        material_names: Vec::new(),
+        textures: Vec::new(),
+        notes: Vec::new(),
         anchor,
         motion: None,
         anchor_from_object: DAffine3::from_translation(position_m),

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::scene::{Family, Marker};
+use crate::scene::{Family, Ink, Marker};
 
 /// What the text beside a printed sheet begins with.
 pub const PRINTED: &str = "# Printed by gnomon markers";
@@ -43,5 +43,8 @@ fn add_family(text: &mut String, family: Family) {
     let _ = writeln!(text, "family = \"{}\"", family.name());
     if family.border_cells() != 1 {
         let _ = writeln!(text, "border_cells = {}", family.border_cells());
+    }
+    if family.ink() == Ink::WhiteOnBlack {
+        text.push_str("inverted = true\n");
     }
 }

@@ -8,7 +8,7 @@ use super::layer_files::{Layer, write_layers};
 use super::output_error::OutputError;
 use super::picture_files;
 use super::result_kind::ResultKind;
-use super::video_writer::{Codec, Naming, VideoWriter};
+use super::video_writer::{Codec, Naming, Pace, VideoWriter};
 use crate::render::Layers;
 
 /// The place that frames go to one by one.
@@ -39,23 +39,35 @@ impl FrameSink {
         Ok(ResultKind::Frames)
     }
 
-    /// Opens `path`: by its extension a video, else a folder of PNGs. Folders on the way are made.
+    /// Opens `path`: by its extension a video, else a folder of PNGs. Folders on the way are made. `fps` is the nominal rate;
+    /// frames of a video keep their times.
     ///
     /// # Errors
     /// As [`FrameSink::kind_of`]; a place that cannot be written to.
     pub fn create(path: &Path, size_px: [u32; 2], fps: f64) -> Result<Self, OutputError> {
         if let Some(codec) = Codec::of_path(path) {
-            let video = VideoWriter::create(path, codec, size_px, fps, Naming::Finished)?;
+            let video = VideoWriter::create(
+                path,
+                codec,
+                size_px,
+                Pace::Stamped { nominal_fps: fps },
+                Naming::Finished,
+            )?;
             return Ok(Self::Video(video));
         }
         Self::kind_of(path)?;
         FrameFolder::create(path).map(Self::Folder)
     }
 
-    /// Adds a frame of 8-bit RGBA.
-    pub fn push(&mut self, index: u32, size_px: [u32; 2], rgba: &[u8]) -> Result<(), OutputError> {
+    /// Adds a frame of 8-bit RGBA by its index and its time.
+    pub fn push(
+        &mut self,
+        (index, time_secs): (u32, f64),
+        size_px: [u32; 2],
+        rgba: &[u8],
+    ) -> Result<(), OutputError> {
         match self {
-            Self::Video(video) => video.push(size_px, rgba),
+            Self::Video(video) => video.push(size_px, time_secs, rgba),
             Self::Folder(folder) => folder.put(&frame_name(index), |path| {
                 picture_files::rgb_png(path, size_px, rgba)
             }),
@@ -128,8 +140,12 @@ mod tests {
             let path = folder.path().join(name);
             let mut sink = FrameSink::create(&path, size_px, 25.0).unwrap();
             for index in 0..3 {
-                sink.push(index, size_px, &noise(size_px, index + 1))
-                    .unwrap();
+                sink.push(
+                    (index, f64::from(index) / 25.0),
+                    size_px,
+                    &noise(size_px, index + 1),
+                )
+                .unwrap();
             }
             sink.finish().unwrap();
             let mut source = FrameSource::open(path.to_str().unwrap()).unwrap();
@@ -156,8 +172,12 @@ mod tests {
         let size_px = [63, 47];
         let mut sink = FrameSink::create(&path, size_px, 29.97).unwrap();
         for index in 0..5 {
-            sink.push(index, size_px, &flat(size_px, [200, 60, 30]))
-                .unwrap();
+            sink.push(
+                (index, f64::from(index) / 29.97),
+                size_px,
+                &flat(size_px, [200, 60, 30]),
+            )
+            .unwrap();
         }
         sink.finish().unwrap();
         let probe = std::process::Command::new("ffprobe")
@@ -194,9 +214,9 @@ mod tests {
         let path = folder.path().join("a.mp4");
         let size_px = [64, 48];
         let mut sink = FrameSink::create(&path, size_px, 30.0).unwrap();
-        sink.push(0, size_px, &noise(size_px, 1)).unwrap();
+        sink.push((0, 0.0), size_px, &noise(size_px, 1)).unwrap();
         assert!(
-            sink.push(1, [48, 64], &noise(size_px, 1)).is_err(),
+            sink.push((1, 0.1), [48, 64], &noise(size_px, 1)).is_err(),
             "a frame of another size"
         );
         drop(sink);
@@ -209,14 +229,98 @@ mod tests {
     }
 
     #[test]
+    fn frames_keep_their_times() {
+        let folder = tempfile::tempdir().unwrap();
+        let size_px = [64, 48];
+        // A pause, frames of another rate, one that stands still.
+        let times_secs = [
+            0.5,
+            0.5 + 1.0 / 30.0,
+            0.5 + 2.0 / 30.0,
+            1.7,
+            1.74,
+            1.74,
+            2.5,
+        ];
+        for (name, allowed_secs) in [
+            ("a.mp4", 2e-6),
+            ("a.mov", 2e-6),
+            ("a.mkv", 0.51e-3),
+            ("a.avi", 0.51 / 30.0),
+        ] {
+            let path = folder.path().join(name);
+            let mut sink = FrameSink::create(&path, size_px, 30.0).unwrap();
+            for (index, time_secs) in times_secs.into_iter().enumerate() {
+                let frame = (index as u32, time_secs);
+                sink.push(frame, size_px, &flat(size_px, [index as u8 * 30, 60, 30]))
+                    .unwrap();
+            }
+            sink.finish().unwrap();
+            let mut source = FrameSource::open(path.to_str().unwrap()).unwrap();
+            for (index, time_secs) in times_secs.into_iter().enumerate() {
+                let frame = source.next_frame().unwrap().unwrap();
+                let stands_still = index == 5;
+                let off_secs = (frame.time_secs - (time_secs - 0.5)).abs();
+                assert!(
+                    off_secs < allowed_secs || stands_still,
+                    "{name} {index}: {}",
+                    frame.time_secs
+                );
+                assert!(
+                    frame.rgba[0].abs_diff(index as u8 * 30) <= 3,
+                    "{name} {index}"
+                );
+            }
+            assert!(source.next_frame().unwrap().is_none(), "{name}");
+            assert_eq!(source.notices(), [], "{name}");
+        }
+    }
+
+    #[test]
+    fn a_steady_video_says_its_rate() {
+        let folder = tempfile::tempdir().unwrap();
+        let size_px = [64, 48];
+        for (name, fps) in [
+            ("a.mp4", 30.0),
+            ("b.mp4", 30000.0 / 1001.0),
+            ("c.mov", 25.0),
+            ("d.mp4", 24000.0 / 1001.0),
+        ] {
+            let path = folder.path().join(name);
+            let mut sink = FrameSink::create(&path, size_px, fps).unwrap();
+            for index in 0..12 {
+                sink.push(
+                    (index, f64::from(index) / fps),
+                    size_px,
+                    &noise(size_px, index + 1),
+                )
+                .unwrap();
+            }
+            sink.finish().unwrap();
+            let source = FrameSource::open(path.to_str().unwrap()).unwrap();
+            assert!(
+                (source.fps() - fps).abs() < 1e-3,
+                "{name}: {}",
+                source.fps()
+            );
+            assert_eq!(source.frame_count(), Some(12));
+        }
+    }
+
+    #[test]
     fn an_encoder_that_fails_is_quoted() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.mp4");
         // No rate that the encoder knows.
-        let mut sink = FrameSink::create(&path, [64, 48], f64::NAN).unwrap();
+        let pace = Pace::Even { fps: f64::NAN };
+        let mut video =
+            VideoWriter::create(&path, Codec::H264, [64, 48], pace, Naming::Finished).unwrap();
         let pushed: Result<(), OutputError> =
-            (0..500).try_for_each(|index| sink.push(index, [64, 48], &noise([64, 48], 1)));
-        let text = pushed.and_then(|()| sink.finish()).unwrap_err().to_string();
+            (0..500).try_for_each(|_| video.push([64, 48], 0.0, &noise([64, 48], 1)));
+        let text = pushed
+            .and_then(|()| video.finish())
+            .unwrap_err()
+            .to_string();
         assert!(
             text.contains("a.mp4: ffmpeg failed") && text.contains("NaN"),
             "{text}"

@@ -2,6 +2,7 @@
 
 pub(crate) mod anchor_block;
 pub mod detections_file;
+mod encoder;
 mod file_conflict;
 mod file_identity;
 mod frame_folder;
@@ -14,6 +15,7 @@ pub mod output_error;
 pub mod picture_files;
 pub mod poses_file;
 pub mod result_kind;
+mod stamped_frames;
 pub mod video_writer;
 
 pub(crate) use file_identity::is_at;

@@ -113,7 +113,7 @@ impl ResultKind {
         }
         match self {
             Self::Poses => first_line() == poses_file::HEADER,
-            Self::Detections => first_line() == detections_file::HEADER,
+            Self::Detections => first_line().starts_with(detections_file::FIRST_COLUMNS),
             Self::Response => {
                 std::str::from_utf8(bytes).is_ok_and(|text| Response::from_csv(text).is_ok())
             }

@@ -1,14 +1,14 @@
 //! Video files, encoded by an ffmpeg process that is fed raw frames.
 
 use std::fs::File;
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, Command, Stdio};
-use std::thread::JoinHandle;
 
+use super::encoder::Encoder;
 use super::file_identity::is_at;
 use super::new_file::{NewFile, vanished};
 use super::output_error::OutputError;
+use super::stamped_frames::{write_frame, write_head};
 
 /// A video's encoding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,10 +66,33 @@ pub enum Naming {
     AtOnce,
 }
 
+/// When the frames of a video are shown.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Pace {
+    /// One after the other at this rate, whatever their times.
+    Even {
+        /// Frames per second.
+        fps: f64,
+    },
+    /// Each at its own time since the first; in AVI, which has no times, as near as its rate allows.
+    Stamped {
+        /// Frames per second, for the most part.
+        nominal_fps: f64,
+    },
+}
+
+/// Ticks per second of the times in MP4: the usual rates, and the clocks of cameras and broadcasts, are whole numbers of
+/// them.
+const MP4_TICKS: u32 = 360_000;
+
 /// A video that is being written.
 pub struct VideoWriter {
     path: PathBuf,
     size_px: [u32; 2],
+    pace: Pace,
+    /// Times of the first frame and of the last, seconds; the last since the first.
+    first_secs: Option<f64>,
+    last_secs: Option<f64>,
     frames: u32,
     encoder: Option<Encoder>,
     /// `None` once it is finished.
@@ -82,12 +105,6 @@ enum VideoFile {
     Named(File),
 }
 
-struct Encoder {
-    child: Child,
-    frames_in: ChildStdin,
-    talk: JoinHandle<String>,
-}
-
 impl VideoWriter {
     /// Starts the encoder; the folder is made where it is missing. With [`Naming::AtOnce`] there must be no file of that
     /// name.
@@ -98,68 +115,51 @@ impl VideoWriter {
         path: &Path,
         codec: Codec,
         size_px: [u32; 2],
-        fps: f64,
+        pace: Pace,
         naming: Naming,
     ) -> Result<Self, OutputError> {
         let file = VideoFile::create(path, naming)?;
         let mut writer = Self {
             path: path.to_owned(),
             size_px,
+            pace,
+            first_secs: None,
+            last_secs: None,
             frames: 0,
             encoder: None,
             file: None,
         };
-        let mut command = Command::new("ffmpeg");
-        command
-            .args(["-hide_banner", "-loglevel", "error", "-nostdin", "-y"])
-            .args(["-f", "rawvideo", "-pixel_format", "rgba"])
-            .args([
-                "-video_size",
-                &format!("{}x{}", size_px[0], size_px[1]),
-                "-framerate",
-                &fps.to_string(),
-            ])
-            .args(["-i", "pipe:0"])
-            .args(codec.arguments())
-            .args(naming.arguments())
-            .arg(file_url(file.working_path(path)))
-            .stdin(Stdio::piped())
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped());
+        let mut arguments = pace.input_arguments(size_px);
+        arguments.extend(codec.arguments().iter().map(|&word| word.to_owned()));
+        arguments.extend(pace.output_arguments(path));
+        arguments.extend(naming.arguments().iter().map(|&word| word.to_owned()));
+        let url = file_url(file.working_path(path));
         // From here on the file goes if the encoder does not start.
         writer.file = Some(file);
-        // Ctrl-C is for gnomon, which then finishes the video; the encoder must live until that is done.
-        #[cfg(unix)]
-        std::os::unix::process::CommandExt::process_group(&mut command, 0);
-        let mut child = command
-            .spawn()
-            .map_err(|error| OutputError::FfmpegMissing {
+        let encoder =
+            Encoder::start(&arguments, &url).map_err(|error| OutputError::FfmpegMissing {
                 path: path.to_owned(),
                 error,
             })?;
-        let pipe_lost = || OutputError::Encoder {
-            path: path.to_owned(),
-            frames: 0,
-            message: "its input or output cannot be reached".to_owned(),
-        };
-        let frames_in = child.stdin.take().ok_or_else(pipe_lost)?;
-        let mut stderr = child.stderr.take().ok_or_else(pipe_lost)?;
-        let talk = std::thread::spawn(move || {
-            let mut bytes = Vec::new();
-            // What could be read is worth telling, even where reading ended in an error.
-            _ = stderr.read_to_end(&mut bytes);
-            String::from_utf8_lossy(&bytes).into_owned()
-        });
-        writer.encoder = Some(Encoder {
-            child,
-            frames_in,
-            talk,
-        });
+        let encoder = writer.encoder.insert(encoder);
+        if let Pace::Stamped { nominal_fps } = pace
+            && write_head(encoder, size_px, nominal_fps).is_err()
+        {
+            return Err(writer.gave_up());
+        }
         Ok(writer)
     }
 
-    /// Adds a frame of 8-bit RGBA.
-    pub fn push(&mut self, size_px: [u32; 2], rgba: &[u8]) -> Result<(), OutputError> {
+    /// Adds a frame of 8-bit RGBA, taken at this time; times that do not increase are moved on by a hair.
+    ///
+    /// # Errors
+    /// A frame of another size, an encoder that fails or hangs, a file that was taken away.
+    pub fn push(
+        &mut self,
+        size_px: [u32; 2],
+        time_secs: f64,
+        rgba: &[u8],
+    ) -> Result<(), OutputError> {
         let expected = self.size_px[0] as usize * self.size_px[1] as usize * 4;
         if size_px != self.size_px || rgba.len() != expected {
             let [width, height] = self.size_px;
@@ -173,21 +173,29 @@ impl VideoWriter {
             });
         }
         self.check_that_it_is_there()?;
-        let written = self
-            .encoder
-            .as_mut()
-            .map(|encoder| encoder.frames_in.write_all(rgba));
+        let since_first_secs = time_secs - *self.first_secs.get_or_insert(time_secs);
+        let stamp_secs = self
+            .pace
+            .stamp_secs(&self.path, since_first_secs, self.last_secs);
+        self.last_secs = Some(stamp_secs);
+        let written = self.encoder.as_mut().map(|encoder| match self.pace {
+            Pace::Even { .. } => encoder.write_all(rgba),
+            Pace::Stamped { .. } => write_frame(encoder, stamp_secs, rgba),
+        });
         match written {
             Some(Ok(())) => {
                 self.frames += 1;
                 Ok(())
             }
             // The pipe breaks when the encoder gives up; why, it says itself.
-            Some(Err(_)) | None => Err(self
-                .close()
-                .err()
-                .unwrap_or_else(|| self.failed("it ended too soon"))),
+            Some(Err(_)) | None => Err(self.gave_up()),
         }
+    }
+
+    fn gave_up(&mut self) -> OutputError {
+        self.close()
+            .err()
+            .unwrap_or_else(|| self.failed("it ended too soon"))
     }
 
     /// Waits for the encoder and gives the video its name. Without any frame there is no video.
@@ -222,28 +230,11 @@ impl VideoWriter {
 
     /// Ends the encoder's input and waits for it.
     fn close(&mut self) -> Result<(), OutputError> {
-        let Some(Encoder {
-            mut child,
-            frames_in,
-            talk,
-        }) = self.encoder.take()
-        else {
+        let Some(encoder) = self.encoder.take() else {
             return Err(self.failed("it ended before"));
         };
-        drop(frames_in);
-        let status = child.wait().map_err(|error| OutputError::Io {
-            path: self.path.clone(),
-            error,
-        })?;
-        let said = talk.join().unwrap_or_default();
-        // A full disk while the index is written is only said, the status is 0.
-        if status.success() && said.trim().is_empty() {
-            return Ok(());
-        }
-        match last_lines(&said) {
-            words if words.is_empty() => Err(self.failed(&status.to_string())),
-            words => Err(self.failed(&words)),
-        }
+        let file = self.file.as_ref().map(|file| file.working_path(&self.path));
+        encoder.finish(file).map_err(|words| self.failed(&words))
     }
 
     fn failed(&self, message: &str) -> OutputError {
@@ -263,6 +254,69 @@ impl Naming {
             Self::AtOnce => &["-cluster_time_limit", "300", "-flush_packets", "1"],
         }
     }
+}
+
+impl Pace {
+    /// What the encoder is told of the frames that it reads.
+    fn input_arguments(self, size_px: [u32; 2]) -> Vec<String> {
+        let [width, height] = size_px;
+        let words = match self {
+            Self::Even { fps } => {
+                format!(
+                    "-f rawvideo -pixel_format rgba -video_size {width}x{height} -framerate {fps} -i pipe:0"
+                )
+            }
+            // All that there is to know stands at the stream's beginning.
+            Self::Stamped { .. } => {
+                "-f matroska -probesize 32 -analyzeduration 0 -fpsprobesize 0 -i pipe:0".to_owned()
+            }
+        };
+        words.split(' ').map(str::to_owned).collect()
+    }
+
+    /// What it is told of their times.
+    fn output_arguments(self, path: &Path) -> Vec<String> {
+        let words = match self {
+            Self::Even { .. } => return Vec::new(),
+            Self::Stamped { nominal_fps } if is_avi(path) => {
+                format!("-fps_mode passthrough -r {nominal_fps}")
+            }
+            Self::Stamped { .. } => format!(
+                "-fps_mode passthrough -enc_time_base 1:{MP4_TICKS} -video_track_timescale {MP4_TICKS}"
+            ),
+        };
+        let mut words: Vec<String> = words.split(' ').map(str::to_owned).collect();
+        if !has_track_timescale(path) {
+            words.truncate(4);
+        }
+        words
+    }
+
+    /// The time that a frame gets, since the first.
+    fn stamp_secs(self, path: &Path, since_first_secs: f64, last_secs: Option<f64>) -> f64 {
+        let per_second = match self {
+            Self::Stamped { nominal_fps } if is_avi(path) => nominal_fps,
+            // Matroska's own clock.
+            Self::Stamped { .. } if !has_track_timescale(path) => 1000.0,
+            Self::Even { .. } | Self::Stamped { .. } => f64::from(MP4_TICKS),
+        };
+        let slot = (since_first_secs * per_second).round();
+        let least = last_secs.map_or(0.0, |last| (last * per_second).round() + 1.0);
+        slot.max(least) / per_second
+    }
+}
+
+fn is_avi(path: &Path) -> bool {
+    extension(path) == "avi"
+}
+
+fn has_track_timescale(path: &Path) -> bool {
+    matches!(extension(path).as_str(), "mp4" | "mov")
+}
+
+fn extension(path: &Path) -> String {
+    let extension = path.extension().unwrap_or_default();
+    extension.to_string_lossy().to_ascii_lowercase()
 }
 
 impl VideoFile {
@@ -308,17 +362,8 @@ impl Drop for VideoWriter {
             if self.frames == 0 && is_at(&self.path, &file) {
                 _ = std::fs::remove_file(&self.path);
             }
-        } else if let Some(Encoder {
-            mut child,
-            frames_in,
-            ..
-        }) = self.encoder.take()
-        {
-            drop(frames_in);
-            // Both fail only where the encoder is gone already.
-            _ = child.kill();
-            _ = child.wait();
         }
+        // An encoder that was not finished is ended.
     }
 }
 
@@ -327,13 +372,4 @@ fn file_url(path: &Path) -> std::ffi::OsString {
     let mut url = std::ffi::OsString::from("file:");
     url.push(path);
     url
-}
-
-fn last_lines(text: &str) -> String {
-    let lines: Vec<&str> = text
-        .lines()
-        .map(str::trim)
-        .filter(|line| !line.is_empty())
-        .collect();
-    lines[lines.len().saturating_sub(4)..].join("; ")
 }

@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use crate::capture::Frame;
-use crate::scene::{Anchor, Family, TrackingSettings};
+use crate::scene::{Family, TrackingSettings};
 use crate::tracking::{Detector, grey_from_rgba};
 
 /// A watch for mirrored recordings, which looks into a few of those frames that show nothing.
@@ -18,12 +18,11 @@ pub(crate) struct MirrorWatch {
 }
 
 impl MirrorWatch {
-    /// A watch for the markers of `anchors`.
-    pub(crate) fn new(settings: &TrackingSettings, anchors: &[Anchor]) -> Self {
-        let markers = anchors.iter().flat_map(|anchor| &anchor.markers);
+    /// A watch for markers of families, each of which may be named more than once.
+    pub(crate) fn new(settings: &TrackingSettings, families: Vec<Family>) -> Self {
         Self {
             settings: settings.clone(),
-            families: markers.map(|marker| marker.family).collect(),
+            families,
             detector: None,
             blank_frames: 0,
             seen: false,

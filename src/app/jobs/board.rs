@@ -10,12 +10,12 @@ use crate::app::files::anchor_block;
 use crate::app::files::job_files::{JobFiles, Replacing};
 use crate::app::files::picture_files::write_text;
 use crate::app::files::result_kind::ResultKind;
-use crate::app::input::source;
+use crate::app::input::source::{self, CalibrationNamed};
 use crate::app::input::usual_tracking::usual_tracking;
 use crate::app::stages::progress::Progress;
 use crate::app::talk;
 use crate::capture::{FrameSource, Notice};
-use crate::scene::{CameraSettings, DetectorKind, Family, Marker, TrackingSettings};
+use crate::scene::{CameraSettings, Family, Marker, TrackingSettings};
 use crate::tracking::mapping::{LearntBoard, MapSettings, learn_board};
 use crate::tracking::{Detection, Detector, grey_from_rgba};
 
@@ -77,7 +77,7 @@ pub fn board(request: &BoardRequest, stop: &AtomicBool) -> Result<()> {
         }
         BoardInput::Recording { camera, decimation } => {
             files.reads_camera(camera);
-            (camera.clone(), usual_tracking(request.family, *decimation))
+            (camera.clone(), usual_tracking(*decimation))
         }
     };
     files.reads_family(request.family);
@@ -85,7 +85,11 @@ pub fn board(request: &BoardRequest, stop: &AtomicBool) -> Result<()> {
         files.writes("--out", out, ResultKind::LearntBoard);
     }
     files.check()?;
-    let (source, intrinsics) = source::open(&camera)?;
+    let named = match &request.input {
+        BoardInput::Scene(_) => CalibrationNamed::ByKey,
+        BoardInput::Recording { .. } => CalibrationNamed::ByOption,
+    };
+    let (source, intrinsics) = source::open_named(&camera, named)?;
     let (pictures, notices) = detections(source, &settings, request.family, stop)?;
     let learnt = learn_board(&intrinsics, request.family, &pictures, &request.map)
         .with_context(|| format!("{} pictures of {}", pictures.len(), camera.source))?;
@@ -94,9 +98,6 @@ pub fn board(request: &BoardRequest, stop: &AtomicBool) -> Result<()> {
         None => learnt,
     };
     talk::say_lines(&certainty_text(&learnt));
-    if settings.detector == DetectorKind::Aruco {
-        talk::say("a scene with this board needs [tracking] detector = \"aruco\"");
-    }
     let block = board_block(&learnt, &request.name);
     match &request.out {
         Some(path) => write_text(path, &block)?,

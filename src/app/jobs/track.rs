@@ -15,7 +15,8 @@ use crate::app::files::result_kind::ResultKind;
 use crate::app::input::live_capture::LiveCapture;
 use crate::app::input::live_input::LiveInput;
 use crate::app::input::mirror_watch::MirrorWatch;
-use crate::app::input::source;
+use crate::app::input::sightings::Sightings;
+use crate::app::input::source::{self, CalibrationNamed};
 use crate::app::input::usual_tracking::usual_tracking;
 use crate::app::stages::report::Report;
 use crate::app::stages::stats::{Stats, detector_in_words, peak_memory_mib};
@@ -34,7 +35,7 @@ pub struct TrackRequest {
     pub input: TrackInput,
     /// Where to write the poses.
     pub poses: Option<PathBuf>,
-    /// Where to write every marker that the detector sees.
+    /// Where to write every marker that the detector sees or that a pose rests on.
     pub markers: Option<PathBuf>,
     /// Where to write what it cost.
     pub stats: Option<PathBuf>,
@@ -78,15 +79,12 @@ pub fn track(request: &TrackRequest, stop: &AtomicBool) -> Result<Report> {
     let plan = TrackPlan::of(&request.input, &mut files)?;
     request.name_results(&mut files);
     files.check()?;
-    let (frames_in, intrinsics) = open(&plan.camera)?;
-    let poser = Poser::Tracker(
-        Box::new(Tracker::new(&plan.settings, &plan.anchors, intrinsics)?),
-        MirrorWatch::new(&plan.settings, &plan.anchors),
-    );
+    let (frames_in, intrinsics) = open(&plan.camera, request.input.calibration_named())?;
+    let poser = plan.poser(intrinsics)?;
     let raw = request
         .markers
         .as_ref()
-        .map(|_| Raw::new(&plan.settings, &plan.anchors))
+        .map(|_| Raw::new(&plan.settings, &plan.families()))
         .transpose()?;
     let mut run = TrackRun {
         request,
@@ -109,6 +107,15 @@ pub fn track(request: &TrackRequest, stop: &AtomicBool) -> Result<Report> {
         return Err(failure);
     }
     Ok(run.report(&ended, interrupts && stop.load(Ordering::Relaxed)))
+}
+
+impl TrackInput {
+    fn calibration_named(&self) -> CalibrationNamed {
+        match self {
+            Self::Scene(_) => CalibrationNamed::ByKey,
+            Self::RecordingWithScene(..) | Self::LoneMarkers { .. } => CalibrationNamed::ByOption,
+        }
+    }
 }
 
 impl TrackRequest {
@@ -142,17 +149,18 @@ impl TrackRun<'_> {
         if let Some(raw) = &mut self.raw {
             raw.add(&tracked)?;
         }
+        self.plan.anchors.extend(tracked.came.iter().cloned());
         self.frames.push(KeptFrame::of(tracked));
         Ok(())
     }
 
-    /// The anchors that are written and told of.
+    /// The anchors in the order in which they are written and told of; those that came by themselves by their numbers.
     fn listed(&self) -> Vec<usize> {
-        (0..self.plan.anchors.len())
-            .filter(|&anchor| {
-                !self.plan.lists_found_alone || self.tally.lost[anchor] < self.tally.frames
-            })
-            .collect()
+        let mut listed: Vec<usize> = (0..self.plan.anchors.len()).collect();
+        if self.plan.every_marker.is_some() {
+            listed.sort_by_key(|&anchor| self.plan.anchors[anchor].markers[0].id);
+        }
+        listed
     }
 
     /// An anchor's name, and the frames without a pose of it.
@@ -180,7 +188,7 @@ impl TrackRun<'_> {
                 drawn: 0,
                 drops,
                 lost: listed.iter().map(|&anchor| self.lost(anchor)).collect(),
-                detector: detector_in_words(&self.plan.settings),
+                detector: detector_in_words(&self.plan.settings, &self.plan.families()),
                 technique: None,
                 adapter: None,
                 stages: self.tally.log.summary(),
@@ -200,7 +208,7 @@ impl TrackRun<'_> {
             .map(|(name, lost)| format!("\"{name}\" was not found in {lost} of them"))
             .collect();
         let frames = self.tally.frames;
-        let done = match self.plan.lists_found_alone {
+        let done = match self.plan.every_marker.is_some() {
             true => format!("{frames} frames, {} markers found", listed.len()),
             false => format!("{frames} frames"),
         };
@@ -216,17 +224,14 @@ impl TrackRun<'_> {
 }
 
 /// Opens a recording or begins to open a camera, with its calibration.
-fn open(camera: &CameraSettings) -> Result<(Frames, Intrinsics)> {
+fn open(camera: &CameraSettings, named: CalibrationNamed) -> Result<(Frames, Intrinsics)> {
     if !is_live(&camera.source) {
-        let (source, intrinsics) = source::open(camera)?;
+        let (source, intrinsics) = source::open_named(camera, named)?;
         return Ok((Frames::Recorded(source), intrinsics));
     }
     let input = LiveInput::of(camera)?;
     let Some(intrinsics) = input.calibration else {
-        bail!(
-            "{} carries no calibration: give one (--calibration FILE; in a scene, [camera] calibration)",
-            camera.source
-        );
+        bail!(named.missing(&camera.source));
     };
     let now = Arc::new(Stopwatch::clock());
     let capture = LiveCapture::start(&camera.source, &input.options(false), now, None);
@@ -238,8 +243,8 @@ struct TrackPlan {
     camera: CameraSettings,
     settings: TrackingSettings,
     anchors: Vec<Anchor>,
-    /// Whether anchors that no frame shows are left out: nobody named them.
-    lists_found_alone: bool,
+    /// A family and the size of its markers where each that is seen is an anchor, as they come.
+    every_marker: Option<(Family, f64)>,
 }
 
 impl TrackPlan {
@@ -251,7 +256,7 @@ impl TrackPlan {
                     camera: scene.camera,
                     settings: scene.tracking,
                     anchors: scene.anchors,
-                    lists_found_alone: false,
+                    every_marker: None,
                 }
             }
             TrackInput::RecordingWithScene(camera, path) => {
@@ -261,7 +266,7 @@ impl TrackPlan {
                     camera: camera.clone(),
                     settings: scene.tracking,
                     anchors: scene.anchors,
-                    lists_found_alone: false,
+                    every_marker: None,
                 }
             }
             TrackInput::LoneMarkers {
@@ -274,20 +279,40 @@ impl TrackPlan {
                 files.reads_family(*family);
                 Self {
                     camera: camera.clone(),
-                    settings: usual_tracking(*family, *decimation),
-                    anchors: lone_anchors(*family, *size_m),
-                    lists_found_alone: true,
+                    settings: usual_tracking(*decimation),
+                    anchors: Vec::new(),
+                    every_marker: Some((*family, *size_m)),
                 }
             }
         })
     }
 }
 
-/// An anchor for each marker of a family, by the name of its number.
-fn lone_anchors(family: Family, size_m: f64) -> Vec<Anchor> {
-    (0..family.id_count())
-        .map(|id| Anchor::lone(id.to_string(), family, id, size_m))
-        .collect()
+impl TrackPlan {
+    fn families(&self) -> Vec<Family> {
+        let markers = self.anchors.iter().flat_map(|anchor| &anchor.markers);
+        let every_marker = self.every_marker.iter().map(|&(family, _)| family);
+        markers
+            .map(|marker| marker.family)
+            .chain(every_marker)
+            .collect()
+    }
+
+    fn poser(&self, intrinsics: Intrinsics) -> Result<Poser> {
+        let mirror_watch = MirrorWatch::new(&self.settings, self.families());
+        Ok(match self.every_marker {
+            Some((family, size_m)) => Poser::tracker(
+                Tracker::of_every_marker(&self.settings, (family, size_m), intrinsics)?,
+                mirror_watch,
+                Sightings::of_family(family),
+            ),
+            None => Poser::tracker(
+                Tracker::new(&self.settings, &self.anchors, intrinsics)?,
+                mirror_watch,
+                Sightings::of_anchors(&self.anchors),
+            ),
+        })
+    }
 }
 
 /// The poses of a frame, kept until all anchors are known.
@@ -339,11 +364,9 @@ struct Raw {
 }
 
 impl Raw {
-    fn new(settings: &TrackingSettings, anchors: &[Anchor]) -> Result<Self> {
-        let markers = anchors.iter().flat_map(|anchor| &anchor.markers);
-        let families: Vec<Family> = markers.map(|marker| marker.family).collect();
+    fn new(settings: &TrackingSettings, families: &[Family]) -> Result<Self> {
         Ok(Self {
-            detector: Detector::new(settings, &families)?,
+            detector: Detector::new(settings, families)?,
             grey: Vec::new(),
             text: DetectionsText::new(),
         })
@@ -352,7 +375,8 @@ impl Raw {
     fn add(&mut self, tracked: &TrackedFrame) -> Result<()> {
         grey_from_rgba(&tracked.frame, &mut self.grey)?;
         let detections = self.detector.detect(&self.grey, tracked.frame.size_px)?;
-        self.text.add_frame(tracked.frame.index, &detections);
+        let (index, used) = (tracked.frame.index, &tracked.used);
+        self.text.add_frame(index, &detections, used);
         Ok(())
     }
 }

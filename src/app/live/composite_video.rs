@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 
 use crate::app::files::output_error::OutputError;
-use crate::app::files::video_writer::{Codec, Naming, VideoWriter};
+use crate::app::files::video_writer::{Codec, Naming, Pace, VideoWriter};
 
 /// Frames that may wait for the encoder; more are left out, and the one before is seen for longer.
 const QUEUE: usize = 16;
@@ -27,7 +27,8 @@ impl CompositeVideo {
     /// # Errors
     /// As [`VideoWriter::create`].
     pub fn start(path: &Path, size_px: [u32; 2], fps: f64) -> Result<Self, OutputError> {
-        let writer = VideoWriter::create(path, Codec::Ffv1, size_px, fps, Naming::AtOnce)?;
+        let pace = Pace::Even { fps };
+        let writer = VideoWriter::create(path, Codec::Ffv1, size_px, pace, Naming::AtOnce)?;
         let (to_writer, frames) = sync_channel(QUEUE);
         let thread = std::thread::spawn(move || write(writer, size_px, fps, &frames));
         Ok(Self {
@@ -77,7 +78,7 @@ fn write(
     fps: f64,
     frames: &Receiver<(f64, Vec<u8>)>,
 ) -> Result<u32, OutputError> {
-    let mut pace = Pace::new(fps);
+    let mut pace = Due::new(fps);
     let mut before: Option<Vec<u8>> = None;
     let mut written = 0;
     for (time_secs, rgba) in frames {
@@ -88,7 +89,7 @@ fn write(
                 (Some(before), true) => before,
                 _ => &rgba,
             };
-            writer.push(size_px, pixels)?;
+            writer.push(size_px, time_secs, pixels)?;
             written += 1;
         }
         before = Some(rgba);
@@ -98,13 +99,13 @@ fn write(
 }
 
 /// The times at which the video's frames are due.
-struct Pace {
+struct Due {
     fps: f64,
     begin_secs: Option<f64>,
     written: u32,
 }
 
-impl Pace {
+impl Due {
     fn new(fps: f64) -> Self {
         Self {
             fps,
@@ -139,12 +140,12 @@ mod tests {
 
     #[test]
     fn frames_are_due_by_their_times() {
-        let mut pace = Pace::new(30.0);
+        let mut pace = Due::new(30.0);
         let even: u32 = (0..300)
             .map(|frame| pace.due(5.0 + f64::from(frame) / 30.0))
             .sum();
         assert_eq!(even, 300);
-        let mut pace = Pace::new(30.0);
+        let mut pace = Due::new(30.0);
         let slow: Vec<u32> = (0..10)
             .map(|frame| pace.due(f64::from(frame) / 10.0))
             .collect();

@@ -300,6 +300,7 @@ fn distance_to_segment(point: DVec2, from: DVec2, to: DVec2) -> f64 {
 mod tests {
     use super::*;
     use crate::geometry::camera::Intrinsics;
+    use crate::light::Shape;
     use glam::{DAffine3, DMat3};
 
     /// A camera 0.8 m away that looks down on the origin from the front.
@@ -406,6 +407,7 @@ mod tests {
         let light = Light::Point {
             position_m,
             intensity: DVec3::ONE,
+            shape: Shape::Point,
         };
         let target = GizmoTarget::Light { index: 1, light };
         let sight = sight();
@@ -439,6 +441,7 @@ mod tests {
             light: Light::Directional {
                 direction: DVec3::NEG_Z,
                 irradiance: DVec3::ONE,
+                angle_rad: 0.0,
             },
         };
         let gizmo = Gizmo::new(&target, &sight).unwrap();

@@ -152,17 +152,17 @@ impl Overlays<'_> {
     }
 
     fn lights(&self, scene: &Scene) {
-        let world = self.picture.poses.first();
-        let Some(camera_from_world) = world.and_then(|pose| pose.camera_from_anchor) else {
-            return;
-        };
         for (index, light) in scene.lights.iter().enumerate() {
-            let at_m = light_place_m(light);
-            let foot_m = at_m.with_z(0.0);
-            let Some(place) = self.place(&camera_from_world, at_m) else {
+            let pose = self.picture.poses.get(light.anchor);
+            let Some(camera_from_anchor) = pose.and_then(|pose| pose.camera_from_anchor) else {
                 continue;
             };
-            if let Some(foot) = self.place(&camera_from_world, foot_m) {
+            let at_m = light_place_m(&light.light);
+            let foot_m = at_m.with_z(0.0);
+            let Some(place) = self.place(&camera_from_anchor, at_m) else {
+                continue;
+            };
+            if let Some(foot) = self.place(&camera_from_anchor, foot_m) {
                 let stroke = Stroke::new(1.0, LIGHT.gamma_multiply(0.6));
                 self.painter
                     .extend(Shape::dashed_line(&[place, foot], stroke, 5.0, 4.0));

@@ -53,14 +53,14 @@ pub fn selected_at(
 }
 
 fn light_at(scene: &Scene, picture: &TrackedPicture, pixel: DVec2) -> Option<usize> {
-    let sight = PosedCamera {
-        intrinsics: picture.intrinsics,
-        camera_from_world: picture.poses.first()?.camera_from_anchor?,
-    };
     let lights = scene.lights.iter().enumerate();
     let (light, _) = lights
         .filter_map(|(index, light)| {
-            let off_px = sight.pixel(light_place_m(light))?.distance(pixel);
+            let sight = PosedCamera {
+                intrinsics: picture.intrinsics,
+                camera_from_world: picture.poses.get(light.anchor)?.camera_from_anchor?,
+            };
+            let off_px = sight.pixel(light_place_m(&light.light))?.distance(pixel);
             (off_px <= LIGHT_REACH_PX).then_some((index, off_px))
         })
         .min_by(|(_, a), (_, b)| a.total_cmp(b))?;

@@ -87,8 +87,11 @@ impl ShadowClicks {
 pub fn edits(scene: &Scene, index: usize, found: &FoundLight) -> Vec<Edit> {
     let light = match (scene.lights.get(index), found.strengths) {
         // The picture does not tell how strong it is: it stays as strong as it was.
-        (Some(before), None) => as_strong_as(found.light, before),
-        _ => found.light,
+        (Some(before), None) => {
+            as_large_as(as_strong_as(found.light, &before.light), &before.light)
+        }
+        (Some(before), Some(_)) => as_large_as(found.light, &before.light),
+        (None, _) => found.light,
     };
     let placed = match scene.lights.len() {
         count if index < count => Edit::Light { index, light },
@@ -98,20 +101,34 @@ pub fn edits(scene: &Scene, index: usize, found: &FoundLight) -> Vec<Edit> {
     std::iter::once(placed).chain(ambient).collect()
 }
 
-fn as_strong_as(light: Light, before: &Light) -> Light {
-    match (light, *before) {
-        (Light::Point { position_m, .. }, Light::Point { intensity, .. }) => Light::Point {
-            position_m,
-            intensity,
-        },
-        (Light::Directional { direction, .. }, Light::Directional { irradiance, .. }) => {
+fn as_strong_as(mut light: Light, before: &Light) -> Light {
+    match (&mut light, *before) {
+        (Light::Point { intensity, .. }, Light::Point { intensity: was, .. }) => *intensity = was,
+        (
+            Light::Directional { irradiance, .. },
             Light::Directional {
-                direction,
-                irradiance,
-            }
+                irradiance: was, ..
+            },
+        ) => {
+            *irradiance = was;
         }
-        _ => light,
+        (Light::Point { .. }, Light::Directional { .. })
+        | (Light::Directional { .. }, Light::Point { .. }) => {}
     }
+    light
+}
+
+/// Shadows tell where a light is, not how large: it keeps its size, and what is aimed still aims where it did.
+fn as_large_as(mut light: Light, before: &Light) -> Light {
+    match (&mut light, *before) {
+        (Light::Point { shape, .. }, Light::Point { shape: was, .. }) => *shape = was,
+        (Light::Directional { angle_rad, .. }, Light::Directional { angle_rad: was, .. }) => {
+            *angle_rad = was;
+        }
+        (Light::Point { .. }, Light::Directional { .. })
+        | (Light::Directional { .. }, Light::Point { .. }) => {}
+    }
+    light
 }
 
 /// What was found, for a notice.

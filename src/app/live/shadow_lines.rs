@@ -4,6 +4,7 @@ use glam::{DAffine3, DVec3};
 
 use crate::geometry::shadow_volume::{Caster, LightPlace};
 use crate::light::Light;
+use crate::scene::SceneLight;
 use crate::scene::{Object, Scene};
 
 /// Sides of volumes are drawn up to the table, but no longer than this, metres.
@@ -45,14 +46,18 @@ impl ShadowLines {
     ) -> Vec<ShadowLine> {
         self.prepare(scene);
         let mut lines = Vec::new();
-        for light in &scene.lights {
+        for SceneLight { anchor, light } in &scene.lights {
+            let Some(pose) = world_from_anchor.get(*anchor).copied().flatten() else {
+                continue;
+            };
+            let light = light.moved(&pose);
             for standing in &self.casters {
                 let pose = world_from_anchor.get(standing.anchor).copied().flatten();
                 let Some(world_from_anchor) = pose else {
                     continue;
                 };
                 let anchor_from_world = world_from_anchor.inverse();
-                let place = match *light {
+                let place = match light {
                     Light::Point { position_m, .. } => {
                         LightPlace::Point(anchor_from_world.transform_point3(position_m))
                     }
@@ -62,7 +67,7 @@ impl ShadowLines {
                 };
                 let cast = |point_m: DVec3| {
                     let in_world = world_from_anchor.transform_point3(point_m);
-                    anchor_from_world.transform_point3(shadow_of(in_world, light))
+                    anchor_from_world.transform_point3(shadow_of(in_world, &light))
                 };
                 lines.extend(
                     standing

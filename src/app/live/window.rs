@@ -27,6 +27,7 @@ use crate::app::window::fit::PictureFit;
 use crate::app::window::notices::{CameraState, Weight};
 use crate::app::window::screen::Screen;
 use crate::geometry::light_placing::PosedCamera;
+use crate::scene::SceneLight;
 
 /// The window looks at the world at least this often, even when no frame comes.
 const PULSE: Duration = Duration::from_millis(200);
@@ -234,12 +235,10 @@ impl LiveWindow {
                 (GizmoTarget::Thing { name, placement }, frame)
             }
             Selected::Light(index) => {
-                let light = *scene.lights.get(*index)?;
+                let SceneLight { anchor, light } = *scene.lights.get(*index)?;
                 let index = *index;
-                (
-                    GizmoTarget::Light { index, light },
-                    camera_from_node.first().copied()??,
-                )
+                let frame = camera_from_node.get(anchor).copied()??;
+                (GizmoTarget::Light { index, light }, frame)
             }
         };
         let sight = PosedCamera {

@@ -3,18 +3,22 @@
 //! What a scene or a mesh names may be somebody else's doing, so no name of theirs is ever written to: copies have names
 //! of our own, and what named the originals names the copies.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
 use toml_edit::{DocumentMut, Item, Table, Value};
 
 use crate::app::files::new_file::sync_folder;
 use crate::scene::format::{CAMERA, CAMERA_SECTION};
-use crate::scene::material_libraries::with_libraries_named;
+use crate::scene::gltf::copies::with_files_named;
+use crate::scene::mesh_file::MeshFormat;
+use crate::scene::obj::libraries::{with_libraries_named, with_maps_named};
 use crate::scene::plain_file::{self, MOST_MESH};
+use crate::scene::ply::with_picture_named;
 use crate::scene::{FileKind, NamedFile, Scene};
 
 /// The name of the scene in its folder.
@@ -159,25 +163,91 @@ impl Copies<'_> {
         Ok(Some(name))
     }
 
-    /// Copies a mesh with its materials into a folder of its own.
+    /// Copies a glTF file with its buffers and pictures into a folder of its own.
+    fn copy_gltf(&self, mesh: &Path, bytes: &[u8], folder: &str) -> Result<String> {
+        let parts = OwnNames::default();
+        let with_own_names = with_files_named(mesh, bytes, |part| {
+            let (number, is_new) = parts.number(part);
+            let name = format!("part-{number}");
+            if is_new {
+                self.put(format!("{folder}/{name}"), &read(part)?)?;
+            }
+            Ok::<_, anyhow::Error>(name)
+        })?;
+        let extension = match bytes.starts_with(b"glTF") {
+            true => "glb",
+            false => "gltf",
+        };
+        self.put(format!("{folder}/mesh.{extension}"), &with_own_names)
+    }
+
+    /// Copies a mesh with its materials and their pictures into a folder of its own.
     fn copy_mesh(&self, mesh: &Path, folder: &str) -> Result<String> {
-        let mut libraries: Vec<PathBuf> = Vec::new();
-        let with_own_names = with_libraries_named(mesh, &read(mesh)?, |library| {
-            let known = libraries.iter().position(|known| known == library);
-            let number = known.unwrap_or(libraries.len()) + 1;
+        let bytes = read(mesh)?;
+        match MeshFormat::of(mesh, &bytes) {
+            MeshFormat::Obj => {}
+            MeshFormat::Gltf => return self.copy_gltf(mesh, &bytes, folder),
+            MeshFormat::Stl => return self.put(format!("{folder}/mesh.stl"), &bytes),
+            MeshFormat::Ply => {
+                let pictures = OwnNames::default();
+                let named = with_picture_named(mesh, &bytes, |picture| {
+                    self.copy_picture(picture, folder, &pictures)
+                })?;
+                return self.put(format!("{folder}/mesh.ply"), &named);
+            }
+            MeshFormat::Other(what) => bail!("{}: {what} is not copied", mesh.display()),
+        }
+        let (libraries, pictures) = (OwnNames::default(), OwnNames::default());
+        let with_own_names = with_libraries_named(mesh, &bytes, |library| {
+            let (number, is_new) = libraries.number(library);
             let name = format!("material-{number}.mtl");
-            if known.is_none() {
-                libraries.push(library.to_owned());
-                self.put(format!("{folder}/{name}"), &read(library)?)?;
+            if is_new {
+                let text = with_maps_named(library, &read(library)?, |picture| {
+                    self.copy_picture(picture, folder, &pictures)
+                })?;
+                self.put(format!("{folder}/{name}"), &text)?;
             }
             Ok::<_, anyhow::Error>(name)
         })?;
         self.put(format!("{folder}/mesh.obj"), &with_own_names)
     }
 
+    /// Copies a picture unless that is done already; its name in the mesh's folder.
+    fn copy_picture(&self, picture: &Path, folder: &str, pictures: &OwnNames) -> Result<String> {
+        let (number, is_new) = pictures.number(picture);
+        // TGA alone is known by its name.
+        let is_tga = picture
+            .extension()
+            .is_some_and(|it| it.eq_ignore_ascii_case("tga"));
+        let extension = if is_tga { ".tga" } else { "" };
+        let name = format!("picture-{number}{extension}");
+        if is_new {
+            self.put(format!("{folder}/{name}"), &read(picture)?)?;
+        }
+        Ok(name)
+    }
+
     fn put(&self, name: String, bytes: &[u8]) -> Result<String> {
         write_new(&self.session.join(&name), bytes)?;
         Ok(name)
+    }
+}
+
+/// Files in the order in which they were named.
+#[derive(Default)]
+struct OwnNames(RefCell<Vec<PathBuf>>);
+
+impl OwnNames {
+    /// A file's number, from 1, and whether it has it only now.
+    fn number(&self, file: &Path) -> (usize, bool) {
+        let mut files = self.0.borrow_mut();
+        match files.iter().position(|known| known == file) {
+            Some(known) => (known + 1, false),
+            None => {
+                files.push(file.to_owned());
+                (files.len(), true)
+            }
+        }
     }
 }
 
@@ -375,7 +445,7 @@ mod tests {
         let albedos: Vec<f64> = (copy.virtuals[0].materials.iter())
             .map(|material| material.albedo.x)
             .collect();
-        assert_eq!(albedos, [0.1, 0.4].map(|kd: f32| f64::from(kd)));
+        assert_eq!(albedos, [0.1, 0.4]);
         let text = fs::read_to_string(session.join(SCENE_NAME)).unwrap();
         assert!(text.contains("# a tetrahedron") && !text.contains("odd.name"));
     }

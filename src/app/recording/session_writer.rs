@@ -13,7 +13,7 @@ use crate::app::files::job_files::Replacing;
 use crate::app::files::new_file::{sync_folder, vanished};
 use crate::app::files::output_error::OutputError;
 use crate::app::files::poses_file::PosesText;
-use crate::app::files::video_writer::{Codec, Naming, VideoWriter};
+use crate::app::files::video_writer::{Codec, Naming, Pace, VideoWriter};
 use crate::capture::{Frame, calibration_text, check_frame_size};
 use crate::geometry::camera::Intrinsics;
 use crate::scene::Anchor;
@@ -113,7 +113,7 @@ impl SessionWriter {
         let written = self
             .times
             .add(&format!("{number},{time_secs}\n"))
-            .and_then(|()| video.push(frame.size_px, &frame.rgba));
+            .and_then(|()| video.push(frame.size_px, time_secs, &frame.rgba));
         self.video = Some(video);
         written?;
         self.frames += 1;
@@ -173,7 +173,9 @@ impl SessionWriter {
         }
         let path = self.folder.path().join("video.mkv");
         let fps = self.head.fps.unwrap_or(ASSUMED_FPS);
-        VideoWriter::create(&path, Codec::Ffv1, size_px, fps, Naming::AtOnce)
+        // Each frame's own time is in times.csv.
+        let pace = Pace::Even { fps };
+        VideoWriter::create(&path, Codec::Ffv1, size_px, pace, Naming::AtOnce)
     }
 
     fn refuse(&self, message: String) -> OutputError {

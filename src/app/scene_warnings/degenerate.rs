@@ -15,7 +15,7 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
     let things = || scene.phantoms.iter().chain(&scene.virtuals);
     let mut warnings = Vec::new();
     for (number, light) in scene.lights.iter().enumerate() {
-        let Light::Point { position_m, .. } = *light else {
+        let (0, Light::Point { position_m, .. }) = (light.anchor, light.light) else {
             continue;
         };
         // Where other anchors are is not known before there are pictures.

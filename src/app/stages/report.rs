@@ -4,6 +4,7 @@ use anyhow::{Result, bail};
 
 use super::tally::Tally;
 use super::tracked::Ended;
+use crate::app::input::sightings::Sightings;
 use crate::scene::Anchor;
 
 /// Markers of a size that is off by a smaller part are not worth a word.
@@ -18,6 +19,8 @@ pub struct Report {
     pub remarks: Vec<String>,
     /// What was wrong with the recording, in words.
     notices: Vec<String>,
+    /// What was looked for and never found, in words.
+    never_found: Option<String>,
     /// Whether it was told to stop before the end.
     interrupted: bool,
 }
@@ -49,12 +52,15 @@ impl Report {
                  markers' sizes and places in the scene are wrong"
             ));
         }
+        remarks.extend(turned_words(anchors, ended));
+        remarks.extend(doubled_words(anchors, ended));
         let watch = ended.mirror_watch.as_ref();
         remarks.extend(watch.and_then(|watch| watch.hint(mirror)));
         Self {
             done,
             remarks,
             notices: ended.notices.iter().map(ToString::to_string).collect(),
+            never_found: ended.sightings.as_ref().and_then(Sightings::never_found),
             interrupted,
         }
     }
@@ -62,7 +68,7 @@ impl Report {
     /// Whether the job was done to its end, with what was done first if it was not.
     ///
     /// # Errors
-    /// An interrupt, or a damaged recording.
+    /// An interrupt, a damaged recording, or something that was looked for and is in none of its pictures.
     pub fn conclude(&self) -> Result<()> {
         if self.interrupted {
             bail!("interrupted; what was done until then is whole");
@@ -73,6 +79,38 @@ impl Report {
                 self.notices.join("; ")
             );
         }
+        if let Some(never_found) = &self.never_found {
+            bail!("{never_found}");
+        }
         Ok(())
     }
+}
+
+/// Boards whose markers are all turned alike.
+fn turned_words(anchors: &[Anchor], ended: &Ended) -> impl Iterator<Item = String> {
+    let turned = anchors.iter().zip(&ended.quarter_turns);
+    turned
+        .filter(|(_, turns)| **turns > 0)
+        .map(|(anchor, turns)| {
+            format!(
+                "all markers of {} are turned by {}° against what the scene says; poses allow for it, rotation_deg (or \
+                 a family's name: DICT_APRILTAG_… is OpenCV's drawing) is to be corrected",
+                anchor.name,
+                90 * turns
+            )
+        })
+}
+
+/// Anchors beside which there were other markers with their ids.
+fn doubled_words(anchors: &[Anchor], ended: &Ended) -> impl Iterator<Item = String> {
+    let doubled = anchors.iter().zip(&ended.doubled_frames);
+    doubled
+        .filter(|(_, frames)| **frames > 0)
+        .map(|(anchor, frames)| {
+            format!(
+                "another marker with an id of {} was seen elsewhere in {frames} of the pictures that were searched; the \
+                 one that fits was tracked",
+                anchor.name
+            )
+        })
 }

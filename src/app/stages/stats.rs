@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::scene::{DetectorKind, TrackingSettings};
+use crate::scene::{DetectorKind, Family, TrackingSettings};
 
 /// Times of one stage over all frames, milliseconds.
 #[derive(Debug, Clone, Copy, Serialize, PartialEq)]
@@ -96,11 +96,21 @@ impl Stats {
     }
 }
 
-/// The detector of `--stats`.
-pub fn detector_in_words(tracking: &TrackingSettings) -> String {
+/// The detector of `--stats` for markers of some families.
+pub fn detector_in_words(tracking: &TrackingSettings, families: &[Family]) -> String {
+    let april_tag = format!("apriltag, decimation {}", tracking.decimation);
     match tracking.detector {
-        DetectorKind::AprilTag => format!("apriltag, decimation {}", tracking.decimation),
+        DetectorKind::AprilTag => april_tag,
         DetectorKind::Aruco => "aruco".to_owned(),
+        DetectorKind::ByFamily => {
+            let has_tags = families.iter().any(|family| family.is_april_tag());
+            let has_others = families.iter().any(|family| !family.is_april_tag());
+            match (has_tags, has_others) {
+                (true, true) => format!("{april_tag}; aruco"),
+                (false, true) => "aruco".to_owned(),
+                _ => april_tag,
+            }
+        }
     }
 }
 

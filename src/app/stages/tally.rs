@@ -35,6 +35,10 @@ impl Tally {
     }
 
     pub(crate) fn add(&mut self, tracked: &TrackedFrame) {
+        // An anchor that comes by itself was not there before.
+        let anchors = self.lost.len().max(tracked.poses.len());
+        self.lost.resize(anchors, self.frames);
+        self.hindered.resize(anchors, BTreeMap::new());
         self.frames += 1;
         self.last_read = Some(tracked.frame.index);
         if let Some(ms) = tracked.decode_ms {

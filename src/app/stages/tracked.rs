@@ -15,10 +15,12 @@ use crate::app::input::capture_talk::say;
 use crate::app::input::live_capture::{Arrived, CaptureEvent, LiveCapture};
 use crate::app::input::mailbox::Taken;
 use crate::app::input::mirror_watch::MirrorWatch;
+use crate::app::input::sightings::Sightings;
 use crate::app::stopwatch::Stopwatch;
 use crate::capture::{Frame, FrameSource, Notice, check_frame_size};
 use crate::geometry::camera::Intrinsics;
-use crate::tracking::{AnchorPose, Tracker};
+use crate::scene::Anchor;
+use crate::tracking::{AnchorPose, Detection, Tracker};
 
 /// Frames that may wait between two stages: enough to even out their times, few enough to stay small.
 pub(crate) const QUEUE: usize = 3;
@@ -36,9 +38,18 @@ pub(crate) enum Frames {
 /// The source of a job's poses.
 pub(crate) enum Poser {
     /// The pictures.
-    Tracker(Box<Tracker>, MirrorWatch),
+    Tracker(Box<PicturePoser>),
     /// A file.
     Given(GivenPoses),
+}
+
+/// A tracker, and what is watched beside it.
+pub(crate) struct PicturePoser {
+    tracker: Tracker,
+    mirror_watch: MirrorWatch,
+    sightings: Sightings,
+    /// Anchors that came by themselves so far.
+    came: usize,
 }
 
 /// A frame with the poses that were measured in it.
@@ -50,6 +61,10 @@ pub(crate) struct TrackedFrame {
     pub decode_ms: Option<f64>,
     /// `None` where poses were given.
     pub track_ms: Option<f64>,
+    /// Anchors whose first frame it is, where each marker is one; their poses come last.
+    pub came: Vec<Anchor>,
+    /// The markers that the poses rest on.
+    pub used: Vec<Detection>,
 }
 
 /// The knowledge that is there once a recording has ended.
@@ -61,6 +76,12 @@ pub(crate) struct Ended {
     pub dropped: u32,
     /// Tells whether it is mirrored; `None` where poses were given.
     pub mirror_watch: Option<MirrorWatch>,
+    /// Tells what was never found; `None` where poses were given.
+    pub sightings: Option<Sightings>,
+    /// Per anchor by how many quarter turns its markers are turned against what the scene says.
+    pub quarter_turns: Vec<u32>,
+    /// Per anchor the frames in which another marker with one of its ids was seen elsewhere.
+    pub doubled_frames: Vec<u32>,
     /// Per anchor by what part of their size its markers are larger than the scene says, where that is known.
     pub size_errors: Vec<Option<f64>>,
 }
@@ -107,13 +128,12 @@ pub(crate) fn each_tracked_frame(
         progress.finish();
         // A stage that fails stops those before it: the last one knows why.
         outcome?;
-        let (mirror_watch, size_errors) = tracked?;
+        let tracked = tracked?;
         let Captured { notices, dropped } = captured?;
         Ok(Ended {
             notices,
             dropped,
-            mirror_watch,
-            size_errors,
+            ..tracked
         })
     })
 }
@@ -196,37 +216,86 @@ fn track_stage(
     mut poser: Poser,
     from_camera: &Receiver<Decoded>,
     to_caller: &SyncSender<TrackedFrame>,
-) -> Result<(Option<MirrorWatch>, Vec<Option<f64>>)> {
+) -> Result<Ended> {
     for (frame, decode_ms) in from_camera {
-        let (poses, track_ms) = poser
-            .poses(&frame)
-            .with_context(|| format!("frame {}", frame.index))?;
+        let frame_words = || format!("frame {}", frame.index);
+        let (poses, track_ms) = poser.poses(&frame).with_context(frame_words)?;
+        let came = poser.came(poses.len());
+        let used = match &poser {
+            Poser::Tracker(poser) => poser.tracker.used_markers().to_vec(),
+            Poser::Given(_) => Vec::new(),
+        };
         let tracked = TrackedFrame {
             frame,
             poses,
             decode_ms,
             track_ms,
+            came,
+            used,
         };
         if to_caller.send(tracked).is_err() {
             break;
         }
     }
     Ok(match poser {
-        Poser::Tracker(tracker, watch) => (Some(watch), tracker.size_errors().collect()),
-        Poser::Given(_) => (None, Vec::new()),
+        Poser::Tracker(poser) => Ended {
+            quarter_turns: poser.tracker.quarter_turns().collect(),
+            doubled_frames: poser.tracker.doubled_frames().collect(),
+            size_errors: poser.tracker.size_errors().collect(),
+            mirror_watch: Some(poser.mirror_watch),
+            sightings: Some(poser.sightings),
+            ..Ended::default()
+        },
+        Poser::Given(_) => Ended::default(),
     })
 }
 
 impl Poser {
+    /// Poses from pictures.
+    pub(crate) fn tracker(
+        tracker: Tracker,
+        mirror_watch: MirrorWatch,
+        sightings: Sightings,
+    ) -> Self {
+        Self::Tracker(Box::new(PicturePoser {
+            tracker,
+            mirror_watch,
+            sightings,
+            came: 0,
+        }))
+    }
+
     /// The poses, and what a tracker took for them.
     fn poses(&mut self, frame: &Frame) -> Result<(Vec<AnchorPose>, Option<f64>)> {
         match self {
-            Self::Tracker(tracker, watch) => {
-                let (poses, ms) = Stopwatch::time(|| tracker.track(frame));
-                watch.watch(frame, !tracker.detections().is_empty())?;
-                Ok((poses?, Some(ms)))
+            Self::Tracker(poser) => {
+                let (poses, ms) = Stopwatch::time(|| poser.tracker.track(frame));
+                let poses = poses?;
+                let shows_marker = !poser.tracker.detections().is_empty();
+                poser.mirror_watch.watch(frame, shows_marker)?;
+                let is_there = |pose: &AnchorPose| pose.camera_from_anchor.is_some();
+                match poser.tracker.is_of_every_marker() {
+                    true => {
+                        let any = poses.iter().any(is_there);
+                        poser.sightings.watch(frame, [any])?;
+                    }
+                    false => poser.sightings.watch(frame, poses.iter().map(is_there))?,
+                }
+                Ok((poses, Some(ms)))
             }
             Self::Given(given) => Ok((given.of_frame(frame.index), None)),
+        }
+    }
+
+    /// Anchors that came with the last of so many poses.
+    fn came(&mut self, poses: usize) -> Vec<Anchor> {
+        match self {
+            Self::Tracker(poser) if poser.tracker.is_of_every_marker() && poses > poser.came => {
+                let came = poser.tracker.lone_anchors().split_off(poser.came);
+                poser.came = poses;
+                came
+            }
+            _ => Vec::new(),
         }
     }
 }

@@ -1,5 +1,7 @@
 //! From what a camera sends to 8-bit RGBA.
 
+use std::borrow::Cow;
+
 use opencv::core::{Mat, MatTraitConst, Vec4b};
 use opencv::imgproc;
 use zune_jpeg::JpegDecoder;
@@ -7,6 +9,7 @@ use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
+use super::standard_tables::with_tables;
 use crate::scene::PixelFormat;
 
 /// How much of a JPEG may be broken.
@@ -18,34 +21,94 @@ pub(super) enum Tolerance {
     Lenient,
 }
 
-/// The picture's size and its RGBA; `None` where the bytes are no such picture. `size_px` is the camera's format; a JPEG
-/// says its own.
+/// A picture as a driver hands it out.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RawPicture<'a> {
+    pub bytes: &'a [u8],
+    pub pixels: PixelFormat,
+    /// The camera's format; a JPEG says its own.
+    pub size_px: [u32; 2],
+    /// Bytes from a row of the first plane to the next; 0 where rows follow each other.
+    pub stride_bytes: usize,
+}
+
+/// The picture's size and its RGBA; `None` where the bytes are no such picture.
 pub(super) fn rgba_of(
-    bytes: &[u8],
-    pixels: PixelFormat,
-    size_px: [u32; 2],
+    picture: RawPicture<'_>,
     tolerance: Tolerance,
 ) -> Option<([u32; 2], Vec<u8>)> {
-    let [width, height] = size_px.map(|side| side as usize);
-    let area = width * height;
-    // What OpenCV is told: channels, the bytes of a picture, its rows, and the conversion.
-    let (channels, length, rows, conversion) = match pixels {
+    let RawPicture {
+        bytes,
+        pixels,
+        size_px,
+        ..
+    } = picture;
+    let rows = size_px[1] as usize;
+    // What OpenCV is told: channels, rows, and the conversion.
+    let (channels, rows, conversion) = match pixels {
         PixelFormat::Mjpeg => return rgba_of_jpeg(bytes, tolerance),
-        PixelFormat::Yuyv => (2, area * 2, height, imgproc::COLOR_YUV2RGBA_YUYV),
-        PixelFormat::Nv12 => (
-            1,
-            area * 3 / 2,
-            height * 3 / 2,
-            imgproc::COLOR_YUV2RGBA_NV12,
-        ),
-        PixelFormat::Grey => (1, area, height, imgproc::COLOR_GRAY2RGBA),
-        PixelFormat::Rgb => (3, area * 3, height, imgproc::COLOR_RGB2RGBA),
-        PixelFormat::Bgr => (3, area * 3, height, imgproc::COLOR_BGR2RGBA),
+        PixelFormat::Y16 => {
+            let packed = without_padding(picture)?;
+            // Full scale is white, to the nearest.
+            let eight = |word: &[u8]| {
+                let deep = u32::from(u16::from_le_bytes([word[0], word[1]]));
+                ((deep * 255 + 32_767) / 65_535) as u8
+            };
+            let rgba = packed
+                .chunks_exact(2)
+                .map(eight)
+                .flat_map(|grey| [grey, grey, grey, 255]);
+            return Some((size_px, rgba.collect()));
+        }
+        PixelFormat::Yuyv => (2, rows, imgproc::COLOR_YUV2RGBA_YUYV),
+        PixelFormat::Yvyu => (2, rows, imgproc::COLOR_YUV2RGBA_YVYU),
+        PixelFormat::Uyvy => (2, rows, imgproc::COLOR_YUV2RGBA_UYVY),
+        PixelFormat::Nv12 => (1, rows * 3 / 2, imgproc::COLOR_YUV2RGBA_NV12),
+        PixelFormat::Yu12 => (1, rows * 3 / 2, imgproc::COLOR_YUV2RGBA_I420),
+        PixelFormat::Grey => (1, rows, imgproc::COLOR_GRAY2RGBA),
+        PixelFormat::Rgb => (3, rows, imgproc::COLOR_RGB2RGBA),
+        PixelFormat::Bgr => (3, rows, imgproc::COLOR_BGR2RGBA),
     };
-    let bytes = bytes.get(..length).filter(|bytes| !bytes.is_empty())?;
-    let rgba = convert(bytes, channels, rows, size_px, conversion);
+    let packed = without_padding(picture)?;
+    let rgba = convert(&packed, channels, rows, size_px, conversion);
     // OpenCV refuses what it has no conversion for: odd sides of pictures whose colour comes at half the resolution.
     Some((size_px, rgba.ok()?))
+}
+
+/// The planes of a picture, row after row; `None` where there are fewer bytes than that.
+fn without_padding(picture: RawPicture<'_>) -> Option<Cow<'_, [u8]>> {
+    let [width, height] = picture.size_px.map(|side| side as usize);
+    let row_bytes = match picture.pixels {
+        PixelFormat::Mjpeg | PixelFormat::Grey | PixelFormat::Nv12 | PixelFormat::Yu12 => width,
+        PixelFormat::Yuyv | PixelFormat::Yvyu | PixelFormat::Uyvy | PixelFormat::Y16 => width * 2,
+        PixelFormat::Rgb | PixelFormat::Bgr => width * 3,
+    };
+    let stride_bytes = picture.stride_bytes.max(row_bytes);
+    // Rows, bytes of each, and bytes to the next.
+    let planes: &[(usize, usize, usize)] = match picture.pixels {
+        PixelFormat::Nv12 => &[(height * 3 / 2, row_bytes, stride_bytes)],
+        PixelFormat::Yu12 => &[
+            (height, row_bytes, stride_bytes),
+            (height / 2 * 2, row_bytes / 2, stride_bytes / 2),
+        ],
+        _ => &[(height, row_bytes, stride_bytes)],
+    };
+    let length: usize = planes.iter().map(|(rows, bytes, _)| rows * bytes).sum();
+    if length == 0 {
+        return None;
+    }
+    if stride_bytes == row_bytes {
+        return picture.bytes.get(..length).map(Cow::from);
+    }
+    let mut packed = Vec::with_capacity(length);
+    let mut begin = 0;
+    for &(rows, row_bytes, stride_bytes) in planes {
+        for _ in 0..rows {
+            packed.extend_from_slice(picture.bytes.get(begin..begin + row_bytes)?);
+            begin += stride_bytes;
+        }
+    }
+    Some(packed.into())
 }
 
 fn convert(
@@ -65,7 +128,8 @@ fn convert(
     Ok(rgba)
 }
 
-fn rgba_of_jpeg(bytes: &[u8], tolerance: Tolerance) -> Option<([u32; 2], Vec<u8>)> {
+/// RGBA of a JPEG and its size.
+pub(super) fn rgba_of_jpeg(bytes: &[u8], tolerance: Tolerance) -> Option<([u32; 2], Vec<u8>)> {
     // Zeros in place of a lost end are codes like any other; the mark of the end tells.
     if tolerance == Tolerance::Strict && !bytes.windows(2).any(|pair| pair == [0xff, 0xd9]) {
         return None;
@@ -73,7 +137,8 @@ fn rgba_of_jpeg(bytes: &[u8], tolerance: Tolerance) -> Option<([u32; 2], Vec<u8>
     let options = DecoderOptions::default()
         .set_strict_mode(tolerance == Tolerance::Strict)
         .jpeg_set_out_colorspace(ColorSpace::RGBA);
-    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    let jpeg = with_tables(bytes);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(&*jpeg), options);
     let rgba = decoder.decode().ok()?;
     let info = decoder.info()?;
     let size_px = [u32::from(info.width), u32::from(info.height)];
@@ -84,6 +149,22 @@ fn rgba_of_jpeg(bytes: &[u8], tolerance: Tolerance) -> Option<([u32; 2], Vec<u8>
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A picture whose rows follow each other.
+    fn rgba_of(
+        bytes: &[u8],
+        pixels: PixelFormat,
+        size_px: [u32; 2],
+        tolerance: Tolerance,
+    ) -> Option<([u32; 2], Vec<u8>)> {
+        let picture = RawPicture {
+            bytes,
+            pixels,
+            size_px,
+            stride_bytes: 0,
+        };
+        super::rgba_of(picture, tolerance)
+    }
     use opencv::core::{Mat, Vector};
     use opencv::imgcodecs;
 
@@ -110,7 +191,16 @@ mod tests {
             let expected = rgb_of([y, cb, cr]);
             let yuyv = [y, cb, y, cr].repeat(2 * 2);
             let nv12: Vec<u8> = [vec![y; 4 * 2], [cb, cr].repeat(2)].concat();
-            for (bytes, pixels) in [(yuyv, PixelFormat::Yuyv), (nv12, PixelFormat::Nv12)] {
+            let yvyu = [y, cr, y, cb].repeat(2 * 2);
+            let uyvy = [cb, y, cr, y].repeat(2 * 2);
+            let yu12 = [vec![y; 4 * 2], vec![cb; 2], vec![cr; 2]].concat();
+            for (bytes, pixels) in [
+                (yuyv, PixelFormat::Yuyv),
+                (yvyu, PixelFormat::Yvyu),
+                (uyvy, PixelFormat::Uyvy),
+                (nv12, PixelFormat::Nv12),
+                (yu12, PixelFormat::Yu12),
+            ] {
                 let (size_px, rgba) = rgba_of(&bytes, pixels, [4, 2], Tolerance::Strict).unwrap();
                 assert_eq!((size_px, rgba.len()), ([4, 2], 32));
                 for pixel in rgba.chunks_exact(4) {
@@ -149,6 +239,87 @@ mod tests {
             .flat_map(|&g| [g, g, g, 255])
             .collect();
         assert_eq!(grey, Some(([1, 4], expected)));
+    }
+
+    #[test]
+    fn sixteen_bits_of_brightness_are_rounded_to_eight() {
+        let deep: [u16; 4] = [0, 0x8000, 0x1234, 0xffff];
+        let bytes: Vec<u8> = deep.iter().flat_map(|word| word.to_le_bytes()).collect();
+        let (_, rgba) = rgba_of(&bytes, PixelFormat::Y16, [2, 2], Tolerance::Strict).unwrap();
+        for (pixel, deep) in rgba.chunks_exact(4).zip(deep) {
+            let expected = (f64::from(deep) * 255.0 / 65_535.0).round() as u8;
+            assert_eq!(pixel, [expected, expected, expected, 255]);
+        }
+    }
+
+    /// The picture of rows that a driver has filled up is that of the rows alone, in each format.
+    #[test]
+    fn padding_of_rows_is_passed_over() {
+        let size_px = [6_u32, 4];
+        let noise = |k: usize| (k.wrapping_mul(2_654_435_761) >> 7) as u8;
+        for (_, pixels) in PixelFormat::BY_NAME {
+            let planes: &[(usize, usize)] = match pixels {
+                PixelFormat::Mjpeg => continue,
+                PixelFormat::Grey => &[(4, 6)],
+                PixelFormat::Nv12 => &[(4, 6), (2, 6)],
+                PixelFormat::Yu12 => &[(4, 6), (2, 3), (2, 3)],
+                PixelFormat::Rgb | PixelFormat::Bgr => &[(4, 18)],
+                PixelFormat::Yuyv | PixelFormat::Yvyu | PixelFormat::Uyvy | PixelFormat::Y16 => {
+                    &[(4, 12)]
+                }
+            };
+            let padding = 10;
+            let (mut plain, mut padded) = (Vec::new(), Vec::new());
+            for &(rows, bytes) in planes {
+                // A plane of half as many bytes has half the padding.
+                let fill = padding * bytes / planes[0].1;
+                for _ in 0..rows {
+                    let row: Vec<u8> = (0..bytes).map(|k| noise(plain.len() + k)).collect();
+                    plain.extend(&row);
+                    padded.extend(row);
+                    padded.extend(vec![0xee; fill]);
+                }
+            }
+            let expected = rgba_of(&plain, pixels, size_px, Tolerance::Strict);
+            assert!(expected.is_some(), "{pixels:?}");
+            let picture = RawPicture {
+                bytes: &padded,
+                pixels,
+                size_px,
+                stride_bytes: planes[0].1 + padding,
+            };
+            let found = super::rgba_of(picture, Tolerance::Strict);
+            assert_eq!(found, expected, "{pixels:?}");
+        }
+    }
+
+    #[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+    #[test]
+    fn webcams_jpegs_without_huffman_tables_are_read() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/cases/camera");
+        for name in ["nodht_avi1.jpg", "nodht_bare.jpg", "nodht_jfif.jpg"] {
+            let bytes = std::fs::read(format!("{folder}/{name}")).unwrap();
+            let (size_px, rgba) =
+                rgba_of(&bytes, PixelFormat::Mjpeg, [0, 0], Tolerance::Strict).expect(name);
+            let shown = std::process::Command::new("ffmpeg")
+                .args(["-v", "error", "-i", &format!("{folder}/{name}")])
+                .args(["-pix_fmt", "rgba", "-f", "rawvideo", "-"])
+                .output()
+                .unwrap()
+                .stdout;
+            assert_eq!(
+                shown.len(),
+                (size_px[0] * size_px[1] * 4) as usize,
+                "{name}"
+            );
+            let off: u64 = rgba
+                .iter()
+                .zip(&shown)
+                .map(|(a, b)| u64::from(a.abs_diff(*b)))
+                .sum();
+            let mean = off as f64 / shown.len() as f64;
+            assert!(mean < 2.0, "{name}: {mean} levels off on the average");
+        }
     }
 
     #[test]

@@ -53,7 +53,7 @@ pub enum LiveError {
     /// It offers nothing that was asked for, or nothing that can be decoded.
     #[error(
         "{camera}: cannot give {wanted}; it offers {}",
-        offers_in_words(offers)
+        offers_in_words(offers, unknown)
     )]
     NoFormat {
         /// The camera.
@@ -62,6 +62,8 @@ pub enum LiveError {
         wanted: String,
         /// What it has.
         offers: Vec<Offer>,
+        /// What it has besides, in formats that are not read: the camera's own names of them.
+        unknown: Vec<String>,
     },
     /// The camera's driver refuses, or the camera has gone.
     #[error("{camera}: {message}")]
@@ -94,6 +96,19 @@ pub enum LiveError {
         /// The address.
         address: String,
     },
+    /// The stream goes on with pictures of another size.
+    #[error(
+        "{address}: its pictures are {} x {} from here on, they were {} x {}",
+        size_px[0], size_px[1], before_px[0], before_px[1]
+    )]
+    StreamResized {
+        /// The address.
+        address: String,
+        /// Width and height of the picture at hand.
+        size_px: [u32; 2],
+        /// Width and height of those before.
+        before_px: [u32; 2],
+    },
     /// A recording that is to be played cannot be.
     #[error(transparent)]
     Recording(#[from] CaptureError),
@@ -120,7 +135,12 @@ fn in_words(found: &[String]) -> String {
     }
 }
 
-fn offers_in_words(offers: &[Offer]) -> String {
+fn offers_in_words(offers: &[Offer], unknown: &[String]) -> String {
+    if !unknown.is_empty() {
+        let known: Vec<String> = offers.iter().map(ToString::to_string).collect();
+        let unread = format!("{}, which gnomon does not read", unknown.join(", "));
+        return [known, vec![unread]].concat().join(", ");
+    }
     if offers.is_empty() {
         return "no format that gnomon reads (it may be the second device of a camera: try the number before)".to_owned();
     }

@@ -58,10 +58,10 @@ pub(super) fn choose(offers: &[Offer], wanted: &WantedFormat) -> Option<Offer> {
 fn quality(pixels: PixelFormat) -> u32 {
     match pixels {
         PixelFormat::Rgb | PixelFormat::Bgr => 4,
-        PixelFormat::Yuyv => 3,
-        PixelFormat::Nv12 => 2,
+        PixelFormat::Yuyv | PixelFormat::Yvyu | PixelFormat::Uyvy => 3,
+        PixelFormat::Nv12 | PixelFormat::Yu12 => 2,
         PixelFormat::Mjpeg => 1,
-        PixelFormat::Grey => 0,
+        PixelFormat::Grey | PixelFormat::Y16 => 0,
     }
 }
 

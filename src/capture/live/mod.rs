@@ -4,11 +4,13 @@
 //! it is back.
 
 mod decode;
+mod device;
 mod error;
 mod feed;
 mod format;
 mod played;
 mod reader;
+mod standard_tables;
 mod stream;
 mod webcam;
 

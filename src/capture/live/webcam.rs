@@ -1,13 +1,9 @@
-//! Webcams, through nokhwa.
+//! Webcams: which one is meant, and what is done about its broken pictures.
 
-use nokhwa::Camera;
-use nokhwa::error::NokhwaError;
-use nokhwa::utils::{
-    ApiBackend, CameraFormat, CameraIndex, CameraInfo, FrameFormat, RequestedFormat,
-    RequestedFormatType, Resolution, frame_formats,
-};
+use nokhwa::utils::{ApiBackend, CameraInfo};
 
 use super::decode::{Tolerance, rgba_of};
+use super::device::{self, Device};
 use super::error::LiveError;
 use super::feed::{Feed, Link, LivePicture, Opened, Opener};
 use super::format::{self, Offer};
@@ -38,8 +34,9 @@ pub fn list_cameras() -> Result<Vec<ListedCamera>, LiveError> {
         .into_iter()
         .map(|KnownDevice { number, name }| {
             let label = label_of(number, &name);
-            let offers =
-                open_any(number, &label).and_then(|mut camera| offers_of(&mut camera, &label));
+            let offers = look_at_device(number, &label)
+                .and_then(|()| device::offered(number, &label))
+                .map(|offered| offered.offers);
             ListedCamera {
                 number,
                 name,
@@ -182,7 +179,7 @@ fn known(wanted: &str) -> Result<Vec<KnownDevice>, LiveError> {
 
 /// A camera that sends pictures.
 struct WebcamFeed {
-    camera: Camera,
+    device: Device,
     name: String,
     label: String,
     offer: Offer,
@@ -199,29 +196,16 @@ impl WebcamFeed {
         link: &Link,
     ) -> Result<Self, LiveError> {
         let label = label_of(number, name);
-        let mut camera = open_any(number, &label)?;
-        let offers = offers_of(&mut camera, &label)?;
-        let offer = format::choose(&offers, wanted).ok_or_else(|| LiveError::NoFormat {
+        look_at_device(number, &label)?;
+        let offered = device::offered(number, &label)?;
+        let offer = format::choose(&offered.offers, wanted).ok_or_else(|| LiveError::NoFormat {
             camera: label.clone(),
             wanted: format::in_words(wanted),
-            offers,
+            offers: offered.offers,
+            unknown: offered.unknown,
         })?;
-        let [width, height] = offer.size_px;
-        let chosen = CameraFormat::new(
-            Resolution::new(width, height),
-            frame_format_of(offer.pixels),
-            offer.fps,
-        );
-        let refused = |error| refusal(&label, &error);
-        if camera.camera_format() != chosen {
-            let exactly = RequestedFormatType::Exact(chosen);
-            camera
-                .set_camera_requset(RequestedFormat::with_formats(exactly, frame_formats()))
-                .map_err(refused)?;
-        }
-        camera.open_stream().map_err(refused)?;
         Ok(Self {
-            camera,
+            device: Device::open(number, offer, &label)?,
             name: name.to_owned(),
             label,
             offer,
@@ -261,16 +245,13 @@ impl Feed for WebcamFeed {
 
     fn next_picture(&mut self) -> Result<Option<LivePicture>, LiveError> {
         loop {
-            let Offer {
-                size_px, pixels, ..
-            } = self.offer;
-            let bytes = self
-                .camera
-                .frame_raw()
-                .map_err(|error| refusal(&self.label, &error))?;
-            let time_secs = self.link.now_secs();
-            if let Some((size_px, rgba)) = rgba_of(&bytes, pixels, size_px, self.tolerance) {
-                drop(bytes);
+            let mut time_secs = 0.0;
+            let (link, tolerance) = (&self.link, self.tolerance);
+            let decoded = self.device.next(&self.label, |picture| {
+                time_secs = link.now_secs();
+                rgba_of(picture, tolerance)
+            })?;
+            if let Some((size_px, rgba)) = decoded {
                 self.broken_in_a_row = 0;
                 return Ok(Some(LivePicture {
                     index: None,
@@ -279,30 +260,12 @@ impl Feed for WebcamFeed {
                     rgba,
                 }));
             }
-            drop(bytes);
             self.bear_broken()?;
         }
     }
 }
 
-/// Opens a camera in whatever format, so that it can be asked for those it has.
-fn open_any(number: u32, label: &str) -> Result<Camera, LiveError> {
-    look_at_device(number, label)?;
-    let any = RequestedFormat::with_formats(RequestedFormatType::None, frame_formats());
-    Camera::new(CameraIndex::Index(number), any).map_err(|error| match error {
-        // There was no format to take.
-        NokhwaError::GetPropertyError { property, .. } if property == "CameraFormat" => {
-            LiveError::NoFormat {
-                camera: label.to_owned(),
-                wanted: format::in_words(&WantedFormat::default()),
-                offers: Vec::new(),
-            }
-        }
-        error => refusal(label, &error),
-    })
-}
-
-/// Asks the system itself where it can tell more than nokhwa, which has texts alone.
+/// Asks the system itself where it can tell more than a library, which has texts alone.
 #[cfg(target_os = "linux")]
 fn look_at_device(number: u32, label: &str) -> Result<(), LiveError> {
     let device = format!("/dev/video{number}");
@@ -330,57 +293,6 @@ fn look_at_device(number: u32, label: &str) -> Result<(), LiveError> {
 #[cfg(not(target_os = "linux"))]
 fn look_at_device(_: u32, _: &str) -> Result<(), LiveError> {
     Ok(())
-}
-
-/// What nokhwa says, as one of our errors.
-fn refusal(label: &str, error: &NokhwaError) -> LiveError {
-    let message = error.to_string();
-    let camera = label.to_owned();
-    // EBUSY: another program has the camera's buffers or its format.
-    if message.contains("os error 16") {
-        LiveError::Busy { camera }
-    } else {
-        LiveError::Camera { camera, message }
-    }
-}
-
-fn offers_of(camera: &mut Camera, label: &str) -> Result<Vec<Offer>, LiveError> {
-    let formats = camera
-        .compatible_camera_formats()
-        .map_err(|error| refusal(label, &error))?;
-    let mut offers: Vec<Offer> = formats
-        .iter()
-        .map(|format| Offer {
-            size_px: [format.width(), format.height()],
-            fps: format.frame_rate(),
-            pixels: pixels_of(format.format()),
-        })
-        .collect();
-    offers.sort_by_key(|offer| (offer.pixels.name(), offer.size_px, offer.fps));
-    offers.dedup();
-    Ok(offers)
-}
-
-fn pixels_of(format: FrameFormat) -> PixelFormat {
-    match format {
-        FrameFormat::MJPEG => PixelFormat::Mjpeg,
-        FrameFormat::YUYV => PixelFormat::Yuyv,
-        FrameFormat::NV12 => PixelFormat::Nv12,
-        FrameFormat::GRAY => PixelFormat::Grey,
-        FrameFormat::RAWRGB => PixelFormat::Rgb,
-        FrameFormat::RAWBGR => PixelFormat::Bgr,
-    }
-}
-
-fn frame_format_of(pixels: PixelFormat) -> FrameFormat {
-    match pixels {
-        PixelFormat::Mjpeg => FrameFormat::MJPEG,
-        PixelFormat::Yuyv => FrameFormat::YUYV,
-        PixelFormat::Nv12 => FrameFormat::NV12,
-        PixelFormat::Grey => FrameFormat::GRAY,
-        PixelFormat::Rgb => FrameFormat::RAWRGB,
-        PixelFormat::Bgr => FrameFormat::RAWBGR,
-    }
 }
 
 #[cfg(test)]
@@ -425,20 +337,5 @@ mod tests {
         assert_eq!(again("0"), Ok(vec![1, 2]), "its number is another's now");
         assert_eq!(again("2"), Ok(vec![2, 1]));
         assert!(pick(&known, "0", Some("Gone")).is_err());
-    }
-
-    #[test]
-    fn a_busy_camera_is_told_as_one() {
-        let error =
-            NokhwaError::OpenStreamError("Device or resource busy (os error 16)".to_owned());
-        assert!(matches!(
-            refusal("webcam:0", &error),
-            LiveError::Busy { .. }
-        ));
-        let error = NokhwaError::ReadFrameError("No such device (os error 19)".to_owned());
-        assert!(matches!(
-            refusal("webcam:0", &error),
-            LiveError::Camera { .. }
-        ));
     }
 }

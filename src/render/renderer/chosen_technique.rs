@@ -8,7 +8,7 @@ use super::super::gpu_scene::{GpuScene, LitBy};
 use super::super::shafts::Shafts;
 use super::super::technique::TechniquePasses;
 use crate::geometry::camera::Intrinsics;
-use crate::scene::{Scene, ShadowTechnique, Shortcut};
+use crate::scene::{Scene, SceneLight, ShadowTechnique, Shortcut};
 use crate::shafts::room::Room;
 use crate::shafts::room_transport::RoomTransport;
 
@@ -34,18 +34,22 @@ impl ChosenTechnique {
         match (scene.chosen_technique().0, &scene.probe) {
             (ShadowTechnique::Shafts, Some(probe)) => {
                 let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Room);
-                let glossy = gpu_scene.glossy;
-                let shafts = Shafts::new(gpu, scene, probe, background, glossy, transport);
+                let kinds = gpu_scene.kinds;
+                let shafts = Shafts::new(gpu, scene, probe, background, kinds, transport);
                 (Self::Shafts(Box::new(shafts)), gpu_scene)
             }
             // (No scene that was read has shafts without a probe.)
             (ShadowTechnique::Volumes | ShadowTechnique::Shafts, _) => {
                 let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Lights);
-                let (samples, glossy) = (scene.shadows.samples, gpu_scene.glossy);
-                let is_single = samples == 1 && scene.lights.len() == 1;
+                let (samples, kinds) = (scene.shadows.samples, gpu_scene.kinds);
+                // (A lamp that moves along may be lost, and one of some size has soft shadows.)
+                let is_plain = |light: &SceneLight| light.anchor == 0 && !light.light.has_size();
+                let is_single = samples == 1
+                    && gpu_scene.surroundings_count() == 0
+                    && matches!(&scene.lights[..], [one] if is_plain(one));
                 let technique = match is_single && !scene.shadows.without.has(Shortcut::Direct) {
-                    true => Self::Direct(Direct::new(gpu, background, glossy)),
-                    false => Self::Accumulated(Accumulated::new(gpu, background, samples, glossy)),
+                    true => Self::Direct(Direct::new(gpu, background, kinds)),
+                    false => Self::Accumulated(Accumulated::new(gpu, background, samples, kinds)),
                 };
                 (technique, gpu_scene)
             }

@@ -5,6 +5,7 @@
 use super::super::anchor_geometry::Role;
 use super::super::attachments::{loaded, texture};
 use super::super::gpu::RenderError;
+use super::super::gpu_scene::DrawnLight;
 use super::super::layers::{LayerPasses, Layers};
 use super::super::light_sums::GAIN_FORMAT;
 use super::super::passes::Passes;
@@ -31,16 +32,22 @@ impl Renderer {
         let shown = |role: Role| role == Role::Real || self.shown == Shown::Composite;
         let (role, depth_m) = passes.role_and_depth(gpu, &|pass, pipeline, role| {
             if shown(role) {
-                gpu_scene.draw_surfaces(pass, pipeline, role, 0, whole);
+                gpu_scene.draw_surfaces(pass, pipeline, role, DrawnLight::Whole(0), whole);
             }
         })?;
         let mut shadow = Vec::new();
         for light in 0..gpu_scene.light_count() {
-            let mut bits = passes.shadow(gpu, &|pass, volumes, role| {
-                if shown(role) {
-                    gpu_scene.count_volumes(pass, volumes, Among::All, role, light, whole);
+            let mut bits = vec![0; role.len()];
+            for piece in gpu_scene.pieces_of(light) {
+                let of_piece = passes.shadow(gpu, &|pass, volumes, role| {
+                    if shown(role) {
+                        gpu_scene.count_volumes(pass, volumes, Among::All, role, piece, whole);
+                    }
+                })?;
+                for (bits, of_piece) in bits.iter_mut().zip(of_piece) {
+                    *bits |= of_piece;
                 }
-            })?;
+            }
             // Where nothing is modelled nothing can be shadowed.
             for (bits, &role) in bits.iter_mut().zip(&role) {
                 *bits = if role == 0 { 0 } else { *bits };
@@ -68,12 +75,13 @@ impl Renderer {
             .get_or_insert_with(|| LayerPasses::new(gpu, size_px));
         let whole = PixelRect::whole(size_px);
         let (roles, _) = passes.role_and_depth(gpu, &|pass, pipeline, role| {
-            gpu_scene.draw_surfaces(pass, pipeline, role, 0, whole);
+            gpu_scene.draw_surfaces(pass, pipeline, role, DrawnLight::Whole(0), whole);
         })?;
         let mut sums = vec![0_u8; roles.len()];
-        for light in 0..gpu_scene.light_count() {
+        let lights = 0..gpu_scene.light_count();
+        for piece in lights.flat_map(|light| gpu_scene.pieces_of(light)) {
             let counts = passes.counts(gpu, &|pass, volumes, role| {
-                gpu_scene.count_volumes(pass, volumes, Among::All, role, light, whole);
+                gpu_scene.count_volumes(pass, volumes, Among::All, role, piece, whole);
             })?;
             // Where nothing is modelled nothing lies in a shadow.
             for ((sum, count), &role) in sums.iter_mut().zip(counts).zip(&roles) {

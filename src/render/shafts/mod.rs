@@ -28,11 +28,12 @@ use super::attachments::{cleared, depth_stencil};
 use super::background::Background;
 use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
-use super::gpu_scene::GpuScene;
+use super::gpu_scene::{DrawnLight, GpuScene};
 use super::light_sums::{BY_GAIN, CompositeShader, LightSums};
 use super::passes::Passes;
 use super::screen_bounds::ScreenBounds;
 use super::shown::Shown;
+use super::surfaces::SurfaceKinds;
 use super::technique::{FrameContext, TechniquePasses};
 use super::volumes::set_scissor;
 use data::ShaftFrame;
@@ -88,7 +89,7 @@ impl Shafts {
         scene: &Scene,
         probe: &ProbeScene,
         background: &Background,
-        glossy: bool,
+        kinds: SurfaceKinds,
         transport: impl FnOnce(&Room<'_>) -> RoomTransport,
     ) -> Self {
         let parts = scene.room(probe);
@@ -102,9 +103,11 @@ impl Shafts {
         let settings = scene.shadows.shafts;
         let samples = scene.shadows.samples;
         let tiling = Tiling::new(1, settings.map_px, device.limits().max_texture_dimension_2d);
-        let environment = glossy.then_some((&probe.probe, probe.exposure as f32));
+        let environment = kinds
+            .glossy
+            .then_some((&probe.probe, probe.exposure as f32));
         Self {
-            pipelines: Pipelines::new(gpu, samples, glossy),
+            pipelines: Pipelines::new(gpu, samples, kinds),
             sums: LightSums::new(gpu, background, samples, composite(settings.difference)),
             maps: Maps::new(gpu, tiling),
             casters: ShaftCasters::new(&scene.occluders()),
@@ -257,7 +260,7 @@ impl Shafts {
             pass,
             &self.pipelines.light_on_virtual,
             Role::Virtual,
-            0,
+            DrawnLight::Whole(0),
             within,
         );
         gpu_scene.set_world(pass);

@@ -7,7 +7,7 @@ use super::super::pipelines::{
     untouched,
 };
 use super::super::stencil::depth_stencil_state;
-use super::super::surfaces::Sided;
+use super::super::surfaces::{Sided, SurfaceKinds};
 use super::super::uniforms::GEOMETRY_GROUPS;
 use super::data::{PATCH_CORNER_LAYOUT, PLACE_LAYOUT, REFLECTED_CORNER_LAYOUT};
 
@@ -58,12 +58,12 @@ pub(super) struct Pipelines {
 }
 
 impl Pipelines {
-    pub fn new(gpu: &Gpu, samples: u32, glossy: bool) -> Self {
+    pub fn new(gpu: &Gpu, samples: u32, kinds: SurfaceKinds) -> Self {
         let format = gpu.light_format;
         let into_depth = PipelineDescription {
             shader: "shafts.wgsl",
             constants: vec![
-                ("GLOSSY", f64::from(glossy)),
+                ("GLOSSY", f64::from(kinds.glossy)),
                 ("MULTISAMPLED", f64::from(samples > 1)),
             ],
             groups: SHAFT_GROUPS.map(Some).to_vec(),
@@ -111,13 +111,13 @@ impl Pipelines {
             ),
             light_on_virtual: Sided::both(
                 gpu,
-                &PipelineDescription {
+                &kinds.of_virtual(PipelineDescription {
                     vertex: "place_sampled",
                     fragment: "light_on_virtual",
                     vertex_buffers: corners,
                     targets: vec![overwritten(format), overwritten(format)],
                     ..into_depth
-                },
+                }),
             ),
             light_on_patch: gpu.pipeline(&PipelineDescription {
                 vertex: "place_patch",

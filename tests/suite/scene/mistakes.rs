@@ -86,7 +86,7 @@ const MISTAKES: &[Mistake] = &[
     added("[[marker]]\nname = \"m\"\nfamily = \"tag36h12\"\n", 8, 10, &[
         "marker.family = \"tag36h12\": unknown family; did you mean \"tag36h11\"? allowed: tag16h5, ",
     ]),
-    added("[[marker]]\nname = \"m\"\nfamily = \"DICT_4X4_50\"\n", 8, 10, &["libapriltag", "detector = \"aruco\""]),
+    added("[tracking]\ndetector = \"apriltag\"\n[[marker]]\nname = \"m\"\nfamily = \"DICT_4X4_50\"\n", 10, 10, &["libapriltag", "leave out tracking.detector"]),
     changed("name = \"table\"", "name = \"table\"\nborder_cells = 3", 5, 16, &["board.border_cells = 3: out of range; allowed: 1 to 2"]),
     added("[[phantom]]\nname = \"p\"\non = \"tabel\"\n", 8, 6, &[
         "phantom.on = \"tabel\": no board or marker has this name; did you mean \"table\"? allowed: table",

@@ -2,6 +2,7 @@
 
 mod meshes;
 mod mistakes;
+mod models;
 mod mutations;
 
 use std::f64::consts::FRAC_PI_2;
@@ -99,15 +100,15 @@ fn a_bad_mesh_names_its_own_line_and_the_scene_s() {
     for (name, part) in [
         (
             "far.obj",
-            "models/far.obj:4:7: f: vertex 9 does not exist; 3 vertices are known by this line (a mesh of ",
+            "models/far.obj:4:7: f: vertex 9 does not exist; the file has 3 (a mesh of ",
         ),
         (
             "empty.obj",
-            "models/empty.obj: the file is empty; an OBJ mesh is expected (a mesh of ",
+            "models/empty.obj: the file is empty; a mesh is expected (a mesh of ",
         ),
         (
             "nan.obj",
-            "models/nan.obj:2:3: v: nan is not a finite number (a mesh of ",
+            "models/nan.obj:2:1: v: no place, and a face needs it; allowed: three finite numbers",
         ),
     ] {
         let text = format!("{HEAD}[[virtual]]\nname = \"v\"\nmesh = \"models/{name}\"\n");
@@ -132,6 +133,8 @@ fn a_small_scene_has_the_defaults() {
             quality: None,
             technique: Technique::Auto,
             samples: 4,
+            light_samples: 64,
+            ambient_samples: 0,
             counting: VolumeCounting::Auto,
             max_silhouette_error_px: 0.5,
             frame_budget_ms: None,
@@ -150,13 +153,7 @@ fn a_small_scene_has_the_defaults() {
         (object.anchor, object.casts, object.mesh_report.closed),
         (0, true, true)
     );
-    assert_eq!(
-        object.materials,
-        [Material {
-            albedo: DVec3::splat(0.5),
-            roughness: None
-        }]
-    );
+    assert_eq!(object.materials, [Material::matt(DVec3::splat(0.5))]);
     assert_eq!(object.anchor_from_object, glam::DAffine3::IDENTITY);
 }
 
@@ -257,8 +254,8 @@ frame_budget_ms = 16
     assert_eq!(
         object.materials,
         [Material {
-            albedo: DVec3::new(0.1, 0.2, 0.3),
-            roughness: Some(0.4)
+            roughness: Some(0.4),
+            ..Material::matt(DVec3::new(0.1, 0.2, 0.3))
         }]
     );
     // Scaled to (2, 1, 1), turned about x to (2, -1, 1), about z to (1, 2, 1), moved.
@@ -287,10 +284,11 @@ frame_budget_ms = 16
     );
     assert_eq!(table.mesh_report.open_edges, 4);
     assert_eq!(
-        scene.lights,
+        scene.world_lights(),
         [Light::Directional {
             direction: -DVec3::Z,
-            irradiance: DVec3::splat(2.0)
+            irradiance: DVec3::splat(2.0),
+            angle_rad: 0.0
         }]
     );
     assert_eq!(scene.ambient_radiance, DVec3::splat(0.5));
@@ -301,6 +299,8 @@ frame_budget_ms = 16
             quality: Some(Quality::Accurate),
             technique: Technique::Volumes,
             samples: 1,
+            light_samples: 256,
+            ambient_samples: 0,
             counting: VolumeCounting::DepthFail,
             max_silhouette_error_px: 0.0,
             frame_budget_ms: Some(16.0),
@@ -491,7 +491,7 @@ fn a_family_may_be_a_file_beside_the_scene() {
     for (detector, name, id, message) in [
         ("aruco", "own.yml", 2, "own.yml"),
         ("aruco", "other.yml", 0, "other.yml"),
-        ("apriltag", "own.yml", 0, "detector = \"aruco\""),
+        ("apriltag", "own.yml", 0, "leave out tracking.detector"),
     ] {
         let error = scene(detector, name, id)
             .expect_err("a mistake")

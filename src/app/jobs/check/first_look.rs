@@ -1,41 +1,182 @@
 //! What the first frames of a scene's recording tell before it is played.
 
-use anyhow::Result;
+use anyhow::{Result, bail};
+use glam::{DAffine3, DVec2, DVec3};
 
 use crate::app::input::mirror_watch::MirrorWatch;
-use crate::capture::{CaptureError, FrameSource};
-use crate::scene::Scene;
-use crate::tracking::{Detector, grey_from_rgba};
+use crate::app::input::sightings::Sightings;
+use crate::app::input::source;
+use crate::capture::live::is_live;
+use crate::capture::{Frame, FrameSource, load_calibration};
+use crate::geometry::camera::Intrinsics;
+use crate::scene::{Object, Scene};
+use crate::tracking::Tracker;
 
-/// Frames that are looked at.
+/// Frames that are read at most, a few seconds of a recording…
+const READ_FRAMES: u32 = 120;
+/// …of which one in so many is looked at, after the first ones.
+const STRIDE: u32 = 10;
+/// The first ones, each of which is looked at.
 const FIRST_FRAMES: u32 = 16;
 
-/// A warning where the recording cannot be read, or shows markers only when it is mirrored; a webcam is not asked.
-pub fn first_look(scene: &Scene) -> Option<String> {
-    match FrameSource::open(&scene.camera.source) {
-        Err(CaptureError::Live { .. }) => None,
-        Err(error) => Some(error.to_string()),
-        Ok(source) => look(scene, source.mirrored(scene.camera.mirror))
-            .unwrap_or_else(|error| Some(format!("{error:#}"))),
+/// The warnings that the first frames of a scene's recording give: mirrored pictures, anchors that are not seen, things that
+/// are out of view. A camera is not asked, but its calibration is read.
+///
+/// # Errors
+/// What keeps the scene from being replayed: a recording that cannot be opened, is damaged where it was read, or has a
+/// calibration that is missing or of another size.
+pub fn first_look(scene: &Scene) -> Result<Vec<String>> {
+    if is_live(&scene.camera.source) {
+        if let Some(path) = &scene.camera.calibration {
+            load_calibration(path)?;
+        }
+        return Ok(Vec::new());
+    }
+    let (mut source, intrinsics) = source::open(&scene.camera)?;
+    let mut look = Look::new(scene, intrinsics)?;
+    let ended = look.watch(&mut source)?;
+    if !source.notices().is_empty() {
+        let notices: Vec<String> = source.notices().iter().map(ToString::to_string).collect();
+        bail!("the recording is damaged: {}", notices.join("; "));
+    }
+    Ok(look.warnings(ended, source.good_frames()))
+}
+
+/// What was seen so far.
+struct Look<'a> {
+    scene: &'a Scene,
+    intrinsics: Intrinsics,
+    tracker: Tracker,
+    mirror: MirrorWatch,
+    /// What is seen in place of anchors.
+    sightings: Sightings,
+    /// For each anchor, whether it was found.
+    found: Vec<bool>,
+    /// For each virtual thing, whether some of it may have been in the picture.
+    in_view: Vec<bool>,
+}
+
+impl<'a> Look<'a> {
+    fn new(scene: &'a Scene, intrinsics: Intrinsics) -> Result<Self> {
+        Ok(Self {
+            scene,
+            intrinsics,
+            tracker: Tracker::new(&scene.tracking, &scene.anchors, intrinsics)?,
+            mirror: MirrorWatch::new(&scene.tracking, scene.families()),
+            sightings: Sightings::of_anchors(&scene.anchors),
+            found: vec![false; scene.anchors.len()],
+            in_view: (scene.virtuals.iter())
+                .map(|thing| !thing.visible || thing.mesh.positions.is_empty())
+                .collect(),
+        })
+    }
+
+    /// Reads frames until all was seen; whether the recording came to its end.
+    fn watch(&mut self, source: &mut FrameSource) -> Result<bool> {
+        for number in 0..READ_FRAMES {
+            let Some(frame) = source.next_frame()? else {
+                return Ok(true);
+            };
+            if number < FIRST_FRAMES || number % STRIDE == 0 {
+                self.add(&frame)?;
+            }
+            if self.found.iter().chain(&self.in_view).all(|&seen| seen) {
+                return Ok(false);
+            }
+        }
+        Ok(false)
+    }
+
+    fn add(&mut self, frame: &Frame) -> Result<()> {
+        let poses: Vec<Option<DAffine3>> = (self.tracker.track(frame)?.into_iter())
+            .map(|pose| pose.camera_from_anchor)
+            .collect();
+        for (found, pose) in self.found.iter_mut().zip(&poses) {
+            *found |= pose.is_some();
+        }
+        let shows_marker =
+            poses.iter().any(Option::is_some) || !self.tracker.detections().is_empty();
+        self.mirror.watch(frame, shows_marker)?;
+        self.sightings
+            .watch(frame, poses.iter().map(Option::is_some))?;
+        let nodes = self.scene.camera_from_nodes(&poses, frame.time_secs);
+        for (in_view, thing) in self.in_view.iter_mut().zip(&self.scene.virtuals) {
+            let camera_from_node = nodes.get(thing.anchor).copied().flatten();
+            *in_view |= camera_from_node.is_some_and(|node| {
+                may_show(thing, node * thing.anchor_from_object, &self.intrinsics)
+            });
+        }
+        Ok(())
+    }
+
+    fn warnings(&self, ended: bool, read_frames: u32) -> Vec<String> {
+        let frames = match ended {
+            true => "any frame".to_owned(),
+            false => format!("the first {read_frames} frames"),
+        };
+        if let Some(hint) = self.mirror.hint(self.scene.camera.mirror) {
+            return vec![hint];
+        }
+        if !self.found.contains(&true) {
+            if self.sightings.saw_others()
+                && let Some(told) = self.sightings.never_found()
+            {
+                return vec![told];
+            }
+            return vec![format!(
+                "no marker of the scene is found in {frames}: are family and ids those of the print, and is it in the \
+                 picture?"
+            )];
+        }
+        let anchors = self.scene.anchors.iter().zip(&self.found);
+        let lost = anchors.filter(|(_, found)| !**found).map(|(anchor, _)| {
+            format!(
+                "\"{}\" is not found in {frames}: what stands on it is not shown",
+                anchor.name
+            )
+        });
+        let things = self.scene.virtuals.iter().zip(&self.in_view);
+        // What stands on an anchor that is not found has been told of.
+        let out_of_view = things
+            .filter(|(thing, seen)| !**seen && self.found.get(thing.anchor) != Some(&false))
+            .map(|(thing, _)| {
+                format!(
+                    "\"{}\" is out of view in {frames}: is its place right?",
+                    thing.name
+                )
+            });
+        lost.chain(out_of_view).collect()
     }
 }
 
-fn look(scene: &Scene, mut source: FrameSource) -> Result<Option<String>> {
-    let markers = scene.anchors.iter().flat_map(|anchor| &anchor.markers);
-    let families: Vec<_> = markers.map(|marker| marker.family).collect();
-    let mut detector = Detector::new(&scene.tracking, &families)?;
-    let mut watch = MirrorWatch::new(&scene.tracking, &scene.anchors);
-    let mut grey = Vec::new();
-    for _ in 0..FIRST_FRAMES {
-        let Some(frame) = source.next_frame()? else {
-            break;
-        };
-        grey_from_rgba(&frame, &mut grey)?;
-        let shows_marker = !detector.detect(&grey, frame.size_px)?.is_empty();
-        watch.watch(&frame, shows_marker)?;
-        if shows_marker {
-            break;
-        }
-    }
-    Ok(watch.hint(scene.camera.mirror))
+/// Whether some of a thing may be in the picture: its box is not all behind the camera, nor all beyond one of the picture's
+/// sides.
+fn may_show(thing: &Object, camera_from_object: DAffine3, intrinsics: &Intrinsics) -> bool {
+    let positions = || {
+        thing
+            .mesh
+            .positions
+            .iter()
+            .map(|position| position.as_dvec3())
+    };
+    let least = positions().fold(DVec3::INFINITY, DVec3::min);
+    let most = positions().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let corners: Vec<DVec3> = (0..8)
+        .map(|corner| {
+            let choose = |axis: usize| match corner >> axis & 1 {
+                0 => least[axis],
+                _ => most[axis],
+            };
+            camera_from_object.transform_point3(DVec3::from_array([0, 1, 2].map(choose)))
+        })
+        .collect();
+    let size_px = DVec2::from_array(intrinsics.size_px.map(f64::from));
+    let first = intrinsics.plane_from_pixel(DVec2::splat(-0.5));
+    let last = intrinsics.plane_from_pixel(size_px - 0.5);
+    let beyond = |outside: &dyn Fn(&DVec3) -> bool| corners.iter().all(outside);
+    !(beyond(&|corner| corner.z <= 0.0)
+        || beyond(&|corner| corner.x < first.x * corner.z)
+        || beyond(&|corner| corner.x > last.x * corner.z)
+        || beyond(&|corner| corner.y < first.y * corner.z)
+        || beyond(&|corner| corner.y > last.y * corner.z))
 }

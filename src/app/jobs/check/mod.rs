@@ -6,13 +6,16 @@ mod room;
 
 use std::fmt::Write;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3, Vec4};
 
+use crate::app::scene_warnings::sizes::{length, sides_m};
 use crate::app::scene_warnings::warnings;
 use crate::geometry::levels::{Level, levels};
-use crate::geometry::mesh::MeshReport;
+use crate::geometry::mesh::{CornerLook, MeshReport};
 use crate::geometry::outline_scale::largest_scale;
-use crate::light::Light;
+use crate::light::{Light, Shape};
+use crate::scene::SceneLight;
+use crate::scene::format::LightKind;
 use crate::scene::format::{SHADOWS, SHADOWS_SECTION};
 use crate::scene::{Anchor, DetectorKind, Object, Quality, Scene, ShadowSettings};
 use budget::budget_line;
@@ -35,6 +38,9 @@ pub fn summary(scene: &Scene) -> String {
             .unwrap_or("what the recording carries"),
     );
     let detector = match scene.tracking.detector {
+        DetectorKind::ByFamily => {
+            "by family: libapriltag for AprilTag's, OpenCV's ArUco for the others"
+        }
         DetectorKind::AprilTag => "libapriltag",
         DetectorKind::Aruco => "OpenCV's ArUco",
     };
@@ -66,7 +72,9 @@ pub fn summary(scene: &Scene) -> String {
     rows(
         &mut text,
         "lights",
-        scene.lights.iter().enumerate().map(light_row).collect(),
+        (0..scene.lights.len())
+            .map(|number| light_row(scene, number))
+            .collect(),
     );
     line(
         &mut text,
@@ -219,7 +227,8 @@ fn object_row(object: &Object, anchors: &[Anchor], with_levels: bool) -> TableRo
     let anchor = anchors
         .get(object.stands_on())
         .map_or("nothing", |anchor| &anchor.name);
-    let mut notes = mesh_notes(&object.mesh_report);
+    let mut notes = vec![material_note(object)];
+    notes.extend(mesh_notes(&object.mesh_report));
     if with_levels {
         notes.extend(levels_note(object));
     }
@@ -241,11 +250,74 @@ fn object_row(object: &Object, anchors: &[Anchor], with_levels: bool) -> TableRo
         cells: vec![
             object.name.clone(),
             format!("on {anchor}"),
+            size_cell(object),
             mesh_cell(object),
             casts.to_owned(),
         ],
         note: notes.join(", "),
     }
+}
+
+/// The sides of the smallest box around a thing where it stands.
+fn size_cell(object: &Object) -> String {
+    let sides = sides_m(object).to_array().map(length);
+    sides.join(" x ")
+}
+
+/// What a thing is made of, each material with its name and colour, and the memory that it takes.
+fn material_note(object: &Object) -> String {
+    /// So many say enough.
+    const SHOWN: usize = 6;
+    let mut told: Vec<String> = object
+        .materials
+        .iter()
+        .enumerate()
+        .take(SHOWN)
+        .map(|(index, material)| {
+            let name = object.material_names.get(index).map_or("", String::as_str);
+            let mut told = format!("{name} albedo {}", vector(material.albedo));
+            for (what, number) in [
+                ("roughness", material.roughness.unwrap_or(0.0)),
+                ("metal", material.metallic),
+            ] {
+                if number > 0.0 {
+                    told += &format!(" {what} {}", short(number));
+                }
+            }
+            if material.opacity < 1.0 {
+                told += &format!(" opacity {}", short(material.opacity));
+            }
+            if material.emission != DVec3::ZERO {
+                told += &format!(" emission {}", vector(material.emission));
+            }
+            told.trim().to_owned()
+        })
+        .collect();
+    if object.mesh.looks.iter().any(|look| look.color != Vec4::ONE) {
+        told.push("vertex colours".to_owned());
+    }
+    if object.materials.len() > SHOWN {
+        told.push(format!("{} more materials", object.materials.len() - SHOWN));
+    }
+    for texture in object.textures.iter().take(SHOWN) {
+        let [width, height] = texture.size_px;
+        told.push(format!("{} {width}x{height}", texture.name));
+    }
+    let mesh = &object.mesh;
+    let bytes = mesh.positions.len() * size_of::<Vec3>()
+        + mesh.triangles.len() * size_of::<([u32; 3], [Vec3; 3], u32)>()
+        + mesh.looks.len() * size_of::<CornerLook>()
+        + mesh.corner_looks.len() * size_of::<[u32; 3]>()
+        + object
+            .textures
+            .iter()
+            .map(|texture| texture.bytes())
+            .sum::<usize>();
+    told.push(match bytes {
+        0..1_000_000 => format!("{} kB", bytes.div_ceil(1000)),
+        _ => format!("{:.1} MB", bytes as f64 / 1e6),
+    });
+    told.join(", ")
 }
 
 /// Size and topology of a mesh, and how it casts.
@@ -338,28 +410,62 @@ fn counted(count: usize, noun: &str) -> String {
     format!("{count} {}", if count == 1 { noun } else { &nouns })
 }
 
-fn light_row((number, light): (usize, &Light)) -> TableRow {
-    let (kind, place, power) = match light {
+fn light_row(scene: &Scene, number: usize) -> TableRow {
+    let SceneLight { anchor, light } = scene.lights[number];
+    let (place, power, size) = match light {
         Light::Point {
             position_m,
             intensity,
+            shape,
         } => (
-            "point",
-            format!("at {} m", vector(*position_m)),
-            format!("intensity {}", vector(*intensity)),
+            format!("at {} m", vector(position_m)),
+            format!("intensity {}", vector(intensity)),
+            shape_in_words(&shape),
         ),
         Light::Directional {
             direction,
             irradiance,
+            angle_rad,
         } => (
-            "directional",
-            format!("towards {}", vector(*direction)),
-            format!("irradiance {}", vector(*irradiance)),
+            format!("towards {}", vector(direction)),
+            format!("irradiance {}", vector(irradiance)),
+            match angle_rad > 0.0 {
+                true => format!("{}° wide", short(angle_rad.to_degrees())),
+                false => String::new(),
+            },
         ),
     };
+    let kind = LightKind::of(&light).name().to_owned();
+    let on = match anchor {
+        0 => String::new(),
+        _ => format!("on \"{}\"", scene.anchors[anchor].name),
+    };
     TableRow {
-        cells: vec![number.to_string(), kind.to_owned(), place, power],
+        cells: vec![number.to_string(), kind, place, power, size, on],
         ..TableRow::default()
+    }
+}
+
+fn shape_in_words(shape: &Shape) -> String {
+    match shape {
+        Shape::Point => String::new(),
+        Shape::Spot {
+            direction,
+            inner_rad,
+            outer_rad,
+        } => format!(
+            "towards {}, {}° to {}° off its axis",
+            vector(*direction),
+            short(inner_rad.to_degrees()),
+            short(outer_rad.to_degrees())
+        ),
+        Shape::Sphere { radius_m } => format!("radius {} m", short(*radius_m)),
+        Shape::Rect(rect) => format!(
+            "{} m by {} m, towards {}",
+            short(rect.size_m.x),
+            short(rect.size_m.y),
+            vector(rect.facing)
+        ),
     }
 }
 

@@ -15,8 +15,8 @@ use crate::app::files::job_files::{JobFiles, Replacing};
 use crate::app::files::picture_files::{write_bytes, write_text};
 use crate::app::files::result_kind::ResultKind;
 use crate::calibration::Target;
-use crate::scene::{Family, Marker};
-use crate::tracking::printed_cells;
+use crate::scene::{Family, Ink, Marker};
+use crate::tracking::{Cell, PrintedMarker};
 pub use page::Paper;
 use page::{MARGIN_MM, Page};
 
@@ -174,17 +174,23 @@ fn board(sheet: &MarkerSheet, size_mm: [f64; 2]) -> Result<(Page, String)> {
         "a board needs at least one row and one column"
     );
     let cell_mm = marker_mm / f64::from(family.cells_across());
+    let beyond_mm = cells_beyond(*family)? * cell_mm;
+    let least_gap_mm = QUIET_CELLS * cell_mm + 2.0 * beyond_mm;
     ensure!(
-        *gap_mm >= QUIET_CELLS * cell_mm,
-        "--gap-mm {gap_mm} leaves too little white between markers; at least one cell, {:.1}, is needed",
-        QUIET_CELLS * cell_mm
+        *gap_mm >= least_gap_mm,
+        "--gap-mm {gap_mm} leaves too little white between markers; at least one cell, {least_gap_mm:.1}, is needed"
     );
     let pitch_mm = marker_mm + gap_mm;
     let extent = [columns, rows].map(|&count| f64::from(count) * pitch_mm - gap_mm);
     let [left, top, right, bottom] = Page::free_mm(size_mm);
     let free = [right - left, bottom - top];
-    if extent[0] > free[0] || extent[1] > free[1] {
-        let fits = free.map(|free| ((free + gap_mm) / pitch_mm).floor().max(0.0) as u32);
+    let printed = extent.map(|extent| extent + 2.0 * beyond_mm);
+    if printed[0] > free[0] || printed[1] > free[1] {
+        let fits = free.map(|free| {
+            ((free - 2.0 * beyond_mm + gap_mm) / pitch_mm)
+                .floor()
+                .max(0.0) as u32
+        });
         bail!(
             "a board of {:.0} x {:.0} mm does not fit on {:.0} x {:.0} mm of this paper; {} columns and {} rows of this \
              size would",
@@ -217,7 +223,7 @@ fn board(sheet: &MarkerSheet, size_mm: [f64; 2]) -> Result<(Page, String)> {
                 origin[0] + f64::from(column) * pitch_mm,
                 origin[1] + f64::from(row) * pitch_mm,
             ];
-            page.print(at, *marker_mm, &printed_cells(*family, id)?);
+            print_marker(&mut page, at, *marker_mm, (*family, id))?;
             let from_center = [0, 1].map(|k| at[k] + marker_mm / 2.0 - origin[k] - extent[k] / 2.0);
             placed.push(Marker {
                 family: *family,
@@ -241,7 +247,8 @@ fn lone(
 ) -> Result<(Vec<Page>, String)> {
     check_size("--size-mm", marker_mm)?;
     ensure!(!ids.is_empty(), "no ids");
-    let quiet_mm = 2.0 * QUIET_CELLS * marker_mm / f64::from(family.cells_across());
+    let cell_mm = marker_mm / f64::from(family.cells_across());
+    let quiet_mm = (2.0 * QUIET_CELLS + cells_beyond(family)?) * cell_mm;
     let card_mm = [
         marker_mm + 2.0 * quiet_mm,
         marker_mm + 2.0 * quiet_mm + LABEL_MM,
@@ -270,11 +277,8 @@ fn lone(
             let at =
                 [0, 1].map(|k| MARGIN_MM + BETWEEN_MM + step[k] as f64 * (card_mm[k] + BETWEEN_MM));
             page.cut_marks(at, card_mm);
-            page.print(
-                at.map(|at| at + quiet_mm),
-                marker_mm,
-                &printed_cells(family, id)?,
-            );
+            let marker_at = at.map(|at| at + quiet_mm);
+            print_marker(&mut page, marker_at, marker_mm, (family, id))?;
             let label = format!("{} {id}  {marker_mm} mm", family.name());
             page.write([at[0] + quiet_mm, at[1] + card_mm[1] - 1.2], 2.5, &label);
             let marker = Marker {
@@ -332,17 +336,53 @@ fn calibration_target(target: &Target, size_mm: [f64; 2]) -> Result<Page> {
         let marker_mm = markers.size_m * 1000.0;
         for (id, square) in (0..).zip(target.marker_squares(false)) {
             let at = corner_mm(square).map(|at| at + (square_mm - marker_mm) / 2.0);
-            page.print(at, marker_mm, &printed_cells(markers.family, id)?);
+            print_marker(&mut page, at, marker_mm, (markers.family, id))?;
         }
     }
     Ok(page)
 }
 
 fn border_text(family: Family) -> String {
+    let inverted = match family.ink() {
+        Ink::WhiteOnBlack => ", white on black",
+        Ink::BlackOnWhite => "",
+    };
     match family.border_cells() {
-        1 => String::new(),
-        cells => format!(", black border of {cells} cells"),
+        1 => inverted.to_owned(),
+        cells => format!(", black border of {cells} cells{inverted}"),
     }
+}
+
+/// Cells that are printed beyond the square of a marker's size: the codes around a ring, or one of black around a white
+/// border.
+fn cells_beyond(family: Family) -> Result<f64> {
+    let printed = PrintedMarker::of(family, 0)?;
+    Ok(f64::from(match (family.has_ring(), family.ink()) {
+        (true, _) => printed.rim(),
+        (false, Ink::WhiteOnBlack) => 1,
+        (false, Ink::BlackOnWhite) => 0,
+    }))
+}
+
+/// Prints a marker whose square has its upper left corner at `at`, with all that belongs to it around.
+fn print_marker(
+    page: &mut Page,
+    at: [f64; 2],
+    marker_mm: f64,
+    (family, id): (Family, u32),
+) -> Result<()> {
+    let printed = PrintedMarker::of(family, id)?;
+    let beyond = cells_beyond(family)?;
+    let cells = -(beyond as i32)..printed.side() + beyond as i32;
+    let white: Vec<bool> = cells
+        .clone()
+        .flat_map(|row| cells.clone().map(move |column| (column, row)))
+        .map(|(column, row)| printed.cell(column, row) != Cell::Black)
+        .collect();
+    let cell_mm = marker_mm / f64::from(printed.side());
+    let at = at.map(|at| at - beyond * cell_mm);
+    page.print(at, marker_mm + 2.0 * beyond * cell_mm, &white);
+    Ok(())
 }
 
 fn check_size(option: &str, mm: f64) -> Result<()> {

@@ -27,6 +27,7 @@ use crate::app::files::poses_file::{GivenPoses, PosesText};
 use crate::app::files::result_kind::ResultKind;
 use crate::app::files::video_writer::Codec;
 use crate::app::input::mirror_watch::MirrorWatch;
+use crate::app::input::sightings::Sightings;
 use crate::app::input::source;
 use crate::app::scene_warnings;
 use crate::app::stages::budget_words::budget_words;
@@ -87,9 +88,10 @@ pub fn replay(request: &ReplayRequest, stop: &AtomicBool) -> Result<Report> {
     request.check_layers()?;
     let poser = match &request.poses_from {
         Some(path) => Poser::Given(GivenPoses::read(path, &scene.anchors)?),
-        None => Poser::Tracker(
-            Box::new(Tracker::new(&scene.tracking, &scene.anchors, intrinsics)?),
-            MirrorWatch::new(&scene.tracking, &scene.anchors),
+        None => Poser::tracker(
+            Tracker::new(&scene.tracking, &scene.anchors, intrinsics)?,
+            MirrorWatch::new(&scene.tracking, scene.families()),
+            Sightings::of_anchors(&scene.anchors),
         ),
     };
     let drawing = (request.out.is_some() || request.sheet.is_some())
@@ -195,6 +197,7 @@ impl ReplayRequest {
 /// A frame on its way to the files.
 struct DrawnFrame {
     index: u32,
+    time_secs: f64,
     rgba: Vec<u8>,
     layers: Option<Layers>,
 }
@@ -373,6 +376,7 @@ impl ReplayRun<'_> {
         Ok((
             DrawnFrame {
                 index: frame.index,
+                time_secs: frame.time_secs,
                 rgba,
                 layers,
             },
@@ -408,7 +412,7 @@ impl ReplayRun<'_> {
             lost: names.zip(self.tally.lost.iter().copied()).collect(),
             detector: match &self.request.poses_from {
                 Some(path) => format!("none: poses from {}", path.display()),
-                None => detector_in_words(&self.scene.tracking),
+                None => detector_in_words(&self.scene.tracking, &self.scene.families()),
             },
             technique: Some(self.scene.chosen_technique().0.name()),
             adapter,
@@ -446,13 +450,14 @@ fn write_stage(
     let mut encode_ms = Vec::new();
     for DrawnFrame {
         index,
+        time_secs,
         rgba,
         layers,
     } in from_renderer
     {
         let (written, ms) = Stopwatch::time(|| -> Result<()> {
             if let Some(sink) = &mut sink {
-                sink.push(index, size_px, &rgba)?;
+                sink.push((index, time_secs), size_px, &rgba)?;
             }
             if let (Some(sink), Some(layers)) = (&mut sink, &layers) {
                 sink.push_layers(index, size_px, layers, &request.layers)?;

@@ -1,0 +1,178 @@
+// What materials and their pictures say at a place of a surface. Reads the scene's materials and its pictures, which lie in
+// stacks of one size each.
+
+// How a picture lies on a surface: the twin of `MapOnGpu` in materials.rs.
+struct MapOnGpu {
+    // Columns of the map from corners' texture coordinates.
+    linear: vec4f,
+    offset: vec2f,
+    // From the lowest bit: 1 if there is one; 2 bits the stack; 1 the texture coordinates; 2 each how it goes on along u and
+    // v; 1 if its texels stay squares; from bit 16 its layer.
+    place: u32,
+    // Width in the low half, height in the high one, texels.
+    size: u32,
+}
+
+// The twin of `MaterialOnGpu`.
+struct MaterialOnGpu {
+    albedo: vec3f,
+    // 0: Lambert alone.
+    roughness: f32,
+    emission: vec3f,
+    metallic: f32,
+    opacity: f32,
+    // What has less opacity is not there.
+    cutoff: f32,
+    normal_scale: f32,
+    occlusion_strength: f32,
+    // 1 if the colour is the radiance itself.
+    unlit: u32,
+    padding_1: u32,
+    padding_2: u32,
+    padding_3: u32,
+    // Colour, emission, roughness, metallic, normal, occlusion.
+    maps: array<MapOnGpu, 6>,
+}
+
+@group(3) @binding(0) var<storage, read> materials: array<MaterialOnGpu>;
+@group(3) @binding(1) var srgb_0: texture_2d_array<f32>;
+@group(3) @binding(2) var srgb_1: texture_2d_array<f32>;
+@group(3) @binding(3) var srgb_2: texture_2d_array<f32>;
+@group(3) @binding(4) var linear_0: texture_2d_array<f32>;
+@group(3) @binding(5) var linear_1: texture_2d_array<f32>;
+@group(3) @binding(6) var linear_2: texture_2d_array<f32>;
+@group(3) @binding(7) var repeated: sampler;
+@group(3) @binding(8) var clamped: sampler;
+
+const WRAP_CLAMP: u32 = 1u;
+const WRAP_MIRROR: u32 = 2u;
+
+// Both sets of texture coordinates, and how they change from pixel to pixel.
+struct TextureCoordinates {
+    uv: vec4f,
+    along_x: vec4f,
+    along_y: vec4f,
+}
+
+struct Sampled {
+    picture: vec2f,
+    along_x: vec2f,
+    along_y: vec2f,
+    stack: u32,
+    layer: u32,
+    repeats: bool,
+}
+
+fn wrapped(place: f32, wrap: u32) -> f32 {
+    if wrap == WRAP_MIRROR {
+        return 1.0 - abs(1.0 - 2.0 * fract(0.5 * place));
+    }
+    if wrap == WRAP_CLAMP {
+        return clamp(place, 0.0, 1.0);
+    }
+    return place;
+}
+
+fn sampled(map: MapOnGpu, at: TextureCoordinates) -> Sampled {
+    let second = (map.place & 8u) != 0u;
+    let linear = mat2x2f(map.linear.xy, map.linear.zw);
+    var picture = linear * select(at.uv.xy, at.uv.zw, second) + map.offset;
+    let along_x = linear * select(at.along_x.xy, at.along_x.zw, second);
+    let along_y = linear * select(at.along_y.xy, at.along_y.zw, second);
+    let wrap = vec2u((map.place >> 4u) & 3u, (map.place >> 6u) & 3u);
+    let size = vec2f(f32(map.size & 0xffffu), f32(map.size >> 16u));
+    let is_squares = (map.place & 256u) != 0u;
+    if is_squares {
+        // In the middle of a texel nothing of its neighbours is mixed in, as long as it is seen enlarged.
+        let footprint = max(abs(along_x), abs(along_y)) * size;
+        if max(footprint.x, footprint.y) < 1.0 {
+            picture = (floor(picture * size) + 0.5) / size;
+        }
+    }
+    let repeats = wrap.x == 0u && wrap.y == 0u;
+    if !repeats {
+        let once = select(picture, fract(picture), wrap == vec2u(0u));
+        picture = vec2f(wrapped(once.x, wrap.x), wrapped(once.y, wrap.y));
+    }
+    return Sampled(picture, along_x, along_y, (map.place >> 1u) & 3u, map.place >> 16u, repeats);
+}
+
+fn is_there(map: MapOnGpu) -> bool {
+    return (map.place & 1u) != 0u;
+}
+
+// Of a picture in sRGB; white where there is none.
+fn srgb_of(map: MapOnGpu, at: TextureCoordinates) -> vec4f {
+    if !is_there(map) {
+        return vec4f(1.0);
+    }
+    let s = sampled(map, at);
+    if s.repeats {
+        switch s.stack {
+            case 0u: { return textureSampleGrad(srgb_0, repeated, s.picture, s.layer, s.along_x, s.along_y); }
+            case 1u: { return textureSampleGrad(srgb_1, repeated, s.picture, s.layer, s.along_x, s.along_y); }
+            default: { return textureSampleGrad(srgb_2, repeated, s.picture, s.layer, s.along_x, s.along_y); }
+        }
+    }
+    switch s.stack {
+        case 0u: { return textureSampleGrad(srgb_0, clamped, s.picture, s.layer, s.along_x, s.along_y); }
+        case 1u: { return textureSampleGrad(srgb_1, clamped, s.picture, s.layer, s.along_x, s.along_y); }
+        default: { return textureSampleGrad(srgb_2, clamped, s.picture, s.layer, s.along_x, s.along_y); }
+    }
+}
+
+// Of a picture of numbers; 1 where there is none.
+fn linear_of(map: MapOnGpu, at: TextureCoordinates) -> vec4f {
+    if !is_there(map) {
+        return vec4f(1.0);
+    }
+    let s = sampled(map, at);
+    if s.repeats {
+        switch s.stack {
+            case 0u: { return textureSampleGrad(linear_0, repeated, s.picture, s.layer, s.along_x, s.along_y); }
+            case 1u: { return textureSampleGrad(linear_1, repeated, s.picture, s.layer, s.along_x, s.along_y); }
+            default: { return textureSampleGrad(linear_2, repeated, s.picture, s.layer, s.along_x, s.along_y); }
+        }
+    }
+    switch s.stack {
+        case 0u: { return textureSampleGrad(linear_0, clamped, s.picture, s.layer, s.along_x, s.along_y); }
+        case 1u: { return textureSampleGrad(linear_1, clamped, s.picture, s.layer, s.along_x, s.along_y); }
+        default: { return textureSampleGrad(linear_2, clamped, s.picture, s.layer, s.along_x, s.along_y); }
+    }
+}
+
+// What the pictures make of a material; `normal` has unit length and looks out of the surface.
+fn material_at(number: u32, uv: vec4f, color: vec4f, tangent: vec4f, normal: vec3f, side: f32) -> Look {
+    let at = TextureCoordinates(uv, dpdx(uv), dpdy(uv));
+    let material = materials[number];
+    let base = srgb_of(material.maps[0], at) * color;
+    let emission = material.emission * srgb_of(material.maps[1], at).rgb;
+    let rough = linear_of(material.maps[2], at).g;
+    let metal = linear_of(material.maps[3], at).b;
+    let occluded = linear_of(material.maps[5], at).r;
+    var bent = normal;
+    if is_there(material.maps[4]) && tangent.w != 0.0 {
+        let along = tangent.xyz - normal * dot(normal, tangent.xyz);
+        let length_squared = dot(along, along);
+        if length_squared > 1e-12 {
+            let u_direction = along * inverseSqrt(length_squared);
+            let v_direction = cross(normal, u_direction) * sign(tangent.w);
+            let picture = linear_of(material.maps[4], at).xyz * 2.0 - 1.0;
+            let scale = material.normal_scale;
+            bent = unit(u_direction * picture.x * scale + v_direction * picture.y * scale + normal * picture.z);
+        }
+    }
+    let albedo = material.albedo * base.rgb;
+    let is_unlit = material.unlit != 0u;
+    // (A mirror's lobe is narrower than any light.)
+    let roughness = select(0.0, max(material.roughness * rough * rough, 0.01), material.roughness > 0.0);
+    return Look(
+        select(albedo, vec3f(0.0), is_unlit),
+        select(roughness, 0.0, is_unlit),
+        select(material.metallic * metal, 0.0, is_unlit),
+        select(emission, albedo, is_unlit),
+        1.0 + material.occlusion_strength * (occluded - 1.0),
+        select(0.0, 1.0, material.opacity * base.a >= material.cutoff),
+        bent * side,
+    );
+}

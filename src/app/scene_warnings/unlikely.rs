@@ -1,0 +1,50 @@
+//! Values that are allowed but hardly meant: markers as large as houses, virtual things in the dark.
+
+use glam::DVec3;
+
+use crate::light::Light;
+use crate::scene::Scene;
+
+/// Nobody prints larger markers, metres.
+const LARGEST_MARKER_M: f64 = 2.0;
+
+/// What there is to warn of.
+pub fn warnings(scene: &Scene) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for anchor in &scene.anchors {
+        let large = anchor
+            .markers
+            .iter()
+            .find(|marker| marker.size_m > LARGEST_MARKER_M);
+        if let Some(marker) = large {
+            warnings.push(format!(
+                "marker {} of \"{}\" is {} m large: size_m is in metres; was {} meant?",
+                marker.id,
+                anchor.name,
+                marker.size_m,
+                marker.size_m / 1000.0
+            ));
+        }
+    }
+    let shows = scene.virtuals.iter().any(|thing| thing.visible);
+    if shows && is_dark(scene) {
+        warnings.push(
+            "nothing lights the scene: virtual things are black; give a [[light]], [ambient] or a [probe]"
+                .to_owned(),
+        );
+    }
+    warnings
+}
+
+fn is_dark(scene: &Scene) -> bool {
+    let shines = scene.lights.iter().any(|light| {
+        let strength = match light.light {
+            Light::Point { intensity, .. } => intensity,
+            Light::Directional { irradiance, .. } => irradiance,
+        };
+        strength != DVec3::ZERO
+    });
+    let mut materials = scene.virtuals.iter().flat_map(|thing| &thing.materials);
+    let glows = materials.any(|material| material.emission != DVec3::ZERO);
+    !shines && !glows && scene.probe.is_none() && scene.ambient_radiance == DVec3::ZERO
+}

@@ -1,0 +1,174 @@
+//! What ffmpeg says while it decodes: a line a frame from its filter `showinfo`, and its complaints.
+//!
+//! `showinfo` prints for each frame `n: 3 pts: 1536 … fmt:yuv420p … s:640x480 …`, and in a line of its own
+//! `color_range:tv color_space:bt709 …`; so it has since FFmpeg 4, and FFmpeg 8 still does.
+
+/// A line that means something.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Said {
+    /// The file was opened.
+    Input,
+    /// A video was found in it, and is decoded.
+    Decoding,
+    /// Of the frames that follow.
+    TimeBase {
+        /// Seconds that a tick of the time stamps lasts.
+        tick_secs: f64,
+        /// Frames per second, where they are known.
+        fps: Option<f64>,
+    },
+    /// A frame is about to come.
+    Frame(FrameHead),
+    /// The colours of the frame that was told last.
+    Colours(ColourTags),
+    /// The frame that comes next has errors in it.
+    Corrupt,
+    /// The reader or the decoder cannot make something of the file.
+    Complaint(String),
+    /// Nothing can be done with it at all.
+    Fatal(String),
+}
+
+/// What a frame is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct FrameHead {
+    /// Its time stamp in ticks; some streams have none.
+    pub stamp: Option<i64>,
+    /// FFmpeg's name of its pixel format.
+    pub pixels: String,
+    pub size_px: [u32; 2],
+}
+
+/// FFmpeg's names of a frame's colours; `unknown` where the stream says nothing.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(super) struct ColourTags {
+    pub range: String,
+    pub matrix: String,
+    pub primaries: String,
+    pub transfer: String,
+}
+
+/// What a line means; `None` where it does not matter. The lines are those of `-loglevel repeat+level+info`.
+pub(super) fn meaning(line: &str) -> Option<Said> {
+    if line.starts_with("[Parsed_showinfo") {
+        let (_, said) = line.split_once("[info] ")?;
+        return of_showinfo(said);
+    }
+    // A picture of its own that ends too soon is given all the same.
+    let is_half_jpeg =
+        line.starts_with("[mjpeg") && (line.contains("[error] ") || line.contains("EOI missing"));
+    if is_half_jpeg || line.contains("corrupt decoded frame") {
+        return Some(Said::Corrupt);
+    }
+    // What comes after the decoder is ours: it complains of time stamps that it does not need.
+    if line.starts_with("[rawvideo") || line.starts_with("[out#") || line.starts_with("[vf#") {
+        return None;
+    }
+    if let Some((_, words)) = line.split_once("[fatal] ") {
+        return Some(Said::Fatal(words.trim().to_owned()));
+    }
+    if let Some((_, words)) = line.split_once("[error] ") {
+        return Some(Said::Complaint(words.trim().to_owned()));
+    }
+    if line.starts_with("[info] Stream mapping:") {
+        return Some(Said::Decoding);
+    }
+    line.starts_with("[info] Input #0").then_some(Said::Input)
+}
+
+fn of_showinfo(said: &str) -> Option<Said> {
+    if let Some(config) = said.strip_prefix("config in time_base: ") {
+        let (tick, _) = config.split_once(',')?;
+        let tick_secs = ratio(tick)?;
+        let fps = value_of(config, "frame_rate: ").and_then(ratio);
+        return Some(Said::TimeBase { tick_secs, fps });
+    }
+    if said.starts_with("color_range:") {
+        let value = |key| value_of(said, key).unwrap_or("unknown").to_owned();
+        return Some(Said::Colours(ColourTags {
+            range: value("color_range:"),
+            matrix: value("color_space:"),
+            primaries: value("color_primaries:"),
+            transfer: value("color_trc:"),
+        }));
+    }
+    if !said.starts_with("n:") {
+        return None;
+    }
+    let (width, height) = value_of(said, " s:")?.split_once('x')?;
+    Some(Said::Frame(FrameHead {
+        stamp: value_of(said, " pts:")?.parse().ok(),
+        pixels: value_of(said, " fmt:")?.to_owned(),
+        size_px: [width.parse().ok()?, height.parse().ok()?],
+    }))
+}
+
+/// The word after a key; there may be spaces between.
+fn value_of<'a>(line: &'a str, key: &str) -> Option<&'a str> {
+    let (_, rest) = line.split_once(key)?;
+    rest.split_whitespace().next()
+}
+
+/// A fraction as FFmpeg writes it (`30000/1001`), as a number; `None` where it is none (`0/0`).
+pub(super) fn ratio(text: &str) -> Option<f64> {
+    let (above, below) = text.trim().split_once('/')?;
+    let (above, below): (f64, f64) = (above.parse().ok()?, below.parse().ok()?);
+    Some(above / below).filter(|ratio| ratio.is_finite() && *ratio > 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_of_ffmpeg_5_and_7_are_read() {
+        let of_5 = "[Parsed_showinfo_1 @ 0x55f5] [info] n:   3 pts:   1536 pts_time:0.1     pos:    16525 \
+                    fmt:yuv420p10le sar:0/1 s:640x480 i:P iskey:0 type:B ";
+        let of_7 = "[Parsed_showinfo_1 @ 0x55f5] [info] n:   3 pts:   1536 pts_time:0.1     duration:    512 \
+                    duration_time:0.0333333 fmt:yuv420p10le cl:left sar:0/1 s:640x480 i:P iskey:0 type:B ";
+        let expected = Said::Frame(FrameHead {
+            stamp: Some(1536),
+            pixels: "yuv420p10le".to_owned(),
+            size_px: [640, 480],
+        });
+        assert_eq!(meaning(of_5), Some(expected.clone()));
+        assert_eq!(meaning(of_7), Some(expected));
+        let unstamped = of_5.replace("pts:   1536", "pts:  NOPTS");
+        assert!(matches!(
+            meaning(&unstamped),
+            Some(Said::Frame(FrameHead { stamp: None, .. }))
+        ));
+    }
+
+    #[test]
+    fn time_base_colours_and_complaints_are_read() {
+        let base =
+            "[Parsed_showinfo_1 @ 0x1] [info] config in time_base: 1/15360, frame_rate: 30/1";
+        let tick_secs = 1.0 / 15360.0;
+        let fps = Some(30.0);
+        assert_eq!(meaning(base), Some(Said::TimeBase { tick_secs, fps }));
+        let none = "[Parsed_showinfo_1 @ 0x1] [info] config out time_base: 0/0, frame_rate: 0/0";
+        assert_eq!(meaning(none), None);
+        let tags = "[Parsed_showinfo_1 @ 0x1] [info] color_range:tv color_space:bt2020nc color_primaries:bt2020 \
+                    color_trc:arib-std-b67";
+        let words = |word: &str| word.to_owned();
+        assert_eq!(
+            meaning(tags),
+            Some(Said::Colours(ColourTags {
+                range: words("tv"),
+                matrix: words("bt2020nc"),
+                primaries: words("bt2020"),
+                transfer: words("arib-std-b67"),
+            }))
+        );
+        let broken = "[h264 @ 0x5] [error] Invalid NAL unit size (1 > 0).";
+        assert_eq!(
+            meaning(broken),
+            Some(Said::Complaint("Invalid NAL unit size (1 > 0).".to_owned()))
+        );
+        let ours = "[rawvideo @ 0x5] [error] Application provided invalid dts";
+        assert_eq!(meaning(ours), None);
+        let corrupt = "[warning] file:a.mp4: corrupt decoded frame in stream 0";
+        assert_eq!(meaning(corrupt), Some(Said::Corrupt));
+    }
+}

@@ -1,0 +1,402 @@
+//! A video file as a recording, decoded by an ffmpeg process: each frame with its own time stamp, its colours as the
+//! stream says, its picture as it is meant to be held. A decoder that crashes or hangs does not take gnomon with it.
+
+mod colours;
+mod log;
+mod planes;
+mod probe;
+mod process;
+pub(super) mod stream;
+
+use std::ffi::OsString;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+use super::error::{CaptureError, Notice};
+use colours::{Colours, ToSrgb};
+use planes::{rgba8, rgba16};
+use probe::{Header, Packets, Probe};
+use process::{Decoder, Next, NoDecoder, RawFrame};
+
+/// For videos that do not know their own.
+const ASSUMED_FPS: f64 = 30.0;
+/// A playlist from a stranger must not reach into the net, and no header asks for more pixels than a file has.
+const INPUT_OPTIONS: [&str; 4] = ["-protocol_whitelist", "file", "-max_pixels", "134217728"];
+const PROBE_OPTIONS: [&str; 2] = ["-protocol_whitelist", "file"];
+
+/// A frame's place in the recording.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Place {
+    pub index: u32,
+    /// Since the first frame, by the stream's own time stamps, seconds.
+    pub time_secs: f64,
+}
+
+pub(super) struct VideoFrames {
+    path: PathBuf,
+    input: OsString,
+    decoder: Decoder,
+    header: Header,
+    size_px: [u32; 2],
+    /// The first frame is decoded when the video is opened, and waits.
+    waiting: Option<RawFrame>,
+    clock: Clock,
+    conversion: Conversion,
+    remark: Option<&'static str>,
+    damage: Damage,
+    next_index: u32,
+    good_frames: u32,
+    ended: bool,
+}
+
+/// What is known of what is wrong with the file.
+#[derive(Default)]
+struct Damage {
+    /// What ffmpeg said first; without it nothing is damaged.
+    complaint: Option<String>,
+    packets: Option<Option<Packets>>,
+    corrupt: u32,
+    first_corrupt: u32,
+}
+
+impl VideoFrames {
+    pub(super) fn open(path: &Path) -> Result<Self, CaptureError> {
+        if is_playlist(path) {
+            return Err(no_video(
+                path,
+                Some("it is a list of other files".to_owned()),
+            ));
+        }
+        // An absolute path cannot be taken for a protocol ("a:b.mp4") or an option.
+        let absolute = std::path::absolute(path).map_err(|error| CaptureError::Io {
+            path: path.to_owned(),
+            error,
+        })?;
+        let mut input = OsString::from("file:");
+        input.push(absolute);
+        let probe = Probe::start(&PROBE_OPTIONS, &input);
+        let mut decoder =
+            Decoder::start(&INPUT_OPTIONS, &input).map_err(|error| no_decoder(path, error))?;
+        let mut damage = Damage::default();
+        let waiting = loop {
+            match decoder.next() {
+                Next::Frame(frame) => break frame,
+                Next::Complaint(words) => _ = damage.complaint.get_or_insert(words),
+                Next::End => return Err(no_frame(path, &decoder, damage.complaint)),
+            }
+        };
+        let header = probe.and_then(Probe::header).unwrap_or_default();
+        // A text is a picture of letters to ffmpeg.
+        if header.container == "tty" {
+            return Err(no_video(path, None));
+        }
+        let mut video = Self {
+            path: path.to_owned(),
+            input,
+            size_px: waiting.size_px,
+            waiting: Some(waiting),
+            clock: Clock::new(1.0 / header.fps.unwrap_or(ASSUMED_FPS)),
+            header,
+            decoder,
+            conversion: Conversion::default(),
+            remark: None,
+            damage,
+            next_index: 0,
+            good_frames: 0,
+            ended: false,
+        };
+        if let (Some(first), Some((_, layout, [_, lines]))) =
+            (&video.waiting, video.decoder.pixels())
+        {
+            video.remark = Colours::of(&first.colours, layout, lines).remark();
+        }
+        Ok(video)
+    }
+
+    /// Frames that the container counts, or else what its length and rate come to.
+    pub(super) fn announced_frames(&self) -> Option<u32> {
+        self.header.counted_frames.or_else(|| {
+            let frames = (self.header.duration_secs? * self.header.fps?).round();
+            (1.0..1e9).contains(&frames).then_some(frames as u32)
+        })
+    }
+
+    /// The nominal rate; frames come at their own times.
+    pub(super) fn fps(&self) -> f64 {
+        self.header.fps.unwrap_or(ASSUMED_FPS)
+    }
+
+    pub(super) fn size_px(&self) -> [u32; 2] {
+        self.size_px
+    }
+
+    /// What is done to its colours that a user should know.
+    pub(super) fn remark(&self) -> Option<&'static str> {
+        self.remark
+    }
+
+    pub(super) fn next_picture(
+        &mut self,
+        notices: &mut Vec<Notice>,
+    ) -> Result<Option<(Place, Vec<u8>)>, CaptureError> {
+        while !self.ended {
+            let Some(frame) = self.next_decoded() else {
+                self.ended = true;
+                self.tell_end(notices);
+                break;
+            };
+            let index = self.index_of(&frame, notices);
+            self.next_index = index + 1;
+            let time_secs = self.clock.time_secs(frame.stamp_secs);
+            if frame.size_px != self.size_px {
+                notices.push(Notice::OtherSize {
+                    path: self.path.clone(),
+                    frame: index,
+                    size_px: frame.size_px,
+                    expected_px: self.size_px,
+                });
+                continue;
+            }
+            if frame.corrupt {
+                if self.damage.corrupt == 0 {
+                    self.damage.first_corrupt = index;
+                }
+                self.damage.corrupt += 1;
+            }
+            self.good_frames += 1;
+            let lines = self.header.lines;
+            let rgba = self
+                .conversion
+                .rgba_of(&self.decoder, &frame, lines)
+                .map_err(|message| CaptureError::Pixels {
+                    path: self.path.clone(),
+                    frame: index,
+                    message,
+                })?;
+            return Ok(Some((Place { index, time_secs }, rgba)));
+        }
+        Ok(None)
+    }
+
+    fn next_decoded(&mut self) -> Option<RawFrame> {
+        if let Some(waiting) = self.waiting.take() {
+            return Some(waiting);
+        }
+        loop {
+            match self.decoder.next() {
+                Next::Frame(frame) => return Some(frame),
+                Next::Complaint(words) => _ = self.damage.complaint.get_or_insert(words),
+                Next::End => return None,
+            }
+        }
+    }
+
+    /// The index counts frames. Where ffmpeg complains, the file's packets tell which of them gave no frame.
+    fn index_of(&mut self, frame: &RawFrame, notices: &mut Vec<Notice>) -> u32 {
+        let counted = self.next_index;
+        let Some(stamp_secs) = frame.stamp_secs else {
+            return counted;
+        };
+        // A stream that was taken up in its middle begins with what cannot be decoded.
+        let is_taken_up = counted == 0 && self.header.container.contains("mpeg");
+        if is_taken_up {
+            return counted;
+        }
+        let lost = self.lost_between(self.clock.last_stamp_secs, Some(stamp_secs));
+        self.tell_lost(lost, notices);
+        counted + lost
+    }
+
+    fn lost_between(&mut self, after_secs: Option<f64>, before_secs: Option<f64>) -> u32 {
+        if self.damage.complaint.is_none() {
+            return 0;
+        }
+        let input = &self.input;
+        let packets = self
+            .damage
+            .packets
+            .get_or_insert_with(|| Packets::of(&PROBE_OPTIONS, input));
+        packets
+            .as_ref()
+            .map_or(0, |packets| packets.between(after_secs, before_secs))
+    }
+
+    fn tell_lost(&self, count: u32, notices: &mut Vec<Notice>) {
+        if count > 0 {
+            notices.push(Notice::Broken {
+                path: self.path.clone(),
+                first: self.next_index,
+                count,
+                good_before: self.good_frames,
+            });
+        }
+    }
+
+    fn tell_end(&mut self, notices: &mut Vec<Notice>) {
+        if self.damage.corrupt > 0 {
+            notices.push(Notice::Corrupt {
+                path: self.path.clone(),
+                first: self.damage.first_corrupt,
+                count: self.damage.corrupt,
+            });
+        }
+        if let Some(announced) = self.cut_off() {
+            notices.push(Notice::EndedEarly {
+                path: self.path.clone(),
+                good: self.good_frames,
+                ended_at: self.next_index,
+                announced,
+            });
+            return;
+        }
+        let after_last = self.lost_between(self.clock.last_stamp_secs, None);
+        self.tell_lost(after_last, notices);
+    }
+
+    /// How many frames the header says, where the file ends before them.
+    fn cut_off(&self) -> Option<u32> {
+        let announced = self.announced_frames()?;
+        let may_be_cut = self.damage.complaint.is_some() || is_cut_riff(&self.path);
+        let length_secs = self.header.duration_secs? - self.clock.length_secs();
+        let slack_frames = match self.header.counted_frames {
+            Some(_) => 1.5,
+            // A length may be that of the sound.
+            None => 2.5 + f64::from(announced) / 100.0,
+        };
+        let ends_early = length_secs * self.fps() > slack_frames;
+        (may_be_cut && ends_early && self.next_index < announced).then_some(announced)
+    }
+}
+
+/// From decoded pixels to sRGB.
+#[derive(Default)]
+struct Conversion {
+    to_srgb: Option<ToSrgb>,
+}
+
+impl Conversion {
+    /// sRGB of the frame whose pixels the decoder has at hand. `lines`: the rows of the stream's pictures.
+    fn rgba_of(
+        &mut self,
+        decoder: &Decoder,
+        frame: &RawFrame,
+        lines: Option<u32>,
+    ) -> Result<Vec<u8>, String> {
+        let (pixels, layout, size_px) = decoder.pixels().ok_or("no pixels came")?;
+        let colours = Colours::of(&frame.colours, layout, lines.unwrap_or(size_px[1]));
+        if colours.is_srgb() {
+            return rgba8(pixels, layout, size_px, colours.coding)
+                .map_err(|error| error.to_string());
+        }
+        let coded =
+            rgba16(pixels, layout, size_px, colours.coding).map_err(|error| error.to_string())?;
+        let largest = layout.largest();
+        let known = self.to_srgb.take();
+        let to_srgb = known
+            .filter(|known| known.fits(colours, largest))
+            .unwrap_or_else(|| ToSrgb::new(colours, largest));
+        Ok(self.to_srgb.insert(to_srgb).rgba(&coded))
+    }
+}
+
+/// Times since the first frame, from time stamps. Readers count on times that increase: where a stamp does not (recordings
+/// that were put one after the other), or there is none, time goes on by a frame.
+struct Clock {
+    frame_secs: f64,
+    /// What is taken from the stamps.
+    origin_secs: Option<f64>,
+    last_stamp_secs: Option<f64>,
+    last_secs: Option<f64>,
+}
+
+impl Clock {
+    fn new(frame_secs: f64) -> Self {
+        Self {
+            frame_secs,
+            origin_secs: None,
+            last_stamp_secs: None,
+            last_secs: None,
+        }
+    }
+
+    fn time_secs(&mut self, stamp_secs: Option<f64>) -> f64 {
+        let next_secs = self.last_secs.map_or(0.0, |last| last + self.frame_secs);
+        let time_secs = match stamp_secs {
+            None => next_secs,
+            Some(stamp_secs) => {
+                self.last_stamp_secs = Some(stamp_secs);
+                let origin_secs = *self.origin_secs.get_or_insert(stamp_secs - next_secs);
+                let by_stamp = stamp_secs - origin_secs;
+                if self.last_secs.is_none_or(|last| by_stamp > last) {
+                    by_stamp
+                } else {
+                    self.origin_secs = Some(stamp_secs - next_secs);
+                    next_secs
+                }
+            }
+        };
+        self.last_secs = Some(time_secs);
+        time_secs
+    }
+
+    /// To the end of the last frame.
+    fn length_secs(&self) -> f64 {
+        self.last_secs.map_or(0.0, |last| last + self.frame_secs)
+    }
+}
+
+/// Whether an AVI file is shorter than its head says: ffmpeg does not complain of its lost end.
+fn is_cut_riff(path: &Path) -> bool {
+    let head = || {
+        let mut head = [0; 8];
+        let mut file = std::fs::File::open(path).ok()?;
+        file.read_exact(&mut head).ok()?;
+        let said = u32::from_le_bytes([head[4], head[5], head[6], head[7]]);
+        // One that was written as a stream does not know its size.
+        let knows = head.starts_with(b"RIFF") && said != 0 && said != u32::MAX;
+        Some(knows && file.metadata().ok()?.len() < u64::from(said) + 8)
+    };
+    head().unwrap_or(false)
+}
+
+/// Whether a file is a list of other files or addresses, which a stranger's file does not make gnomon open.
+fn is_playlist(path: &Path) -> bool {
+    let mut head = Vec::new();
+    let read = std::fs::File::open(path).and_then(|file| file.take(64).read_to_end(&mut head));
+    let text = head
+        .strip_prefix(b"\xef\xbb\xbf")
+        .unwrap_or(&head)
+        .trim_ascii_start();
+    let heads: [&[u8]; 5] = [b"#EXTM3U", b"ffconcat", b"<?xml", b"<MPD", b"v=0"];
+    read.is_ok() && heads.iter().any(|head| text.starts_with(head))
+}
+
+fn no_decoder(path: &Path, error: NoDecoder) -> CaptureError {
+    let error = match error {
+        NoDecoder::Missing(error) => error,
+        NoDecoder::NoPipe => std::io::Error::other("its output cannot be reached"),
+    };
+    CaptureError::FfmpegMissing {
+        path: path.to_owned(),
+        error,
+    }
+}
+
+fn no_frame(path: &Path, decoder: &Decoder, complaint: Option<String>) -> CaptureError {
+    if decoder.opened && decoder.has_video {
+        return CaptureError::NoGoodFrame {
+            path: path.to_owned(),
+        };
+    }
+    no_video(path, complaint)
+}
+
+fn no_video(path: &Path, complaint: Option<String>) -> CaptureError {
+    CaptureError::NotAVideo {
+        path: path.to_owned(),
+        said: complaint.map_or(String::new(), |words| format!(": {words}")),
+    }
+}
+
+#[cfg(test)]
+mod tests;

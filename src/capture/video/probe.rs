@@ -1,0 +1,174 @@
+//! What ffprobe knows of a video beforehand, and of its packets when some of them are broken.
+
+use std::collections::BTreeSet;
+use std::ffi::{OsStr, OsString};
+use std::io::Read;
+use std::process::{Child, Command, Stdio};
+
+use serde::Deserialize;
+
+use super::log::ratio;
+
+/// What a container says of its first video.
+#[derive(Debug, Default)]
+pub(super) struct Header {
+    /// Frames, where the container counts them.
+    pub counted_frames: Option<u32>,
+    /// How long it lasts, seconds.
+    pub duration_secs: Option<f64>,
+    /// Frames per second, on the average or as it is said.
+    pub fps: Option<f64>,
+    /// Rows of a frame before it is turned.
+    pub lines: Option<u32>,
+    /// FFmpeg's names of the container.
+    pub container: String,
+}
+
+#[derive(Deserialize)]
+struct Answer {
+    #[serde(default)]
+    streams: Vec<Stream>,
+    #[serde(default)]
+    packets: Vec<Packet>,
+    format: Option<Container>,
+}
+
+#[derive(Deserialize)]
+struct Stream {
+    height: Option<u32>,
+    r_frame_rate: Option<String>,
+    avg_frame_rate: Option<String>,
+    duration: Option<String>,
+    nb_frames: Option<String>,
+}
+
+#[derive(Deserialize)]
+struct Container {
+    format_name: Option<String>,
+    duration: Option<String>,
+}
+
+#[derive(Deserialize)]
+struct Packet {
+    pts_time: Option<String>,
+    dts_time: Option<String>,
+    #[serde(default)]
+    flags: String,
+}
+
+/// An ffprobe process. Dropped, it is ended.
+pub(super) struct Probe {
+    child: Child,
+}
+
+impl Probe {
+    /// Begins to ask for the header; `None` where the program cannot be started.
+    pub(super) fn start(input_options: &[&str], input: &OsStr) -> Option<Self> {
+        let entries = "stream=height,r_frame_rate,avg_frame_rate,duration,nb_frames:format=format_name,duration";
+        Self::ask(input_options, input, entries)
+    }
+
+    fn ask(input_options: &[&str], input: &OsStr, entries: &str) -> Option<Self> {
+        let mut command = Command::new("ffprobe");
+        command
+            .args(["-v", "quiet", "-select_streams", "V:0", "-of", "json"])
+            .args(["-show_entries", entries])
+            .args(input_options)
+            .arg(input)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null());
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        command.spawn().ok().map(|child| Self { child })
+    }
+
+    /// Waits for what it says of the header.
+    pub(super) fn header(self) -> Option<Header> {
+        let answer = self.answer()?;
+        let stream = answer.streams.into_iter().next()?;
+        let rate = |text: &Option<String>| {
+            let rate = text.as_deref().and_then(ratio);
+            rate.filter(|fps| (0.1..=1000.0).contains(fps))
+        };
+        let container = answer.format;
+        let secs = |text: Option<&String>| text.and_then(|text| text.parse().ok());
+        let whole = container
+            .as_ref()
+            .and_then(|format| format.duration.as_ref());
+        Some(Header {
+            counted_frames: stream.nb_frames.and_then(|count| count.parse().ok()),
+            duration_secs: secs(stream.duration.as_ref()).or_else(|| secs(whole)),
+            fps: nominal_fps(rate(&stream.avg_frame_rate), rate(&stream.r_frame_rate)),
+            lines: stream.height,
+            container: container
+                .and_then(|format| format.format_name)
+                .unwrap_or_default(),
+        })
+    }
+
+    fn answer(mut self) -> Option<Answer> {
+        let mut text = String::new();
+        self.child.stdout.take()?.read_to_string(&mut text).ok()?;
+        serde_json::from_str(&text).ok()
+    }
+}
+
+impl Drop for Probe {
+    fn drop(&mut self) {
+        // Both fail only where it has ended already.
+        _ = self.child.kill();
+        _ = self.child.wait();
+    }
+}
+
+/// The average, but where it counts what is no frame (AVI with reordered frames): no more than the steps of the time stamps.
+fn nominal_fps(average: Option<f64>, by_steps: Option<f64>) -> Option<f64> {
+    match (average, by_steps) {
+        (Some(average), Some(by_steps)) => Some(average.min(by_steps)),
+        (one, other) => one.or(other),
+    }
+}
+
+/// The packets of a video's first stream that hold something to be shown.
+pub(super) struct Packets {
+    /// Their time stamps, microseconds.
+    stamps: BTreeSet<i64>,
+}
+
+impl Packets {
+    /// Reads the whole file without decoding it.
+    pub(super) fn of(input_options: &[&str], input: &OsString) -> Option<Self> {
+        let entries = "packet=pts_time,dts_time,flags";
+        let answer = Probe::ask(input_options, input, entries)?.answer()?;
+        let micros = |text: &String| text.parse().ok().map(micros_of);
+        let stamps = answer
+            .packets
+            .iter()
+            // An edit list hides what is marked so.
+            .filter(|packet| !packet.flags.contains('D'))
+            .filter_map(|packet| packet.pts_time.as_ref().or(packet.dts_time.as_ref()))
+            .filter_map(micros)
+            .collect();
+        Some(Self { stamps })
+    }
+
+    /// How many there are between two frames, or before or after one.
+    pub(super) fn between(&self, after_secs: Option<f64>, before_secs: Option<f64>) -> u32 {
+        use std::ops::Bound::{Excluded, Unbounded};
+        // The stamps are written with six places.
+        let slack = 1;
+        let after = after_secs.map_or(Unbounded, |secs| Excluded(micros_of(secs) + slack));
+        let before = before_secs.map_or(Unbounded, |secs| Excluded(micros_of(secs) - slack));
+        if let (Excluded(after), Excluded(before)) = (after, before)
+            && after >= before
+        {
+            return 0;
+        }
+        u32::try_from(self.stamps.range((after, before)).count()).unwrap_or(u32::MAX)
+    }
+}
+
+fn micros_of(secs: f64) -> i64 {
+    (secs * 1e6).round() as i64
+}

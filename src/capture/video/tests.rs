@@ -1,0 +1,299 @@
+//! Videos as phones, editors and grabbers write them, made by ffmpeg, and held against what ffprobe and ffmpeg say of them.
+
+use std::path::Path;
+use std::process::Command;
+
+use crate::capture::{Frame, FrameSource, Notice};
+
+/// Runs ffmpeg in a folder.
+fn ffmpeg(folder: &Path, arguments: &str) {
+    let status = Command::new("ffmpeg")
+        .current_dir(folder)
+        .args(["-y", "-v", "error", "-nostdin"])
+        .args(arguments.split_whitespace())
+        .status()
+        .unwrap();
+    assert!(status.success(), "{arguments}");
+}
+
+/// The frames' time stamps relative to the first, as ffprobe tells them; AVI has none for some reordered frames.
+fn probed_secs(path: &Path) -> Vec<Option<f64>> {
+    let secs = probed(path, "best_effort_timestamp_time");
+    let first = secs[0].unwrap();
+    secs.iter().map(|time| Some((*time)? - first)).collect()
+}
+
+/// What ffprobe tells of each frame; `None` where it does not know.
+fn probed(path: &Path, entry: &str) -> Vec<Option<f64>> {
+    let output = Command::new("ffprobe")
+        .args(["-v", "error", "-select_streams", "v:0", "-show_entries"])
+        .args([&format!("frame={entry}"), "-of", "csv=p=0"])
+        .arg(path)
+        .output()
+        .unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    text.lines()
+        .filter_map(|line| line.split(',').next())
+        .filter(|word| !word.is_empty())
+        .map(|word| word.parse().ok())
+        .collect()
+}
+
+fn all(path: &Path) -> (Vec<Frame>, Vec<Notice>) {
+    let mut source = FrameSource::open(path.to_str().unwrap()).unwrap();
+    let mut frames = Vec::new();
+    while let Some(frame) = source.next_frame().unwrap() {
+        frames.push(frame);
+    }
+    (frames, source.notices().to_vec())
+}
+
+const SOURCE: &str = "-f lavfi -i testsrc2=size=128x96:rate=30:duration=4";
+
+#[test]
+fn every_frame_comes_with_its_own_time_and_nothing_whole_is_damaged() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let make = |arguments: &str| ffmpeg(folder, arguments);
+    make(&format!(
+        "{SOURCE} -vf select=not(between(t\\,1\\,2.5))+not(mod(n\\,3)) -fps_mode vfr vfr.mp4"
+    ));
+    make("-i vfr.mp4 -c copy vfr.mkv");
+    make(&format!("{SOURCE} -g 30 whole.mp4"));
+    make("-ss 1.2 -i whole.mp4 -c copy trimmed.mp4");
+    make("-i whole.mp4 -c copy -output_ts_offset 1.4 starts_late.mkv");
+    make("-i whole.mp4 -c copy -output_ts_offset 3.7 starts_late.mp4");
+    make(&format!(
+        "{SOURCE} -frames:v 60 -c:v libx264 -bf 3 b_frames.mp4"
+    ));
+    make("-i b_frames.mp4 -c copy b_frames.avi");
+    make("-i b_frames.mp4 -c copy b_frames.ts");
+    make("-i whole.mp4 -f lavfi -i sine=d=12 -c:v copy -c:a aac longer_sound.mkv");
+    make(&format!("{SOURCE} -c:v mpeg4 -bf 2 mpeg4.avi"));
+    make(&format!("{SOURCE} -c:v mjpeg mjpeg.avi"));
+    make(&format!(
+        "{SOURCE} -r 30000/1001 -c:v libvpx -auto-alt-ref 1 -b:v 200k vp8.webm"
+    ));
+    make(&format!("{SOURCE} -c:v mpeg2video mpeg2.mpg"));
+    for name in [
+        "vfr.mp4",
+        "vfr.mkv",
+        "whole.mp4",
+        "trimmed.mp4",
+        "starts_late.mkv",
+        "starts_late.mp4",
+        "b_frames.mp4",
+        "b_frames.avi",
+        "b_frames.ts",
+        "longer_sound.mkv",
+        "mpeg4.avi",
+        "mjpeg.avi",
+        "vp8.webm",
+        "mpeg2.mpg",
+    ] {
+        let path = folder.join(name);
+        let (frames, notices) = all(&path);
+        let expected = probed_secs(&path);
+        assert_eq!(notices, [], "{name}");
+        assert_eq!(frames.len(), expected.len(), "{name}");
+        for (k, (frame, expected)) in frames.iter().zip(&expected).enumerate() {
+            assert_eq!(frame.index as usize, k, "{name}");
+            let found = frame.time_secs;
+            let agrees = expected.is_none_or(|expected| (found - expected).abs() < 2e-6);
+            assert!(agrees, "{name} {k}: {found} {expected:?}");
+        }
+    }
+}
+
+#[test]
+fn a_frame_of_another_size_is_left_out_and_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for (size, name) in [("128x96", "a.ts"), ("160x128", "b.ts")] {
+        ffmpeg(
+            folder,
+            &format!("-f lavfi -i testsrc2=size={size}:rate=30 -frames:v 5 -f mpegts {name}"),
+        );
+    }
+    // Their stamps follow each other; b's frames come between two parts of a.
+    let parts = ["a.ts", "b.ts", "a.ts"].map(|name| std::fs::read(folder.join(name)).unwrap());
+    let path = folder.join("mixed.ts");
+    std::fs::write(&path, parts.concat()).unwrap();
+    let (frames, notices) = all(&path);
+    // The seam costs frames: those that are left are ffprobe's to tell.
+    let widths = probed(&path, "width");
+    let odd = notices.iter().filter(|notice| {
+        matches!(
+            notice,
+            Notice::OtherSize {
+                size_px: [160, 128],
+                expected_px: [128, 96],
+                ..
+            }
+        )
+    });
+    let count = |width: f64| widths.iter().filter(|found| **found == Some(width)).count();
+    assert!(count(160.0) >= 4 && count(128.0) >= 8, "{widths:?}");
+    assert_eq!(odd.count(), count(160.0), "{notices:?}");
+    assert_eq!(frames.len(), count(128.0));
+    let (alone, _) = all(&folder.join("a.ts"));
+    for frame in &frames {
+        assert!(
+            alone.iter().any(|alone| alone.rgba == frame.rgba),
+            "frame {}",
+            frame.index
+        );
+    }
+    assert!(
+        frames
+            .windows(2)
+            .all(|pair| pair[0].time_secs < pair[1].time_secs)
+    );
+}
+
+#[test]
+fn a_phones_turned_video_is_held_upright() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    ffmpeg(
+        folder,
+        &format!("{SOURCE} -vf gblur=sigma=4 -frames:v 3 -c:v libx264 -pix_fmt yuv420p flat.mp4"),
+    );
+    for degrees in [90, 180, 270] {
+        ffmpeg(
+            folder,
+            &format!("-i flat.mp4 -c copy -metadata:s:v rotate={degrees} turned.mp4"),
+        );
+        ffmpeg(folder, "-i turned.mp4 -frames:v 1 shown.png");
+        let shown = image::open(folder.join("shown.png")).unwrap().to_rgba8();
+        let (turned, notices) = all(&folder.join("turned.mp4"));
+        assert_eq!(notices, []);
+        assert_eq!(turned[0].size_px, <[u32; 2]>::from(shown.dimensions()));
+        let off: u64 = turned[0]
+            .rgba
+            .iter()
+            .zip(shown.as_raw())
+            .map(|(a, b)| u64::from(a.abs_diff(*b)))
+            .sum();
+        let mean = off as f64 / shown.len() as f64;
+        assert!(mean < 2.0, "{degrees}: {mean} levels off on the average");
+    }
+}
+
+/// Bars of known colours through each coding.
+#[test]
+fn colours_are_those_that_the_stream_says() {
+    let colours: [[u8; 3]; 6] = [
+        [200, 60, 40],
+        [40, 180, 60],
+        [30, 50, 210],
+        [128; 3],
+        [240, 230, 40],
+        [90, 20, 120],
+    ];
+    let bars = |size: [u32; 2]| {
+        image::RgbImage::from_fn(size[0], size[1], |x, _| {
+            image::Rgb(colours[(x * 6 / size[0]) as usize])
+        })
+    };
+    let codings = [
+        (
+            "bt601.mp4",
+            "smpte170m",
+            "tv",
+            "-colorspace smpte170m -color_primaries smpte170m -color_trc smpte170m",
+            [192, 64],
+        ),
+        (
+            "bt709.mp4",
+            "bt709",
+            "tv",
+            "-colorspace bt709 -color_primaries bt709 -color_trc bt709",
+            [192, 64],
+        ),
+        (
+            "full.mp4",
+            "bt709",
+            "pc",
+            "-color_range pc -colorspace bt709 -color_primaries bt709 -color_trc bt709",
+            [192, 64],
+        ),
+        ("small_untagged.mkv", "smpte170m", "tv", "", [192, 64]),
+        ("large_untagged.mkv", "bt709", "tv", "", [192, 720]),
+        (
+            "bt2020_matrix.mp4",
+            "bt2020nc",
+            "tv",
+            "-colorspace bt2020nc -color_primaries bt709 -color_trc bt709",
+            [192, 64],
+        ),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for (name, matrix, range, tags, size) in codings {
+        bars(size).save(folder.join("bars.png")).unwrap();
+        for pixels in ["yuv420p", "yuv444p", "yuv422p10le"] {
+            ffmpeg(
+                folder,
+                &format!(
+                    "-loop 1 -i bars.png -frames:v 2 -vf scale=out_color_matrix={matrix}:out_range={range}:flags=accurate_rnd+full_chroma_int,format={pixels} \
+                 -c:v libx264 -qp 1 {tags} {name}"
+                ),
+            );
+            let (frames, notices) = all(&folder.join(name));
+            assert_eq!(notices, []);
+            for (bar, colour) in colours.iter().enumerate() {
+                let place = ((size[1] / 2 * size[0] + 16 + bar as u32 * 32) * 4) as usize;
+                let found = &frames[1].rgba[place..place + 3];
+                let worst = (0..3).map(|k| found[k].abs_diff(colour[k])).max();
+                assert!(worst <= Some(2), "{name} {pixels}: {found:?}, {colour:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn hlg_is_tone_mapped_with_a_word() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hlg.mkv");
+    ffmpeg(
+        folder.path(),
+        &format!(
+            "{SOURCE} -frames:v 2 -pix_fmt yuv420p10le -colorspace bt2020nc -color_primaries bt2020 -color_trc arib-std-b67 -c:v ffv1 hlg.mkv"
+        ),
+    );
+    let source = FrameSource::open(path.to_str().unwrap()).unwrap();
+    let remark = source.remark().unwrap();
+    assert!(
+        remark.contains("hlg.mkv: HLG") && remark.contains("tone-mapped"),
+        "{remark}"
+    );
+    ffmpeg(folder.path(), &format!("{SOURCE} -frames:v 2 plain.mp4"));
+    let plain = folder.path().join("plain.mp4");
+    assert_eq!(
+        FrameSource::open(plain.to_str().unwrap()).unwrap().remark(),
+        None
+    );
+}
+
+#[test]
+fn a_playlist_reaches_for_nothing_else_than_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mp4");
+    std::fs::write(
+        &path,
+        "#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\nhttp://127.0.0.1:1/a.ts\n",
+    )
+    .unwrap();
+    assert!(FrameSource::open(path.to_str().unwrap()).is_err());
+    let text = folder.path().join("notes.txt");
+    std::fs::write(&text, "not a video\n").unwrap();
+    let said = FrameSource::open(text.to_str().unwrap())
+        .err()
+        .unwrap()
+        .to_string();
+    assert!(
+        said.contains("notes.txt: cannot be opened as a video"),
+        "{said}"
+    );
+}

@@ -1,0 +1,235 @@
+//! A light of some size cut into small ones: from each a shadow has a sharp edge, and all together have the soft one.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::DVec3;
+
+use super::{Light, Rect, Shape};
+
+impl Light {
+    /// The light as `count` small ones of equal power, which together give what it gives: itself where that is 1. The first of
+    /// them are the same places whatever the count, and each second one lies opposite the one before it, so that no even number
+    /// has its middle elsewhere.
+    ///
+    /// A sphere's fill it as densely as 1 / √(radius² − distance²): so they fill the disc that it is from whatever side evenly
+    /// (the three first numbers of evenly spread unit quaternions; Shoemake 1992, "Uniform random rotations"), and, being the
+    /// same to all sides, light what is outside it as it does (Newton's shells).
+    pub fn pieces(&self, count: usize) -> Vec<Light> {
+        match count {
+            0 | 1 => vec![*self],
+            _ => (0..count).map(|index| self.piece(index, count)).collect(),
+        }
+    }
+
+    fn piece(&self, index: usize, count: usize) -> Light {
+        let share = 1.0 / count as f64;
+        let smaller = share.sqrt();
+        let side = if index % 2 == 0 { 1.0 } else { -1.0 };
+        let spread = spread(index / 2);
+        match *self {
+            Self::Point {
+                position_m,
+                intensity,
+                shape,
+            } => {
+                let (aside_m, shape) = match shape {
+                    Shape::Point | Shape::Spot { .. } => (DVec3::ZERO, shape),
+                    Shape::Sphere { radius_m } => (
+                        in_sphere(spread) * radius_m,
+                        Shape::Sphere {
+                            radius_m: radius_m * smaller,
+                        },
+                    ),
+                    Shape::Rect(rect) => {
+                        let [width, height] = rect.half_sides_m();
+                        let aside =
+                            width * (2.0 * spread[0] - 1.0) + height * (2.0 * spread[1] - 1.0);
+                        let size_m = rect.size_m * smaller;
+                        (aside, Shape::Rect(Rect { size_m, ..rect }))
+                    }
+                };
+                Self::Point {
+                    position_m: position_m + aside_m * side,
+                    intensity: intensity * share,
+                    shape,
+                }
+            }
+            Self::Directional {
+                direction,
+                irradiance,
+                angle_rad,
+            } => {
+                let (x, y) = direction.any_orthonormal_pair();
+                let [across, up, _] = in_sphere(spread).to_array();
+                let aside = (x * across + y * up) * ((0.5 * angle_rad).sin() * side);
+                let forth = (1.0 - aside.length_squared()).max(0.0).sqrt();
+                // (The directions of a disc are evenly spread where their shadows on a plane across it are.)
+                Self::Directional {
+                    direction: aside + direction * forth,
+                    // A plane across the axis gets its share, one across this direction as much more as it lies straighter.
+                    irradiance: irradiance * (share / forth.max(1e-3)),
+                    angle_rad: angle_rad * smaller,
+                }
+            }
+        }
+    }
+}
+
+/// Light of one radiance from the half of all directions about a unit vector, as `count` lights from one direction each: a plane
+/// across it gets the same of each, and of all together exactly what it gets from all around. (Malley's spiral over the disc.)
+pub fn surroundings(up: DVec3, radiance: DVec3, count: usize) -> Vec<Light> {
+    let (x, y) = up.any_orthonormal_pair();
+    let from = |index: usize| {
+        let radius_squared = (index as f64 + 0.5) / count as f64;
+        let (sine, cosine) = (TAU * 0.618_033_988_749_895 * index as f64).sin_cos();
+        let height = (1.0 - radius_squared).sqrt();
+        let aside = (x * cosine + y * sine) * radius_squared.sqrt();
+        Light::directional(
+            -(aside + up * height),
+            radiance * (PI / (count as f64 * height)),
+        )
+    };
+    (0..count).map(from).collect()
+}
+
+/// Three numbers from 0 to 1, of any number of such evenly spread (Roberts 2018, "The unreasonable effectiveness of quasirandom
+/// sequences": steps by the powers of the inverse of the root of x⁴ = x + 1).
+fn spread(index: usize) -> [f64; 3] {
+    const ROOT: f64 = 1.220_744_084_605_759_6;
+    let step = index as f64 + 1.0;
+    [1, 2, 3].map(|power| (0.5 + step / ROOT.powi(power)).fract())
+}
+
+/// A place in the unit sphere, see [`Light::pieces`].
+fn in_sphere([u, v, w]: [f64; 3]) -> DVec3 {
+    let (sine, cosine) = (TAU * v).sin_cos();
+    let radius = (1.0 - u).sqrt();
+    DVec3::new(radius * cosine, radius * sine, u.sqrt() * (TAU * w).sin())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::light::irradiance;
+    use glam::DVec2;
+
+    fn lamp(shape: Shape) -> Light {
+        Light::Point {
+            position_m: DVec3::new(0.1, -0.2, 0.5),
+            intensity: DVec3::ONE,
+            shape,
+        }
+    }
+
+    fn rect() -> Rect {
+        Rect::upright(
+            DVec3::new(-0.3, 0.4, -1.0).normalize(),
+            DVec3::Z,
+            DVec2::new(0.3, 0.2),
+        )
+    }
+
+    /// By what a light is off that is cut into pieces, at some places on planes that are tilted.
+    fn worst_off(light: &Light, count: usize) -> f64 {
+        let mut worst: f64 = 0.0;
+        for place in [
+            DVec3::ZERO,
+            DVec3::new(0.3, 0.1, 0.0),
+            DVec3::new(-0.2, -0.4, 0.2),
+        ] {
+            for normal in [
+                DVec3::Z,
+                DVec3::new(0.6, 0.0, 0.8),
+                DVec3::new(-0.5, 0.5, 0.7),
+            ] {
+                let normal = normal.normalize();
+                let whole = irradiance(light, place, normal).x;
+                let pieces = light.pieces(count);
+                let sum: f64 = pieces
+                    .iter()
+                    .map(|piece| irradiance(piece, place, normal).x)
+                    .sum();
+                worst = worst.max((sum / whole - 1.0).abs());
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn pieces_together_give_what_the_light_gives() {
+        let sun = Light::Directional {
+            direction: DVec3::new(0.3, 0.2, -1.0).normalize(),
+            irradiance: DVec3::ONE,
+            angle_rad: 0.2,
+        };
+        for light in [
+            lamp(Shape::Sphere { radius_m: 0.05 }),
+            lamp(Shape::Rect(rect())),
+            sun,
+        ] {
+            assert!(
+                worst_off(&light, 16) < 0.02,
+                "{light:?}: {}",
+                worst_off(&light, 16)
+            );
+            assert!(
+                worst_off(&light, 64) < 0.005,
+                "{light:?}: {}",
+                worst_off(&light, 64)
+            );
+        }
+    }
+
+    #[test]
+    fn a_sphere_fills_its_disc_evenly_from_every_side() {
+        let sphere = lamp(Shape::Sphere { radius_m: 1.0 });
+        let Light::Point { position_m, .. } = sphere else {
+            return;
+        };
+        let count = 256;
+        let places: Vec<DVec3> = (sphere.pieces(count).iter())
+            .filter_map(|piece| match piece {
+                Light::Point {
+                    position_m: place, ..
+                } => Some(*place - position_m),
+                Light::Directional { .. } => None,
+            })
+            .collect();
+        for way in [
+            DVec3::X,
+            DVec3::Y,
+            DVec3::Z,
+            DVec3::new(1.0, -2.0, 0.5),
+            DVec3::ONE,
+        ] {
+            let way = way.normalize();
+            let mut along: Vec<f64> = places.iter().map(|place| place.dot(way)).collect();
+            along.sort_by(f64::total_cmp);
+            for (index, &at) in along.iter().enumerate() {
+                // The part of a disc on one side of a line.
+                let part = 0.5 + (at * (1.0 - at * at).max(0.0).sqrt() + at.asin()) / PI;
+                let counted = (index as f64 + 0.5) / count as f64;
+                assert!((part - counted).abs() < 0.03, "{way}: {part} {counted}");
+            }
+        }
+    }
+
+    #[test]
+    fn surroundings_give_a_plane_what_all_around_gives() {
+        let sky = surroundings(DVec3::Z, DVec3::ONE, 32);
+        let on = |normal: DVec3| -> f64 {
+            let given = sky
+                .iter()
+                .map(|light| irradiance(light, DVec3::ZERO, normal).x);
+            given.sum()
+        };
+        assert!((on(DVec3::Z) - PI).abs() < 1e-12);
+        // A wall sees half of them.
+        let walls = (0..16).map(|step| {
+            let (y, x) = (TAU * f64::from(step) / 16.0).sin_cos();
+            on(DVec3::new(x, y, 0.0))
+        });
+        let mean = walls.sum::<f64>() / 16.0;
+        assert!((mean - PI / 2.0).abs() < 0.15, "{mean}");
+    }
+}

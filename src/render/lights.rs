@@ -1,0 +1,249 @@
+//! The lights of a frame: where they are, and in how many pieces each casts its shadows.
+//!
+//! A light of some size is cut into as many pieces as its widest penumbra has pixels (`light::pieces`): each piece casts a shadow
+//! with a sharp edge, no more than a pixel from that of the next. The pieces follow from where everything is, and from nothing
+//! else: what stands still is drawn the same in each frame.
+
+use std::ops::Range;
+
+use glam::{DAffine3, DVec3};
+
+use crate::geometry::penumbra::SizedPlace;
+use crate::light::{Light, Shape};
+use crate::scene::SceneLight;
+
+use super::gpu::Gpu;
+use super::screen_bounds::light_place;
+use super::uniforms::{CameraLight, LIGHT_GROUP, UniformRow};
+
+/// The lights that cast shadow volumes, in the present frame.
+pub(super) struct Lights {
+    scene: Vec<SceneLight>,
+    placed: Vec<PlacedLight>,
+    /// What shines from all around, a light for each direction; they have slots like the rest.
+    surroundings: Vec<Piece>,
+    /// All pieces of the lights, then the surroundings.
+    pieces: Vec<Piece>,
+    /// For each light the slots of its pieces, as many as it ever had.
+    slots: Vec<Vec<usize>>,
+    slot_count: usize,
+    uniforms: UniformRow,
+    capacity: usize,
+    group: wgpu::BindGroup,
+}
+
+/// A light in the world.
+struct PlacedLight {
+    /// `None` where nobody knows where it is.
+    light: Option<Light>,
+    pieces: Range<usize>,
+}
+
+/// A part of a light that casts shadows with sharp edges.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Piece {
+    /// In world space.
+    pub light: Light,
+    /// Its number, which stays the same from frame to frame.
+    pub slot: usize,
+    /// What a real surface loses where a virtual thing hides the piece, if that is something else, and the slot of that.
+    pub taken: Option<(Light, usize)>,
+}
+
+impl Lights {
+    /// `surroundings`: what of light from all around things may hide, and what a surface loses where virtual ones do.
+    pub fn new(gpu: &Gpu, scene: Vec<SceneLight>, surroundings: Vec<[Light; 2]>) -> Self {
+        let capacity = 2 * scene.len();
+        let count = surroundings.len();
+        let (uniforms, group) = uniforms(gpu, capacity);
+        Self {
+            slots: vec![Vec::new(); scene.len()],
+            placed: Vec::new(),
+            pieces: Vec::new(),
+            slot_count: 2 * count,
+            surroundings: surrounding_pieces(surroundings),
+            scene,
+            uniforms,
+            capacity,
+            group,
+        }
+    }
+
+    /// Takes as many lights that shine otherwise.
+    pub fn follow(&mut self, scene: Vec<SceneLight>, surroundings: Vec<[Light; 2]>) {
+        self.scene = scene;
+        self.surroundings = surrounding_pieces(surroundings);
+    }
+
+    /// Places the lights; those on anchors without a pose do not shine.
+    pub fn place(&mut self, camera_from_anchor: &[Option<DAffine3>]) {
+        let world_from_camera = camera_from_anchor
+            .first()
+            .copied()
+            .flatten()
+            .map(|pose| pose.inverse());
+        let placed = self.scene.iter().map(|&SceneLight { anchor, light }| {
+            let light = match anchor {
+                // The world stands still to its lights: no camera may come between, or rounding would move them.
+                0 => world_from_camera.map(|_| light),
+                _ => world_from_camera
+                    .zip(camera_from_anchor[anchor])
+                    .map(|(world, anchor)| light.moved(&(world * anchor))),
+            };
+            PlacedLight {
+                light,
+                pieces: 0..0,
+            }
+        });
+        self.placed = placed.collect();
+        self.pieces.clear();
+    }
+
+    /// Cuts each light into as many pieces as `count` says, and takes all to the GPU.
+    pub fn cut(
+        &mut self,
+        gpu: &Gpu,
+        camera_from_world: &DAffine3,
+        count: impl Fn(&Light) -> usize,
+    ) {
+        self.pieces.clear();
+        for (placed, slots) in self.placed.iter_mut().zip(&mut self.slots) {
+            let first = self.pieces.len();
+            let pieces = placed.light.map(|light| light.pieces(count(&light)));
+            for (index, light) in pieces.into_iter().flatten().enumerate() {
+                if index == slots.len() {
+                    slots.push(self.slot_count);
+                    self.slot_count += 1;
+                }
+                let slot = slots[index];
+                let taken = None;
+                self.pieces.push(Piece { light, slot, taken });
+            }
+            placed.pieces = first..self.pieces.len();
+        }
+        self.pieces.extend(&self.surroundings);
+        let needed = self.scene.len() + self.slot_count;
+        if needed > self.capacity {
+            self.capacity = needed.next_power_of_two();
+            (self.uniforms, self.group) = uniforms(gpu, self.capacity);
+        }
+        let write = |index: usize, light: &Light| {
+            let light = CameraLight::new(light, camera_from_world);
+            self.uniforms.write(&gpu.queue, index, &light);
+        };
+        for (index, placed) in self.placed.iter().enumerate() {
+            if let Some(light) = &placed.light {
+                write(index, light);
+            }
+        }
+        for piece in &self.pieces {
+            write(self.scene.len() + piece.slot, &piece.light);
+            if let Some((light, slot)) = &piece.taken {
+                write(self.scene.len() + slot, light);
+            }
+        }
+    }
+
+    /// Number of lights, also of those that do not shine at present.
+    pub fn count(&self) -> usize {
+        self.scene.len()
+    }
+
+    /// How many slots pieces have.
+    pub fn slot_count(&self) -> usize {
+        self.slot_count
+    }
+
+    /// The lights that shine, in world space.
+    pub fn shining(&self) -> Vec<Light> {
+        self.placed
+            .iter()
+            .filter_map(|placed| placed.light)
+            .collect()
+    }
+
+    /// All pieces.
+    pub fn pieces(&self) -> &[Piece] {
+        &self.pieces
+    }
+
+    /// Which of them are a light's.
+    pub fn pieces_of(&self, light: usize) -> Range<usize> {
+        self.placed
+            .get(light)
+            .map_or(0..0, |placed| placed.pieces.clone())
+    }
+
+    /// How many directions of the surroundings there are.
+    pub fn surroundings_count(&self) -> usize {
+        self.surroundings.len()
+    }
+
+    /// Which of them are the surroundings.
+    pub fn pieces_of_surroundings(&self) -> Range<usize> {
+        self.pieces.len().saturating_sub(self.surroundings.len())..self.pieces.len()
+    }
+
+    /// Puts a whole light into group 1.
+    pub fn set_whole(&self, pass: &mut wgpu::RenderPass<'_>, light: usize) {
+        pass.set_bind_group(1, &self.group, &[self.uniforms.offset(light)]);
+    }
+
+    /// Puts what a piece loses to virtual things into group 1.
+    pub fn set_taken(&self, pass: &mut wgpu::RenderPass<'_>, piece: usize) {
+        let piece = self.pieces.get(piece);
+        let slot = piece.map_or(0, |piece| piece.taken.map_or(piece.slot, |(_, slot)| slot));
+        let offset = self.uniforms.offset(self.scene.len() + slot);
+        pass.set_bind_group(1, &self.group, &[offset]);
+    }
+
+    /// Puts a piece into group 1.
+    pub fn set_piece(&self, pass: &mut wgpu::RenderPass<'_>, piece: usize) {
+        let slot = self.pieces.get(piece).map_or(0, |piece| piece.slot);
+        let offset = self.uniforms.offset(self.scene.len() + slot);
+        pass.set_bind_group(1, &self.group, &[offset]);
+    }
+}
+
+fn surrounding_pieces(surroundings: Vec<[Light; 2]>) -> Vec<Piece> {
+    let count = surroundings.len();
+    let piece = |(slot, [light, taken]): (usize, [Light; 2])| Piece {
+        light,
+        slot,
+        taken: Some((taken, count + slot)),
+    };
+    surroundings.into_iter().enumerate().map(piece).collect()
+}
+
+fn uniforms(gpu: &Gpu, count: usize) -> (UniformRow, wgpu::BindGroup) {
+    let row = UniformRow::new::<CameraLight>(&gpu.device, "lights", count.max(2));
+    let group = gpu.bind_group(&LIGHT_GROUP, [row.binding()]);
+    (row, group)
+}
+
+/// A light's middle and its half extents, in world space; none for a light without a size.
+pub(super) fn sized_place(light: &Light) -> SizedPlace {
+    let half_extents = match *light {
+        Light::Point { shape, .. } => match shape {
+            Shape::Point | Shape::Spot { .. } => Vec::new(),
+            Shape::Sphere { radius_m } => DVec3::AXES.map(|axis| axis * radius_m).to_vec(),
+            Shape::Rect(rect) => {
+                let [width, height] = rect.half_sides_m();
+                vec![width, height, width + height, width - height]
+            }
+        },
+        Light::Directional { angle_rad: 0.0, .. } => Vec::new(),
+        Light::Directional {
+            direction,
+            angle_rad,
+            ..
+        } => {
+            let (x, y) = direction.any_orthonormal_pair();
+            [x, y].map(|way| way * (0.5 * angle_rad).tan()).to_vec()
+        }
+    };
+    SizedPlace {
+        place: light_place(light, &DAffine3::IDENTITY),
+        half_extents,
+    }
+}

@@ -1,0 +1,208 @@
+//! A glTF file as it lies on disk: its JSON, checked, and the bytes of its buffers.
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use gltf::json::{self, Root};
+use gltf::{Document, Glb};
+
+use super::extensions;
+use crate::scene::error::SceneError;
+use crate::scene::plain_file::{self, MOST_MESH};
+
+/// A file that was read, with what was told of it so far.
+pub(super) struct GltfFile<'a> {
+    pub path: &'a Path,
+    pub document: Document,
+    pub buffers: Vec<Vec<u8>>,
+    /// Bytes of the file and of all that it names: what else takes memory is held against it.
+    pub bytes: usize,
+    /// Sentences for the user, each once.
+    pub notes: Vec<String>,
+}
+
+impl<'a> GltfFile<'a> {
+    /// Reads JSON and buffers; `note_read` is told of each other file.
+    pub fn read(
+        path: &'a Path,
+        bytes: &[u8],
+        note_read: &dyn Fn(&Path),
+    ) -> Result<Self, SceneError> {
+        let failed = |message: String| SceneError::of_file(path, message);
+        let (text, binary) = parts(bytes).map_err(failed)?;
+        let mut root = parsed(path, &text)?;
+        let mut notes = Vec::new();
+        extensions::check(&root, &mut notes).map_err(failed)?;
+        // They were checked; the crate knows fewer of them.
+        root.extensions_required.clear();
+        give_bounds(&mut root);
+        let document = Document::from_json(root)
+            .map_err(|error| failed(format!("not a valid glTF file: {error}")))?;
+        let mut file = Self {
+            path,
+            bytes: bytes.len(),
+            buffers: Vec::new(),
+            notes,
+            document,
+        };
+        let mut binary = binary.map(Cow::into_owned);
+        for buffer in file.document.clone().buffers() {
+            let place = format!("buffers[{}]", buffer.index());
+            let found = match buffer.source() {
+                gltf::buffer::Source::Bin => binary.take().ok_or_else(|| {
+                    failed(format!("{place}: no uri, and the file has no binary chunk"))
+                })?,
+                gltf::buffer::Source::Uri(uri) => file.resource(&place, uri, note_read)?,
+            };
+            if found.len() < buffer.length() {
+                return Err(failed(format!(
+                    "{place}: {} bytes, but byteLength says {}",
+                    found.len(),
+                    buffer.length()
+                )));
+            }
+            file.buffers.push(found);
+        }
+        Ok(file)
+    }
+
+    /// An error of a place in the file.
+    pub fn error(&self, place: &str, message: impl std::fmt::Display) -> SceneError {
+        SceneError::of_file(self.path, format!("{place}: {message}"))
+    }
+
+    /// Tells something, once.
+    pub fn note(&mut self, note: String) {
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
+    }
+
+    /// What a `uri` names: data in itself, or a file beside this one.
+    pub fn resource(
+        &mut self,
+        place: &str,
+        uri: &str,
+        note_read: &dyn Fn(&Path),
+    ) -> Result<Vec<u8>, SceneError> {
+        let bytes = match uri.strip_prefix("data:") {
+            Some(data) => from_data_uri(data).map_err(|message| self.error(place, message))?,
+            None => {
+                let path =
+                    file_of_uri(self.path, uri).map_err(|message| self.error(place, message))?;
+                note_read(&path);
+                let shown = path.display().to_string();
+                plain_file::read(&path, MOST_MESH).map_err(|error| {
+                    self.error(place, format!("\"{shown}\" cannot be read: {error}"))
+                })?
+            }
+        };
+        self.bytes += bytes.len();
+        Ok(bytes)
+    }
+
+    /// The bytes of a view of a buffer.
+    pub fn view(&self, place: &str, view: &gltf::buffer::View<'_>) -> Result<&[u8], SceneError> {
+        let buffer = &self.buffers[view.buffer().index()];
+        let end = view.offset().checked_add(view.length());
+        end.and_then(|end| buffer.get(view.offset()..end))
+            .ok_or_else(|| {
+                let message = format!(
+                    "bufferViews[{}] reaches beyond its buffer of {} bytes",
+                    view.index(),
+                    buffer.len()
+                );
+                self.error(place, message)
+            })
+    }
+}
+
+/// The file that a relative URI names, beside the one that names it.
+///
+/// # Errors
+/// A URI with a scheme or a host; one that is no text.
+pub(super) fn file_of_uri(beside: &Path, uri: &str) -> Result<PathBuf, String> {
+    let has_scheme = uri.split_once(':').is_some_and(|(scheme, _)| {
+        scheme.len() > 1 && scheme.chars().all(|c| c.is_ascii_alphanumeric())
+    });
+    if has_scheme || uri.starts_with("//") {
+        return Err(format!(
+            "\"{uri}\" is not beside the file; download it and name it by a relative path"
+        ));
+    }
+    let decoded = percent_encoding::percent_decode_str(uri);
+    let name = decoded
+        .decode_utf8()
+        .map_err(|_| format!("\"{uri}\" is no text"))?;
+    Ok(beside.parent().unwrap_or(Path::new("")).join(&*name))
+}
+
+/// The JSON and the binary chunk.
+fn parts(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, Option<Cow<'_, [u8]>>), String> {
+    if !bytes.starts_with(b"glTF") {
+        return Ok((Cow::Borrowed(bytes), None));
+    }
+    let glb = Glb::from_slice(bytes).map_err(|error| match error {
+        gltf::Error::Binary(gltf::binary::Error::Version(version)) => {
+            format!("glTF of version {version}; version 2 is read")
+        }
+        error => format!("not a whole .glb file: {error}"),
+    })?;
+    Ok((glb.json, glb.bin))
+}
+
+fn parsed(path: &Path, text: &[u8]) -> Result<Root, SceneError> {
+    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+    json::deserialize::from_slice(text).map_err(|error| {
+        let message = format!("not glTF: {error}");
+        match std::str::from_utf8(text) {
+            Ok(text) if error.line() > 0 && text.len() < 1 << 20 => {
+                let before: usize = text
+                    .split_inclusive('\n')
+                    .take(error.line() - 1)
+                    .map(str::len)
+                    .sum();
+                let at = before + error.column().saturating_sub(1);
+                SceneError::at(path, text, at..at + 1, message)
+            }
+            _ => SceneError::of_file(path, message),
+        }
+    })
+}
+
+/// Gives positions bounds where exporters have left them out: nothing here reads them.
+fn give_bounds(root: &mut Root) {
+    let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let positions: Vec<usize> = primitives
+        .flat_map(|primitive| &primitive.attributes)
+        .filter(|(semantic, _)| {
+            matches!(
+                semantic,
+                json::validation::Checked::Valid(gltf::Semantic::Positions)
+            )
+        })
+        .map(|(_, accessor)| accessor.value())
+        .collect();
+    for index in positions {
+        if let Some(accessor) = root.accessors.get_mut(index) {
+            let zero = || json::serialize::to_value([0.0; 3]).ok();
+            if accessor.min.is_none() || accessor.max.is_none() {
+                (accessor.min, accessor.max) = (zero(), zero());
+            }
+        }
+    }
+}
+
+fn from_data_uri(data: &str) -> Result<Vec<u8>, String> {
+    let Some((kind, content)) = data.split_once(',') else {
+        return Err("a data URI without a comma".to_owned());
+    };
+    match kind.ends_with(";base64") {
+        true => STANDARD
+            .decode(content.trim_end())
+            .map_err(|error| format!("a data URI that is not base64: {error}")),
+        false => Ok(percent_encoding::percent_decode_str(content).collect()),
+    }
+}

@@ -1,0 +1,347 @@
+//! Primitives of meshes as triangles in the scene's space, with all that their corners have.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use glam::{DMat3, DMat4, DVec3, Vec2, Vec3, Vec4};
+use gltf::accessor::Dimensions;
+use gltf::mesh::Mode;
+use gltf::{Primitive, Semantic};
+
+use super::file::GltfFile;
+use super::materials::material;
+use super::nodes::{Nodes, PlacedNode};
+use super::skins::{morph, scene_from_vertices, turned_tangent};
+use super::tangents::made_tangents;
+use super::textures::Textures;
+use crate::geometry::mesh::{CornerLook, RawLooks, RawTriangle};
+use crate::scene::error::SceneError;
+use crate::scene::raw_model::GivenMaterial;
+
+/// Corners that all primitives have together at most, where the file itself has no more bytes.
+const MOST_CORNERS: usize = 12_000_000;
+
+/// Triangles so far.
+#[derive(Default)]
+pub(super) struct Builder {
+    pub positions: Vec<Vec3>,
+    pub triangles: Vec<RawTriangle>,
+    pub looks: RawLooks,
+    pub materials: Vec<GivenMaterial>,
+    pub textures: Textures,
+    /// By the file's number, and whether corners have colours.
+    index_of_material: HashMap<(Option<usize>, bool), u32>,
+    /// Primitives of points or lines.
+    without_surface: usize,
+}
+
+/// What the vertices of a primitive have, in the mesh's space.
+struct Vertices {
+    positions: Vec<DVec3>,
+    normals: Vec<Option<DVec3>>,
+    looks: Vec<CornerLook>,
+    has_colors: bool,
+    has_tangents: bool,
+}
+
+impl Builder {
+    /// Adds a mesh where its node or its skin has it.
+    pub fn add(
+        &mut self,
+        file: &mut GltfFile<'_>,
+        nodes: &Nodes<'_>,
+        placed: &PlacedNode<'_>,
+        mesh: &gltf::Mesh<'_>,
+        note_read: &dyn Fn(&Path),
+    ) -> Result<(), SceneError> {
+        let weights = placed.node.weights().or(mesh.weights()).unwrap_or_default();
+        for primitive in mesh.primitives() {
+            let place = format!("meshes[{}].primitives[{}]", mesh.index(), primitive.index());
+            if matches!(
+                primitive.mode(),
+                Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip
+            ) {
+                self.without_surface += 1;
+                continue;
+            }
+            let mut vertices = vertices(file, &place, &primitive)?;
+            morph(
+                file,
+                (&place, &primitive, weights),
+                &mut vertices.positions,
+                &mut vertices.normals,
+            )?;
+            let triangles = triangles(file, &place, &primitive, vertices.positions.len())?;
+            let corners = self.positions.len()
+                + vertices.positions.len()
+                + 3 * (self.triangles.len() + triangles.len());
+            if corners > MOST_CORNERS.max(file.bytes) {
+                return Err(file.error(&place, format!("more than {MOST_CORNERS} corners in all")));
+            }
+            let material = self.material(file, &primitive, vertices.has_colors, note_read)?;
+            let scene_from_vertex = match placed.node.skin() {
+                Some(skin) if primitive.get(&Semantic::Joints(0)).is_some() => scene_from_vertices(
+                    file,
+                    nodes,
+                    &skin,
+                    (&place, &primitive, vertices.positions.len()),
+                )?,
+                _ => vec![placed.scene_from_node; vertices.positions.len()],
+            };
+            self.put(
+                file,
+                &place,
+                (vertices, &scene_from_vertex),
+                triangles,
+                material,
+            )?;
+        }
+        Ok(())
+    }
+
+    /// Tells what has no surface.
+    pub fn note_passed_over(&self, file: &mut GltfFile<'_>) {
+        if self.without_surface > 0 {
+            file.note(format!(
+                "primitives of points or lines, which have no surface, are passed over: {}",
+                self.without_surface
+            ));
+        }
+    }
+
+    fn material(
+        &mut self,
+        file: &mut GltfFile<'_>,
+        primitive: &Primitive<'_>,
+        is_colored: bool,
+        note_read: &dyn Fn(&Path),
+    ) -> Result<u32, SceneError> {
+        let given = primitive.material();
+        let key = (given.index(), is_colored && given.index().is_none());
+        if let Some(&index) = self.index_of_material.get(&key) {
+            return Ok(index);
+        }
+        let read = material(file, &mut self.textures, &given, (is_colored, note_read))?;
+        let index = self.materials.len() as u32;
+        self.materials.push(read);
+        self.index_of_material.insert(key, index);
+        Ok(index)
+    }
+
+    /// Puts triangles into the scene's space.
+    fn put(
+        &mut self,
+        file: &GltfFile<'_>,
+        place: &str,
+        (vertices, scene_from_vertex): (Vertices, &[DMat4]),
+        triangles: Vec<[u32; 3]>,
+        material: u32,
+    ) -> Result<(), SceneError> {
+        let first = self.positions.len() as u32;
+        let mut normals: Vec<Option<Vec3>> = Vec::with_capacity(vertices.normals.len());
+        let normal_map = self.materials[material as usize].material.maps.normal;
+        for (index, scene_from_mesh) in scene_from_vertex.iter().enumerate() {
+            let position = scene_from_mesh
+                .transform_point3(vertices.positions[index])
+                .as_vec3();
+            if !position.is_finite() {
+                return Err(file.error(place, format!("POSITION {index} is placed at infinity")));
+            }
+            self.positions.push(position);
+            let cofactors = normal_from_mesh(scene_from_mesh);
+            normals.push(
+                vertices.normals[index]
+                    .map(|normal| (cofactors * normal).normalize_or_zero().as_vec3()),
+            );
+            let mut look = vertices.looks[index];
+            look.tangent = turned_tangent(scene_from_mesh, look.tangent);
+            self.looks.looks.push(look);
+        }
+        // What a mirror turns is turned back.
+        let is_mirrored =
+            |corners: &[u32; 3]| scene_from_vertex[corners[0] as usize].determinant() < 0.0;
+        let triangles: Vec<[u32; 3]> = triangles
+            .into_iter()
+            .map(|[a, b, c]| {
+                if is_mirrored(&[a, b, c]) {
+                    [a, c, b]
+                } else {
+                    [a, b, c]
+                }
+            })
+            .collect();
+        let given = |vertex: u32| normals[vertex as usize];
+        let start = self.triangles.len();
+        self.triangles
+            .extend(triangles.iter().map(|corners| RawTriangle {
+                vertices: corners.map(|corner| first + corner),
+                normals: corners.map(given),
+                material,
+            }));
+        self.looks.corners.extend(
+            triangles
+                .iter()
+                .map(|corners| corners.map(|corner| first + corner)),
+        );
+        if let Some(map) = normal_map.filter(|_| !vertices.has_tangents) {
+            self.make_tangents(first as usize, start, &triangles, map.uv_set as usize);
+        }
+        Ok(())
+    }
+
+    /// Gives the corners of the last triangles tangents by one of their texture coordinates.
+    fn make_tangents(&mut self, first: usize, start: usize, triangles: &[[u32; 3]], uv_set: usize) {
+        let positions = &self.positions[first..];
+        let normals: Vec<[Vec3; 3]> = triangles
+            .iter()
+            .zip(&self.triangles[start..])
+            .map(|(corners, raw)| {
+                let [a, b, c] = corners.map(|corner| positions[corner as usize]);
+                let face = (b - a).cross(c - a).normalize_or(Vec3::Z);
+                raw.normals.map(|normal| normal.unwrap_or(face))
+            })
+            .collect();
+        let uv: Vec<Vec2> = self.looks.looks[first..]
+            .iter()
+            .map(|look| look.uv[uv_set])
+            .collect();
+        let tangents = made_tangents(triangles, positions, &normals, &uv);
+        let mut is_set = vec![false; uv.len()];
+        for (corners, tangents) in self.looks.corners[start..].iter_mut().zip(tangents) {
+            for (index, tangent) in corners.iter_mut().zip(tangents) {
+                let look = &mut self.looks.looks[*index as usize];
+                let is_first = !std::mem::replace(&mut is_set[*index as usize - first], true);
+                if is_first {
+                    look.tangent = tangent;
+                } else if look.tangent != tangent {
+                    // Another one at the same vertex: a look of its own.
+                    let own = CornerLook { tangent, ..*look };
+                    *index = self.looks.looks.len() as u32;
+                    self.looks.looks.push(own);
+                    is_set.push(true);
+                }
+            }
+        }
+        // (Looks and positions go by the same numbers where the next primitive begins.)
+        self.positions.resize(self.looks.looks.len(), Vec3::ZERO);
+    }
+}
+
+/// Cofactors: normals keep standing on their surface whatever the scale, and on its outside in a mirror.
+fn normal_from_mesh(scene_from_mesh: &DMat4) -> DMat3 {
+    let linear = DMat3::from_mat4(*scene_from_mesh);
+    let cofactors = DMat3::from_cols(
+        linear.y_axis.cross(linear.z_axis),
+        linear.z_axis.cross(linear.x_axis),
+        linear.x_axis.cross(linear.y_axis),
+    );
+    match linear.determinant() < 0.0 {
+        true => cofactors * -1.0,
+        false => cofactors,
+    }
+}
+
+fn vertices(
+    file: &GltfFile<'_>,
+    place: &str,
+    primitive: &Primitive<'_>,
+) -> Result<Vertices, SceneError> {
+    let of = |semantic: Semantic| primitive.get(&semantic);
+    let named = |name: &str| format!("{place}.{name}");
+    let Some(positions) = of(Semantic::Positions) else {
+        return Err(file.error(place, "no POSITION"));
+    };
+    let vec3 = [Dimensions::Vec3];
+    let positions: Vec<[f32; 3]> = file.floats(&named("POSITION"), &positions, &vec3, 0.0)?;
+    let count = positions.len();
+    let checked = |name: &str, found: usize| match found < count {
+        true => Err(file.error(
+            &named(name),
+            format!("{found} elements for {count} positions"),
+        )),
+        false => Ok(()),
+    };
+    let in_double = |vector: [f32; 3]| DVec3::from_array(vector.map(f64::from));
+    let mut vertices = Vertices {
+        positions: positions.into_iter().map(in_double).collect(),
+        normals: vec![None; count],
+        looks: vec![CornerLook::default(); count],
+        has_colors: false,
+        has_tangents: false,
+    };
+    if let Some(accessor) = of(Semantic::Normals) {
+        let normals: Vec<[f32; 3]> = file.floats(&named("NORMAL"), &accessor, &vec3, 0.0)?;
+        checked("NORMAL", normals.len())?;
+        let normals = normals.into_iter().map(|normal| Some(in_double(normal)));
+        vertices.normals = normals.take(count).collect();
+    }
+    if let Some(accessor) = of(Semantic::Tangents) {
+        let tangents: Vec<[f32; 4]> =
+            file.floats(&named("TANGENT"), &accessor, &[Dimensions::Vec4], 0.0)?;
+        checked("TANGENT", tangents.len())?;
+        vertices.has_tangents = true;
+        for (look, tangent) in vertices.looks.iter_mut().zip(tangents) {
+            look.tangent = Vec4::from_array(tangent);
+        }
+    }
+    for set in 0..2 {
+        if let Some(accessor) = of(Semantic::TexCoords(set)) {
+            let name = format!("TEXCOORD_{set}");
+            let uv: Vec<[f32; 2]> =
+                file.floats(&named(&name), &accessor, &[Dimensions::Vec2], 0.0)?;
+            checked(&name, uv.len())?;
+            for (look, uv) in vertices.looks.iter_mut().zip(uv) {
+                look.uv[set as usize] = Vec2::from_array(uv);
+            }
+        }
+    }
+    if let Some(accessor) = of(Semantic::Colors(0)) {
+        let allowed = [Dimensions::Vec3, Dimensions::Vec4];
+        let colors: Vec<[f32; 4]> = file.floats(&named("COLOR_0"), &accessor, &allowed, 1.0)?;
+        checked("COLOR_0", colors.len())?;
+        vertices.has_colors = true;
+        for (look, color) in vertices.looks.iter_mut().zip(colors) {
+            look.color = Vec4::from_array(color).clamp(Vec4::ZERO, Vec4::ONE);
+        }
+    }
+    Ok(vertices)
+}
+
+/// Strips and fans as triangles too, all indices in range.
+fn triangles(
+    file: &GltfFile<'_>,
+    place: &str,
+    primitive: &Primitive<'_>,
+    count: usize,
+) -> Result<Vec<[u32; 3]>, SceneError> {
+    let indices: Vec<u32> = match primitive.indices() {
+        Some(accessor) => {
+            let indices =
+                file.integers::<1>(&format!("{place}.indices"), &accessor, Dimensions::Scalar)?;
+            indices.into_iter().map(|[index]| index).collect()
+        }
+        None => (0..count as u32).collect(),
+    };
+    if let Some(at) = indices.iter().position(|&index| index as usize >= count) {
+        let message = format!("index {at} is {}, of {count} vertices", indices[at]);
+        return Err(file.error(&format!("{place}.indices"), message));
+    }
+    let triangles: Vec<[u32; 3]> = match primitive.mode() {
+        Mode::TriangleStrip => indices
+            .windows(3)
+            .enumerate()
+            .map(|(number, corners)| match number % 2 {
+                0 => [corners[0], corners[1], corners[2]],
+                _ => [corners[1], corners[0], corners[2]],
+            })
+            .collect(),
+        Mode::TriangleFan => indices
+            .get(1..)
+            .unwrap_or_default()
+            .windows(2)
+            .map(|pair| [indices[0], pair[0], pair[1]])
+            .collect(),
+        _ => indices.as_chunks::<3>().0.to_vec(),
+    };
+    Ok(triangles)
+}

@@ -1,0 +1,55 @@
+//! What a file of any format has of a model, before its vertices are welded.
+
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+
+use super::notes::Notes;
+use crate::geometry::mesh::{RawLooks, RawTriangle};
+use crate::light::Material;
+use crate::light::texture::Texture;
+
+/// Diffuse reflectance where neither the scene nor a mesh's file gives one.
+pub const DEFAULT_ALBEDO: f64 = 0.5;
+/// Smoothest surface that is kept apart from a mirror.
+pub const LEAST_ROUGHNESS: f64 = 0.01;
+
+/// A model as its file has it, in the file's own units and axes.
+#[derive(Debug, Default)]
+pub struct RawModel {
+    /// Its vertices.
+    pub positions: Vec<Vec3>,
+    /// Its triangles.
+    pub triangles: Vec<RawTriangle>,
+    /// What their corners have besides.
+    pub looks: RawLooks,
+    /// What they are made of.
+    pub materials: Vec<GivenMaterial>,
+    /// What the materials' maps name.
+    pub textures: Vec<Arc<Texture>>,
+    /// What is passed over or taken for something else.
+    pub notes: Notes,
+}
+
+/// A material with what the file says of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GivenMaterial {
+    /// Its name in the file; empty where it has none.
+    pub name: String,
+    /// What it is.
+    pub material: Material,
+    /// Whether the file gives its colour.
+    pub is_given: bool,
+}
+
+impl GivenMaterial {
+    /// What a file says nothing of: grey, or white below colours of its own.
+    pub fn unknown(has_colors: bool) -> Self {
+        let albedo = if has_colors { 1.0 } else { DEFAULT_ALBEDO };
+        Self {
+            name: String::new(),
+            material: Material::matt(DVec3::splat(albedo)),
+            is_given: has_colors,
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! Pictures that lie on surfaces, from files.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use image::imageops::FilterType;
+use image::{ImageFormat, ImageReader};
+
+use super::plain_file::{self, MOST_PICTURE};
+use crate::light::texture::Texture;
+
+/// Longest side of a picture that is read, pixels.
+const MOST_SIDE_PX: u32 = 16384;
+/// Longest side of a picture that is kept; a larger one is scaled down.
+const KEPT_SIDE_PX: u32 = 4096;
+/// Memory that decoding may take, bytes.
+const MOST_BYTES: u64 = 1 << 30;
+
+/// Reads a picture's file by its content, or where that does not tell (TGA) by its name.
+///
+/// # Errors
+/// What is wrong with it, as it goes on after its name.
+pub fn read(path: &Path) -> Result<Texture, String> {
+    let bytes =
+        plain_file::read(path, MOST_PICTURE).map_err(|error| format!("cannot be read: {error}"))?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    decode(name.into_owned(), &bytes, ImageFormat::from_path(path).ok())
+}
+
+/// Decodes a picture of eight or sixteen bits, no side of it longer than 4096 texels when it is kept; `format` is what it is where its bytes do not tell.
+///
+/// # Errors
+/// As [`read`] has them.
+pub fn decode(name: String, bytes: &[u8], format: Option<ImageFormat>) -> Result<Texture, String> {
+    if bytes.starts_with(b"\xabKTX 20\xbb") {
+        let message = "is KTX2 (Basis Universal), which is not read; allowed: PNG, JPEG, WebP";
+        return Err(message.to_owned());
+    }
+    let failed = |error: &dyn std::fmt::Display| format!("cannot be read: {error}");
+    let mut reader = ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|error| failed(&error))?;
+    if let (None, Some(format)) = (reader.format(), format) {
+        reader.set_format(format);
+    }
+    let mut limits = image::Limits::default();
+    limits.max_image_width = Some(MOST_SIDE_PX);
+    limits.max_image_height = Some(MOST_SIDE_PX);
+    limits.max_alloc = Some(MOST_BYTES);
+    reader.limits(limits);
+    let picture = reader.decode().map_err(|error| failed(&error))?;
+    let picture = match picture.width().max(picture.height()) > KEPT_SIDE_PX {
+        true => picture.resize(KEPT_SIDE_PX, KEPT_SIDE_PX, FilterType::Triangle),
+        false => picture,
+    };
+    let rgba = picture.into_rgba8();
+    Ok(Texture {
+        name,
+        size_px: [rgba.width(), rgba.height()],
+        rgba: rgba.into_raw(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{DynamicImage, ImageFormat, RgbaImage};
+
+    fn encoded(image: DynamicImage, format: ImageFormat) -> Vec<u8> {
+        let mut bytes = Cursor::new(Vec::new());
+        image.write_to(&mut bytes, format).unwrap();
+        bytes.into_inner()
+    }
+
+    #[test]
+    fn pictures_are_read_by_their_content() {
+        let image = RgbaImage::from_fn(3, 2, |x, y| {
+            image::Rgba([40 * x as u8, 90 * y as u8, 7, 200])
+        });
+        let png = encoded(image.clone().into(), ImageFormat::Png);
+        let read = decode("a.jpg".to_owned(), &png, None).unwrap();
+        assert_eq!(read.size_px, [3, 2]);
+        assert_eq!(read.rgba, image.into_raw());
+        let grey = image::GrayImage::from_pixel(5, 4, image::Luma([99]));
+        let jpeg = encoded(grey.into(), ImageFormat::Jpeg);
+        let read = decode("b".to_owned(), &jpeg, None).unwrap();
+        assert_eq!(read.size_px, [5, 4]);
+        assert!(read.rgba[0].abs_diff(99) < 3 && read.rgba[3] == 255);
+    }
+
+    #[test]
+    fn large_ones_are_scaled_and_others_refused() {
+        let wide = image::GrayImage::from_pixel(KEPT_SIDE_PX * 2, 4, image::Luma([50]));
+        let read = decode(
+            "wide".to_owned(),
+            &encoded(wide.into(), ImageFormat::Png),
+            None,
+        )
+        .unwrap();
+        assert_eq!(read.size_px, [KEPT_SIDE_PX, 2]);
+        let huge = image::GrayImage::from_pixel(MOST_SIDE_PX + 1, 1, image::Luma([50]));
+        assert!(
+            decode(
+                "huge".to_owned(),
+                &encoded(huge.into(), ImageFormat::Png),
+                None
+            )
+            .is_err()
+        );
+        for bytes in [
+            &b""[..],
+            b"GIF89a",
+            b"\xabKTX 20\xbb\r\n",
+            b"\x89PNG\r\n\x1a\n",
+        ] {
+            assert!(decode("bad".to_owned(), bytes, None).is_err());
+        }
+    }
+}

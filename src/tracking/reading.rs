@@ -1,0 +1,103 @@
+//! A marker read again: whether the whole picture of it is there, each cell and what lies between them.
+//!
+//! A detector asks for a dark frame and for the middles of the cells. A picture on a wall, a window or another family's
+//! marker has both now and then, and where a family has few bits or many markers, a code of it as well. The whole of a
+//! marker's picture is hard to come by: between its cells there is nothing, and within them it is even.
+//!
+//! What is compared are the differences between places one cell apart, since light and shadow across a marker change
+//! them little.
+
+use glam::{DVec2, DVec3};
+
+use super::expected_picture::{ExpectedPicture, PER_CELL};
+use super::light::Grey;
+use super::marker_template::MarkerTemplate;
+use crate::geometry::homography::linear_homography;
+use crate::scene::Family;
+
+/// A cell of more pixels is looked at in more than one place for each sample.
+const SAMPLE_PX: f64 = 2.0;
+/// The most places a side for each sample.
+const MOST_PLACES: i32 = 3;
+
+/// The least agreement with which a marker is followed.
+pub(super) fn least_to_follow(family: Family) -> f64 {
+    match family.false_rate(family.correctable_bits().min(1)) {
+        rate if rate < 1e-5 => 0.15,
+        rate if rate < 1e-3 => 0.25,
+        _ => 0.4,
+    }
+}
+
+/// By how much the picture is the marker's where its corners were seen: 1 where all differences are as they should be
+/// but for one factor, 0 where they have nothing to do with them. `None` where it is not wholly in the picture.
+pub(super) fn agreement_at_corners(
+    picture: Grey<'_>,
+    template: &MarkerTemplate,
+    corners_px: [DVec2; 4],
+) -> Option<f64> {
+    let side = f64::from(template.side);
+    let cells = [(0.0, 0.0), (side, 0.0), (side, side), (0.0, side)].map(DVec2::from);
+    // Coordinates of about one keep the equations well conditioned.
+    let middle_px = corners_px.iter().sum::<DVec2>() / 4.0;
+    let scale_px = corners_px[0].distance(corners_px[2]).max(1.0);
+    let pairs: Vec<(DVec2, DVec2)> = cells
+        .iter()
+        .zip(corners_px)
+        .map(|(cell, corner_px)| (*cell / side, (corner_px - middle_px) / scale_px))
+        .collect();
+    let homography = linear_homography(&pairs)?;
+    agreement(picture, template, |cells| {
+        let DVec3 { x, y, z } = homography * (cells / side).extend(1.0);
+        Some(DVec2::new(x, y) / z * scale_px + middle_px)
+    })
+}
+
+/// The same, where `place` puts a point in cells from the square's top left corner, pixels.
+pub(super) fn agreement(
+    picture: Grey<'_>,
+    template: &MarkerTemplate,
+    place: impl Fn(DVec2) -> Option<DVec2>,
+) -> Option<f64> {
+    let expected = template
+        .expected
+        .get_or_init(|| ExpectedPicture::of(&template.printed));
+    let side = f64::from(template.side);
+    let (middle, beside) = (
+        DVec2::splat(side / 2.0),
+        DVec2::new(side / 2.0 + 1.0, side / 2.0),
+    );
+    let cell_px = place(middle)?.distance(place(beside)?);
+    let places = ((cell_px / (f64::from(PER_CELL) * SAMPLE_PX)) as i32).clamp(1, MOST_PLACES);
+    let mut samples = Vec::with_capacity((expected.across * expected.across) as usize);
+    for (x, y) in (0..expected.across).flat_map(|y| (0..expected.across).map(move |x| (x, y))) {
+        let corner = DVec2::new(f64::from(x + expected.first), f64::from(y + expected.first));
+        let mut sum = 0.0;
+        for place_of_sample in 0..places * places {
+            let within = DVec2::new(
+                f64::from(place_of_sample % places) + 0.5,
+                f64::from(place_of_sample / places) + 0.5,
+            ) / f64::from(places);
+            sum += picture.level(place((corner + within) / f64::from(PER_CELL))?)?;
+        }
+        samples.push(sum / f64::from(places * places) as f32);
+    }
+    let seen: Vec<f32> = expected
+        .pairs
+        .iter()
+        .map(|pair| samples[pair[1] as usize] - samples[pair[0] as usize])
+        .collect();
+    let all: f32 = seen.iter().map(|seen| seen * seen).sum();
+    let of_blur = |differences: &Vec<f32>| {
+        let (mut common, mut own) = (0.0, 0.0);
+        for (seen, expected) in seen.iter().zip(differences) {
+            common += seen * expected;
+            own += expected * expected;
+        }
+        match common > 0.0 && all > 0.0 {
+            true => f64::from(common * common / (all * own)),
+            false => 0.0,
+        }
+    };
+    Some(expected.differences.iter().map(of_blur).fold(0.0, f64::max))
+}

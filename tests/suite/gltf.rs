@@ -1,0 +1,375 @@
+//! glTF files as the program reads them: written here byte by byte, with known answers, and hostile ones.
+
+use std::path::Path;
+
+use glam::{DVec3, Vec2, Vec3};
+use gnomon::light::material::{Coverage, Shading, Wrap};
+use gnomon::scene::{Object, Scene};
+use serde_json::{Value, json};
+
+/// A scene with a file as its only virtual thing.
+fn read_file(path: &Path, key: &str) -> Result<Object, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("scene.toml");
+    let text = format!(
+        "[camera]\nsource = \"webcam:0\"\n[[marker]]\nname = \"m\"\nid = 1\nsize_m = 0.04\n\
+         [[{key}]]\nname = \"t\"\nmesh = '{}'\n",
+        path.display()
+    );
+    std::fs::write(&scene, text).unwrap();
+    let scene = Scene::load(&scene).map_err(|error| error.to_string())?;
+    let things = scene.phantoms.into_iter().chain(scene.virtuals);
+    Ok(things.last().unwrap())
+}
+
+fn read(json: &Value, files: &[(&str, &[u8])]) -> Result<Object, String> {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, bytes) in files {
+        std::fs::write(folder.path().join(name), bytes).unwrap();
+    }
+    let path = folder.path().join("a.gltf");
+    std::fs::write(&path, json.to_string()).unwrap();
+    read_file(&path, "virtual")
+}
+
+/// Numbers as little-endian bytes.
+fn bytes(numbers: &[f32]) -> Vec<u8> {
+    numbers
+        .iter()
+        .flat_map(|number| number.to_le_bytes())
+        .collect()
+}
+
+/// A square of four vertices with texture coordinates and colours, interleaved, drawn as a strip; one byte an index.
+fn square() -> (Value, Vec<u8>) {
+    let mut data = Vec::new();
+    for (x, y) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+        data.extend(bytes(&[x, y, 0.0, x, 1.0 - y]));
+        data.extend([255, 0, 51, 255]);
+    }
+    data.extend([0, 1, 2, 3]);
+    let json = json!({
+        "asset": {"version": "2.0"},
+        "buffers": [{"uri": "a%20b.bin", "byteLength": 100}],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 96, "byteStride": 24},
+            {"buffer": 0, "byteOffset": 96, "byteLength": 4}
+        ],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
+            {"bufferView": 0, "byteOffset": 12, "componentType": 5126, "count": 4, "type": "VEC2"},
+            {"bufferView": 0, "byteOffset": 20, "componentType": 5121, "normalized": true, "count": 4, "type": "VEC4"},
+            {"bufferView": 1, "componentType": 5121, "count": 4, "type": "SCALAR"}
+        ],
+        "materials": [{
+            "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 0.25], "metallicFactor": 0.75, "roughnessFactor": 0.5},
+            "alphaMode": "MASK", "alphaCutoff": 0.125, "emissiveFactor": [1, 0.5, 0],
+            "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4}, "KHR_materials_unlit": {}}
+        }],
+        "extensionsUsed": ["KHR_materials_emissive_strength", "KHR_materials_unlit", "KHR_materials_clearcoat"],
+        "meshes": [{"primitives": [{
+            "attributes": {"POSITION": 0, "TEXCOORD_0": 1, "COLOR_0": 2}, "indices": 3, "mode": 5, "material": 0
+        }]}],
+        "nodes": [{"children": [1], "translation": [0, 0, 5]}, {"mesh": 0, "scale": [2, 2, 2]}],
+        "scenes": [{"nodes": [0]}],
+        "scene": 0
+    });
+    (json, data)
+}
+
+#[test]
+fn a_strip_in_a_tree_is_where_it_belongs() {
+    let (json, data) = square();
+    let thing = read(&json, &[("a b.bin", &data)]).unwrap();
+    assert_eq!(
+        (thing.mesh.triangles.len(), thing.mesh.positions.len()),
+        (2, 4)
+    );
+    for (triangle, looks) in thing.mesh.triangles.iter().zip(&thing.mesh.corner_looks) {
+        for (&vertex, &look) in triangle.iter().zip(looks) {
+            // The file's (x, y, 0), twice as large and 5 in front, with its y up.
+            let place = thing.mesh.positions[vertex as usize];
+            assert_eq!(place.y, -5.0);
+            let look = thing.mesh.looks[look as usize];
+            assert_eq!(look.uv[0], Vec2::new(place.x / 2.0, 1.0 - place.z / 2.0));
+            assert!((look.color - glam::Vec4::new(1.0, 0.0, 0.2, 1.0)).length() < 1e-6);
+        }
+    }
+    // Both faces look where the file's z points.
+    let normals = thing.mesh.corner_normals.iter().flatten();
+    assert!(
+        normals
+            .into_iter()
+            .all(|normal| normal.distance(Vec3::NEG_Y) < 1e-6)
+    );
+    let [material] = thing.materials[..] else {
+        panic!("one material");
+    };
+    assert_eq!(material.albedo, DVec3::splat(0.5));
+    assert_eq!((material.metallic, material.roughness), (0.75, Some(0.25)));
+    assert_eq!(material.coverage, Coverage::Mask { cutoff: 0.125 });
+    assert_eq!((material.opacity, material.shading), (0.25, Shading::Unlit));
+    assert_eq!(material.emission, DVec3::new(4.0, 2.0, 0.0));
+    assert!((thing.albedo(0) - DVec3::new(0.5, 0.0, 0.1)).length() < 1e-6);
+    assert!(
+        thing
+            .notes
+            .iter()
+            .any(|note| note.contains("KHR_materials_clearcoat"))
+    );
+}
+
+#[test]
+fn sparse_elements_replace_and_skins_and_morphs_rest() {
+    let (mut json, mut data) = square();
+    // Vertex 3 moves to (1, 2, 0); then a morph of half of (0, 0, 2) for all.
+    data.extend([3, 0, 0, 0]);
+    data.extend(bytes(&[1.0, 2.0, 0.0]));
+    data.extend(bytes(&[0.0, 0.0, 2.0].repeat(4)));
+    data.extend([0; 16]);
+    data.extend(bytes(&[1.0, 0.0, 0.0, 0.0].repeat(4)));
+    json["buffers"][0]["byteLength"] = json!(data.len());
+    let views = json["bufferViews"].as_array_mut().unwrap();
+    for (offset, length) in [(100, 4), (104, 12), (116, 48), (164, 16), (180, 64)] {
+        views.push(json!({"buffer": 0, "byteOffset": offset, "byteLength": length}));
+    }
+    json["accessors"][0]["sparse"] = json!({"count": 1,
+        "indices": {"bufferView": 2, "componentType": 5121}, "values": {"bufferView": 3}});
+    let accessors = json["accessors"].as_array_mut().unwrap();
+    accessors.push(json!({"bufferView": 4, "componentType": 5126, "count": 4, "type": "VEC3"}));
+    accessors.push(json!({"bufferView": 5, "componentType": 5121, "count": 4, "type": "VEC4"}));
+    accessors.push(json!({"bufferView": 6, "componentType": 5126, "count": 4, "type": "VEC4"}));
+    let primitive = &mut json["meshes"][0]["primitives"][0];
+    primitive["targets"] = json!([{"POSITION": 4}]);
+    primitive["attributes"]["JOINTS_0"] = json!(5);
+    primitive["attributes"]["WEIGHTS_0"] = json!(6);
+    json["meshes"][0]["weights"] = json!([0.5]);
+    json["skins"] = json!([{"joints": [2]}]);
+    json["nodes"][1]["skin"] = json!(0);
+    json["nodes"]
+        .as_array_mut()
+        .unwrap()
+        .push(json!({"translation": [10, 0, 0]}));
+    json["scenes"][0]["nodes"] = json!([0, 2]);
+    let thing = read(&json, &[("a b.bin", &data)]).unwrap();
+    // The joint holds it, and its own node does not.
+    let places = &thing.mesh.positions;
+    assert!(places.contains(&Vec3::new(11.0, -1.0, 2.0)), "{places:?}");
+    assert!(places.contains(&Vec3::new(10.0, -1.0, 0.0)), "{places:?}");
+}
+
+#[test]
+fn textures_are_read_with_their_transforms() {
+    let (mut json, data) = square();
+    let mut png = std::io::Cursor::new(Vec::new());
+    let picture = image::RgbaImage::from_fn(2, 1, |x, _| image::Rgba([255 * x as u8, 0, 0, 255]));
+    picture.write_to(&mut png, image::ImageFormat::Png).unwrap();
+    json["images"] = json!([{"uri": "p.png"}]);
+    json["samplers"] = json!([{"wrapS": 33071, "wrapT": 33648, "magFilter": 9728}]);
+    json["textures"] = json!([{"source": 0, "sampler": 0}]);
+    json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({"index": 0,
+        "extensions": {"KHR_texture_transform": {"offset": [0.5, 0], "rotation": 0.0, "scale": [0.25, 1]}}});
+    json["materials"][0]["normalTexture"] = json!({"index": 0, "scale": 0.5});
+    let files: [(&str, &[u8]); 2] = [("a b.bin", &data), ("p.png", png.get_ref())];
+    let thing = read(&json, &files).unwrap();
+    assert_eq!(thing.textures.len(), 1, "each picture once");
+    let maps = thing.materials[0].maps;
+    let color = maps.color.unwrap();
+    assert_eq!(color.wrap, [Wrap::Clamp, Wrap::Mirror]);
+    assert_eq!(
+        color.picture_from_corner.transform_point2(Vec2::ONE),
+        Vec2::new(0.75, 1.0)
+    );
+    assert_eq!(maps.normal_scale, 0.5);
+    // Its right half lies on it, times the corners' red.
+    assert!((thing.albedo(0).x - 0.5).abs() < 1e-6);
+    // u grows along x; v grows against the file's y, so the bitangent is turned.
+    for look in &thing.mesh.looks {
+        assert!(
+            look.tangent.truncate().distance(Vec3::X) < 1e-5,
+            "{}",
+            look.tangent
+        );
+        // The picture's top lies where z is high: so does a normal's y, which is across the face's (-y) and u.
+        assert_eq!(look.tangent.w, 1.0);
+    }
+    let missing = read(&json, &files[..1]).unwrap_err();
+    assert!(
+        missing.contains("images[0]") && missing.contains("p.png"),
+        "{missing}"
+    );
+}
+
+#[test]
+fn hostile_files_are_errors_with_their_place() {
+    type Spoiled = (&'static str, fn(&mut Value), &'static str);
+    let spoiled: [Spoiled; 14] = [
+        (
+            "required",
+            |j| j["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]),
+            "KHR_draco_mesh_compression",
+        ),
+        (
+            "unknown",
+            |j| j["extensionsRequired"] = json!(["X_y"]),
+            "\"X_y\" is not read",
+        ),
+        (
+            "length",
+            |j| j["buffers"][0]["byteLength"] = json!(1_u64 << 40),
+            "buffers[0]: 100 bytes",
+        ),
+        (
+            "view",
+            |j| j["bufferViews"][0]["byteLength"] = json!(101),
+            "bufferViews[0] reaches beyond",
+        ),
+        (
+            "count",
+            |j| j["accessors"][0]["count"] = json!(u32::MAX),
+            "reach beyond a view",
+        ),
+        (
+            "overflow",
+            |j| j["accessors"][0]["byteOffset"] = json!(u64::MAX / 2),
+            "reach beyond a view",
+        ),
+        (
+            "zeros",
+            |j| {
+                j["accessors"][0] = json!({"componentType": 5126, "count": 1_u64 << 40, "type": "VEC3",
+                "min": [0, 0, 0], "max": [0, 0, 0],
+                    "sparse": {"count": 1, "indices": {"bufferView": 1, "componentType": 5121}, "values": {"bufferView": 0}}});
+            },
+            "without a view",
+        ),
+        (
+            "kind",
+            |j| j["accessors"][0]["type"] = json!("MAT4"),
+            "accessors[0]",
+        ),
+        (
+            "circle",
+            |j| j["nodes"][1]["children"] = json!([0]),
+            "its own ancestor",
+        ),
+        (
+            "parents",
+            |j| j["nodes"][1]["children"] = json!([1]),
+            "nodes[1]",
+        ),
+        (
+            "place",
+            |j| j["nodes"][1]["scale"] = json!([1e38, 1e38, 1e38]),
+            "infinity",
+        ),
+        (
+            "remote",
+            |j| j["buffers"][0]["uri"] = json!("https://a.b/c.bin"),
+            "not beside the file",
+        ),
+        (
+            "data",
+            |j| j["buffers"][0]["uri"] = json!("data:;base64,@@"),
+            "not base64",
+        ),
+        (
+            "missing",
+            |j| j["buffers"][0]["uri"] = json!("none.bin"),
+            "none.bin",
+        ),
+    ];
+    for (name, spoil, expected) in spoiled {
+        let (mut json, data) = square();
+        spoil(&mut json);
+        let message = read(&json, &[("a b.bin", &data)]).unwrap_err();
+        assert!(message.contains("a.gltf"), "{name}: {message}");
+        assert!(message.contains(expected), "{name}: {message}");
+    }
+    // Indices out of range, and numbers that are none.
+    let (json, mut data) = square();
+    data[99] = 4;
+    let message = read(&json, &[("a b.bin", &data)]).unwrap_err();
+    assert!(message.contains("index 3 is 4, of 4 vertices"), "{message}");
+    data[99] = 3;
+    data[0..4].copy_from_slice(&f32::NAN.to_le_bytes());
+    let message = read(&json, &[("a b.bin", &data)]).unwrap_err();
+    assert!(message.contains("element 0 is not finite"), "{message}");
+}
+
+#[test]
+fn a_spoiled_binary_file_never_panics() {
+    let (mut json, data) = square();
+    json["buffers"][0].as_object_mut().unwrap().remove("uri");
+    let mut text = json.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let mut whole = b"glTF\x02\0\0\0".to_vec();
+    let length = 12 + 8 + text.len() + 8 + data.len();
+    whole.extend((length as u32).to_le_bytes());
+    whole.extend((text.len() as u32).to_le_bytes());
+    whole.extend(b"JSON");
+    whole.extend(&text);
+    whole.extend((data.len() as u32).to_le_bytes());
+    whole.extend(b"BIN\0");
+    whole.extend(&data);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.glb");
+    let written = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        read_file(&path, "virtual")
+    };
+    assert_eq!(written(&whole).unwrap().mesh.triangles.len(), 2);
+    let mut random = fastrand::Rng::with_seed(7);
+    for _ in 0..300 {
+        let mut bytes = whole.clone();
+        for _ in 0..random.usize(1..4) {
+            let at = random.usize(..bytes.len());
+            bytes[at] = random.u8(..);
+        }
+        bytes.truncate(random.usize(bytes.len() / 2..=bytes.len()));
+        // Whatever it says of it.
+        let _ = written(&bytes);
+    }
+    for cut in (0..whole.len()).step_by(13) {
+        assert!(written(&whole[..cut]).is_err());
+    }
+}
+
+#[cfg_attr(not(has_shared), ignore = "../shared is not here")]
+#[test]
+fn khronos_samples_are_read() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/models/gltf");
+    // Triangles and pictures as the files' own JSON has them.
+    for (name, triangles, pictures) in [
+        ("AlphaBlendModeTest", 0, 9),
+        ("BoxTextured", 12, 1),
+        ("BoxVertexColors", 12, 0),
+        ("CesiumMan", 4672, 1),
+        ("CesiumMilkTruck", 0, 1),
+        ("DamagedHelmet", 15_452, 5),
+        ("Duck", 4212, 1),
+        ("Fox", 576, 1),
+    ] {
+        let path = folder.join(name).with_extension("glb");
+        for key in ["virtual", "phantom"] {
+            let thing = read_file(&path, key).unwrap();
+            let dropped =
+                thing.mesh_report.dropped_without_area + thing.mesh_report.dropped_duplicates;
+            let found = thing.mesh.triangles.len() + dropped - thing.mesh_report.splits;
+            assert!(triangles == 0 || found == triangles, "{name}: {found}");
+            assert!(
+                thing.textures.len() == pictures,
+                "{name}: {}",
+                thing.textures.len()
+            );
+            assert!(
+                thing
+                    .mesh
+                    .corner_normals
+                    .iter()
+                    .flatten()
+                    .all(|n| n.is_finite())
+            );
+        }
+    }
+}
