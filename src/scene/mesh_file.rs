@@ -17,11 +17,6 @@ use crate::light::Material;
 use crate::light::material::{Coverage, Map};
 use crate::light::texture::Texture;
 
-/// Diffuse reflectance where neither the scene nor a mesh's file gives one.
-pub const DEFAULT_ALBEDO: f64 = 0.5;
-/// Smoothest surface that is kept apart from a mirror.
-pub const LEAST_ROUGHNESS: f64 = 0.01;
-
 /// A mesh, what was done to it, and its materials (never none).
 #[derive(Debug)]
 pub struct LoadedMesh {

@@ -7,11 +7,12 @@ use glam::{DAffine3, DVec3, Vec3};
 
 use super::anchors::unique_name;
 use super::error::{SceneError, suggestion};
-use super::mesh_file::{self, DEFAULT_ALBEDO, LoadedMesh, MeshReading, Up};
+use super::mesh_file::{self, LoadedMesh, MeshReading, Up};
 use super::motion::{MotionKeys, motion};
 use super::named_files::FileKind;
 use super::placement::{POSITION, PlacementKeys, placement};
 use super::ranges::Numbers;
+use super::raw_model::DEFAULT_ALBEDO;
 use super::reader::{Table, Value};
 use super::schema::key::Missing::{Is, Means};
 use super::schema::section::{Example, Section, Times};
@@ -149,6 +150,8 @@ pub static PHANTOM_SECTION: Section = Section {
         ("name", Example::Live("\"house\"")),
         ("mesh", Example::Live("\"models/house.obj\"")),
         ("rect_m", Example::Aside("[-0.21, -0.1485, 0.21, 0.1485]")),
+        ("up", Example::Aside("\"y\"")),
+        ("fit_m", Example::Aside("0.12")),
         ("on", Example::Live("\"table\"")),
         ("position_m", Example::Live("[-0.055, 0.035, 0.0]")),
         ("rotation_deg", Example::Live("[0, 0, 20]")),
@@ -180,6 +183,8 @@ pub static VIRTUAL_SECTION: Section = Section {
     shown: &[
         ("name", Example::Live("\"torus\"")),
         ("mesh", Example::Live("\"models/torus.obj\"")),
+        ("up", Example::Aside("\"y\"")),
+        ("fit_m", Example::Aside("0.12")),
         ("on", Example::Live("\"table\"")),
         ("position_m", Example::Live("[0.022, 0.0, 0.036]")),
         ("rotation_deg", Example::Live("[70, 0, 35]")),

@@ -212,7 +212,9 @@ fn read_text(path: &Path, bytes: &[u8]) -> Result<RawModel, SceneError> {
             }
             _ => {}
         }
-        last_line = line;
+        if !line.trim().is_empty() {
+            last_line = line;
+        }
     }
     if !outline.is_empty() {
         let at = last_line.as_ptr() as usize - text.as_ptr() as usize;

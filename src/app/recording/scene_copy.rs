@@ -445,7 +445,7 @@ mod tests {
         let albedos: Vec<f64> = (copy.virtuals[0].materials.iter())
             .map(|material| material.albedo.x)
             .collect();
-        assert_eq!(albedos, [0.1, 0.4].map(|kd: f32| f64::from(kd)));
+        assert_eq!(albedos, [0.1, 0.4]);
         let text = fs::read_to_string(session.join(SCENE_NAME)).unwrap();
         assert!(text.contains("# a tetrahedron") && !text.contains("odd.name"));
     }

@@ -119,7 +119,11 @@ fn a_head_that_lies_is_a_mistake_with_its_line() {
     let message = lying("vertex 5", "vertex 18446744073709551615");
     assert!(message.starts_with("a.ply:5:1: element vertex: the head counts 18446744073709551615, and the file has room for "), "{message}");
     for (from, to, part) in [
-        ("element face 3", "element face 4", "room for"),
+        (
+            "element face 3",
+            "element face 4",
+            "the file ends before its last element",
+        ),
         (
             "vertex 5",
             "vertex x",
