@@ -77,8 +77,10 @@ fn sampled(map: MapOnGpu, at: TextureCoordinates) -> Sampled {
     let second = (map.place & 8u) != 0u;
     let linear = mat2x2f(map.linear.xy, map.linear.zw);
     var picture = linear * select(at.uv.xy, at.uv.zw, second) + map.offset;
-    let along_x = linear * select(at.along_x.xy, at.along_x.zw, second);
-    let along_y = linear * select(at.along_y.xy, at.along_y.zw, second);
+    // Beyond the whole picture a pixel sees no more of it. (Of a triangle seen edge-on they may be anything, and Mesa's software
+    // driver would look at all texels between.)
+    let along_x = clamp(linear * select(at.along_x.xy, at.along_x.zw, second), vec2f(-1.0), vec2f(1.0));
+    let along_y = clamp(linear * select(at.along_y.xy, at.along_y.zw, second), vec2f(-1.0), vec2f(1.0));
     let wrap = vec2u((map.place >> 4u) & 3u, (map.place >> 6u) & 3u);
     let size = vec2f(f32(map.size & 0xffffu), f32(map.size >> 16u));
     let is_squares = (map.place & 256u) != 0u;

@@ -238,7 +238,7 @@ mod tests {
         });
         assert_eq!(
             String::from_utf8(renamed.unwrap()).unwrap(),
-            "newmtl a\nmap_Kd -s 2 2 1 p.png\n# not there: bump -bm 2 none.png\nmap_d p.png\nmap_Ke\nKd 1 1 1"
+            "newmtl a\nmap_Kd -s 2 2 1 p.png\n# not there: bump -bm 2 none.png\nmap_d  p.png\nmap_Ke\nKd 1 1 1"
         );
     }
 }
