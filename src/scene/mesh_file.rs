@@ -272,7 +272,8 @@ fn place(model: &mut RawModel, path: &Path, up: Up, fit_m: Option<f64>) -> Resul
     let least = corners().fold(DVec3::INFINITY, DVec3::min);
     let most = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
     let longest = (most - least).max_element();
-    if !(longest > 0.0) {
+    // (Also where there is no corner.)
+    if longest <= 0.0 {
         let message = "no triangle has an area; a mesh is expected";
         return Err(SceneError::of_file(path, message));
     }

@@ -47,7 +47,7 @@ impl PrintedMarker {
     }
 
     /// The same as a family has it drawn and inked; a family with a ring lays nothing down beyond its cells.
-    pub(super) fn as_of(mut self, family: Family) -> Self {
+    pub(super) fn drawn_for(mut self, family: Family) -> Self {
         if family.has_ring() {
             self.around = Cell::Open;
         }

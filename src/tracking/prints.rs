@@ -21,7 +21,7 @@ impl PrintedMarker {
             true => apriltag::printed_marker(family, id),
             false => installed_marker(family, id)?,
         };
-        Ok(drawn.ok_or_else(no_such_marker)?.as_of(family))
+        Ok(drawn.ok_or_else(no_such_marker)?.drawn_for(family))
     }
 }
 

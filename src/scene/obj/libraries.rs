@@ -176,7 +176,7 @@ pub fn with_maps_named<E>(
         }
         let line = record.line.trim();
         let options = line.rfind(&written).map_or(line, |at| &line[..at]);
-        let options = options.trim_end().trim_end_matches('"').trim_end();
+        let options = options.trim_end().trim_end_matches('"').trim();
         Ok(Some(match named_file(folder, &written) {
             Some(path) => format!("{options} {}\n", name_of(&path)?),
             None => format!("# not there: {line}\n"),
@@ -238,7 +238,7 @@ mod tests {
         });
         assert_eq!(
             String::from_utf8(renamed.unwrap()).unwrap(),
-            "newmtl a\nmap_Kd -s 2 2 1 p.png\n# not there: bump -bm 2 none.png\nmap_d  p.png\nmap_Ke\nKd 1 1 1"
+            "newmtl a\nmap_Kd -s 2 2 1 p.png\n# not there: bump -bm 2 none.png\nmap_d p.png\nmap_Ke\nKd 1 1 1"
         );
     }
 }
