@@ -3,9 +3,14 @@
 //! ways are off by a pixel).
 
 use bytemuck::cast_slice;
-use yuv::{YuvError, YuvGrayImage, YuvPlanarImage, YuvRange};
+use yuv::{YuvError, YuvGrayImage, YuvPlanarImage, YuvRange, YuvStandardMatrix};
 
-use super::colours::Coding;
+/// How R'G'B' was coded as luma and chroma.
+#[derive(Clone, Copy)]
+pub(super) struct Coding {
+    pub matrix: YuvStandardMatrix,
+    pub range: YuvRange,
+}
 
 /// The way in which a frame's pixels lie in memory: planes without padding, or RGBA.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
