@@ -845,7 +845,7 @@ fn check_warns_of_what_shows_nothing() {
         ),
         (
             good.replace("tag36h11", "tag25h9"),
-            "no marker of the scene is found",
+            "was never found: tag36h11 0, 2 to 4 are seen; the scene wants tag25h9 0 to 5",
         ),
         (away, "out of view"),
         (dark, "nothing lights the scene"),
