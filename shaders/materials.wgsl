@@ -44,6 +44,9 @@ struct MaterialOnGpu {
 @group(3) @binding(7) var repeated: sampler;
 @group(3) @binding(8) var clamped: sampler;
 
+// What is seen at a slant is sampled in a row of spots, so many at most. (Not by the driver's anisotropic filter: it is another
+// one on each GPU, and Mesa's software one takes seconds for a small thing.)
+const MOST_SPOTS: f32 = 8.0;
 const WRAP_CLAMP: u32 = 1u;
 const WRAP_MIRROR: u32 = 2u;
 
@@ -56,11 +59,14 @@ struct TextureCoordinates {
 
 struct Sampled {
     picture: vec2f,
-    along_x: vec2f,
-    along_y: vec2f,
+    // What a pixel sees of it: so many round spots in a row, and what lies between two of them.
+    spots: u32,
+    step: vec2f,
+    spot_x: vec2f,
+    spot_y: vec2f,
     stack: u32,
     layer: u32,
-    repeats: bool,
+    wrap: vec2u,
 }
 
 fn wrapped(place: f32, wrap: u32) -> f32 {
@@ -77,28 +83,64 @@ fn sampled(map: MapOnGpu, at: TextureCoordinates) -> Sampled {
     let second = (map.place & 8u) != 0u;
     let linear = mat2x2f(map.linear.xy, map.linear.zw);
     var picture = linear * select(at.uv.xy, at.uv.zw, second) + map.offset;
-    let along_x = linear * select(at.along_x.xy, at.along_x.zw, second);
-    let along_y = linear * select(at.along_y.xy, at.along_y.zw, second);
     let wrap = vec2u((map.place >> 4u) & 3u, (map.place >> 6u) & 3u);
     let size = vec2f(f32(map.size & 0xffffu), f32(map.size >> 16u));
+    // The pixel's axes on the picture, texels; its longer one, and its width across that.
+    let along_x = linear * select(at.along_x.xy, at.along_x.zw, second) * size;
+    let along_y = linear * select(at.along_y.xy, at.along_y.zw, second) * size;
+    let long = select(along_y, along_x, dot(along_x, along_x) >= dot(along_y, along_y));
+    // (Beyond the whole picture a pixel sees no more of it; of a triangle seen edge-on the axes may be anything.)
+    let length_px = clamp(length(long), 1e-6, max(size.x, size.y));
+    let area = abs(along_x.x * along_y.y - along_x.y * along_y.x);
+    let width_px = clamp(area / length_px, max(length_px / MOST_SPOTS, 1e-6), length_px);
+    // A spot that is seen enlarged needs no others beside it.
+    let spots = clamp(ceil(length_px / max(width_px, 1.0) - 0.1), 1.0, MOST_SPOTS);
+    let along = long * (length_px / max(length(long), 1e-6)) / size;
     let is_squares = (map.place & 256u) != 0u;
     if is_squares {
         // In the middle of a texel nothing of its neighbours is mixed in, as long as it is seen enlarged.
-        let footprint = max(abs(along_x), abs(along_y)) * size;
+        let footprint = max(abs(along_x), abs(along_y));
         if max(footprint.x, footprint.y) < 1.0 {
             picture = (floor(picture * size) + 0.5) / size;
         }
     }
-    let repeats = wrap.x == 0u && wrap.y == 0u;
-    if !repeats {
-        let once = select(picture, fract(picture), wrap == vec2u(0u));
-        picture = vec2f(wrapped(once.x, wrap.x), wrapped(once.y, wrap.y));
+    let spot_x = vec2f(width_px / size.x, 0.0);
+    let spot_y = vec2f(0.0, width_px / size.y);
+    let stack = (map.place >> 1u) & 3u;
+    return Sampled(picture, u32(spots), along / spots, spot_x, spot_y, stack, map.place >> 16u, wrap);
+}
+
+// The middle of a spot on the picture as the sampler takes it.
+fn spot_at(s: Sampled, spot: u32) -> vec2f {
+    let at = s.picture + s.step * (f32(spot) - 0.5 * (f32(s.spots) - 1.0));
+    if is_repeated(s) {
+        return at;
     }
-    return Sampled(picture, along_x, along_y, (map.place >> 1u) & 3u, map.place >> 16u, repeats);
+    let once = select(at, fract(at), s.wrap == vec2u(0u));
+    return vec2f(wrapped(once.x, s.wrap.x), wrapped(once.y, s.wrap.y));
+}
+
+fn is_repeated(s: Sampled) -> bool {
+    return all(s.wrap == vec2u(0u));
 }
 
 fn is_there(map: MapOnGpu) -> bool {
     return (map.place & 1u) != 0u;
+}
+
+fn srgb_spot(s: Sampled, at: vec2f) -> vec4f {
+    if is_repeated(s) {
+        switch s.stack {
+            case 0u: { return textureSampleGrad(srgb_0, repeated, at, s.layer, s.spot_x, s.spot_y); }
+            case 1u: { return textureSampleGrad(srgb_1, repeated, at, s.layer, s.spot_x, s.spot_y); }
+            default: { return textureSampleGrad(srgb_2, repeated, at, s.layer, s.spot_x, s.spot_y); }
+        }
+    }
+    switch s.stack {
+        case 0u: { return textureSampleGrad(srgb_0, clamped, at, s.layer, s.spot_x, s.spot_y); }
+        case 1u: { return textureSampleGrad(srgb_1, clamped, at, s.layer, s.spot_x, s.spot_y); }
+        default: { return textureSampleGrad(srgb_2, clamped, at, s.layer, s.spot_x, s.spot_y); }
+    }
 }
 
 // Of a picture in sRGB; white where there is none.
@@ -107,17 +149,25 @@ fn srgb_of(map: MapOnGpu, at: TextureCoordinates) -> vec4f {
         return vec4f(1.0);
     }
     let s = sampled(map, at);
-    if s.repeats {
+    var sum = vec4f(0.0);
+    for (var spot = 0u; spot < s.spots; spot++) {
+        sum += srgb_spot(s, spot_at(s, spot));
+    }
+    return sum / f32(s.spots);
+}
+
+fn linear_spot(s: Sampled, at: vec2f) -> vec4f {
+    if is_repeated(s) {
         switch s.stack {
-            case 0u: { return textureSampleGrad(srgb_0, repeated, s.picture, s.layer, s.along_x, s.along_y); }
-            case 1u: { return textureSampleGrad(srgb_1, repeated, s.picture, s.layer, s.along_x, s.along_y); }
-            default: { return textureSampleGrad(srgb_2, repeated, s.picture, s.layer, s.along_x, s.along_y); }
+            case 0u: { return textureSampleGrad(linear_0, repeated, at, s.layer, s.spot_x, s.spot_y); }
+            case 1u: { return textureSampleGrad(linear_1, repeated, at, s.layer, s.spot_x, s.spot_y); }
+            default: { return textureSampleGrad(linear_2, repeated, at, s.layer, s.spot_x, s.spot_y); }
         }
     }
     switch s.stack {
-        case 0u: { return textureSampleGrad(srgb_0, clamped, s.picture, s.layer, s.along_x, s.along_y); }
-        case 1u: { return textureSampleGrad(srgb_1, clamped, s.picture, s.layer, s.along_x, s.along_y); }
-        default: { return textureSampleGrad(srgb_2, clamped, s.picture, s.layer, s.along_x, s.along_y); }
+        case 0u: { return textureSampleGrad(linear_0, clamped, at, s.layer, s.spot_x, s.spot_y); }
+        case 1u: { return textureSampleGrad(linear_1, clamped, at, s.layer, s.spot_x, s.spot_y); }
+        default: { return textureSampleGrad(linear_2, clamped, at, s.layer, s.spot_x, s.spot_y); }
     }
 }
 
@@ -127,18 +177,11 @@ fn linear_of(map: MapOnGpu, at: TextureCoordinates) -> vec4f {
         return vec4f(1.0);
     }
     let s = sampled(map, at);
-    if s.repeats {
-        switch s.stack {
-            case 0u: { return textureSampleGrad(linear_0, repeated, s.picture, s.layer, s.along_x, s.along_y); }
-            case 1u: { return textureSampleGrad(linear_1, repeated, s.picture, s.layer, s.along_x, s.along_y); }
-            default: { return textureSampleGrad(linear_2, repeated, s.picture, s.layer, s.along_x, s.along_y); }
-        }
+    var sum = vec4f(0.0);
+    for (var spot = 0u; spot < s.spots; spot++) {
+        sum += linear_spot(s, spot_at(s, spot));
     }
-    switch s.stack {
-        case 0u: { return textureSampleGrad(linear_0, clamped, s.picture, s.layer, s.along_x, s.along_y); }
-        case 1u: { return textureSampleGrad(linear_1, clamped, s.picture, s.layer, s.along_x, s.along_y); }
-        default: { return textureSampleGrad(linear_2, clamped, s.picture, s.layer, s.along_x, s.along_y); }
-    }
+    return sum / f32(s.spots);
 }
 
 // What the pictures make of a material; `normal` has unit length and looks out of the surface.

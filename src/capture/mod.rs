@@ -65,7 +65,7 @@ pub struct FrameSource {
 }
 
 enum PictureSource {
-    Video(VideoFrames),
+    Video(Box<VideoFrames>),
     Images(ImageFrames),
 }
 
@@ -114,7 +114,7 @@ impl FrameSource {
             let video = VideoFrames::open(path)?;
             Ok(Self::new(
                 path,
-                PictureSource::Video(video),
+                PictureSource::Video(Box::new(video)),
                 FrameTimes::default(),
                 None,
             ))
@@ -137,7 +137,7 @@ impl FrameSource {
                     .cloned()
                     .collect(),
             )?),
-            [video] => PictureSource::Video(VideoFrames::open(video)?),
+            [video] => PictureSource::Video(Box::new(VideoFrames::open(video)?)),
             [first, second, ..] => {
                 return Err(CaptureError::SeveralVideos {
                     path: folder.to_owned(),

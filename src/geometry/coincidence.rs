@@ -4,6 +4,10 @@ use glam::DVec3;
 
 use super::bounds::Bounds;
 
+/// Surfaces that are no farther apart, metres, are drawn as if they were in one place: at a metre from the camera what is
+/// virtual is drawn so much nearer there.
+pub const IN_ONE_PLACE_M: f64 = 1.5e-5;
+
 /// How triangles of two surfaces lie in one plane and overlap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Coincidence {

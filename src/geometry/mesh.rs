@@ -298,6 +298,9 @@ fn component_count(uses: &[EdgeUse], triangles: usize) -> usize {
 }
 
 #[cfg(test)]
+mod looks_tests;
+
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -7,9 +7,8 @@ use glam::DVec3;
 use super::{Light, Rect, Shape};
 
 impl Light {
-    /// The light as `count` small ones of equal power, which together give what it gives: itself where that is 1. The first of
-    /// them are the same places whatever the count, and each second one lies opposite the one before it, so that no even number
-    /// has its middle elsewhere.
+    /// The light as `count` small ones of equal power, which together give what it gives: itself where that is 1. They lie in
+    /// pairs opposite each other, so that no even number has its middle elsewhere.
     ///
     /// A sphere's fill it as densely as 1 / √(radius² − distance²): so they fill the disc that it is from whatever side evenly
     /// (the three first numbers of evenly spread unit quaternions; Shoemake 1992, "Uniform random rotations"), and, being the
@@ -24,8 +23,7 @@ impl Light {
     fn piece(&self, index: usize, count: usize) -> Light {
         let share = 1.0 / count as f64;
         let smaller = share.sqrt();
-        let side = if index % 2 == 0 { 1.0 } else { -1.0 };
-        let spread = spread(index / 2);
+        let side = if index.is_multiple_of(2) { 1.0 } else { -1.0 };
         match *self {
             Self::Point {
                 position_m,
@@ -35,21 +33,21 @@ impl Light {
                 let (aside_m, shape) = match shape {
                     Shape::Point | Shape::Spot { .. } => (DVec3::ZERO, shape),
                     Shape::Sphere { radius_m } => (
-                        in_sphere(spread) * radius_m,
+                        in_sphere(spread(index / 2)) * (radius_m * side),
                         Shape::Sphere {
                             radius_m: radius_m * smaller,
                         },
                     ),
                     Shape::Rect(rect) => {
                         let [width, height] = rect.half_sides_m();
-                        let aside =
-                            width * (2.0 * spread[0] - 1.0) + height * (2.0 * spread[1] - 1.0);
+                        let [across, up] = in_square(index, count);
+                        let aside = width * across + height * up;
                         let size_m = rect.size_m * smaller;
                         (aside, Shape::Rect(Rect { size_m, ..rect }))
                     }
                 };
                 Self::Point {
-                    position_m: position_m + aside_m * side,
+                    position_m: position_m + aside_m,
                     intensity: intensity * share,
                     shape,
                 }
@@ -60,7 +58,7 @@ impl Light {
                 angle_rad,
             } => {
                 let (x, y) = direction.any_orthonormal_pair();
-                let [across, up, _] = in_sphere(spread).to_array();
+                let [across, up, _] = in_sphere(spread(index / 2)).to_array();
                 let aside = (x * across + y * up) * ((0.5 * angle_rad).sin() * side);
                 let forth = (1.0 - aside.length_squared()).max(0.0).sqrt();
                 // (The directions of a disc are evenly spread where their shadows on a plane across it are.)
@@ -98,6 +96,17 @@ fn spread(index: usize) -> [f64; 3] {
     const ROOT: f64 = 1.220_744_084_605_759_6;
     let step = index as f64 + 1.0;
     [1, 2, 3].map(|power| (0.5 + step / ROOT.powi(power)).fract())
+}
+
+/// One of `count` places evenly spread over the square from −1 to 1: a lattice by the golden ratio, alike on opposite sides of
+/// the middle. By what the pieces there have a size of their own they lie nearer the middle, so that their spread is the square's.
+fn in_square(index: usize, count: usize) -> [f64; 2] {
+    const GOLDEN: f64 = 0.618_033_988_749_895;
+    let count = count as f64;
+    let from_middle = index as f64 - 0.5 * (count - 1.0);
+    let shrunk = (1.0 - 1.0 / count).sqrt();
+    let part = (GOLDEN * from_middle + 0.5).rem_euclid(1.0);
+    [2.0 * from_middle / count, 2.0 * part - 1.0].map(|part| part * shrunk)
 }
 
 /// A place in the unit sphere, see [`Light::pieces`].

@@ -10,7 +10,7 @@ use glam::{DVec3, Vec3};
 use wgpu::util::DeviceExt as _;
 
 use crate::geometry::bounds::Bounds;
-use crate::geometry::coincidence::may_coincide;
+use crate::geometry::coincidence::{IN_ONE_PLACE_M, may_coincide};
 use crate::geometry::levels::{Level, levels};
 use crate::geometry::mesh::{CornerLook, Mesh};
 use crate::geometry::outline_scale::largest_scale;
@@ -161,6 +161,8 @@ impl AnchorGeometry {
             things: Vec::new(),
             virtual_corners: Vec::new(),
         };
+        let things = scene.phantoms.iter().chain(&scene.virtuals);
+        let surfaces: Vec<_> = things.map(triangles_in_anchor).collect();
         let needs_looks = scene.virtuals.iter().any(needs_looks);
         for (role, objects) in [
             (Role::Real, &scene.phantoms),
@@ -176,7 +178,7 @@ impl AnchorGeometry {
                     .enumerate()
                     .filter(|(_, object)| object.visible && object.anchor == anchor);
                 for (index, object) in there {
-                    let ties = role == Role::Virtual && ties(scene, index);
+                    let ties = role == Role::Virtual && ties(scene, &surfaces, index);
                     let tie = ties.then_some(index);
                     let coarsest_px = scene.shadows.max_silhouette_error_px;
                     let with_levels =
@@ -212,18 +214,17 @@ impl AnchorGeometry {
 /// Whether a virtual object may lie in the surface of a real one, or of a virtual one before it in the scene; where those
 /// of other anchors will be is not known. All others keep their depth: what is nearer by a hair also shades what lies in
 /// one plane with it, as far as a light at a hair above that plane throws the hair.
-fn ties(scene: &Scene, index: usize) -> bool {
+///
+/// `surfaces` has the triangles of each phantom, then of each virtual object, in its anchor.
+fn ties(scene: &Scene, surfaces: &[Vec<[DVec3; 3]>], index: usize) -> bool {
     let object = &scene.virtuals[index];
-    let own = triangles_in_anchor(object);
+    let own = &surfaces[scene.phantoms.len() + index];
     let others = scene.phantoms.iter().chain(&scene.virtuals[..index]);
-    others.filter(|other| other.visible).any(|other| {
-        other.anchor != object.anchor
-            || may_coincide(&own, &triangles_in_anchor(other), IN_ONE_PLACE_M)
+    let mut others = others.zip(surfaces).filter(|(other, _)| other.visible);
+    others.any(|(other, triangles)| {
+        other.anchor != object.anchor || may_coincide(own, triangles, IN_ONE_PLACE_M)
     })
 }
-
-/// Surfaces that are this near to each other, metres, may be drawn at the same depth.
-const IN_ONE_PLACE_M: f64 = 1e-5;
 
 /// An object's triangles where the GPU has them.
 fn triangles_in_anchor(object: &Object) -> Vec<[DVec3; 3]> {

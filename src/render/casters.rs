@@ -12,8 +12,8 @@ use crate::scene::{self, ShadowSettings, Shortcut};
 use super::anchor_geometry::{AnchoredModel, LevelCaster, Role};
 use super::gpu::Gpu;
 use super::insides::Insides;
-use super::lights::Piece;
-use super::screen_bounds::{ScreenBounds, light_place};
+use super::light_piece::{Piece, light_place};
+use super::screen_bounds::ScreenBounds;
 use super::uniforms::{CastingLight, LIGHT_GROUP, NEAR_M, UniformRow};
 use super::volumes::{CountedVolume, IndexBuffer, MadeFor, Volume};
 

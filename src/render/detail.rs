@@ -11,8 +11,8 @@ use crate::geometry::shadow_volume::LightPlace;
 use crate::light::Light;
 
 use super::anchor_geometry::{AnchoredModel, ModelLevel, Role};
+use super::light_piece::light_place;
 use super::lights::sized_place;
-use super::screen_bounds::light_place;
 use super::uniforms::NEAR_M;
 
 /// The limit to how far the line may move at which a real thing turns away from a light, pixels.

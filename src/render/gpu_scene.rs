@@ -18,6 +18,7 @@ use super::detail::{chosen_levels, widest_penumbra_px};
 use super::gpu::Gpu;
 use super::indirect::Indirect;
 use super::insides::{Insides, insides};
+use super::light_piece::LitBy;
 use super::lights::Lights;
 use super::materials::{materials_group, needs_looks};
 use super::screen_bounds::{ScreenBounds, screen_bounds};
@@ -27,15 +28,6 @@ use super::surfaces::{Sided, SurfaceKinds};
 use super::surroundings::hidden_surroundings;
 use super::uniforms::{AnchorView, UniformRow, VIEW_GROUP};
 use super::volumes::{Among, Volumes, set_scissor};
-
-/// The origin of a scene's light.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum LitBy {
-    /// The scene's lights, and what reflects them.
-    Lights,
-    /// A room, whose light a technique brings ([`GpuScene::set_indirect`]).
-    Room,
-}
 
 /// The light in group 1 while surfaces are drawn.
 #[derive(Debug, Clone, Copy)]

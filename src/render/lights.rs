@@ -13,7 +13,7 @@ use crate::light::{Light, Shape};
 use crate::scene::SceneLight;
 
 use super::gpu::Gpu;
-use super::screen_bounds::light_place;
+use super::light_piece::{Piece, light_place};
 use super::uniforms::{CameraLight, LIGHT_GROUP, UniformRow};
 
 /// The lights that cast shadow volumes, in the present frame.
@@ -37,17 +37,6 @@ struct PlacedLight {
     /// `None` where nobody knows where it is.
     light: Option<Light>,
     pieces: Range<usize>,
-}
-
-/// A part of a light that casts shadows with sharp edges.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Piece {
-    /// In world space.
-    pub light: Light,
-    /// Its number, which stays the same from frame to frame.
-    pub slot: usize,
-    /// What a real surface loses where a virtual thing hides the piece, if that is something else, and the slot of that.
-    pub taken: Option<(Light, usize)>,
 }
 
 impl Lights {

@@ -31,8 +31,6 @@ pub(super) const MATERIALS_GROUP: GroupLayout = GroupLayout {
 
 /// Stacks of each encoding, by the longest side of their pictures, texels.
 const STACKS_PX: [u32; 3] = [256, 1024, u32::MAX];
-/// Texels along the longest side of what is seen at a slant.
-const ANISOTROPY: u16 = 8;
 /// What has less opacity than this is not drawn, of what is half transparent.
 const CLEAR: f32 = 0.1;
 
@@ -103,7 +101,6 @@ pub(super) fn materials_group(gpu: &Gpu, scene: &Scene) -> wgpu::BindGroup {
             mag_filter: wgpu::FilterMode::Linear,
             min_filter: wgpu::FilterMode::Linear,
             mipmap_filter: wgpu::MipmapFilterMode::Linear,
-            anisotropy_clamp: ANISOTROPY,
             ..Default::default()
         })
     });

@@ -17,6 +17,7 @@ mod gpu_scene;
 mod indirect;
 mod insides;
 mod layers;
+mod light_piece;
 mod light_sums;
 mod lights;
 mod materials;

@@ -5,12 +5,10 @@ use glam::{DAffine3, DVec3};
 use crate::geometry::bounds::{Bounds, HalfSpace};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::{self, PixelRect};
-use crate::geometry::shadow_volume::LightPlace;
-use crate::light::Light;
 use crate::scene::{Shortcut, Shortcuts};
 
 use super::anchor_geometry::{AnchoredModel, Role};
-use super::lights::Piece;
+use super::light_piece::{Piece, light_place};
 
 const UNSEEN: ShadowReach = ShadowReach {
     pixels: PixelRect::NONE,
@@ -108,16 +106,4 @@ pub(super) fn screen_bounds(
         virtuals,
         shadows,
     })
-}
-
-/// A light as its shadow volumes see it from an anchor.
-pub(super) fn light_place(light: &Light, anchor_from_world: &DAffine3) -> LightPlace {
-    match *light {
-        Light::Point { position_m, .. } => {
-            LightPlace::Point(anchor_from_world.transform_point3(position_m))
-        }
-        Light::Directional { direction, .. } => {
-            LightPlace::Along(anchor_from_world.transform_vector3(direction))
-        }
-    }
 }

@@ -9,7 +9,7 @@ use crate::light::pieces::surroundings;
 use crate::light::{Light, irradiance};
 use crate::scene::{Object, Scene};
 
-use super::gpu_scene::LitBy;
+use super::light_piece::LitBy;
 
 /// For each direction its light, and what is lost of it behind virtual things; none where a room or nothing shines.
 pub(super) fn hidden_surroundings(scene: &Scene, lit_by: LitBy) -> Vec<[Light; 2]> {

@@ -184,6 +184,7 @@ pub static DIRECTIONAL_LIGHT_SECTION: Section = Section {
     groups: &[LightKeys::ALL, StandingKeys::ALL, DirectionalLightKeys::ALL],
     shown: &[
         ("kind", Example::Live("\"directional\"")),
+        ("on", Example::Aside("\"table\"")),
         ("direction", Example::Live("[0.3, -0.2, -1.0]")),
         ("irradiance", Example::Live("0.4")),
         ("angle_deg", Example::Live("0.53")),
@@ -205,6 +206,7 @@ pub static SPOT_LIGHT_SECTION: Section = Section {
     ],
     shown: &[
         ("kind", Example::Live("\"spot\"")),
+        ("on", Example::Aside("\"table\"")),
         ("position_m", Example::Live("[0.3, 0.1, 0.6]")),
         ("intensity", Example::Live("0.3")),
         ("direction", Example::Live("[-0.3, -0.1, -0.6]")),
@@ -227,6 +229,7 @@ pub static SPHERE_LIGHT_SECTION: Section = Section {
     ],
     shown: &[
         ("kind", Example::Live("\"sphere\"")),
+        ("on", Example::Aside("\"table\"")),
         ("position_m", Example::Live("[0.2, 0.3, 0.5]")),
         ("intensity", Example::Live("0.2")),
         ("radius_m", Example::Live("0.04")),
@@ -248,6 +251,7 @@ pub static RECT_LIGHT_SECTION: Section = Section {
     ],
     shown: &[
         ("kind", Example::Live("\"rect\"")),
+        ("on", Example::Aside("\"table\"")),
         ("position_m", Example::Live("[-1.2, 0.0, 0.9]")),
         ("intensity", Example::Live("0.6")),
         ("direction", Example::Live("[1, 0, -0.5]")),

@@ -17,11 +17,6 @@ use crate::light::Material;
 use crate::light::material::{Coverage, Map};
 use crate::light::texture::Texture;
 
-/// Diffuse reflectance where neither the scene nor a mesh's file gives one.
-pub const DEFAULT_ALBEDO: f64 = 0.5;
-/// Smoothest surface that is kept apart from a mirror.
-pub const LEAST_ROUGHNESS: f64 = 0.01;
-
 /// A mesh, what was done to it, and its materials (never none).
 #[derive(Debug)]
 pub struct LoadedMesh {
@@ -277,7 +272,8 @@ fn place(model: &mut RawModel, path: &Path, up: Up, fit_m: Option<f64>) -> Resul
     let least = corners().fold(DVec3::INFINITY, DVec3::min);
     let most = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
     let longest = (most - least).max_element();
-    if !(longest > 0.0) {
+    // (Also where there is no corner.)
+    if longest <= 0.0 {
         let message = "no triangle has an area; a mesh is expected";
         return Err(SceneError::of_file(path, message));
     }

@@ -184,6 +184,15 @@ pub struct Object {
     pub visible: bool,
 }
 
+impl Object {
+    /// What it stands or moves on: index into [`Scene::anchors`].
+    pub fn stands_on(&self) -> usize {
+        self.motion
+            .as_ref()
+            .map_or(self.anchor, |motion| motion.anchor)
+    }
+}
+
 /// The light that a probe saw, and the room that sent it.
 #[derive(Debug, Clone)]
 pub struct ProbeScene {

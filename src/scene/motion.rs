@@ -3,7 +3,7 @@
 use glam::{DAffine3, DQuat, DVec3};
 
 use super::error::SceneError;
-use super::placement::{ANGLE, POSITION};
+use super::placement::{ANGLE, POSITION, turn};
 use super::ranges::Numbers;
 use super::reader::{Table, Value};
 use super::schema::key::Missing::{Is, Means};
@@ -51,7 +51,8 @@ keys! {
     }
     /// Added to the thing's position_m.
     position_m: DVec3, Vectors::three(POSITION) => Is(DVec3::ZERO);
-    /// Turns about x, then y, then z, after the thing's own, about its origin.
+    /// Turns about x, then y, then z, after the thing's own, about its origin; from one place to the next the angles are
+    /// counted up or down, so 360 is a whole turn.
     rotation_deg: DVec3, Vectors::three(ANGLE) => Is(DVec3::ZERO);
 }
 
@@ -85,8 +86,8 @@ pub struct Station {
     pub time_s: f64,
     /// Beside the thing's own place, metres.
     pub offset_m: DVec3,
-    /// After the thing's own turn.
-    pub turn: DQuat,
+    /// After the thing's own turn: about x, then y, then z, degrees.
+    pub rotation_deg: DVec3,
 }
 
 impl Motion {
@@ -122,17 +123,14 @@ impl Motion {
         let next = self
             .path
             .partition_point(|station| station.time_s <= time_s);
-        let (before, after) = match (next, self.path.get(next)) {
-            (0, _) | (_, None) => {
-                let there = if next == 0 { first } else { last };
-                return (there.offset_m, there.turn);
-            }
-            (_, Some(after)) => (&self.path[next - 1], after),
+        let before = self.path[..next].last().unwrap_or(first);
+        let Some(after) = self.path.get(next) else {
+            return (last.offset_m, turn(last.rotation_deg));
         };
         let part = (time_s - before.time_s) / (after.time_s - before.time_s);
         (
             before.offset_m.lerp(after.offset_m, part),
-            before.turn.slerp(after.turn, part),
+            turn(before.rotation_deg.lerp(after.rotation_deg, part)),
         )
     }
 }
@@ -209,15 +207,10 @@ fn stations(list: &Value) -> Result<Vec<Station>, SceneError> {
                 before.time_s
             )));
         }
-        let [x, y, z] = STATION
-            .rotation_deg
-            .read(&table)?
-            .to_array()
-            .map(f64::to_radians);
         stations.push(Station {
             time_s,
             offset_m: STATION.position_m.read(&table)?,
-            turn: DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x),
+            rotation_deg: STATION.rotation_deg.read(&table)?,
         });
     }
     match stations.is_empty() {
@@ -234,7 +227,7 @@ mod tests {
         Station {
             time_s,
             offset_m: DVec3::X * x_m,
-            turn: DQuat::from_rotation_z(turn_z_deg.to_radians()),
+            rotation_deg: DVec3::Z * turn_z_deg,
         }
     }
 
@@ -267,11 +260,25 @@ mod tests {
             }
         }
         assert_eq!(on_path(PathEnd::Stay, 99.0), 1.0);
-        // Four seconds a round: 6.5 is 2.5 of it, 1.5 s after the place at 2.
-        assert!((on_path(PathEnd::Repeat, 6.5) - 0.5).abs() < 0.2 + 1e-12);
+        // Four seconds a round: 6.5 is 1.5 of the second one, half a second after the place at 2.
+        assert!((on_path(PathEnd::Repeat, 6.5) - 0.5).abs() < 1e-12);
         assert!((on_path(PathEnd::Repeat, 5.5) - on_path(PathEnd::Stay, 1.5)).abs() < 1e-12);
         assert!((on_path(PathEnd::Return, 6.0) - on_path(PathEnd::Stay, 4.0)).abs() < 1e-12);
         assert!((on_path(PathEnd::Return, 10.0) - on_path(PathEnd::Stay, 2.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_path_turns_as_far_as_its_angles_say() {
+        let motion = Motion {
+            anchor: 0,
+            turn_rad_per_s: DVec3::ZERO,
+            path: vec![station(0.0, 0.0, 0.0), station(3.0, 0.0, 270.0)],
+            path_end: PathEnd::Stay,
+        };
+        for (time_s, turned) in [(1.0, DVec3::Y), (2.0, DVec3::NEG_X), (4.0, DVec3::NEG_Y)] {
+            let (_, turn) = motion.at(time_s);
+            assert!((turn * DVec3::X).distance(turned) < 1e-12, "{time_s}");
+        }
     }
 
     #[test]

@@ -7,11 +7,12 @@ use glam::{DAffine3, DVec3, Vec3};
 
 use super::anchors::unique_name;
 use super::error::{SceneError, suggestion};
-use super::mesh_file::{self, DEFAULT_ALBEDO, LoadedMesh, MeshReading, Up};
+use super::mesh_file::{self, LoadedMesh, MeshReading, Up};
 use super::motion::{MotionKeys, motion};
 use super::named_files::FileKind;
 use super::placement::{POSITION, PlacementKeys, placement};
 use super::ranges::Numbers;
+use super::raw_model::DEFAULT_ALBEDO;
 use super::reader::{Table, Value};
 use super::schema::key::Missing::{Is, Means};
 use super::schema::section::{Example, Section, Times};

@@ -54,14 +54,17 @@ impl Default for Placement {
 impl Placement {
     /// Scale, then turn about x, then y, then z, then move.
     pub fn anchor_from_object(&self) -> DAffine3 {
-        let [x, y, z] = self.rotation_deg.to_array().map(f64::to_radians);
-        let rotation =
-            DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x);
         DAffine3 {
-            matrix3: DMat3::from_quat(rotation) * DMat3::from_diagonal(self.scale),
+            matrix3: DMat3::from_quat(turn(self.rotation_deg)) * DMat3::from_diagonal(self.scale),
             translation: self.position_m,
         }
     }
+}
+
+/// The turn that `rotation_deg` means: about x, then y, then z.
+pub fn turn(rotation_deg: DVec3) -> DQuat {
+    let [x, y, z] = rotation_deg.to_array().map(f64::to_radians);
+    DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x)
 }
 
 /// Reads it.

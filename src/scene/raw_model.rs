@@ -4,11 +4,15 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::mesh_file::DEFAULT_ALBEDO;
 use super::notes::Notes;
 use crate::geometry::mesh::{RawLooks, RawTriangle};
 use crate::light::Material;
 use crate::light::texture::Texture;
+
+/// Diffuse reflectance where neither the scene nor a mesh's file gives one.
+pub const DEFAULT_ALBEDO: f64 = 0.5;
+/// Smoothest surface that is kept apart from a mirror.
+pub const LEAST_ROUGHNESS: f64 = 0.01;
 
 /// A model as its file has it, in the file's own units and axes.
 #[derive(Debug, Default)]

@@ -220,12 +220,12 @@ impl<'a> Value<'a> {
         Ok(table)
     }
 
-    /// The entries of an array of `what`.
     /// Whether it is in brackets.
     pub fn is_array(&self) -> bool {
         self.value.get_ref().is_array()
     }
 
+    /// The entries of an array of `what`.
     pub fn array(&self, what: &str) -> Result<Vec<Value<'a>>, SceneError> {
         let entries = self
             .value

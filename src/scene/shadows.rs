@@ -348,6 +348,7 @@ mod tests {
         let expected = [
             ("quality", Some("\"accurate\"")),
             ("samples", None),
+            ("light_samples", None),
             ("max_silhouette_error_px", None),
             ("sources", None),
         ];

@@ -1,7 +1,11 @@
 //! A grey picture as light.
 
 use glam::DVec2;
+use opencv::core::Mat;
+use opencv::imgproc;
 
+use super::TrackingError;
+use crate::capture::Frame;
 use crate::capture::linear::{between_pixels, linear};
 
 /// An 8-bit grey picture, rows from the top without padding.
@@ -42,4 +46,30 @@ impl<'a> Grey<'a> {
         let lower = at(below) + right * (at(below + 1) - at(below));
         Some(upper + down * (lower - upper))
     }
+}
+
+/// The grey levels of a frame as detectors want them: rows from the top, no padding.
+///
+/// # Errors
+/// The frame's bytes do not make up its size.
+pub fn grey_from_rgba(frame: &Frame, grey: &mut Vec<u8>) -> Result<(), TrackingError> {
+    let [width, height] = frame.size_px;
+    let wrong_size = || TrackingError::PictureSize {
+        bytes: frame.rgba.len(),
+        size_px: frame.size_px,
+    };
+    let pixels = width as usize * height as usize;
+    if frame.rgba.len() != 4 * pixels {
+        return Err(wrong_size());
+    }
+    grey.resize(pixels, 0);
+    if pixels == 0 {
+        return Ok(());
+    }
+    let rows = i32::try_from(height).map_err(|_| wrong_size())?;
+    let columns = i32::try_from(width).map_err(|_| wrong_size())?;
+    let rgba = Mat::new_rows_cols_with_bytes::<opencv::core::Vec4b>(rows, columns, &frame.rgba)?;
+    let mut target = Mat::new_rows_cols_with_data_mut(rows, columns, grey.as_mut_slice())?;
+    imgproc::cvt_color_def(&rgba, &mut target, imgproc::COLOR_RGBA2GRAY)?;
+    Ok(())
 }

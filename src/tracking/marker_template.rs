@@ -4,8 +4,8 @@ use std::cell::OnceCell;
 
 use glam::DVec2;
 
+use super::expected_picture::ExpectedPicture;
 use super::printed_marker::{Cell, PrintedMarker};
-use super::reading::ExpectedPicture;
 use crate::scene::Marker;
 
 /// Rows of cells that an edge knows: the one that it bounds, and one to either side.

@@ -9,11 +9,13 @@
 )]
 mod apriltag;
 mod aruco;
+mod aruco_dictionary;
 mod belief;
 mod condition;
 mod conventions;
 mod detector;
 mod edge_fit;
+mod expected_picture;
 mod filter;
 mod flipped_pose;
 mod layout;
@@ -23,20 +25,24 @@ mod marker_template;
 mod pixel_pose;
 mod pose;
 mod printed_marker;
+mod prints;
 mod reading;
 mod refine;
 mod survey;
 mod template_match;
 mod tracked_anchor;
 mod tracker;
+mod wanted;
 
 use glam::DAffine3;
 
-pub use aruco::{Quad, printed_cells, rejected_quads};
+pub use aruco::{Quad, rejected_quads};
 pub use detector::{Detection, Detector};
+pub use light::grey_from_rgba;
 pub use printed_marker::{Cell, PrintedMarker};
+pub use prints::printed_cells;
 pub use survey::Survey;
-pub use tracker::{Tracker, grey_from_rgba};
+pub use tracker::Tracker;
 
 /// How far a pose can be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,8 +1,5 @@
 //! A marker as printed: its cells, and those around it that its family lays down.
 
-use super::TrackingError;
-use super::apriltag;
-use super::aruco::installed_marker;
 use crate::scene::{Drawing, Family, Ink};
 
 /// A cell of a print.
@@ -49,31 +46,19 @@ impl PrintedMarker {
         }
     }
 
-    /// A marker of a family.
-    ///
-    /// # Errors
-    /// A marker that the family does not have.
-    pub fn of(family: Family, id: u32) -> Result<Self, TrackingError> {
-        let no_such_marker = || TrackingError::NoSuchMarker {
-            family: family.name(),
-            id,
-            count: family.id_count(),
-        };
-        let mut printed = match family.is_april_tag() {
-            true => apriltag::printed_marker(family, id).ok_or_else(no_such_marker)?,
-            false => installed_marker(family, id)?.ok_or_else(no_such_marker)?,
-        };
+    /// The same as a family has it drawn and inked; a family with a ring lays nothing down beyond its cells.
+    pub(super) fn drawn_for(mut self, family: Family) -> Self {
         if family.has_ring() {
-            printed.around = Cell::Open;
+            self.around = Cell::Open;
         }
         if family.drawing() == Drawing::OpenCv {
-            printed.cells.reverse();
+            self.cells.reverse();
         }
         if family.ink() == Ink::WhiteOnBlack {
-            printed.around = printed.around.inverted();
-            printed.cells = printed.cells.into_iter().map(Cell::inverted).collect();
+            self.around = self.around.inverted();
+            self.cells = self.cells.into_iter().map(Cell::inverted).collect();
         }
-        Ok(printed)
+        self
     }
 
     /// Cells a side of the square whose corners are found: the border's, or the ring's.
@@ -102,47 +87,5 @@ impl PrintedMarker {
         rows.flat_map(|row| (0..self.side).map(move |column| (column, row)))
             .map(|(column, row)| self.cell(column, row) == Cell::White)
             .collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn rows(name: &str, id: u32) -> Vec<String> {
-        let family = Family::from_name(name).unwrap();
-        let printed = PrintedMarker::of(family, id).unwrap();
-        let reach = -printed.rim()..printed.side() + printed.rim();
-        reach
-            .clone()
-            .map(|row| {
-                let cells = reach.clone().map(|column| match printed.cell(column, row) {
-                    Cell::Black => '.',
-                    Cell::White => '#',
-                    Cell::Open => '?',
-                });
-                cells.collect()
-            })
-            .collect()
-    }
-
-    #[test]
-    fn a_round_tag_leaves_its_corners_open() {
-        let found = rows("tagCircle21h7", 0);
-        assert_eq!(found.len(), 9);
-        assert!(found[0].starts_with("???") && found[0].ends_with("???"));
-        assert_eq!(found[1], "?.......?");
-        assert_eq!(found[2], "?.#####.?");
-    }
-
-    #[test]
-    fn opencv_s_drawing_stands_on_its_head_and_an_inverted_one_is_its_negative() {
-        let family = Family::TAG36H11;
-        let own = PrintedMarker::of(family, 5).unwrap().square();
-        let turned = PrintedMarker::of(family.drawn_as(Drawing::OpenCv), 5).unwrap();
-        assert!(turned.square().iter().eq(own.iter().rev()));
-        let inverted = PrintedMarker::of(family.with_ink(Ink::WhiteOnBlack), 5).unwrap();
-        assert!(inverted.square().iter().zip(&own).all(|(a, b)| a != b));
-        assert_eq!(inverted.cell(-3, 0), Cell::Black);
     }
 }

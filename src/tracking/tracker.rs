@@ -1,22 +1,17 @@
 //! From a frame to the poses of all anchors in it.
 
 use std::collections::HashMap;
-use std::collections::hash_map::Entry;
-
-use opencv::core::Mat;
-use opencv::imgproc;
 
 use super::belief::Belief;
 use super::layout::{Agreement, Layout, Located};
-use super::light::Grey;
-use super::marker_template::MarkerTemplate;
+use super::light::{Grey, grey_from_rgba};
 use super::pixel_pose::{PixelPose, pixel_of};
-use super::printed_marker::PrintedMarker;
 use super::tracked_anchor::TrackedAnchor;
+use super::wanted::Wanted;
 use super::{AnchorPose, Detection, Detector, LossReason, TrackingError};
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
-use crate::scene::{Anchor, Family, Marker, SearchArea, TrackingSettings};
+use crate::scene::{Anchor, Family, SearchArea, TrackingSettings};
 
 /// The whole picture is searched again after this, even when nothing is missing, seconds.
 const SEARCH_AGAIN_SECS: f64 = 2.0;
@@ -56,18 +51,6 @@ pub struct Tracker {
     searched_secs: f64,
     searched_better_secs: f64,
     searched_light_secs: f64,
-}
-
-/// What a tracker looks for.
-enum Wanted {
-    /// The anchors that it was given, whose markers' templates are found by anchor and number.
-    Anchors(HashMap<(Family, u32), (usize, usize)>),
-    /// Each marker of a family, alone; templates are kept of those that were seen.
-    EveryMarker {
-        family: Family,
-        size_m: f64,
-        templates: HashMap<u32, MarkerTemplate>,
-    },
 }
 
 /// What was noticed of an anchor beside its poses.
@@ -280,23 +263,7 @@ impl Tracker {
     ) -> Result<Vec<Detection>, TrackingError> {
         let mut believed = Vec::with_capacity(found.len());
         for detection in found {
-            let template: Option<&MarkerTemplate> = match &mut self.wanted {
-                Wanted::Anchors(places) => places
-                    .get(&(detection.family, detection.id))
-                    .map(|&(anchor, number)| &self.anchors[anchor].layout.templates[number]),
-                Wanted::EveryMarker {
-                    family,
-                    size_m,
-                    templates,
-                } => Some(match templates.entry(detection.id) {
-                    Entry::Occupied(entry) => &*entry.into_mut(),
-                    Entry::Vacant(entry) => {
-                        let printed = PrintedMarker::of(*family, detection.id)?;
-                        let marker = Marker::alone(*family, detection.id, *size_m);
-                        entry.insert(MarkerTemplate::new(&marker, printed))
-                    }
-                }),
-            };
+            let template = self.wanted.template_of(&self.anchors, &detection)?;
             let believes = |template| {
                 self.belief
                     .believes(picture, template, &detection, now_secs)
@@ -392,24 +359,11 @@ impl Tracker {
     /// The anchors where every marker is one, by the name of its number; of several with one number the later ones are
     /// `7#2`, `7#3`.
     pub fn lone_anchors(&self) -> Vec<Anchor> {
-        let Wanted::EveryMarker { family, size_m, .. } = &self.wanted else {
-            return Vec::new();
-        };
-        let mut counts: HashMap<u32, u32> = HashMap::new();
-        let ids = self
+        let markers = self
             .anchors
             .iter()
             .flat_map(|anchor| anchor.layout.markers());
-        ids.map(|(_, id)| {
-            let count = counts.entry(id).or_default();
-            *count += 1;
-            let name = match *count {
-                1 => id.to_string(),
-                count => format!("{id}#{count}"),
-            };
-            Anchor::lone(name, *family, id, *size_m)
-        })
-        .collect()
+        self.wanted.lone_anchors(markers.map(|(_, id)| id))
     }
 
     /// Whether the whole picture is to be searched.
@@ -512,30 +466,4 @@ fn add_new(detections: &mut Vec<Detection>, seen: &[Detection]) {
             detections.push(marker.clone());
         }
     }
-}
-
-/// The grey levels of a frame as detectors want them: rows from the top, no padding.
-///
-/// # Errors
-/// The frame's bytes do not make up its size.
-pub fn grey_from_rgba(frame: &Frame, grey: &mut Vec<u8>) -> Result<(), TrackingError> {
-    let [width, height] = frame.size_px;
-    let wrong_size = || TrackingError::PictureSize {
-        bytes: frame.rgba.len(),
-        size_px: frame.size_px,
-    };
-    let pixels = width as usize * height as usize;
-    if frame.rgba.len() != 4 * pixels {
-        return Err(wrong_size());
-    }
-    grey.resize(pixels, 0);
-    if pixels == 0 {
-        return Ok(());
-    }
-    let rows = i32::try_from(height).map_err(|_| wrong_size())?;
-    let columns = i32::try_from(width).map_err(|_| wrong_size())?;
-    let rgba = Mat::new_rows_cols_with_bytes::<opencv::core::Vec4b>(rows, columns, &frame.rgba)?;
-    let mut target = Mat::new_rows_cols_with_data_mut(rows, columns, grey.as_mut_slice())?;
-    imgproc::cvt_color_def(&rgba, &mut target, imgproc::COLOR_RGBA2GRAY)?;
-    Ok(())
 }

@@ -205,7 +205,7 @@ fn a_mesh_of_somebody_else_s_cannot_say_where_a_recording_writes() {
         .unwrap();
     let text = String::from_utf8_lossy(torus);
     assert!(
-        text.starts_with("mtllib material-1.mtl\nmtllib material-2.mtl\nusemtl wood\n"),
+        text.starts_with("mtllib material-1.mtl\nmtllib material-2.mtl\n# not there: mtllib none.mtl\nusemtl wood\n"),
         "{}",
         text.lines().take(4).collect::<Vec<_>>().join("\n")
     );
@@ -253,10 +253,19 @@ fn a_session_has_probe_room_and_dictionaries_with_it() {
         }
         let scene = session.join("scene.toml");
         done(home.path(), &["check", plain(&scene)]);
-        done(
-            home.path(),
-            &["replay", plain(&scene), "--frames", "0", "--poses", "p.csv"],
-        );
+        let arguments = ["replay", plain(&scene), "--frames", "0", "--poses", "p.csv"];
+        if before.contains_key("markers/1.yml") {
+            // All that is wrong is that nobody holds the card into the picture.
+            let output = run(home.path(), &arguments);
+            assert!(
+                said(&output).contains("gnomon: \"card\" was never found"),
+                "{}",
+                said(&output)
+            );
+            fs::remove_file(home.path().join("p.csv")).unwrap();
+        } else {
+            done(home.path(), &arguments);
+        }
         fs::remove_dir_all(&session).unwrap();
     }
 }

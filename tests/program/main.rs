@@ -12,7 +12,6 @@ mod cli;
 mod job_files;
 mod live;
 mod live_panel;
-mod lost_gpu;
 mod markers;
 mod record;
 mod soak;

@@ -260,7 +260,10 @@ fn hostile_files_are_errors_with_their_place() {
         ),
         (
             "place",
-            |j| j["nodes"][1]["scale"] = json!([1e38, 1e38, 1e38]),
+            |j| {
+                j["nodes"][0]["scale"] = json!([1e5, 1e5, 1e5]);
+                j["nodes"][1]["scale"] = json!([1e38, 1e38, 1e38]);
+            },
             "infinity",
         ),
         (

@@ -5,7 +5,7 @@ use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::render::{Renderer, Shown, VIRTUAL};
 use gnomon::scene::Scene;
 
-use crate::common::{Picture, frame_of, gpu, look_at, project_file};
+use crate::common::{Picture, Stage, look_at, project_file};
 
 const CAMERA: Intrinsics = Intrinsics {
     size_px: [320, 240],
@@ -45,11 +45,9 @@ fn shot(renderer: &mut Renderer, scene: &Scene, time_s: f64) -> Shot {
     }
 }
 
+/// Over a white video.
 fn renderer(scene: &Scene) -> Renderer {
-    let mut renderer = Renderer::new(gpu(), scene, CAMERA).expect("a renderer");
-    let frame = frame_of(CAMERA.size_px, |_| 255);
-    renderer.upload(&frame).expect("an uploaded frame");
-    renderer
+    Stage::of_scene(scene.clone()).renderer(CAMERA)
 }
 
 /// Real pixels that differ by more than rounding. (What surroundings reflect on to a virtual thing is not gathered anew

@@ -311,7 +311,7 @@ fn metal_is_its_layer_in_its_color_and_emission_adds() {
         (
             "half metal",
             0.5,
-            vec![sun([-0.5, 0.6, -1.0], [0.8, 0.7, 0.8])],
+            vec![sun([-0.5, 0.6, -1.0], [1.4, 1.2, 1.3])],
         ),
         (
             "metal under two lights",

@@ -134,8 +134,8 @@ fn a_board_that_is_contradicted_is_not_tracked() {
         center_m: DVec2::new(x_m, 0.0),
         ..Marker::alone(family, id, 0.05)
     };
-    // Its second marker lies on the other side.
-    let printed = [marker(0, -0.05), marker(1, -0.15)];
+    // Its second marker lies on the other side, and farther off than any turn would bring it.
+    let printed = [marker(0, -0.05), marker(1, -0.18)];
     let anchor = Anchor {
         name: "table".into(),
         markers: vec![marker(0, -0.05), marker(1, 0.05)],

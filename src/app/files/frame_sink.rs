@@ -14,7 +14,7 @@ use crate::render::Layers;
 /// The place that frames go to one by one.
 pub enum FrameSink {
     /// A video file.
-    Video(VideoWriter),
+    Video(Box<VideoWriter>),
     /// A folder of `NNNNNN.png`.
     Folder(FrameFolder),
 }
@@ -53,7 +53,7 @@ impl FrameSink {
                 Pace::Stamped { nominal_fps: fps },
                 Naming::Finished,
             )?;
-            return Ok(Self::Video(video));
+            return Ok(Self::Video(Box::new(video)));
         }
         Self::kind_of(path)?;
         FrameFolder::create(path).map(Self::Folder)

@@ -227,7 +227,7 @@ impl TrackRun<'_> {
 fn open(camera: &CameraSettings, named: CalibrationNamed) -> Result<(Frames, Intrinsics)> {
     if !is_live(&camera.source) {
         let (source, intrinsics) = source::open_named(camera, named)?;
-        return Ok((Frames::Recorded(source), intrinsics));
+        return Ok((Frames::Recorded(Box::new(source)), intrinsics));
     }
     let input = LiveInput::of(camera)?;
     let Some(intrinsics) = input.calibration else {
@@ -235,7 +235,7 @@ fn open(camera: &CameraSettings, named: CalibrationNamed) -> Result<(Frames, Int
     };
     let now = Arc::new(Stopwatch::clock());
     let capture = LiveCapture::start(&camera.source, &input.options(false), now, None);
-    Ok((Frames::Live(capture, intrinsics), intrinsics))
+    Ok((Frames::Live(Box::new(capture), intrinsics), intrinsics))
 }
 
 /// What an [`TrackInput`] comes to.

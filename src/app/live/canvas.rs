@@ -169,9 +169,11 @@ impl SceneCanvas {
         renderer.upload(&picture.frame)?;
         let placed = picture.camera_from_nodes(&order.scene);
         let visibility: Vec<f64> = picture.poses.iter().map(|pose| pose.visibility).collect();
-        let mut visibility = order.scene.of_nodes(&visibility);
         // Poses of other anchors than the scene's are none.
-        visibility.resize(placed.len(), 0.0);
+        let visibility = match picture.is_of(&order.scene) {
+            true => order.scene.of_nodes(&visibility),
+            false => vec![0.0; placed.len()],
+        };
         let shown = match view {
             ViewMode::Bare => Shown::Bare,
             _ => Shown::Composite,

@@ -56,9 +56,14 @@ pub struct TrackedPicture {
 }
 
 impl TrackedPicture {
+    /// Whether its poses are of a scene's anchors.
+    pub fn is_of(&self, scene: &Scene) -> bool {
+        scene.anchors[..] == self.anchors[..]
+    }
+
     /// Where a scene's nodes are; nowhere where its anchors are others than those of the poses.
     pub fn camera_from_nodes(&self, scene: &Scene) -> Vec<Option<DAffine3>> {
-        let anchors: Vec<_> = match scene.anchors[..] == self.anchors[..] {
+        let anchors: Vec<_> = match self.is_of(scene) {
             true => self
                 .poses
                 .iter()

@@ -13,7 +13,7 @@ const LONGEST_M: f64 = 1.5;
 /// The casters of a scene, prepared while they stand still.
 #[derive(Default)]
 pub struct ShadowLines {
-    standing: Vec<(String, DAffine3, bool)>,
+    standing: Vec<(String, usize, DAffine3, bool)>,
     casters: Vec<StandingCaster>,
 }
 
@@ -91,10 +91,11 @@ impl ShadowLines {
 
     fn prepare(&mut self, scene: &Scene) {
         let things = || scene.phantoms.iter().chain(&scene.virtuals);
-        let standing: Vec<(String, DAffine3, bool)> = things()
+        let standing: Vec<_> = things()
             .map(|thing| {
                 let casts = thing.visible && thing.casts;
-                (thing.name.clone(), thing.anchor_from_object, casts)
+                let place = thing.anchor_from_object;
+                (thing.name.clone(), thing.anchor, place, casts)
             })
             .collect();
         if standing == self.standing {

@@ -8,7 +8,6 @@ use eframe::egui::{
     Align2, Area, CentralPanel, Color32, Context, FontId, Frame, Grid, Id, PointerButton, Pos2,
     Rect, Response, RichText, Sense, Ui, Vec2, ViewportCommand,
 };
-
 use glam::DAffine3;
 
 use super::command::{
@@ -226,14 +225,11 @@ impl LiveWindow {
             Selected::Thing(name) => {
                 let mut things = scene.phantoms.iter().chain(&scene.virtuals);
                 let thing = things.find(|thing| thing.name == *name)?;
-                let frame = match &thing.motion {
-                    None => camera_from_node[thing.anchor]?,
-                    // Where it stands is edited in its anchor's axes, wherever it is by now.
-                    Some(motion) => {
-                        let (offset_m, _) = motion.at(picture.frame.time_secs);
-                        camera_from_node[motion.anchor]? * DAffine3::from_translation(offset_m)
-                    }
-                };
+                // Where it stands is edited in its anchor's axes, wherever it is by now.
+                let time_s = picture.frame.time_secs;
+                let moved_m = thing.motion.as_ref().map(|motion| motion.at(time_s).0);
+                let frame = camera_from_node[thing.stands_on()]?
+                    * DAffine3::from_translation(moved_m.unwrap_or_default());
                 let placement = self.session.placement(name)?;
                 let name = name.clone();
                 (GizmoTarget::Thing { name, placement }, frame)

@@ -3,15 +3,12 @@
 
 use glam::DVec3;
 
-use crate::geometry::coincidence::{coincidence, is_on_surface};
+use crate::geometry::coincidence::{IN_ONE_PLACE_M, coincidence, is_on_surface};
 use crate::light::Light;
 use crate::scene::{Object, Scene};
 
 /// A light is on a surface that is no farther away, metres.
 const ON_SURFACE_M: f64 = 1e-6;
-/// A virtual surface is drawn in front of a real one that is no farther before it, metres: at a metre from the camera, as
-/// the renderer has it.
-const IN_SURFACE_M: f64 = 1.5e-5;
 
 /// What there is to warn of.
 pub fn warnings(scene: &Scene) -> Vec<String> {
@@ -37,7 +34,7 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
         let beside = |phantom: &&Object| phantom.visible && phantom.anchor == thing.anchor;
         for phantom in scene.phantoms.iter().filter(beside) {
             let real: Vec<[DVec3; 3]> = triangles(phantom).collect();
-            let found = coincidence(&own, &real, IN_SURFACE_M);
+            let found = coincidence(&own, &real, IN_ONE_PLACE_M);
             // What stands on the table shows nothing of its underside.
             if found.alike || found.opposed && !thing.mesh_report.closed {
                 warnings.push(format!(

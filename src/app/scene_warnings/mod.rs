@@ -32,10 +32,6 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
         let notes = probe.notes.iter();
         warnings.extend(notes.map(|note| format!("{}: {note}", probe.image.display())));
     }
-    for thing in scene.phantoms.iter().chain(&scene.virtuals) {
-        let notes = thing.notes.iter();
-        warnings.extend(notes.map(|note| format!("\"{}\": {note}", thing.name)));
-    }
     for (number, light) in scene.lights.iter().enumerate() {
         // Where other anchors are is not known before there are pictures.
         let (0, Light::Point { position_m, .. }) = (light.anchor, light.light) else {

@@ -44,5 +44,7 @@ fn is_dark(scene: &Scene) -> bool {
         };
         strength != DVec3::ZERO
     });
-    !shines && scene.probe.is_none() && scene.ambient_radiance == DVec3::ZERO
+    let mut materials = scene.virtuals.iter().flat_map(|thing| &thing.materials);
+    let glows = materials.any(|material| material.emission != DVec3::ZERO);
+    !shines && !glows && scene.probe.is_none() && scene.ambient_radiance == DVec3::ZERO
 }

@@ -30,9 +30,9 @@ const LIVE_PATIENCE: Duration = Duration::from_millis(50);
 /// The source of a job's frames.
 pub(crate) enum Frames {
     /// A recording: all of them.
-    Recorded(FrameSource),
+    Recorded(Box<FrameSource>),
     /// A camera, calibrated: as they come.
-    Live(LiveCapture, Intrinsics),
+    Live(Box<LiveCapture>, Intrinsics),
 }
 
 /// The source of a job's poses.
@@ -107,7 +107,7 @@ pub(crate) fn each_tracked_frame(
         let (to_tracker, from_camera) = sync_channel(QUEUE);
         let (to_caller, from_tracker) = sync_channel(QUEUE);
         let capture = scope.spawn(move || match frames {
-            Frames::Recorded(source) => capture_stage(source, &to_tracker, last, stop),
+            Frames::Recorded(source) => capture_stage(*source, &to_tracker, last, stop),
             Frames::Live(capture, intrinsics) => {
                 live_stage(&capture, &intrinsics, &to_tracker, stop)
             }

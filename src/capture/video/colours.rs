@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use yuv::{YuvRange, YuvStandardMatrix};
 
 use super::log::ColourTags;
-use super::planes::{self, PixelLayout};
+use super::planes::{self, Coding, PixelLayout};
 
 /// Streams with fewer lines that say nothing are BT.601, others BT.709.
 const LINES_OF_BT_709: u32 = 720;
@@ -19,13 +19,6 @@ const LINES_OF_BT_709: u32 = 720;
 const WHITE_NITS: f64 = 203.0;
 /// The brightest light of HLG's reference display, and of what is mastered in PQ for the most part, cd/m².
 const PEAK_NITS: f64 = 1000.0;
-
-/// How R'G'B' was coded as luma and chroma.
-#[derive(Clone, Copy)]
-pub(super) struct Coding {
-    pub matrix: YuvStandardMatrix,
-    pub range: YuvRange,
-}
 
 /// How coded values become light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,10 +1,16 @@
 //! From planes of luma and chroma to RGB, by the `yuv` crate: it knows all matrices, ranges and depths, and is as fast as
-//! the decoders.
+//! the decoders. Chroma of less resolution is that of the nearest sample, as FFmpeg and OpenCV have it (the crate's bilinear
+//! ways are off by a pixel).
 
 use bytemuck::cast_slice;
-use yuv::{YuvError, YuvGrayImage, YuvPlanarImage, YuvRange};
+use yuv::{YuvError, YuvGrayImage, YuvPlanarImage, YuvRange, YuvStandardMatrix};
 
-use super::colours::Coding;
+/// How R'G'B' was coded as luma and chroma.
+#[derive(Clone, Copy)]
+pub(super) struct Coding {
+    pub matrix: YuvStandardMatrix,
+    pub range: YuvRange,
+}
 
 /// The way in which a frame's pixels lie in memory: planes without padding, or RGBA.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -170,8 +176,8 @@ pub(super) fn rgba8(
     match depth {
         Depth::Eight => {
             let convert = match chroma {
-                Chroma::Yuv420 => yuv::yuv420_to_rgba_bilinear,
-                Chroma::Yuv422 => yuv::yuv422_to_rgba_bilinear,
+                Chroma::Yuv420 => yuv::yuv420_to_rgba,
+                Chroma::Yuv422 => yuv::yuv422_to_rgba,
                 Chroma::Yuv444 => yuv::yuv444_to_rgba,
             };
             let planes = planes(pixels, chroma, size_px);
@@ -202,11 +208,11 @@ pub(super) fn rgba16(
     };
     let convert = match (depth, chroma) {
         (Depth::Eight, _) => return rgba8(pixels, layout, size_px, coding).map(widened),
-        (Depth::Ten, Chroma::Yuv420) => yuv::i010_to_rgba10_bilinear,
-        (Depth::Ten, Chroma::Yuv422) => yuv::i210_to_rgba10_bilinear,
+        (Depth::Ten, Chroma::Yuv420) => yuv::i010_to_rgba10,
+        (Depth::Ten, Chroma::Yuv422) => yuv::i210_to_rgba10,
         (Depth::Ten, Chroma::Yuv444) => yuv::i410_to_rgba10,
-        (Depth::Twelve, Chroma::Yuv420) => yuv::i012_to_rgba12_bilinear,
-        (Depth::Twelve, Chroma::Yuv422) => yuv::i212_to_rgba12_bilinear,
+        (Depth::Twelve, Chroma::Yuv420) => yuv::i012_to_rgba12,
+        (Depth::Twelve, Chroma::Yuv422) => yuv::i212_to_rgba12,
         (Depth::Twelve, Chroma::Yuv444) => yuv::i412_to_rgba12,
     };
     let mut rgba = vec![0; area(size_px) * 4];

@@ -26,21 +26,17 @@ impl GltfFile<'_> {
         }
         let width = accessor.dimensions().multiplicity().min(N);
         let kind = accessor.data_type();
-        let scale = if accessor.normalized() {
-            one(kind)
-        } else {
-            1.0
-        };
+        let scale = one(kind);
         let read = |bytes: &[u8]| {
             let mut tuple = [missing; N];
             let step = kind.size();
             for (number, value) in tuple.iter_mut().enumerate().take(width) {
-                let value_of = number_of(kind, &bytes[number * step..(number + 1) * step]);
-                *value = (value_of / scale).max(if accessor.normalized() {
-                    -1.0
-                } else {
-                    f32::MIN
-                });
+                let given = number_of(kind, &bytes[number * step..(number + 1) * step]);
+                // (A signed number's least is below −1; no maximum for the others, which would turn what is none into one.)
+                *value = match accessor.normalized() && kind != DataType::F32 {
+                    true => (given / scale).max(-1.0),
+                    false => given,
+                };
             }
             tuple
         };

@@ -140,7 +140,10 @@ pub(super) fn file_of_uri(beside: &Path, uri: &str) -> Result<PathBuf, String> {
 }
 
 /// The JSON and the binary chunk.
-fn parts(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, Option<Cow<'_, [u8]>>), String> {
+type Parts<'a> = (Cow<'a, [u8]>, Option<Cow<'a, [u8]>>);
+
+/// A file's parts.
+fn parts(bytes: &[u8]) -> Result<Parts<'_>, String> {
     if !bytes.starts_with(b"glTF") {
         return Ok((Cow::Borrowed(bytes), None));
     }

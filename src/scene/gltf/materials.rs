@@ -10,8 +10,7 @@ use super::textures::Textures;
 use crate::light::Material;
 use crate::light::material::{Coverage, Maps, Shading};
 use crate::scene::error::SceneError;
-use crate::scene::mesh_file::LEAST_ROUGHNESS;
-use crate::scene::raw_model::GivenMaterial;
+use crate::scene::raw_model::{GivenMaterial, LEAST_ROUGHNESS};
 
 /// Most that one channel of emission may be; what is above would be no number in the picture's sums.
 const MOST_EMISSION: f64 = 1e6;

@@ -61,7 +61,7 @@ fn bad_meshes_say_what_is_expected() {
     );
     let fbx = failure("Kaydara FBX Binary  \0");
     assert!(
-        fbx.contains("an FBX file is not read; allowed: OBJ, PLY, STL"),
+        fbx.contains("an FBX file is not read; allowed: glTF, OBJ, PLY, STL"),
         "{fbx}"
     );
 }

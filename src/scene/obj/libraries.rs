@@ -176,7 +176,7 @@ pub fn with_maps_named<E>(
         }
         let line = record.line.trim();
         let options = line.rfind(&written).map_or(line, |at| &line[..at]);
-        let options = options.trim_end().trim_end_matches('"').trim_end();
+        let options = options.trim_end().trim_end_matches('"').trim();
         Ok(Some(match named_file(folder, &written) {
             Some(path) => format!("{options} {}\n", name_of(&path)?),
             None => format!("# not there: {line}\n"),

@@ -5,9 +5,8 @@ use std::sync::Arc;
 
 use glam::{Affine2, DVec3, Mat2, Vec2};
 
-use super::super::mesh_file::{DEFAULT_ALBEDO, LEAST_ROUGHNESS};
 use super::super::notes::Notes;
-use super::super::raw_model::GivenMaterial;
+use super::super::raw_model::{DEFAULT_ALBEDO, GivenMaterial, LEAST_ROUGHNESS};
 use super::super::texture_file;
 use super::files::named_file;
 use super::mtl::{MapRole, MtlMap, MtlMaterial};

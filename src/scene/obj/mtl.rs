@@ -299,7 +299,7 @@ fn reflectance(
 }
 
 fn number_of(keyword: &str, record: &Record) -> (Option<f64>, Option<String>) {
-    match record.words().next().map(|word| number(word)) {
+    match record.words().next().map(number) {
         None => (None, None),
         Some(None) => (
             None,

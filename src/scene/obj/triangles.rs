@@ -73,7 +73,7 @@ impl Reader<'_> {
     fn check_vertices(&self) -> Result<(), SceneError> {
         let known = self.positions.len();
         for face in &self.faces {
-            for corner in self.corners_of(face) {
+            for (index, corner) in self.corners_of(face).iter().enumerate() {
                 let line = |at: usize| {
                     let rest = self.text.get(at..).unwrap_or_default();
                     rest.lines().next().unwrap_or_default()
@@ -83,7 +83,11 @@ impl Reader<'_> {
                     let number = u64::from(corner.vertex) + 1;
                     let message =
                         format!("f: vertex {number} does not exist; the file has {known}");
-                    return Err(self.error_at(at, line(at).len(), message));
+                    // A face that goes on in the next line has its later corners there.
+                    let record = line(at);
+                    let word = record.split_whitespace().nth(index + 1).unwrap_or(record);
+                    let at = word.as_ptr() as usize - self.text.as_ptr() as usize;
+                    return Err(self.error_at(at, word.len(), message));
                 }
                 if let Some(&at) = self.nowhere.get(&corner.vertex) {
                     let message = format!(

@@ -276,8 +276,8 @@ impl Reader {
                     "a face names vertex {corner}; the file has {known}"
                 ))
             })?;
-            let is_far = |part: f32| !(f64::from(part.abs()) <= FARTHEST);
-            if position.to_array().into_iter().any(is_far) {
+            let is_place = |part: f32| f64::from(part.abs()) <= FARTHEST;
+            if !position.to_array().into_iter().all(is_place) {
                 return Err(error(format!(
                     "vertex {corner} is at {position}, which is no place; allowed: up to {FARTHEST} in size"
                 )));

@@ -18,12 +18,12 @@ fn told(obj: &str, added: &str) -> String {
     text[from..to].to_owned()
 }
 
-const CLOSED: &str =
-    "virtuals     v  on table  12 triangles, closed: silhouettes of one orientation  casts\n";
+const CLOSED: &str = "virtuals     v  on table  1 m x 1 m x 1 m  12 triangles, closed: silhouettes of one orientation  casts\n";
+const GREY: &str = "                albedo [0.5, 0.5, 0.5], 1 kB";
 
 #[test]
-fn a_good_mesh_is_one_line() {
-    assert_eq!(told(CUBE, ""), CLOSED);
+fn a_good_mesh_is_two_lines() {
+    assert_eq!(told(CUBE, ""), format!("{CLOSED}{GREY}\n"));
     let mute = told(CUBE, "casts = false\n");
     assert!(
         mute.contains("12 triangles, closed  casts no shadow\n"),
@@ -36,7 +36,10 @@ fn an_open_mesh_names_its_method() {
     let open = CUBE.replace("f 2 4 8 6\n", "");
     assert_eq!(
         told(&open, ""),
-        "virtuals     v  on table  10 triangles, 4 open edges: signed edge multiplicity  casts\n"
+        format!(
+            "virtuals     v  on table  1 m x 1 m x 1 m  10 triangles, 4 open edges: signed edge multiplicity  casts\n\
+             {GREY}\n"
+        )
     );
 }
 
@@ -53,7 +56,7 @@ fn what_was_mended_is_told_below() {
         ),
     ] {
         let told = told(&obj, "");
-        assert_eq!(told, format!("{CLOSED}                {note}\n"), "{obj}");
+        assert_eq!(told, format!("{CLOSED}{GREY}, {note}\n"), "{obj}");
     }
 }
 
@@ -64,7 +67,7 @@ fn a_cut_at_a_vertex_on_an_edge_is_told() {
     let obj = CUBE.replace("f 1 2 6 5", front);
     let told = told(&obj, "");
     assert!(
-        told.contains("14 triangles, closed: ") && told.contains("  1 cut at vertices on edges\n"),
+        told.contains("14 triangles, closed: ") && told.contains(", 1 cut at vertices on edges\n"),
         "{told}"
     );
 }

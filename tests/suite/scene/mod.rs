@@ -2,6 +2,7 @@
 
 mod meshes;
 mod mistakes;
+mod models;
 mod mutations;
 
 use std::f64::consts::FRAC_PI_2;
@@ -99,15 +100,15 @@ fn a_bad_mesh_names_its_own_line_and_the_scene_s() {
     for (name, part) in [
         (
             "far.obj",
-            "models/far.obj:4:7: f: vertex 9 does not exist; 3 vertices are known by this line (a mesh of ",
+            "models/far.obj:4:7: f: vertex 9 does not exist; the file has 3 (a mesh of ",
         ),
         (
             "empty.obj",
-            "models/empty.obj: the file is empty; an OBJ mesh is expected (a mesh of ",
+            "models/empty.obj: the file is empty; a mesh is expected (a mesh of ",
         ),
         (
             "nan.obj",
-            "models/nan.obj:2:3: v: nan is not a finite number (a mesh of ",
+            "models/nan.obj:2:1: v: no place, and a face needs it; allowed: three finite numbers",
         ),
     ] {
         let text = format!("{HEAD}[[virtual]]\nname = \"v\"\nmesh = \"models/{name}\"\n");

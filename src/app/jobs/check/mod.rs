@@ -6,7 +6,7 @@ mod room;
 
 use std::fmt::Write;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec4};
 
 use crate::app::scene_warnings::sizes::{length, sides_m};
 use crate::app::scene_warnings::warnings;
@@ -225,12 +225,7 @@ fn anchor_row((number, anchor): (usize, &Anchor)) -> TableRow {
 
 fn object_row(object: &Object, anchors: &[Anchor], with_levels: bool) -> TableRow {
     let anchor = anchors
-        .get(
-            object
-                .motion
-                .as_ref()
-                .map_or(object.anchor, |motion| motion.anchor),
-        )
+        .get(object.stands_on())
         .map_or("nothing", |anchor| &anchor.name);
     let mut notes = vec![material_note(object)];
     notes.extend(mesh_notes(&object.mesh_report));
@@ -280,11 +275,27 @@ fn material_note(object: &Object) -> String {
         .take(SHOWN)
         .map(|(index, material)| {
             let name = object.material_names.get(index).map_or("", String::as_str);
-            format!("{name} albedo {}", vector(material.albedo))
-                .trim()
-                .to_owned()
+            let mut told = format!("{name} albedo {}", vector(material.albedo));
+            for (what, number) in [
+                ("roughness", material.roughness.unwrap_or(0.0)),
+                ("metal", material.metallic),
+            ] {
+                if number > 0.0 {
+                    told += &format!(" {what} {}", short(number));
+                }
+            }
+            if material.opacity < 1.0 {
+                told += &format!(" opacity {}", short(material.opacity));
+            }
+            if material.emission != DVec3::ZERO {
+                told += &format!(" emission {}", vector(material.emission));
+            }
+            told.trim().to_owned()
         })
         .collect();
+    if object.mesh.looks.iter().any(|look| look.color != Vec4::ONE) {
+        told.push("vertex colours".to_owned());
+    }
     if object.materials.len() > SHOWN {
         told.push(format!("{} more materials", object.materials.len() - SHOWN));
     }

@@ -267,10 +267,13 @@ impl ReplayRun<'_> {
             };
             let request = self.request;
             let writing = scope.spawn(move || write_stage(request, files, &from_renderer));
-            let ended =
-                each_tracked_frame(Frames::Recorded(source), poser, last, stop, |tracked| {
-                    self.one_frame(tracked, renderer.as_mut(), &to_files)
-                });
+            let ended = each_tracked_frame(
+                Frames::Recorded(Box::new(source)),
+                poser,
+                last,
+                stop,
+                |tracked| self.one_frame(tracked, renderer.as_mut(), &to_files),
+            );
             // Closing the end lets the writer finish. Rendering knows of a failed writer only that it is gone.
             drop(to_files);
             for (stage, times) in join(writing)? {

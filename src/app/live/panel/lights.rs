@@ -100,7 +100,7 @@ pub fn show(
 fn other_kind(ui: &mut Ui, light: &Light) -> Option<Light> {
     let now = LightKind::of(light);
     let mut chosen = now;
-    ComboBox::from_id_salt("kind")
+    ComboBox::from_label("kind")
         .selected_text(now.name())
         .show_ui(ui, |ui| {
             for (name, kind) in LightKind::BY_NAME {

@@ -67,11 +67,7 @@ fn fields(
     editing: &mut Editing,
     commands: &mut Commands,
 ) {
-    let anchor = thing
-        .motion
-        .as_ref()
-        .map_or(thing.anchor, |motion| motion.anchor);
-    if let Some(anchor) = scene.anchors.get(anchor) {
+    if let Some(anchor) = scene.anchors.get(thing.stands_on()) {
         ui.weak(format!("on {}", anchor.name));
     }
     let [position, rotation, scale] = SPEEDS;
