@@ -3,10 +3,12 @@
 pub mod bounce;
 pub mod brightest;
 pub mod chromaticities;
+pub mod compact;
 pub mod contrast;
 pub mod prefiltered;
 pub mod probe;
 pub mod probe_maps;
+pub mod probe_power;
 pub mod radiance_picture;
 pub mod response;
 

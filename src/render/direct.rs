@@ -3,6 +3,7 @@
 //! Reads the recorded picture and the stencil (stencil.rs). Writes depth, stencil and the picture; beside it, for virtual
 //! surfaces, what a shadow leaves of them, which is copied into the picture where one falls.
 
+use crate::geometry::reach::PixelRect;
 use super::anchor_geometry::Role;
 use super::attachments::{kept, loaded, target};
 use super::background::{Background, PICTURE_FORMAT, VIDEO_GROUP};
@@ -181,7 +182,7 @@ impl TechniquePasses for Direct {
         gpu_scene: &mut GpuScene,
         shown: Shown,
     ) -> Option<ScreenBounds> {
-        gpu_scene.cast_shadows(gpu, shown)
+        gpu_scene.cast_shadows(gpu, shown, PixelRect::NONE)
     }
 
     /// Haller et al. 2003, section 3.2, for one light and one sample: phantoms and lit virtual things into depth; *real

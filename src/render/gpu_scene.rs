@@ -27,13 +27,12 @@ use super::volumes::{Among, Volumes, set_scissor};
 pub(super) enum LitBy {
     /// The scene's lights, and what reflects them.
     Lights,
-    /// A room, whose light a technique brings ([`GpuScene::set_indirect`]).
+    /// A room, whose light a technique brings ([`GpuScene::set_indirect`]), and lights beside it.
     Room,
 }
 
 /// The scene as the present frame has it.
 pub(super) struct GpuScene {
-    lit_by: LitBy,
     intrinsics: Intrinsics,
     /// Those that cast shadow volumes.
     lights: Vec<Light>,
@@ -65,9 +64,10 @@ pub(super) struct GpuScene {
 impl GpuScene {
     pub fn new(gpu: &Gpu, scene: &Scene, intrinsics: Intrinsics, lit_by: LitBy) -> Self {
         let device = &gpu.device;
+        let lights = scene.outlined_lights();
         let view_count = scene.anchors.len() + scene.virtuals.len();
         let views = UniformRow::new::<AnchorView>(device, "views", view_count);
-        let camera_lights = UniformRow::new::<CameraLight>(device, "lights", scene.lights.len());
+        let camera_lights = UniformRow::new::<CameraLight>(device, "lights", lights.len());
         let mut known_levels = KnownLevels::default();
         let AnchorGeometry {
             batches,
@@ -76,10 +76,9 @@ impl GpuScene {
         } = AnchorGeometry::new(device, scene, &mut known_levels);
         let world_virtuals = virtual_corners.iter().find(|(anchor, _)| *anchor == 0);
         Self {
-            lit_by,
             standing: standing(scene),
             known_levels,
-            casters: Casters::new(gpu, things.len(), scene.lights.len(), &scene.shadows),
+            casters: Casters::new(gpu, things.len(), lights.len(), &scene.shadows),
             indirect: match lit_by {
                 LitBy::Lights => {
                     world_virtuals.and_then(|(_, corners)| Indirect::new(scene, corners))
@@ -96,7 +95,7 @@ impl GpuScene {
             view_group: gpu.bind_group(&VIEW_GROUP, [views.binding()]),
             light_group: gpu.bind_group(&LIGHT_GROUP, [camera_lights.binding()]),
             camera_from_anchor: vec![None; scene.anchors.len()],
-            lights: lights(scene, lit_by),
+            lights,
             glossy: scene.virtuals.iter().any(|object| {
                 let mut materials = object.materials.iter();
                 materials.any(|material| material.roughness.is_some())
@@ -110,7 +109,7 @@ impl GpuScene {
     /// Takes another state of the same scene: lights otherwise, things elsewhere, shown or hidden. What surroundings
     /// reflect stays as it was gathered, where the same corners are there to get it.
     pub fn follow(&mut self, gpu: &Gpu, scene: &Scene) {
-        self.lights = lights(scene, self.lit_by);
+        self.lights = scene.outlined_lights();
         let standing = standing(scene);
         if self.standing == standing {
             return;
@@ -120,7 +119,7 @@ impl GpuScene {
             things,
             virtual_corners,
         } = AnchorGeometry::new(&gpu.device, scene, &mut self.known_levels);
-        self.casters = Casters::new(gpu, things.len(), scene.lights.len(), &scene.shadows);
+        self.casters = Casters::new(gpu, things.len(), self.lights.len(), &scene.shadows);
         let world_virtuals = virtual_corners.iter().find(|(anchor, _)| *anchor == 0);
         self.indirect = self
             .indirect
@@ -271,15 +270,21 @@ impl GpuScene {
     }
 
     /// Makes the shadow volumes that the picture shows. Returns where the placed things and their shadows can be; `None`
-    /// where nothing is placed.
-    pub fn cast_shadows(&mut self, gpu: &Gpu, shown: Shown) -> Option<ScreenBounds> {
-        let bounds = screen_bounds(
+    /// where nothing is placed; what changes `besides` is among them.
+    pub fn cast_shadows(
+        &mut self,
+        gpu: &Gpu,
+        shown: Shown,
+        besides: PixelRect,
+    ) -> Option<ScreenBounds> {
+        let mut bounds = screen_bounds(
             &self.things,
             &self.lights,
             &self.camera_from_anchor,
             &self.intrinsics,
             self.shadows.without,
         )?;
+        bounds.pixels = bounds.pixels.union(besides);
         if shown == Shown::Composite && !bounds.pixels.is_empty() {
             self.cast(gpu, &bounds, bounds.pixels);
         }
@@ -476,14 +481,6 @@ impl GpuScene {
         pass.set_vertex_buffer(0, batch.corners.slice(..));
         pass.set_vertex_buffer(1, batch.indirect.slice(..));
         pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
-    }
-}
-
-/// The lights of a scene that cast shadow volumes.
-fn lights(scene: &Scene, lit_by: LitBy) -> Vec<Light> {
-    match lit_by {
-        LitBy::Lights => scene.lights.clone(),
-        LitBy::Room => Vec::new(),
     }
 }
 

@@ -80,7 +80,7 @@ impl Shape {
         Self {
             technique: scene.chosen_technique().0,
             shadows: scene.shadows,
-            lights: scene.lights.len(),
+            lights: scene.outlined_lights().len(),
             ambient_radiance: scene.ambient_radiance,
             anchors: scene.anchors.len(),
             things: things().map(shape).collect(),

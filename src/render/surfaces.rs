@@ -7,6 +7,15 @@ use super::pipelines::{PipelineDescription, added, overwritten, untouched};
 use super::stencil::{ADDED, REAL_HIDES, SHADOW, VIRTUAL_SHADOW, depth_stencil_state, stencil};
 use super::uniforms::GEOMETRY_GROUPS;
 
+/// The light that is there before all lights.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum First {
+    /// The ambient light, which is drawn with depth.
+    Ambient,
+    /// What another technique has drawn: of surfaces only depth is drawn.
+    DepthAlone,
+}
+
 /// Pipelines of the pass where several samples or lights are added up.
 pub(super) struct Surfaces {
     /// Depth and ambient light of real surfaces.
@@ -78,7 +87,8 @@ pub(super) fn surface_description(
 }
 
 impl Surfaces {
-    pub fn new(gpu: &Gpu, samples: u32, glossy: bool) -> Self {
+    /// `first` says what the pass begins with.
+    pub fn new(gpu: &Gpu, samples: u32, glossy: bool, first: First) -> Self {
         let build = |fragment, stencil, targets: [wgpu::ColorTargetState; 2]| {
             let description = PipelineDescription {
                 shader: "surfaces.wgsl",
@@ -100,7 +110,10 @@ impl Surfaces {
             || added(format, wgpu::BlendFactor::One),
             || untouched(format),
         );
-        let ambient = |fragment| build(fragment, None, [overwritten(format), overwritten(format)]);
+        let ambient = |fragment| match first {
+            First::Ambient => build(fragment, None, [overwritten(format), overwritten(format)]),
+            First::DepthAlone => build(fragment, None, [untouched(), untouched()]),
+        };
         let (equal, other) = (
             wgpu::CompareFunction::Equal,
             wgpu::CompareFunction::NotEqual,

@@ -15,6 +15,7 @@ pub mod schema;
 
 mod anchors;
 mod camera;
+mod compact;
 mod dictionary;
 mod error;
 mod family;
@@ -40,6 +41,7 @@ mod shortcuts;
 mod tracking;
 mod transport;
 
+pub use compact::{ProbeLight, ProbeLightKind, SplitLight};
 pub use camera::{CameraSettings, PixelFormat, WantedFormat};
 pub use dictionary::Dictionary;
 pub use error::{SceneError, TextPlace};

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Object, ProbeScene, Scene};
+use super::{Object, ProbeScene, Scene, SplitLight};
 use crate::geometry::bounds::Bounds;
 use crate::geometry::mesh::Mesh;
 use crate::light::bounce::Reflector;
@@ -36,7 +36,7 @@ impl Object {
     }
 
     /// The smallest box around it, in its anchor's space; `None` without triangles.
-    fn bounds_in_anchor(&self) -> Option<Bounds> {
+    pub(super) fn bounds_in_anchor(&self) -> Option<Bounds> {
         let positions = self.mesh.positions.iter();
         Bounds::around(positions.map(|position| {
             self.anchor_from_object
@@ -74,8 +74,10 @@ impl Scene {
             .filter(|object| object.casts)
             .filter_map(Object::bounds_in_anchor);
         let settings = &self.shadows.shafts;
+        let SplitLight { compact, rest, .. } = self.split_light(probe);
         Room {
             triangles,
+            standing: first,
             things: things.chain(self.virtual_bounds()).collect(),
             options: RoomOptions {
                 patches: settings.patches as usize,
@@ -84,10 +86,11 @@ impl Scene {
                 least_part: settings.least_part,
             },
             probe: PlacedProbe {
-                probe: &probe.probe,
+                probe: rest,
                 position_m: probe.position_m,
                 exposure: probe.exposure as f32,
             },
+            compact,
         }
     }
 

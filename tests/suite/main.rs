@@ -18,6 +18,7 @@ mod figures;
 mod light_from_picture;
 mod picture;
 mod probe;
+mod probe_light;
 mod scene;
 mod shading;
 mod shafts;

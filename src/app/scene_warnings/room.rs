@@ -1,11 +1,11 @@
 //! What a room's light does not take account of.
 
 use super::counted;
-use crate::scene::{Scene, ShadowTechnique};
+use crate::scene::Scene;
 
 /// What of a scene has no part in a room's light.
 pub fn warnings(scene: &Scene) -> Vec<String> {
-    if scene.chosen_technique().0 != ShadowTechnique::Shafts {
+    if !scene.chosen_technique().0.has_shafts() {
         return Vec::new();
     }
     let mut warnings = Vec::new();

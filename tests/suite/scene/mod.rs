@@ -134,6 +134,7 @@ fn a_small_scene_has_the_defaults() {
             samples: 4,
             counting: VolumeCounting::Auto,
             max_silhouette_error_px: 0.5,
+            compact_penumbra_px: 8.0,
             frame_budget_ms: None,
             shafts: Default::default(),
         }

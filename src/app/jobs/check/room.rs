@@ -3,7 +3,7 @@
 use crate::app::room_transport_cache;
 use crate::app::scene_warnings::counted;
 use crate::app::stopwatch::Stopwatch;
-use crate::scene::{ProbeScene, Scene, ShadowTechnique};
+use crate::scene::{ProbeScene, Scene};
 
 /// Labels and what stands behind them. Works the room out where that has not been done yet.
 pub fn room_lines(scene: &Scene, probe: &ProbeScene) -> Vec<(&'static str, String)> {
@@ -30,7 +30,7 @@ pub fn room_lines(scene: &Scene, probe: &ProbeScene) -> Vec<(&'static str, Strin
             ),
         ),
     ];
-    if scene.chosen_technique().0 != ShadowTechnique::Shafts {
+    if !scene.chosen_technique().0.has_shafts() {
         return lines;
     }
     let folder = room_transport_cache::folder();
