@@ -380,6 +380,7 @@ mod edits {
             5 => Edit::Shadows(ShadowChange {
                 from: scene.shadows,
                 to: ShadowSettings {
+                    compact_penumbra_px: (random.between(0.0, 40.0) * 100.0).round() / 100.0,
                     without: Shortcuts::NONE,
                     technique: if random.chance(0.5) {
                         Technique::Auto

@@ -6,6 +6,8 @@ use std::borrow::Cow;
 use glam::{DVec3, Vec3};
 use gnomon::geometry::bounds::Bounds;
 use gnomon::light::probe::Probe;
+use gnomon::light::{Light, irradiance};
+use gnomon::scene::{ProbeLightKind, Scene, Technique};
 use gnomon::shafts::patches::RoomTriangle;
 use gnomon::shafts::room::Room;
 use gnomon::shafts::room_transport::{PlacedProbe, RoomOptions, RoomTransport};
@@ -186,4 +188,79 @@ fn photographed_surroundings_give_planes_their_light_however_they_are_turned() {
             assert!(error < 0.01, "{name} {columns}: {error:.4}");
         }
     }
+}
+
+/// The room that ships, under other surroundings from afar.
+fn scene_under(probe: Probe) -> Scene {
+    let mut scene = Scene::load(&crate::common::project_file("config/room.toml")).expect("a scene");
+    let lit_by = scene.probe.as_mut().expect("a probe");
+    lit_by.probe = probe;
+    lit_by.is_far = true;
+    lit_by.exposure = 1.0;
+    scene
+}
+
+/// Irradiance of a plane that sees all lights.
+fn from_lights(lights: &[Light], normal: Vec3) -> f64 {
+    let given = |light| irradiance(light, DVec3::ZERO, normal.as_dvec3()).y;
+    lights.iter().map(given).sum()
+}
+
+#[test]
+fn light_does_not_depend_on_where_compact_ends() {
+    let mut scene = scene_under(sun(-131.0, 40.0, 4.0));
+    let mut counts = Vec::new();
+    for compact_penumbra_px in [0.0, 1.0, 8.0, 100.0] {
+        scene.shadows.compact_penumbra_px = compact_penumbra_px;
+        let probe = scene.probe.as_ref().expect("a probe");
+        let split = scene.split_light(probe);
+        counts.push(split.compact.len());
+        for normal in [Vec3::Z, Vec3::new(-0.6, -0.48, 0.64)] {
+            let both = exact(&split.rest, normal) + from_lights(&split.compact, normal);
+            let whole = exact(&probe.probe, normal);
+            assert!((both / whole - 1.0).abs() < 1e-3, "{normal}: {both} {whole}");
+        }
+    }
+    assert_eq!(counts, [0, 0, 1, 1]);
+}
+
+#[test]
+fn a_lamp_that_the_scene_and_the_probe_know_shines_once() {
+    let mut scene = scene_under(sun(-131.0, 40.0, 1.0));
+    let to_sun = |azimuth_deg: f64, elevation_deg: f64| {
+        let (azimuth, elevation) = (azimuth_deg.to_radians(), elevation_deg.to_radians());
+        let (sine, cosine) = azimuth.sin_cos();
+        DVec3::new(cosine, sine, 0.0) * elevation.cos() + DVec3::Z * elevation.sin()
+    };
+    let directional = |toward: DVec3, power: f64| Light::Directional {
+        direction: -toward,
+        irradiance: DVec3::splat(power),
+    };
+    // A degree beside, and not quite as strong: the same.
+    scene.lights = vec![directional(to_sun(-131.0, 41.0), 2.6)];
+    let probe = scene.probe.as_ref().expect("a probe");
+    let split = scene.split_light(probe);
+    assert_eq!(split.compact, scene.lights);
+    let ProbeLightKind::SameAs { light, ratio, .. } = split.found[0].kind else {
+        panic!("{:?}", split.found);
+    };
+    assert_eq!(light, 0);
+    assert!((ratio - 3.0 / 2.6).abs() < 0.01, "{ratio}");
+    let left = exact(&split.rest, Vec3::Z) / (0.15 * std::f64::consts::PI);
+    assert!((left - 1.0).abs() < 0.01, "{left}");
+    // Elsewhere, or far weaker: another one.
+    for other in [
+        directional(to_sun(-100.0, 40.0), 2.6),
+        directional(to_sun(-131.0, 40.0), 0.1),
+    ] {
+        scene.lights = vec![other];
+        let split = scene.split_light(scene.probe.as_ref().expect("a probe"));
+        assert_eq!(split.compact.len(), 2);
+        assert_eq!(split.found[0].kind, ProbeLightKind::Compact);
+    }
+    // With shafts alone the probe has all light.
+    scene.shadows.technique = Technique::Shafts;
+    let probe = scene.probe.as_ref().expect("a probe");
+    let split = scene.split_light(probe);
+    assert!(split.compact.is_empty() && *split.rest == probe.probe);
 }

@@ -304,6 +304,7 @@ frame_budget_ms = 16
             samples: 1,
             counting: VolumeCounting::DepthFail,
             max_silhouette_error_px: 0.0,
+            compact_penumbra_px: 8.0,
             frame_budget_ms: Some(16.0),
             // All of them: what this quality means.
             shafts: ShaftSettings {
