@@ -25,7 +25,9 @@ pub struct TakenLight {
 /// The width that a bright region would have as a disc, radians.
 pub fn width_rad(region: &BrightRegion) -> f64 {
     let solid_angle = region.light.solid_angle_sr;
-    2.0 * (1.0 - solid_angle / std::f64::consts::TAU).clamp(-1.0, 1.0).acos()
+    2.0 * (1.0 - solid_angle / std::f64::consts::TAU)
+        .clamp(-1.0, 1.0)
+        .acos()
 }
 
 /// Takes a light's pixels out of a probe: as bright as their surroundings is what stays.
@@ -40,8 +42,8 @@ pub fn take(probe: &mut Probe, region: &BrightRegion) -> TakenLight {
     // (The sum of a set would depend on its order.)
     let mut rim: Vec<usize> = rim.into_iter().collect();
     rim.sort_unstable();
-    let around = rim.iter().map(|&pixel| probe.pixels()[pixel]).sum::<Vec3>()
-        / (rim.len().max(1)) as f32;
+    let around =
+        rim.iter().map(|&pixel| probe.pixels()[pixel]).sum::<Vec3>() / (rim.len().max(1)) as f32;
     let [width, _] = probe.size_px();
     // Of each channel the irradiance vector.
     let mut vectors = DMat3::ZERO;
@@ -74,20 +76,35 @@ mod tests {
         let size_px = [512, 256];
         let grid = Probe::new(size_px, vec![Vec3::ONE; 512 * 256]).unwrap();
         let lamps = [
-            (DVec3::new(0.5, -0.3, 0.8).normalize(), 0.03, Vec3::new(900.0, 700.0, 400.0)),
-            (DVec3::new(-0.9, 0.01, 0.6).normalize(), 0.1, Vec3::new(50.0, 60.0, 70.0)),
+            (
+                DVec3::new(0.5, -0.3, 0.8).normalize(),
+                0.03,
+                Vec3::new(900.0, 700.0, 400.0),
+            ),
+            (
+                DVec3::new(-0.9, 0.01, 0.6).normalize(),
+                0.1,
+                Vec3::new(50.0, 60.0, 70.0),
+            ),
         ];
         let pixels = (0..512 * 256).map(|index| {
             let direction = grid.direction((index % 512) as f64 + 0.5, (index / 512) as f64 + 0.5);
-            let lamp = lamps.iter().find(|lamp| direction.angle_between(lamp.0) < lamp.1);
-            lamp.map_or(Vec3::new(0.4, 0.5, 0.6), |lamp| lamp.2 * (1.0 + direction.y as f32))
+            let lamp = lamps
+                .iter()
+                .find(|lamp| direction.angle_between(lamp.0) < lamp.1);
+            lamp.map_or(Vec3::new(0.4, 0.5, 0.6), |lamp| {
+                lamp.2 * (1.0 + direction.y as f32)
+            })
         });
         let probe = Probe::new(size_px, pixels.collect()).unwrap();
         let on_plane = |probe: &Probe, normal: DVec3| -> DVec3 {
             let pixels = probe.pixels().iter().enumerate();
             let arriving = |(index, pixel): (usize, &Vec3)| {
                 let (column, row) = ((index % 512) as f64 + 0.5, index / 512);
-                let cosine = probe.direction(column, row as f64 + 0.5).dot(normal).max(0.0);
+                let cosine = probe
+                    .direction(column, row as f64 + 0.5)
+                    .dot(normal)
+                    .max(0.0);
                 pixel.as_dvec3() * (cosine * probe.pixel_solid_angle(row))
             };
             pixels.map(arriving).sum()

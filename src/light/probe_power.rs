@@ -61,8 +61,7 @@ impl ProbePower {
         let middle = direction.y.atan2(direction.x) + PI;
         let part = |azimuth: f64, polar: f64| self.before(azimuth / TAU, polar);
         let (first, last) = (middle - half_width, middle + half_width);
-        let power =
-            part(last, high) - part(first, high) - part(last, low) + part(first, low);
+        let power = part(last, high) - part(first, high) - part(last, low) + part(first, low);
         let solid_angle = 2.0 * half_width * (low.cos() - high.cos());
         (power / solid_angle.max(1e-30)).max(0.0)
     }
@@ -96,10 +95,18 @@ mod tests {
     fn an_even_probe_has_its_radiance_around_every_direction() {
         let power = ProbePower::new(&Probe::new([64, 32], vec![Vec3::splat(2.5); 2048]).unwrap());
         assert!((power.mean() - 2.5).abs() < 1e-6);
-        for direction in [DVec3::X, DVec3::NEG_X, DVec3::Z, DVec3::new(0.3, -0.9, -2.0)] {
+        for direction in [
+            DVec3::X,
+            DVec3::NEG_X,
+            DVec3::Z,
+            DVec3::new(0.3, -0.9, -2.0),
+        ] {
             for half_angle in [1e-4, 0.01, 0.3, 1.4] {
                 let mean = power.mean_around(direction, half_angle);
-                assert!((mean - 2.5).abs() < 1e-5, "{direction} {half_angle}: {mean}");
+                assert!(
+                    (mean - 2.5).abs() < 1e-5,
+                    "{direction} {half_angle}: {mean}"
+                );
             }
         }
     }
@@ -118,7 +125,10 @@ mod tests {
         let width = 2.0 * (wide.sin() / polar.sin()).asin();
         let rectangle = width * ((polar - wide).cos() - (polar + wide).cos());
         let found = power.mean_around(middle, wide) * rectangle;
-        assert!((found / solid_angle - 1.0).abs() < 1e-6, "{found} {solid_angle}");
+        assert!(
+            (found / solid_angle - 1.0).abs() < 1e-6,
+            "{found} {solid_angle}"
+        );
         assert!(power.mean_around(-middle, wide) < 1e-9);
         assert!((power.mean_around(middle, 0.01) - 1.0).abs() < 1e-5);
     }

@@ -3,7 +3,6 @@
 //! Reads the recorded picture and the stencil (stencil.rs). Writes depth, stencil and the picture; beside it, for virtual
 //! surfaces, what a shadow leaves of them, which is copied into the picture where one falls.
 
-use crate::geometry::reach::PixelRect;
 use super::anchor_geometry::Role;
 use super::attachments::{kept, loaded, target};
 use super::background::{Background, PICTURE_FORMAT, VIDEO_GROUP};
@@ -20,6 +19,7 @@ use super::surfaces::{Sided, surface_description};
 use super::technique::{FrameContext, TechniquePasses};
 use super::uniforms::GEOMETRY_GROUPS;
 use super::volumes::{Among, Volumes, set_scissor};
+use crate::geometry::reach::PixelRect;
 
 /// Values of `SEEN` in direct.wgsl.
 const IN_OPEN_LIGHT: f64 = 1.0;

@@ -41,8 +41,8 @@ mod shortcuts;
 mod tracking;
 mod transport;
 
-pub use compact::{ProbeLight, ProbeLightKind, SplitLight};
 pub use camera::{CameraSettings, PixelFormat, WantedFormat};
+pub use compact::{ProbeLight, ProbeLightKind, SplitLight};
 pub use dictionary::Dictionary;
 pub use error::{SceneError, TextPlace};
 pub use family::{Codes, Family};

@@ -144,8 +144,7 @@ fn cut_pixel(probe: &Probe, [column, row]: [usize; 2], most: f64, parcels: &mut 
     for down in 0..count {
         let place = |part: f64| row as f64 + (down as f64 + part) / count as f64;
         let height_of_band = cosine(place(0.0)) - cosine(place(1.0));
-        let solid_angle_sr =
-            TAU / width as f64 / count as f64 * height_of_band;
+        let solid_angle_sr = TAU / width as f64 / count as f64 * height_of_band;
         for across in 0..count {
             let column = column as f64 + (across as f64 + 0.5) / count as f64;
             parcels.push(Parcel {

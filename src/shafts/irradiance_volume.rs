@@ -62,7 +62,15 @@ impl IrradianceVolume {
         };
         volume.gathered = (0..points.element_product())
             .into_par_iter()
-            .map(|index| gathered(volume.point(index), patches, caster, radiance, &volume.bright))
+            .map(|index| {
+                gathered(
+                    volume.point(index),
+                    patches,
+                    caster,
+                    radiance,
+                    &volume.bright,
+                )
+            })
             .collect();
         volume
     }

@@ -141,9 +141,8 @@ fn seen_radiance(
     let seen: Vec<Vec3> = points_on(corners, SAMPLES)
         .filter(|&point| placed.sees(caster, point))
         .collect();
-    let over = |solid_angle_sr: f64| {
-        (carried.radiance_solid_angle / solid_angle_sr.max(1e-30)).as_vec3()
-    };
+    let over =
+        |solid_angle_sr: f64| (carried.radiance_solid_angle / solid_angle_sr.max(1e-30)).as_vec3();
     let mean_of_rays = over(carried.solid_angle_sr);
     if seen.len() == SAMPLES {
         // All of it is seen: what came from there is what it sends. Where it is dim the mean of its rays does not tell of how
@@ -211,7 +210,9 @@ fn irradiances(
         };
         hemisphere(normal, RAYS).filter_map(arriving).sum::<Vec3>() * (PI / RAYS as f32)
             + bright.irradiance(start, normal, caster)
-            + compact_irradiance(compact, start, normal, |way| caster.is_hidden(start, way, REACH))
+            + compact_irradiance(compact, start, normal, |way| {
+                caster.is_hidden(start, way, REACH)
+            })
     };
     chosen.par_iter().map(gathered).collect()
 }

@@ -55,7 +55,10 @@ impl Room<'_> {
             position_m,
             exposure,
         } = &self.probe;
-        hash_numbers(&mut hasher, [source_power, least_part, f64::from(*exposure)]);
+        hash_numbers(
+            &mut hasher,
+            [source_power, least_part, f64::from(*exposure)],
+        );
         hash_numbers(&mut hasher, position_m.to_array());
         probe.size_px().hash(&mut hasher);
         hash_vectors(&mut hasher, probe.pixels());

@@ -62,7 +62,11 @@ fn a_room_of_one_brightness_lights_every_place_with_pi_times_it() {
     let color = Vec3::new(1.0, 0.5, 0.25);
     let probe = Probe::new([64, 32], vec![color; 64 * 32]).expect("a probe");
     let room = Room {
-        triangles: inside_of(Vec3::new(-1.0, -1.2, -0.5), Vec3::new(1.1, 1.0, 1.3), Some(0.4)),
+        triangles: inside_of(
+            Vec3::new(-1.0, -1.2, -0.5),
+            Vec3::new(1.1, 1.0, 1.3),
+            Some(0.4),
+        ),
         standing: 0,
         compact: Vec::new(),
         things: vec![bounds(DVec3::splat(-0.1), DVec3::splat(0.1))],

@@ -108,7 +108,9 @@ impl Shafts {
         let standing = parts.standing;
         let is_standing = |patch: &&RoomPatch| patch.piece < standing;
         let patches = || room.patches.patches.iter();
-        let ordered = patches().filter(is_standing).chain(patches().filter(|it| !is_standing(it)));
+        let ordered = patches()
+            .filter(is_standing)
+            .chain(patches().filter(|it| !is_standing(it)));
         let places: Vec<ReflectedCorner> = ordered
             .flat_map(|patch| patch.vertices)
             .map(|vertex| ReflectedCorner {
@@ -174,8 +176,7 @@ impl Shafts {
             let volume = &self.room.volume;
             gpu_scene.set_indirect(&gpu.queue, &world_from_anchor, |place, normal| {
                 let surfels = self.hidden.iter().flat_map(|hidden| hidden.surfels.all());
-                volume.irradiance(place, normal)
-                    + interreflected_irradiance(place, normal, surfels)
+                volume.irradiance(place, normal) + interreflected_irradiance(place, normal, surfels)
             });
             self.world_from_anchor = world_from_anchor;
         }
@@ -418,7 +419,14 @@ impl TechniquePasses for ShaftsAlone {
 fn mean_irradiance(room: &RoomTransport, things: &[Bounds]) -> Vec3 {
     let places = things.iter().map(|bounds| (bounds.low + bounds.high) / 2.0);
     let middle = places.sum::<DVec3>() / things.len().max(1) as f64;
-    let sides = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z];
+    let sides = [
+        Vec3::X,
+        Vec3::Y,
+        Vec3::Z,
+        Vec3::NEG_X,
+        Vec3::NEG_Y,
+        Vec3::NEG_Z,
+    ];
     let of_side = |normal| room.volume.irradiance(middle.as_vec3(), normal);
     sides.into_iter().map(of_side).sum::<Vec3>() / 6.0
 }

@@ -21,7 +21,10 @@ fn compact_lines(scene: &Scene, probe: &ProbeScene) -> Vec<(&'static str, String
         let edges = format!("edges of {:.1} px", found.penumbra_px);
         match found.kind {
             ProbeLightKind::Compact => ("compact", format!("{seen}: {edges}, drawn with outlines")),
-            ProbeLightKind::Broad => ("broad", format!("{seen}: {edges}, a part of the broad light")),
+            ProbeLightKind::Broad => (
+                "broad",
+                format!("{seen}: {edges}, a part of the broad light"),
+            ),
             ProbeLightKind::SameAs {
                 light,
                 beside_rad,

@@ -7,8 +7,7 @@ use crate::app::authoring::Edit;
 use crate::app::live::command::Commands;
 use crate::scene::format::{AnyKey, DIFFERENCE, SHADOWS, SHAFTS};
 use crate::scene::{
-    Difference, Quality, Scene, ShadowChange, ShaftSettings, Technique,
-    VolumeCounting,
+    Difference, Quality, Scene, ShadowChange, ShaftSettings, Technique, VolumeCounting,
 };
 
 /// What a frame may take when a limit is first asked for, milliseconds.
