@@ -36,6 +36,11 @@ impl Bounds {
         }
     }
 
+    /// Whether no point is in both.
+    pub fn is_apart_from(&self, other: &Self) -> bool {
+        self.low.cmpgt(other.high).any() || self.high.cmplt(other.low).any()
+    }
+
     /// Whether a point lies in it or on its sides.
     pub fn contains(&self, point: DVec3) -> bool {
         point.cmpge(self.low).all() && point.cmple(self.high).all()

@@ -28,8 +28,8 @@ pub fn coincidence(one: &[[DVec3; 3]], other: &[[DVec3; 3]], within_m: f64) -> C
         };
         let reached = sorted.partition_point(|(around, _)| around.low.x <= bounds.high.x);
         for (around, facing) in &sorted[..reached] {
-            let apart = around.low.cmpgt(bounds.high).any() || around.high.cmplt(bounds.low).any();
-            let Some(other_normal) = (!apart).then(|| unit_normal(facing)).flatten() else {
+            let near = !around.is_apart_from(&bounds);
+            let Some(other_normal) = near.then(|| unit_normal(facing)).flatten() else {
                 continue;
             };
             let off_m = |point: &DVec3| normal.dot(*point - triangle[0]).abs();
@@ -47,6 +47,28 @@ pub fn coincidence(one: &[[DVec3; 3]], other: &[[DVec3; 3]], within_m: f64) -> C
     }
     found
 }
+
+/// Whether two meshes may have a place in common where each has a surface, to `within_m` metres; both in one space. `true`
+/// too where there are too many triangles near each other to look at all pairs.
+pub fn may_coincide(one: &[[DVec3; 3]], other: &[[DVec3; 3]], within_m: f64) -> bool {
+    let around = |triangles: &[[DVec3; 3]]| Bounds::around(triangles.iter().flatten().copied());
+    let (Some(around_one), Some(around_other)) = (around(one), around(other)) else {
+        return false;
+    };
+    let near = |triangles: &[[DVec3; 3]], bounds: &Bounds| -> Vec<[DVec3; 3]> {
+        let bounds = bounds.grown(within_m);
+        let reaches = |triangle: &&[DVec3; 3]| {
+            Bounds::around(**triangle).is_some_and(|triangle| !triangle.is_apart_from(&bounds))
+        };
+        triangles.iter().filter(reaches).copied().collect()
+    };
+    let (one, other) = (near(one, &around_other), near(other, &around_one));
+    one.len() * other.len() > MOST_PAIRS
+        || coincidence(&one, &other, within_m) != Coincidence::default()
+}
+
+/// Pairs of triangles that are looked at in some milliseconds.
+const MOST_PAIRS: usize = 4_000_000;
 
 /// Whether a point lies on some of the triangles, to `within_m` metres.
 pub fn is_on_surface(

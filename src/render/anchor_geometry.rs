@@ -10,6 +10,7 @@ use glam::{DVec3, Vec3};
 use wgpu::util::DeviceExt as _;
 
 use crate::geometry::bounds::Bounds;
+use crate::geometry::coincidence::may_coincide;
 use crate::geometry::levels::{Level, levels};
 use crate::geometry::mesh::Mesh;
 use crate::geometry::outline_scale::largest_scale;
@@ -65,7 +66,7 @@ pub(super) struct AnchoredModel {
     pub role: Role,
     pub anchor: usize,
     /// Where two surfaces are in one place, one is to be seen: a virtual thing before a real one, and of virtual ones that
-    /// of the larger number, the later in the scene. `None`: it is real.
+    /// of the larger number, the later in the scene. `None`: it is real, or in no place where another is.
     pub tie: Option<usize>,
     /// Around the mesh itself; its coarser levels lie within.
     pub bounds: Bounds,
@@ -142,14 +143,15 @@ impl AnchorGeometry {
             (Role::Real, &scene.phantoms),
             (Role::Virtual, &scene.virtuals),
         ] {
-            for anchor in 0..scene.anchors.len() {
+            for anchor in 0..scene.node_count() {
                 let mut shared = SharedCorners::default();
                 let there = objects
                     .iter()
                     .enumerate()
                     .filter(|(_, object)| object.visible && object.anchor == anchor);
                 for (index, object) in there {
-                    let tie = (role == Role::Virtual).then_some(index);
+                    let ties = role == Role::Virtual && ties(scene, index);
+                    let tie = ties.then_some(index);
                     let coarsest_px = scene.shadows.max_silhouette_error_px;
                     let with_levels =
                         coarsest_px > 0.0 && !scene.shadows.without.has(Shortcut::Levels);
@@ -176,6 +178,30 @@ impl AnchorGeometry {
         }
         geometry
     }
+}
+
+/// Whether a virtual object may lie in the surface of a real one, or of a virtual one before it in the scene; where those
+/// of other anchors will be is not known. All others keep their depth: what is nearer by a hair also shades what lies in
+/// one plane with it, as far as a light at a hair above that plane throws the hair.
+fn ties(scene: &Scene, index: usize) -> bool {
+    let object = &scene.virtuals[index];
+    let own = triangles_in_anchor(object);
+    let others = scene.phantoms.iter().chain(&scene.virtuals[..index]);
+    others.filter(|other| other.visible).any(|other| {
+        other.anchor != object.anchor
+            || may_coincide(&own, &triangles_in_anchor(other), IN_ONE_PLACE_M)
+    })
+}
+
+/// Surfaces that are this near to each other, metres, may be drawn at the same depth.
+const IN_ONE_PLACE_M: f64 = 1e-5;
+
+/// An object's triangles where the GPU has them.
+fn triangles_in_anchor(object: &Object) -> Vec<[DVec3; 3]> {
+    let positions = object.positions_in_anchor(&object.mesh);
+    let corner = |index: u32| positions[index as usize].as_dvec3();
+    let triangles = object.mesh.triangles.iter();
+    triangles.map(|triangle| triangle.map(corner)).collect()
 }
 
 /// Puts an object's levels among its batch's corners; `None` without triangles.

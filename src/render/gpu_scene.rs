@@ -65,7 +65,7 @@ impl GpuScene {
     pub fn new(gpu: &Gpu, scene: &Scene, intrinsics: Intrinsics, lit_by: LitBy) -> Self {
         let device = &gpu.device;
         let lights = scene.outlined_lights();
-        let view_count = scene.anchors.len() + scene.virtuals.len();
+        let view_count = scene.node_count() + scene.virtuals.len();
         let views = UniformRow::new::<AnchorView>(device, "views", view_count);
         let camera_lights = UniformRow::new::<CameraLight>(device, "lights", lights.len());
         let mut known_levels = KnownLevels::default();
@@ -94,7 +94,7 @@ impl GpuScene {
             things,
             view_group: gpu.bind_group(&VIEW_GROUP, [views.binding()]),
             light_group: gpu.bind_group(&LIGHT_GROUP, [camera_lights.binding()]),
-            camera_from_anchor: vec![None; scene.anchors.len()],
+            camera_from_anchor: vec![None; scene.node_count()],
             lights,
             glossy: scene.virtuals.iter().any(|object| {
                 let mut materials = object.materials.iter();

@@ -43,7 +43,7 @@ impl Indirect {
                 .flat_map(Object::reflectors)
                 .collect::<Vec<_>>()
         };
-        let movers: Vec<(usize, Mover)> = (1..scene.anchors.len())
+        let movers: Vec<(usize, Mover)> = (1..scene.node_count())
             .filter_map(|anchor| Some((anchor, Mover::new(&on_anchor(anchor))?)))
             .collect();
         let surroundings =

@@ -64,7 +64,7 @@ struct Shape {
     shadows: ShadowSettings,
     lights: usize,
     ambient_radiance: DVec3,
-    anchors: usize,
+    nodes: usize,
     /// Of each thing its name, its anchor, its mesh's triangles and whether it casts.
     things: Vec<(String, usize, usize, bool)>,
     materials: Vec<Material>,
@@ -82,7 +82,7 @@ impl Shape {
             shadows: scene.shadows,
             lights: scene.outlined_lights().len(),
             ambient_radiance: scene.ambient_radiance,
-            anchors: scene.anchors.len(),
+            nodes: scene.node_count(),
             things: things().map(shape).collect(),
             materials: things().flat_map(|thing| thing.materials.clone()).collect(),
         }
@@ -244,7 +244,8 @@ impl Renderer {
         }
     }
 
-    /// Draws the uploaded picture with what stands on the anchors, whose poses come in the scene's order. Without
+    /// Draws the uploaded picture with what stands on the nodes, whose poses come as [`Scene::camera_from_nodes`] gives
+    /// them; where nothing moves by itself these are the anchors, in the scene's order. Without
     /// the world's pose nobody knows where the light comes from, and the video is shown alone.
     pub fn draw(&mut self, camera_from_anchor: &[Option<DAffine3>], shown: Shown) {
         self.shown = shown;

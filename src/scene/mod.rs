@@ -24,6 +24,7 @@ mod lights;
 mod load;
 pub mod material_libraries;
 mod mesh_file;
+mod motion;
 mod named_files;
 mod obj_scan;
 mod objects;
@@ -48,6 +49,7 @@ pub use error::{SceneError, TextPlace};
 pub use family::{Codes, Family};
 pub use lights::unit_direction;
 pub use load::Reading;
+pub use motion::{Motion, PathEnd, Station};
 pub use named_files::{FileKind, NamedFile};
 pub use placement::Placement;
 pub use quality::Quality;
@@ -134,8 +136,11 @@ pub struct Object {
     pub mesh_report: MeshReport,
     /// As many as `mesh.triangle_materials` names; never empty.
     pub materials: Vec<Material>,
-    /// Index into [`Scene::anchors`].
+    /// The node that it stands still on: an anchor, or, beyond the anchors, one that moves with it
+    /// ([`Scene::camera_from_nodes`]).
     pub anchor: usize,
+    /// How it moves by itself.
+    pub motion: Option<Motion>,
     /// Placement with rotation and scale; its determinant is never 0.
     pub anchor_from_object: DAffine3,
     /// Whether it takes light away from others.

@@ -8,6 +8,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use super::anchors::unique_name;
 use super::error::{SceneError, suggestion};
 use super::mesh_file::{self, DEFAULT_ALBEDO, LoadedMesh};
+use super::motion::{MotionKeys, motion};
 use super::named_files::FileKind;
 use super::placement::{POSITION, PlacementKeys, placement};
 use super::ranges::Numbers;
@@ -137,6 +138,7 @@ pub static PHANTOM_SECTION: Section = Section {
         RectangleKeys::ALL,
         StandingKeys::ALL,
         PlacementKeys::ALL,
+        MotionKeys::ALL,
         ThingKeys::ALL,
     ],
     shown: &[
@@ -147,6 +149,11 @@ pub static PHANTOM_SECTION: Section = Section {
         ("position_m", Example::Live("[-0.055, 0.035, 0.0]")),
         ("rotation_deg", Example::Live("[0, 0, 20]")),
         ("scale", Example::Live("1")),
+        ("turn_deg_per_s", Example::Aside("30")),
+        (
+            "path",
+            Example::Aside("[{ time_s = 0 }, { time_s = 2, position_m = [0.1, 0, 0] }]"),
+        ),
         ("material", Example::Live("{ albedo = [0.62, 0.55, 0.42] }")),
     ],
     is_aside: false,
@@ -162,6 +169,7 @@ pub static VIRTUAL_SECTION: Section = Section {
         ShapeKeys::ALL,
         StandingKeys::ALL,
         PlacementKeys::ALL,
+        MotionKeys::ALL,
         ThingKeys::ALL,
         VirtualKeys::ALL,
     ],
@@ -172,6 +180,11 @@ pub static VIRTUAL_SECTION: Section = Section {
         ("position_m", Example::Live("[0.022, 0.0, 0.036]")),
         ("rotation_deg", Example::Live("[70, 0, 35]")),
         ("scale", Example::Live("[1, 1, 1]")),
+        ("turn_deg_per_s", Example::Aside("30")),
+        (
+            "path",
+            Example::Aside("[{ time_s = 0 }, { time_s = 2, position_m = [0.1, 0, 0] }]"),
+        ),
         (
             "material",
             Example::Live("{ albedo = [0.75, 0.16, 0.12], roughness = 0.4 }"),
@@ -211,6 +224,11 @@ pub fn objects(root: &Table, anchors: &[Anchor]) -> Result<(Vec<Object>, Vec<Obj
             &mut name_lines,
         )?);
     }
+    // Each moving thing has a node of its own, after the anchors.
+    let moving = phantoms.iter_mut().chain(&mut virtuals);
+    for (index, thing) in moving.filter(|thing| thing.motion.is_some()).enumerate() {
+        thing.anchor = anchors.len() + index;
+    }
     Ok((phantoms, virtuals))
 }
 
@@ -230,6 +248,7 @@ fn table_top(table: &Table) -> Result<Object, SceneError> {
         mesh_report: report,
         materials,
         anchor: 0,
+        motion: None,
         anchor_from_object: DAffine3::from_translation(DVec3::Z * height_m),
         casts: false,
         visible: TABLE.visible.read(table)?,
@@ -285,6 +304,7 @@ fn object(
         mesh_report: loaded.report,
         materials,
         anchor,
+        motion: motion(table, anchor)?,
         anchor_from_object,
         casts,
         visible,

@@ -221,6 +221,11 @@ impl<'a> Value<'a> {
     }
 
     /// The entries of an array of `what`.
+    /// Whether it is in brackets.
+    pub fn is_array(&self) -> bool {
+        self.value.get_ref().is_array()
+    }
+
     pub fn array(&self, what: &str) -> Result<Vec<Value<'a>>, SceneError> {
         let entries = self
             .value

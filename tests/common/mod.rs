@@ -101,6 +101,7 @@ pub fn object(name: &str, mesh: Mesh, albedo: DVec3, world_from_object: DAffine3
             roughness: None,
         }],
         anchor: 0,
+        motion: None,
         anchor_from_object: world_from_object,
         casts: true,
         visible: true,

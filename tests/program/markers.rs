@@ -258,6 +258,7 @@ fn a_picture_says_its_resolution_and_what_it_shows() {
 }
 
 /// White and black cells of a sheet, looked at in the middle of each of `columns` x `rows` cells of a rectangle, pixels.
+#[cfg(aruco_in_contrib)]
 fn looked_at(
     grey: &image::GrayImage,
     [left, top, right, bottom]: [f64; 4],

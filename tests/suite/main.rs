@@ -16,6 +16,7 @@ mod counting;
 mod detail;
 mod figures;
 mod light_from_picture;
+mod motion;
 mod picture;
 mod probe;
 mod probe_light;

@@ -100,13 +100,13 @@ pub enum LightNotFound {
 }
 
 impl PicturedThings {
-    /// What a scene's phantoms are in a frame with these poses; `None` while the world is not seen.
+    /// What a scene's phantoms are in a frame where the nodes are there; `None` while the world is not seen.
     pub fn new(
         scene: &Scene,
         intrinsics: Intrinsics,
-        camera_from_anchor: &[Option<DAffine3>],
+        camera_from_node: &[Option<DAffine3>],
     ) -> Option<Self> {
-        let camera_from_world = camera_from_anchor.first().copied().flatten()?;
+        let camera_from_world = camera_from_node.first().copied().flatten()?;
         let world_from_camera = camera_from_world.inverse();
         let camera = PosedCamera {
             intrinsics,
@@ -116,8 +116,7 @@ impl PicturedThings {
         let mut reflectors = Vec::new();
         let mut vertices = Vec::new();
         for phantom in scene.phantoms.iter().filter(|phantom| phantom.visible) {
-            let Some(camera_from_anchor) =
-                camera_from_anchor.get(phantom.anchor).copied().flatten()
+            let Some(camera_from_anchor) = camera_from_node.get(phantom.anchor).copied().flatten()
             else {
                 continue;
             };
@@ -152,7 +151,7 @@ impl PicturedThings {
                 }));
             }
         }
-        let anchors = scene.anchors.iter().zip(camera_from_anchor);
+        let anchors = scene.anchors.iter().zip(camera_from_node);
         let prints = anchors.filter_map(|(anchor, pose)| {
             let anchor_from_world = (world_from_camera * (*pose)?).inverse();
             Some(

@@ -157,6 +157,7 @@ fn object(name: &str, mesh: Mesh, albedo: DVec3, anchor: usize, position_m: DVec
             roughness: None,
         }],
         anchor,
+        motion: None,
         anchor_from_object: DAffine3::from_translation(position_m),
         casts: true,
         visible: true,

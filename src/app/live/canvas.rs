@@ -5,8 +5,6 @@ use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use glam::DAffine3;
-
 use super::false_colour;
 use super::frame_tracker::TrackedPicture;
 use super::views::ViewMode;
@@ -169,17 +167,11 @@ impl SceneCanvas {
             return Ok(());
         };
         renderer.upload(&picture.frame)?;
-        let anchors = &order.scene.anchors;
+        let placed = picture.camera_from_nodes(&order.scene);
+        let visibility: Vec<f64> = picture.poses.iter().map(|pose| pose.visibility).collect();
+        let mut visibility = order.scene.of_nodes(&visibility);
         // Poses of other anchors than the scene's are none.
-        let (placed, visibility): (Vec<Option<DAffine3>>, Vec<f64>) =
-            match anchors[..] == picture.anchors[..] {
-                true => picture
-                    .poses
-                    .iter()
-                    .map(|pose| (pose.camera_from_anchor, pose.visibility))
-                    .unzip(),
-                false => (vec![None; anchors.len()], vec![0.0; anchors.len()]),
-            };
+        visibility.resize(placed.len(), 0.0);
         let shown = match view {
             ViewMode::Bare => Shown::Bare,
             _ => Shown::Composite,

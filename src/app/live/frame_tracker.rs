@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use glam::DVec2;
+use glam::{DAffine3, DVec2};
 
 use crate::app::input::live_capture::Arrived;
 use crate::app::stopwatch::Stopwatch;
 use crate::capture::{Frame, check_frame_size};
 use crate::geometry::camera::Intrinsics;
-use crate::scene::{Anchor, Family, TrackingSettings};
+use crate::scene::{Anchor, Family, Scene, TrackingSettings};
 use crate::tracking::{
     AnchorPose, Detection, Detector, Quad, Tracker, TrackingError, grey_from_rgba, rejected_quads,
 };
@@ -53,6 +53,21 @@ pub struct TrackedPicture {
     pub track_ms: f64,
     /// Why the frame could not be tracked.
     pub trouble: Option<String>,
+}
+
+impl TrackedPicture {
+    /// Where a scene's nodes are; nowhere where its anchors are others than those of the poses.
+    pub fn camera_from_nodes(&self, scene: &Scene) -> Vec<Option<DAffine3>> {
+        let anchors: Vec<_> = match scene.anchors[..] == self.anchors[..] {
+            true => self
+                .poses
+                .iter()
+                .map(|pose| pose.camera_from_anchor)
+                .collect(),
+            false => vec![None; scene.anchors.len()],
+        };
+        scene.camera_from_nodes(&anchors, self.frame.time_secs)
+    }
 }
 
 /// The tracker of live frames, made anew where their size or the plan changes.

@@ -179,17 +179,17 @@ impl Overlays<'_> {
     }
 
     fn shadow_lines(&self, scene: &Scene, lines: &mut ShadowLines, with_sides: bool) {
-        let poses = &self.picture.poses;
-        let Some(camera_from_world) = poses.first().and_then(|pose| pose.camera_from_anchor) else {
+        let camera_from_node = self.picture.camera_from_nodes(scene);
+        let Some(camera_from_world) = camera_from_node.first().copied().flatten() else {
             return;
         };
         let world_from_camera = camera_from_world.inverse();
-        let world_from_anchor: Vec<Option<DAffine3>> = poses
+        let world_from_anchor: Vec<Option<DAffine3>> = camera_from_node
             .iter()
-            .map(|pose| Some(world_from_camera * pose.camera_from_anchor?))
+            .map(|pose| pose.map(|camera_from_node| world_from_camera * camera_from_node))
             .collect();
         for line in lines.lines(scene, &world_from_anchor) {
-            let Some(camera_from_anchor) = poses[line.anchor].camera_from_anchor else {
+            let Some(camera_from_anchor) = camera_from_node[line.anchor] else {
                 continue;
             };
             let colour = match line.is_virtual {

@@ -26,9 +26,9 @@ pub fn selected_at(
     }
     let mut corners = Vec::new();
     let mut owners = Vec::new();
+    let camera_from_node = picture.camera_from_nodes(scene);
     for thing in scene.phantoms.iter().chain(&scene.virtuals) {
-        let pose = picture.poses.get(thing.anchor);
-        let Some(camera_from_anchor) = pose.and_then(|pose| pose.camera_from_anchor) else {
+        let Some(camera_from_anchor) = camera_from_node[thing.anchor] else {
             continue;
         };
         if !thing.visible {

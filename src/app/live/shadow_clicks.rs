@@ -21,7 +21,7 @@ pub struct ShadowClicks {
 impl ShadowClicks {
     /// No click yet; `None` while the world is not seen.
     pub fn begin(scene: &Scene, picture: &TrackedPicture) -> Option<Self> {
-        let poses: Vec<_> = picture.poses.iter().map(|p| p.camera_from_anchor).collect();
+        let poses = picture.camera_from_nodes(scene);
         Some(Self {
             things: PicturedThings::new(scene, picture.intrinsics, &poses)?,
             vertex: None,

@@ -9,6 +9,8 @@ use eframe::egui::{
     Rect, Response, RichText, Sense, Ui, Vec2, ViewportCommand,
 };
 
+use glam::DAffine3;
+
 use super::command::{
     Clicks, Commands, LiveCommand, Overlay, SceneCommand, Selected, WindowCommand,
 };
@@ -218,23 +220,35 @@ impl LiveWindow {
     /// What is selected, with the camera as its anchor sees it.
     fn target(&self) -> Option<(GizmoTarget, PosedCamera)> {
         let (scene, picture) = (self.session.scene()?, self.session.picture()?);
-        let (target, anchor) = match self.state.selected.as_ref()? {
+        let camera_from_node = picture.camera_from_nodes(scene);
+        let (target, camera_from_frame) = match self.state.selected.as_ref()? {
             Selected::Thing(name) => {
                 let mut things = scene.phantoms.iter().chain(&scene.virtuals);
-                let anchor = things.find(|thing| thing.name == *name)?.anchor;
+                let thing = things.find(|thing| thing.name == *name)?;
+                let frame = match &thing.motion {
+                    None => camera_from_node[thing.anchor]?,
+                    // Where it stands is edited in its anchor's axes, wherever it is by now.
+                    Some(motion) => {
+                        let (offset_m, _) = motion.at(picture.frame.time_secs);
+                        camera_from_node[motion.anchor]? * DAffine3::from_translation(offset_m)
+                    }
+                };
                 let placement = self.session.placement(name)?;
                 let name = name.clone();
-                (GizmoTarget::Thing { name, placement }, anchor)
+                (GizmoTarget::Thing { name, placement }, frame)
             }
             Selected::Light(index) => {
                 let light = *scene.lights.get(*index)?;
                 let index = *index;
-                (GizmoTarget::Light { index, light }, 0)
+                (
+                    GizmoTarget::Light { index, light },
+                    camera_from_node.first().copied()??,
+                )
             }
         };
         let sight = PosedCamera {
             intrinsics: picture.intrinsics,
-            camera_from_world: picture.poses.get(anchor)?.camera_from_anchor?,
+            camera_from_world: camera_from_frame,
         };
         Some((target, sight))
     }

@@ -52,6 +52,13 @@ const MISTAKES: &[Mistake] = &[
     // What is no plain file is neither read without end nor waited for
     added("[[phantom]]\nname = \"p\"\nmesh = \"/dev/zero\"\n", 8, 8, &["phantom.mesh", "not a plain file"]),
     added("[probe]\nimage = \"/dev/zero\"\n", 7, 9, &["probe.image", "/dev/zero", "not a plain file"]),
+    // Things that move
+    added("[[virtual]]\nname = \"v\"\nmesh = \"models/cube.obj\"\nturn_deg_per_s = \"fast\"\n", 9, 18, &["turn_deg_per_s", "a number"]),
+    added("[[virtual]]\nname = \"v\"\nmesh = \"models/cube.obj\"\nturn_deg_per_s = [0, 90]\n", 9, 18, &["turn_deg_per_s", "3 numbers"]),
+    added("[[virtual]]\nname = \"v\"\nmesh = \"models/cube.obj\"\npath = []\n", 9, 8, &["path", "at least one place"]),
+    added("[[virtual]]\nname = \"v\"\nmesh = \"models/cube.obj\"\npath = [{ position_m = [0, 0, 0] }]\n", 9, 9, &["the time in seconds is expected"]),
+    added("[[virtual]]\nname = \"v\"\nmesh = \"models/cube.obj\"\npath = [{ time_s = 1 }, { time_s = 1 }]\n", 9, 25, &["the place before it has time_s = 1; allowed: a later time"]),
+    added("[[virtual]]\nname = \"v\"\nmesh = \"models/cube.obj\"\npath_end = \"loop\"\n", 9, 12, &["path_end", "stay, repeat, return"]),
     // Unknown keys and tables
     added("[[lihgt]]\n", 6, 3, &["lihgt: unknown key", "did you mean \"light\"?", "allowed: camera, tracking, board"]),
     changed("source", "sourc", 2, 1, &["camera.sourc: unknown key", "did you mean \"source\"?", "calibration"]),

@@ -46,7 +46,8 @@ fn measured(scene: &Scene) -> Result<String> {
             .map(|pose| pose.camera_from_anchor)
             .collect();
         if poses.first().is_some_and(Option::is_some) {
-            found = Some((frame, poses));
+            let nodes = scene.camera_from_nodes(&poses, frame.time_secs);
+            found = Some((frame, nodes));
             break;
         }
     }

@@ -217,7 +217,12 @@ fn anchor_row((number, anchor): (usize, &Anchor)) -> TableRow {
 
 fn object_row(object: &Object, anchors: &[Anchor], with_levels: bool) -> TableRow {
     let anchor = anchors
-        .get(object.anchor)
+        .get(
+            object
+                .motion
+                .as_ref()
+                .map_or(object.anchor, |motion| motion.anchor),
+        )
         .map_or("nothing", |anchor| &anchor.name);
     let mut notes = mesh_notes(&object.mesh_report);
     if with_levels {
@@ -225,6 +230,9 @@ fn object_row(object: &Object, anchors: &[Anchor], with_levels: bool) -> TableRo
     }
     if object.anchor_from_object.matrix3.determinant() < 0.0 {
         notes.push("mirrored".to_owned());
+    }
+    if object.motion.is_some() {
+        notes.push("moves by itself".to_owned());
     }
     if !object.visible {
         notes.push("hidden".to_owned());

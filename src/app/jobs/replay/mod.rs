@@ -11,6 +11,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
 use anyhow::{Context as _, Result, bail};
+use glam::DAffine3;
 
 use crate::capture::{Frame, FrameSource};
 use crate::geometry::camera::Intrinsics;
@@ -300,8 +301,7 @@ impl ReplayRun<'_> {
         let mut render_ms = None;
         if let (Some(renderer), false) = (&mut renderer, wanted) {
             // `--frames 25` shows what the whole replay shows in frame 25.
-            let placed: Vec<_> = poses.iter().map(|pose| pose.camera_from_anchor).collect();
-            renderer.pass_over(&placed);
+            renderer.pass_over(&self.camera_from_nodes(&frame, &poses));
         }
         if let (Some(renderer), true) = (renderer, wanted) {
             let (drawn, ms) = self
@@ -322,6 +322,12 @@ impl ReplayRun<'_> {
         Ok(())
     }
 
+    /// What the frame's things stand on.
+    fn camera_from_nodes(&self, frame: &Frame, poses: &[AnchorPose]) -> Vec<Option<DAffine3>> {
+        let anchors: Vec<_> = poses.iter().map(|pose| pose.camera_from_anchor).collect();
+        self.scene.camera_from_nodes(&anchors, frame.time_secs)
+    }
+
     fn draw(
         &mut self,
         renderer: &mut Renderer,
@@ -333,11 +339,12 @@ impl ReplayRun<'_> {
         } else {
             Shown::Composite
         };
-        let placed: Vec<_> = poses.iter().map(|pose| pose.camera_from_anchor).collect();
+        let placed = self.camera_from_nodes(frame, poses);
         let whole = Stopwatch::start();
         let (uploaded, upload_ms) = Stopwatch::time(|| renderer.upload(frame));
         uploaded?;
         let visibility: Vec<_> = poses.iter().map(|pose| pose.visibility).collect();
+        let visibility = self.scene.of_nodes(&visibility);
         let ((), submit_ms) = Stopwatch::time(|| renderer.draw_fading(&placed, &visibility, shown));
         let waiting = Stopwatch::start();
         renderer.wait()?;

@@ -67,7 +67,11 @@ fn fields(
     editing: &mut Editing,
     commands: &mut Commands,
 ) {
-    if let Some(anchor) = scene.anchors.get(thing.anchor) {
+    let anchor = thing
+        .motion
+        .as_ref()
+        .map_or(thing.anchor, |motion| motion.anchor);
+    if let Some(anchor) = scene.anchors.get(anchor) {
         ui.weak(format!("on {}", anchor.name));
     }
     let [position, rotation, scale] = SPEEDS;
