@@ -6,10 +6,9 @@
 
 struct ShaftFrame {
     world_from_camera: mat4x4f,
+    // Broad light on what moves.
+    moving_irradiance: vec3f,
     source_count: u32,
-    padding_1: u32,
-    padding_2: u32,
-    padding_3: u32,
 }
 
 @group(2) @binding(0) var<uniform> frame: ShaftFrame;
@@ -167,6 +166,18 @@ fn light_on_patch(surface: PatchSurface) -> LightSums {
         + weights.y * irradiances[surface.rows.y]
         + weights.z * irradiances[surface.rows.z];
     return LightSums(vec4f(reaching, 1.0), vec4f(taken, 0.0));
+}
+
+// All light of a patch, nothing hidden.
+@fragment
+fn whole_light_on_patch(surface: ReflectedSurface) -> LightSums {
+    let irradiance = recovered(surface.irradiance, surface.first_irradiance, surface.one);
+    return LightSums(vec4f(irradiance, 1.0), vec4f(0.0));
+}
+
+@fragment
+fn light_on_moving() -> LightSums {
+    return LightSums(vec4f(frame.moving_irradiance, 1.0), vec4f(0.0));
 }
 
 // Added to what sources take.

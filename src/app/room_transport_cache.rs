@@ -9,13 +9,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::geometry::camera::Intrinsics;
+use crate::light::Light;
 use crate::render::{Gpu, RenderError, Renderer};
 use crate::scene::{Scene, plain_file};
 use crate::shafts::room::Room;
 use crate::shafts::room_transport::RoomTransport;
 
 /// Another layout, or another way to work rooms out.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Bytes of the largest room that is taken from the disk.
 const MOST_ROOM: u64 = 1 << 30;
 /// The newest ones stay.
@@ -51,7 +52,7 @@ pub fn renderer(
 pub fn ready(room: &Room<'_>, folder: Option<&Path>) -> ReadyRoom {
     let path = folder.map(|folder| folder.join(format!("{:016x}.room", room.key())));
     if let Some(path) = &path
-        && let Some(transport) = read(path)
+        && let Some(transport) = read(path, &room.compact)
     {
         return ReadyRoom {
             transport,
@@ -68,14 +69,14 @@ pub fn ready(room: &Room<'_>, folder: Option<&Path>) -> ReadyRoom {
     }
 }
 
-fn read(path: &Path) -> Option<RoomTransport> {
+fn read(path: &Path, compact: &[Light]) -> Option<RoomTransport> {
     let bytes = plain_file::read(path, MOST_ROOM).ok()?;
     let (sum, room) = bytes.split_at_checked(size_of::<u64>())?;
     if sum != checksum(room) {
         return None;
     }
     let (version, transport): (u32, RoomTransport) = postcard::from_bytes(room).ok()?;
-    (version == VERSION).then(|| transport.with_caster())
+    (version == VERSION).then(|| transport.with_caster(compact))
 }
 
 fn checksum(bytes: &[u8]) -> [u8; 8] {

@@ -29,8 +29,23 @@ pub struct BrightLight {
     pub horizontal_share: f64,
 }
 
+/// A bright part of a probe, and the pixels that it has.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BrightRegion {
+    /// What they add up to.
+    pub light: BrightLight,
+    /// Their indices among the probe's pixels.
+    pub pixels: Vec<usize>,
+}
+
 /// The brightest lights, the one with the most power first; empty where the light is even.
 pub fn brightest(probe: &Probe, most: usize) -> Vec<BrightLight> {
+    let regions = bright_regions(probe, most).into_iter();
+    regions.map(|region| region.light).collect()
+}
+
+/// The same with their pixels.
+pub fn bright_regions(probe: &Probe, most: usize) -> Vec<BrightRegion> {
     let luminance: Vec<f32> = probe
         .pixels()
         .iter()
@@ -64,10 +79,11 @@ pub fn brightest(probe: &Probe, most: usize) -> Vec<BrightLight> {
             share: 0.0,
             horizontal_share: 0.0,
         };
-        let mut open = vec![peak];
+        let (mut open, mut pixels) = (vec![peak], Vec::new());
         taken[peak] = true;
         while let Some(index) = open.pop() {
             if luminance[index] >= edge {
+                pixels.push(index);
                 let solid_angle = probe.pixel_solid_angle(index / width);
                 let part = f64::from(luminance[index]) * solid_angle;
                 light.direction += part * direction(index);
@@ -89,16 +105,16 @@ pub fn brightest(probe: &Probe, most: usize) -> Vec<BrightLight> {
         }
         light.direction = light.direction.normalize_or_zero();
         if light.share >= LEAST_SHARE {
-            found.push(light);
+            found.push(BrightRegion { light, pixels });
         }
     }
-    found.sort_by(|a, b| b.share.total_cmp(&a.share));
+    found.sort_by(|a, b| b.light.share.total_cmp(&a.light.share));
     found.truncate(most);
     found
 }
 
 /// Beside, above and below; above the uppermost row lies what is across the pole.
-fn neighbours([width, height]: [usize; 2], index: usize) -> [usize; 4] {
+pub(super) fn neighbours([width, height]: [usize; 2], index: usize) -> [usize; 4] {
     let (column, row) = (index % width, index / width);
     let across = row * width + (column + width / 2) % width;
     [

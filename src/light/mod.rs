@@ -3,6 +3,7 @@
 pub mod bounce;
 pub mod brightest;
 pub mod chromaticities;
+pub mod compact;
 pub mod contrast;
 pub mod form_factor;
 pub mod material;
@@ -10,6 +11,7 @@ pub mod pieces;
 pub mod prefiltered;
 pub mod probe;
 pub mod probe_maps;
+pub mod probe_power;
 pub mod radiance_picture;
 pub mod response;
 pub mod texture;

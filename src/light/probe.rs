@@ -29,6 +29,11 @@ impl Probe {
         &self.radiance
     }
 
+    /// Puts another radiance into a pixel.
+    pub(super) fn set_pixel(&mut self, index: usize, radiance: Vec3) {
+        self.radiance[index] = radiance;
+    }
+
     /// Radiance from the pixel that a direction of any length falls into.
     pub fn radiance(&self, direction: DVec3) -> Vec3 {
         let [width, height] = self.size_px;

@@ -2,6 +2,8 @@
 //! arrives in the video on real surfaces, and what virtual things take of it; on virtual ones what arrives past all casters.
 //! Writes depth, stencil and light sums; then the picture.
 
+use crate::geometry::reach::PixelRect;
+
 use super::anchor_geometry::Role;
 use super::attachments::{depth_stencil, loaded};
 use super::background::Background;
@@ -12,7 +14,7 @@ use super::light_sums::{BY_GAIN, LightSums};
 use super::passes::Passes;
 use super::screen_bounds::ScreenBounds;
 use super::shown::Shown;
-use super::surfaces::{SurfaceKinds, Surfaces};
+use super::surfaces::{First, SurfaceKinds, Surfaces};
 use super::technique::{FrameContext, TechniquePasses};
 use super::uniforms::GEOMETRY_GROUPS;
 use super::volumes::{Among, Volumes, set_scissor};
@@ -21,15 +23,69 @@ use super::volumes::{Among, Volumes, set_scissor};
 pub(super) struct Accumulated {
     surfaces: Surfaces,
     volumes: Volumes,
-    sums: LightSums,
+    first: First,
+    /// Where all is added up.
+    pub sums: LightSums,
 }
 
 impl Accumulated {
-    pub fn new(gpu: &Gpu, background: &Background, samples: u32, kinds: SurfaceKinds) -> Self {
+    /// `first` says what is there before the lights.
+    pub fn new(
+        gpu: &Gpu,
+        background: &Background,
+        samples: u32,
+        kinds: SurfaceKinds,
+        first: First,
+    ) -> Self {
         Self {
-            surfaces: Surfaces::new(gpu, samples, kinds),
+            first,
+            surfaces: Surfaces::new(gpu, samples, kinds, first),
             volumes: Volumes::new(gpu, &GEOMETRY_GROUPS, samples, &[gpu.light_format; 2]),
             sums: LightSums::new(gpu, background, samples, BY_GAIN),
+        }
+    }
+
+    /// Adds up what all lights give and lose; `before` draws what else there is into depth.
+    pub fn draw_lights(
+        &self,
+        passes: &mut Passes<'_>,
+        frame: &FrameContext<'_>,
+        before: impl Fn(&mut wgpu::RenderPass<'_>),
+    ) {
+        let sums = &self.sums;
+        let count = frame.gpu_scene.light_count().max(1);
+        let surroundings = frame.gpu_scene.pieces_of_surroundings();
+        let fresh = match self.first {
+            First::Ambient => wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+            First::DepthAlone => wgpu::LoadOp::Load,
+        };
+        for light in 0..count {
+            let (first, last) = (light == 0, light + 1 == count && surroundings.is_empty());
+            let begins = first && self.first == First::Ambient;
+            let load = match first {
+                true => fresh,
+                false => wgpu::LoadOp::Load,
+            };
+            let mut pass = passes.begin(
+                "light",
+                Some(GpuSpan::Light.part(begins, last)),
+                &[loaded(&sums.reaching, load), loaded(&sums.change, load)],
+                Some(depth_stencil(&sums.depth_stencil, first, last)),
+            );
+            if first {
+                before(&mut pass);
+            }
+            self.draw_light(&mut pass, frame, light, first);
+        }
+        if !surroundings.is_empty() {
+            let load = wgpu::LoadOp::Load;
+            let mut pass = passes.begin(
+                "surroundings",
+                Some(GpuSpan::Light.part(false, true)),
+                &[loaded(&sums.reaching, load), loaded(&sums.change, load)],
+                Some(depth_stencil(&sums.depth_stencil, false, true)),
+            );
+            self.draw_surroundings(&mut pass, frame);
         }
     }
 
@@ -146,38 +202,12 @@ impl TechniquePasses for Accumulated {
         gpu_scene: &mut GpuScene,
         shown: Shown,
     ) -> Option<ScreenBounds> {
-        gpu_scene.cast_shadows(gpu, shown)
+        gpu_scene.cast_shadows(gpu, shown, PixelRect::NONE)
     }
 
     fn draw(&mut self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) {
-        let sums = &self.sums;
-        let count = frame.gpu_scene.light_count().max(1);
-        let surroundings = frame.gpu_scene.pieces_of_surroundings();
-        for light in 0..count {
-            let (first, last) = (light == 0, light + 1 == count && surroundings.is_empty());
-            let load = match first {
-                true => wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                false => wgpu::LoadOp::Load,
-            };
-            let mut pass = passes.begin(
-                "light",
-                Some(GpuSpan::Light.part(first, last)),
-                &[loaded(&sums.reaching, load), loaded(&sums.change, load)],
-                Some(depth_stencil(&sums.depth_stencil, first, last)),
-            );
-            self.draw_light(&mut pass, frame, light, first);
-        }
-        if !surroundings.is_empty() {
-            let load = wgpu::LoadOp::Load;
-            let mut pass = passes.begin(
-                "surroundings",
-                Some(GpuSpan::Light.part(false, true)),
-                &[loaded(&sums.reaching, load), loaded(&sums.change, load)],
-                Some(depth_stencil(&sums.depth_stencil, false, true)),
-            );
-            self.draw_surroundings(&mut pass, frame);
-        }
-        sums.composite(passes, frame);
+        self.draw_lights(passes, frame, |_| {});
+        self.sums.composite(passes, frame);
     }
 
     fn draw_gain(

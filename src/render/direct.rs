@@ -19,6 +19,7 @@ use super::surfaces::{Sided, SurfaceKinds, surface_description};
 use super::technique::{FrameContext, TechniquePasses};
 use super::uniforms::GEOMETRY_GROUPS;
 use super::volumes::{Among, Volumes, set_scissor};
+use crate::geometry::reach::PixelRect;
 
 /// Values of `SEEN` in direct.wgsl.
 const IN_OPEN_LIGHT: f64 = 1.0;
@@ -195,7 +196,7 @@ impl TechniquePasses for Direct {
         gpu_scene: &mut GpuScene,
         shown: Shown,
     ) -> Option<ScreenBounds> {
-        gpu_scene.cast_shadows(gpu, shown)
+        gpu_scene.cast_shadows(gpu, shown, PixelRect::NONE)
     }
 
     /// Haller et al. 2003, section 3.2, for one light and one sample: phantoms and lit virtual things into depth; *real

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
 use crate::light::{Light, Shape};
-use crate::scene::{Scene, SceneLight, ShadowSettings, Shortcut};
+use crate::scene::{Scene, ShadowSettings, Shortcut};
 
 use super::anchor_geometry::{
     AnchorGeometry, AnchoredModel, KnownLevels, Role, SurfaceBatch, VirtualCorners,
@@ -76,6 +76,7 @@ pub(super) struct GpuScene {
 impl GpuScene {
     pub fn new(gpu: &Gpu, scene: &Scene, intrinsics: Intrinsics, lit_by: LitBy) -> Self {
         let device = &gpu.device;
+        let lights = scene.outlined_lights();
         let view_count = scene.node_count() + scene.virtuals.len();
         let views = UniformRow::new::<AnchorView>(device, "views", view_count);
         let mut known_levels = KnownLevels::default();
@@ -86,6 +87,7 @@ impl GpuScene {
         } = AnchorGeometry::new(device, scene, &mut known_levels);
         let world_virtuals = virtual_corners.iter().find(|(anchor, _)| *anchor == 0);
         let looks = scene.virtuals.iter().any(needs_looks);
+        let shaped = lights.iter().any(|light| is_shaped(&light.light));
         Self {
             lit_by,
             standing: standing(scene),
@@ -106,17 +108,13 @@ impl GpuScene {
             things,
             view_group: gpu.bind_group(&VIEW_GROUP, [views.binding()]),
             camera_from_anchor: vec![None; scene.node_count()],
-            lights: Lights::new(
-                gpu,
-                lights(scene, lit_by),
-                hidden_surroundings(scene, lit_by),
-            ),
+            lights: Lights::new(gpu, lights, hidden_surroundings(scene, lit_by)),
             kinds: SurfaceKinds {
                 glossy: scene.virtuals.iter().any(|object| {
                     let mut materials = object.materials.iter();
                     materials.any(|material| material.roughness.is_some())
                 }),
-                shaped: scene.lights.iter().any(|light| is_shaped(&light.light)),
+                shaped,
                 looks,
             },
             materials: looks.then(|| materials_group(gpu, scene)),
@@ -129,8 +127,9 @@ impl GpuScene {
     /// reflect stays as it was gathered, where the same corners are there to get it.
     pub fn follow(&mut self, gpu: &Gpu, scene: &Scene) {
         let surroundings = hidden_surroundings(scene, self.lit_by);
-        self.lights.follow(lights(scene, self.lit_by), surroundings);
-        self.kinds.shaped = scene.lights.iter().any(|light| is_shaped(&light.light));
+        let lights = scene.outlined_lights();
+        self.kinds.shaped = lights.iter().any(|light| is_shaped(&light.light));
+        self.lights.follow(lights, surroundings);
         let standing = standing(scene);
         if self.standing == standing {
             return;
@@ -322,15 +321,21 @@ impl GpuScene {
     }
 
     /// Makes the shadow volumes that the picture shows. Returns where the placed things and their shadows can be; `None`
-    /// where nothing is placed.
-    pub fn cast_shadows(&mut self, gpu: &Gpu, shown: Shown) -> Option<ScreenBounds> {
-        let bounds = screen_bounds(
+    /// where nothing is placed; what changes `besides` is among them.
+    pub fn cast_shadows(
+        &mut self,
+        gpu: &Gpu,
+        shown: Shown,
+        besides: PixelRect,
+    ) -> Option<ScreenBounds> {
+        let mut bounds = screen_bounds(
             &self.things,
             self.lights.pieces(),
             &self.camera_from_anchor,
             &self.intrinsics,
             self.shadows.without,
         )?;
+        bounds.pixels = bounds.pixels.union(besides);
         if shown == Shown::Composite && !bounds.pixels.is_empty() {
             self.cast(gpu, &bounds, bounds.pixels);
         }
@@ -557,14 +562,6 @@ impl GpuScene {
             pass.set_bind_group(3, materials, &[]);
         }
         pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
-    }
-}
-
-/// The lights of a scene that cast shadow volumes.
-fn lights(scene: &Scene, lit_by: LitBy) -> Vec<SceneLight> {
-    match lit_by {
-        LitBy::Lights => scene.lights.clone(),
-        LitBy::Room => Vec::new(),
     }
 }
 

@@ -8,6 +8,7 @@ mod anchor_geometry;
 mod attachments;
 mod background;
 mod casters;
+mod combined;
 mod detail;
 mod direct;
 mod fade;

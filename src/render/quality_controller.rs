@@ -36,7 +36,9 @@ impl QualityController {
     pub(super) fn new(scene: &Scene, technique: ShadowTechnique) -> Option<Self> {
         let budget_ms = scene.shadows.frame_budget_ms?;
         let (settings, costs): (Vec<Setting>, Vec<f64>) = match technique {
-            ShadowTechnique::Shafts => sources(scene.shadows.shafts.sources).unzip(),
+            ShadowTechnique::Shafts | ShadowTechnique::Both => {
+                sources(scene.shadows.shafts.sources).unzip()
+            }
             ShadowTechnique::Volumes => outlines(scene.shadows.max_silhouette_error_px).unzip(),
         };
         Some(Self {

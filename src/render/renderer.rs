@@ -88,7 +88,7 @@ impl Shape {
         Self {
             technique: scene.chosen_technique().0,
             shadows: scene.shadows,
-            lights: scene.lights.iter().map(kind).collect(),
+            lights: scene.outlined_lights().iter().map(kind).collect(),
             ambient_radiance: scene.ambient_radiance,
             nodes: scene.node_count(),
             things: things().map(shape).collect(),

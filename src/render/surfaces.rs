@@ -8,6 +8,15 @@ use super::pipelines::{PipelineDescription, added, overwritten, taken_off, untou
 use super::stencil::{ADDED, REAL_HIDES, SHADOW, VIRTUAL_SHADOW, depth_stencil_state, stencil};
 use super::uniforms::GEOMETRY_GROUPS;
 
+/// The light that is there before all lights.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum First {
+    /// The ambient light, which is drawn with depth.
+    Ambient,
+    /// What another technique has drawn: of surfaces only depth is drawn.
+    DepthAlone,
+}
+
 /// Pipelines of the pass where several samples or lights are added up.
 pub(super) struct Surfaces {
     /// Depth and ambient light of real surfaces.
@@ -105,7 +114,8 @@ pub(super) fn surface_description(
 }
 
 impl Surfaces {
-    pub fn new(gpu: &Gpu, samples: u32, kinds: SurfaceKinds) -> Self {
+    /// `first` says what the pass begins with.
+    pub fn new(gpu: &Gpu, samples: u32, kinds: SurfaceKinds, first: First) -> Self {
         let described =
             |fragment, stencil, targets: [wgpu::ColorTargetState; 2]| PipelineDescription {
                 shader: "surfaces.wgsl",
@@ -134,7 +144,10 @@ impl Surfaces {
             || added(format, wgpu::BlendFactor::One),
             || untouched(format),
         );
-        let both = || [overwritten(format), overwritten(format)];
+        let before = || match first {
+            First::Ambient => [overwritten(format), overwritten(format)],
+            First::DepthAlone => [untouched(), untouched()],
+        };
         let (equal, other) = (
             wgpu::CompareFunction::Equal,
             wgpu::CompareFunction::NotEqual,
@@ -150,8 +163,8 @@ impl Surfaces {
         let hidden = stencil(other, VIRTUAL_SHADOW, taken);
         let unshadowed = stencil(at_most, SHADOW, nothing);
         Self {
-            ambient_on_real: build("ambient_on_real", None, both()),
-            ambient_on_virtual: build_virtual("ambient_on_virtual", None, both()),
+            ambient_on_real: build("ambient_on_real", None, before()),
+            ambient_on_virtual: build_virtual("ambient_on_virtual", None, before()),
             light_reaching_real: build("light_on_real", Some(reaching), [added(), untouched()]),
             light_kept_from_real: build(
                 "light_on_real",

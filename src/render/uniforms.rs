@@ -356,10 +356,8 @@ mod tests {
             &shafts,
             ShaftFrame,
             world_from_camera,
-            source_count,
-            padding_1,
-            padding_2,
-            padding_3
+            moving_irradiance,
+            source_count
         );
         let video = shader::source("video.wgsl", &[]).unwrap();
         assert_twins!(

@@ -17,6 +17,7 @@ pub mod schema;
 
 mod anchors;
 mod camera;
+mod compact;
 mod dictionary;
 mod error;
 mod family;
@@ -52,6 +53,7 @@ mod transport;
 mod vertex_colors;
 
 pub use camera::{CameraSettings, PixelFormat, WantedFormat};
+pub use compact::{ProbeLight, ProbeLightKind, SplitLight};
 pub use dictionary::Dictionary;
 pub use error::{SceneError, TextPlace};
 pub use family::{Codes, Drawing, Family, Ink};

@@ -22,8 +22,8 @@ use crate::geometry::cuboid::cuboid;
 use crate::geometry::winding::winding_number;
 
 /// Without a room the light comes from a box that reaches so far to each side of the probe: on a table it comes from the same
-/// direction everywhere.
-const FAR_M: f32 = 20.0;
+/// direction everywhere, to a tenth of a degree.
+const FAR_M: f32 = 300.0;
 
 keys! {
     /// Keys of `[probe]`.

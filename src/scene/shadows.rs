@@ -15,7 +15,8 @@ use crate::shafts::difference::Difference;
 choices! {
     /// How shadows are made.
     pub enum Technique, "technique" {
-        /// What the scene's lights call for: shafts with a probe, else volumes.
+        /// What the scene's light calls for: with a probe shadow volumes of what is compact and shafts of the rest, else
+        /// volumes.
         Auto = "auto",
         /// Shadow volumes (Haller, Drab & Hartmann 2003).
         Volumes = "volumes",
@@ -61,6 +62,8 @@ pub enum ShadowTechnique {
     Volumes,
     /// Soft shadows of a probe's light in a room.
     Shafts,
+    /// Shadow volumes of compact lights, soft shadows of the rest of the probe's light.
+    Both,
 }
 
 impl ShadowTechnique {
@@ -69,7 +72,13 @@ impl ShadowTechnique {
         match self {
             Self::Volumes => Technique::Volumes.name(),
             Self::Shafts => Technique::Shafts.name(),
+            Self::Both => "volumes and shafts",
         }
+    }
+
+    /// Whether a probe's light is worked out for it.
+    pub fn has_shafts(self) -> bool {
+        self != Self::Volumes
     }
 }
 
@@ -95,6 +104,9 @@ settings! {
     /// see it; 0: things are never made coarser.
     max_silhouette_error_px: f64, Numbers::between(0.0, LARGEST_MOVE_PX).unit("px")
         => ByQuality { fast: 2.0, balanced: 0.5, accurate: 0.0 };
+    /// Lights in a probe are compact, with outlines in their shadows, where the camera would see these blurred over less than
+    /// this; 0: none is. Others are a part of the broad light.
+    compact_penumbra_px: f64, Numbers::between(0.0, 1e4).unit("px") => Is(8.0);
     /// What drawing a frame may take: as many sources (volumes: as fine outlines) as fit, up to what the other keys say.
     /// What is drawn then depends on the machine.
     frame_budget_ms: Option<f64>, Numbers::above(0.0, 1e6).unit("ms") => Means(None, "no limit");
@@ -308,11 +320,15 @@ impl Scene {
         match self.shadows.technique {
             Technique::Auto => match &self.probe {
                 None => (ShadowTechnique::Volumes, "the scene has no probe"),
+                Some(_) if self.shadows.shafts.difference != Difference::Ratio => (
+                    ShadowTechnique::Shafts,
+                    "the scene has a probe; only a ratio is taken of several lights' sum",
+                ),
                 Some(probe) if probe.is_far => {
                     let reason = "the scene has a probe; without a room its light comes from afar";
-                    (ShadowTechnique::Shafts, reason)
+                    (ShadowTechnique::Both, reason)
                 }
-                Some(_) => (ShadowTechnique::Shafts, "the scene has a probe and a room"),
+                Some(_) => (ShadowTechnique::Both, "the scene has a probe and a room"),
             },
             Technique::Shafts => (ShadowTechnique::Shafts, "the scene asks for it"),
             Technique::Volumes => (ShadowTechnique::Volumes, "the scene asks for it"),

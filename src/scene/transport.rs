@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::{Object, ProbeScene, Scene};
+use super::{Object, ProbeScene, Scene, SplitLight};
 use crate::geometry::bounds::Bounds;
 use crate::geometry::mesh::{CornerLook, Mesh};
 use crate::light::bounce::Reflector;
@@ -99,7 +99,7 @@ impl Object {
     }
 
     /// The smallest box around it, in its anchor's space; `None` without triangles.
-    fn bounds_in_anchor(&self) -> Option<Bounds> {
+    pub(super) fn bounds_in_anchor(&self) -> Option<Bounds> {
         let positions = self.mesh.positions.iter();
         Bounds::around(positions.map(|position| {
             self.anchor_from_object
@@ -137,8 +137,10 @@ impl Scene {
             .filter(|object| object.casts)
             .filter_map(Object::bounds_in_anchor);
         let settings = &self.shadows.shafts;
+        let SplitLight { compact, rest, .. } = self.split_light(probe);
         Room {
             triangles,
+            standing: first,
             things: things.chain(self.virtual_bounds()).collect(),
             options: RoomOptions {
                 patches: settings.patches as usize,
@@ -147,10 +149,16 @@ impl Scene {
                 least_part: settings.least_part,
             },
             probe: PlacedProbe {
-                probe: &probe.probe,
+                probe: rest,
                 position_m: probe.position_m,
                 exposure: probe.exposure as f32,
             },
+            // (The room is worked out once: a light that moves along with an anchor is thrown back by nothing.)
+            compact: compact
+                .iter()
+                .filter(|light| light.anchor == 0)
+                .map(|light| light.light)
+                .collect(),
         }
     }
 

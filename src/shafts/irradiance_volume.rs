@@ -1,5 +1,6 @@
 //! The light around where virtual things may be (Greger et al. 1998, Gibson et al. 2003, section 9): radiance in spherical
-//! harmonics on a grid, real occluders included.
+//! harmonics on a grid, real occluders included; of bright patches what each point sees of them, for a lamp lights a ball with a
+//! terminator that few harmonics have not.
 
 use std::f32::consts::PI;
 
@@ -10,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::ray_caster::RayCaster;
 
 use super::bounding::Aabb;
+use super::bright_patches::BrightPatches;
 use super::harmonics::{Radiance9, sphere};
 use super::patches::RoomPatches;
 
@@ -25,32 +27,57 @@ const MOST_BACKS: f32 = 0.25;
 pub struct IrradianceVolume {
     bounds: Aabb,
     points: UVec3,
+    bright: BrightPatches,
     /// x fastest; `None` within things.
-    radiance: Vec<Option<Radiance9>>,
+    gathered: Vec<Option<Gathered>>,
+}
+
+/// The light at a point.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Gathered {
+    /// Of all but the bright patches.
+    rest: Radiance9,
+    /// The part that is seen of each bright patch.
+    seen: Vec<f32>,
 }
 
 impl IrradianceVolume {
     /// Gathers light in a box at points about `spacing_m` apart; `caster` holds the patches' triangles, which send out
-    /// `radiance`.
+    /// `radiance`, the `bright` ones among them.
     pub fn new(
         bounds: Aabb,
         spacing_m: f32,
         patches: &RoomPatches,
         caster: &RayCaster,
         radiance: &[Vec3],
+        bright: BrightPatches,
     ) -> Self {
         let points = ((bounds.max - bounds.min) / spacing_m).ceil().as_uvec3() + 1;
         let points = points.clamp(UVec3::splat(2), UVec3::splat(MOST_POINTS));
         let mut volume = Self {
             bounds,
             points,
-            radiance: Vec::new(),
+            bright,
+            gathered: Vec::new(),
         };
-        volume.radiance = (0..points.element_product())
+        volume.gathered = (0..points.element_product())
             .into_par_iter()
-            .map(|index| gathered(volume.point(index), patches, caster, radiance))
+            .map(|index| {
+                gathered(
+                    volume.point(index),
+                    patches,
+                    caster,
+                    radiance,
+                    &volume.bright,
+                )
+            })
             .collect();
         volume
+    }
+
+    /// The patches that are told from the others.
+    pub fn bright(&self) -> &BrightPatches {
+        &self.bright
     }
 
     fn point(&self, index: u32) -> Vec3 {
@@ -71,16 +98,38 @@ impl IrradianceVolume {
         holds(bounds.min) && holds(bounds.max)
     }
 
-    /// Radiance around a place, between the points of the grid; beyond it that of its edge.
-    pub fn radiance(&self, place: Vec3) -> Radiance9 {
+    /// Irradiance of a place with a unit normal, between the points of the grid; beyond it the light of its edge.
+    pub fn irradiance(&self, place: Vec3, normal: Vec3) -> Vec3 {
+        let around = self.around(place);
+        let whole: f32 = around.iter().map(|(_, share)| share).sum();
+        if whole <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let mut rest = Radiance9::default();
+        for (gathered, share) in &around {
+            rest.add_scaled(&gathered.rest, share / whole);
+        }
+        let mut sent = Vec3::ZERO;
+        for (index, bright) in self.bright.patches.iter().enumerate() {
+            let seen: f32 = around
+                .iter()
+                .map(|(gathered, share)| gathered.seen[index] * share)
+                .sum();
+            if seen > 0.0 {
+                sent += bright.radiance * (bright.form_factor(place, normal) * seen / whole);
+            }
+        }
+        rest.irradiance(normal) + sent * PI
+    }
+
+    /// The points of the grid around a place, as far as they lie in no thing, and what each of them counts.
+    fn around(&self, place: Vec3) -> Vec<(&Gathered, f32)> {
         let size = (self.bounds.max - self.bounds.min).max(Vec3::splat(1e-6));
         let cells = (self.points - 1).as_vec3();
         let at = ((place - self.bounds.min) / size * cells).clamp(Vec3::ZERO, cells);
         let low = at.floor().min(cells - 1.0).max(Vec3::ZERO);
         let part = at - low;
-        let mut sum = Radiance9::default();
-        let mut weight = 0.0;
-        for corner in 0..8_u32 {
+        let corner = |corner: u32| {
             let step = UVec3::new(corner & 1, corner >> 1 & 1, corner >> 2);
             let place = low.as_uvec3() + step;
             let index = (place.z * self.points.y + place.y) * self.points.x + place.x;
@@ -90,16 +139,10 @@ impl IrradianceVolume {
                     _ => part[axis],
                 })
                 .product();
-            if let Some(radiance) = &self.radiance[index as usize] {
-                sum.add_scaled(radiance, share.max(1e-6));
-                weight += share.max(1e-6);
-            }
-        }
-        let mut mean = Radiance9::default();
-        if weight > 0.0 {
-            mean.add_scaled(&sum, weight.recip());
-        }
-        mean
+            let gathered = self.gathered[index as usize].as_ref()?;
+            Some((gathered, share.max(1e-6)))
+        };
+        (0..8).filter_map(corner).collect()
     }
 }
 
@@ -108,9 +151,10 @@ fn gathered(
     patches: &RoomPatches,
     caster: &RayCaster,
     radiance: &[Vec3],
-) -> Option<Radiance9> {
+    bright: &BrightPatches,
+) -> Option<Gathered> {
     let share = 4.0 * PI / RAYS as f32;
-    let mut sum = Radiance9::default();
+    let mut rest = Radiance9::default();
     let mut backs = 0;
     for direction in sphere(RAYS) {
         let Some(hit) = caster.first_hit(point, direction, f32::INFINITY) else {
@@ -119,9 +163,12 @@ fn gathered(
         let patch = &patches.patches[hit.triangle];
         if patches.normal(patch).dot(direction) > 0.0 {
             backs += 1;
-        } else {
-            sum.add(direction, radiance[hit.triangle] * share);
+        } else if !bright.has(hit.triangle) {
+            rest.add(direction, radiance[hit.triangle] * share);
         }
     }
-    (backs as f32 <= MOST_BACKS * RAYS as f32).then_some(sum)
+    (backs as f32 <= MOST_BACKS * RAYS as f32).then(|| Gathered {
+        rest,
+        seen: bright.seen_from(point, caster),
+    })
 }

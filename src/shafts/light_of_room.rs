@@ -2,6 +2,7 @@
 //! where it came from. What it did not see is taken from what it saw of the same thing close by, or else from the light
 //! that falls there.
 
+use std::borrow::Cow;
 use std::f32::consts::{PI, TAU};
 
 use glam::{DVec3, Vec3};
@@ -10,12 +11,23 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::ray_caster::RayCaster;
 use crate::light::probe::Probe;
+use crate::light::{Light, irradiance};
 
+use super::bright_patches::BrightPatches;
+use super::carried_light::{Carried, carried_light};
+use super::luminance;
 use super::patches::{RoomPatch, RoomPatches};
 use super::points::points_on;
+use super::solid_angle::solid_angle;
 
 /// Points of a patch that are looked for from the probe.
 const SAMPLES: usize = 16;
+/// Rays of the probe that tell the light of a patch better than those points do.
+const ENOUGH_RAYS: u32 = 4;
+/// Rays that tell the light of a patch of which next to nothing is seen.
+const MANY_RAYS: u32 = 16;
+/// From so many times the mean radiance on a patch's light is spread over all of its solid angle, however its rays fell.
+const BRIGHT: f32 = 4.0;
 /// Seen patches of the same thing that speak for one that is not.
 const NEIGHBOURS: usize = 6;
 /// Rays that gather the light of a patch of which nothing is known.
@@ -28,10 +40,10 @@ const USUAL_ALBEDO: f32 = 0.5;
 const MOST_ALBEDO: f32 = 0.95;
 
 /// A probe, and where it was taken.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct PlacedProbe<'a> {
     /// Radiance by direction.
-    pub probe: &'a Probe,
+    pub probe: Cow<'a, Probe>,
     /// Where it was taken, metres.
     pub position_m: DVec3,
     /// Display white over the probe's unit of radiance.
@@ -59,16 +71,20 @@ pub struct PatchLight {
     pub albedo: Vec3,
 }
 
-/// Light of every patch; `caster` holds the patches' triangles in their order.
+/// Light of every patch; `caster` holds the patches' triangles in their order, and `mean` is the probe's mean luminance.
 pub fn light_of_room(
     patches: &RoomPatches,
     caster: &RayCaster,
-    placed: PlacedProbe<'_>,
+    placed: &PlacedProbe<'_>,
+    compact: &[Light],
+    mean: f32,
 ) -> Vec<PatchLight> {
+    let carried = carried_light(patches, caster, placed);
     let seen: Vec<Option<Vec3>> = patches
         .patches
-        .iter()
-        .map(|patch| seen_radiance(patches, patch, caster, placed))
+        .par_iter()
+        .zip(&carried)
+        .map(|(patch, carried)| seen_radiance(patches, patch, carried, caster, placed, mean))
         .collect();
     let mut radiance: Vec<Option<Vec3>> = patches
         .patches
@@ -80,19 +96,19 @@ pub fn light_of_room(
         .filter(|&index| radiance[index].is_none())
         .collect();
     for _ in 0..PASSES {
-        let gathered = irradiances(patches, caster, &unknown, &radiance);
+        if unknown.is_empty() {
+            break;
+        }
+        let gathered = irradiances(patches, caster, &unknown, &radiance, (compact, mean));
         for (&index, irradiance) in unknown.iter().zip(gathered) {
             let albedo = patches.patches[index]
                 .albedo
                 .unwrap_or(Vec3::splat(USUAL_ALBEDO));
             radiance[index] = Some(albedo / PI * irradiance);
         }
-        if unknown.is_empty() {
-            break;
-        }
     }
     let all: Vec<usize> = (0..radiance.len()).collect();
-    let irradiances = irradiances(patches, caster, &all, &radiance);
+    let irradiances = irradiances(patches, caster, &all, &radiance, (compact, mean));
     let light = |((patch, radiance), irradiance): ((&RoomPatch, &Option<Vec3>), Vec3)| {
         let radiance = radiance.unwrap_or(Vec3::ZERO);
         let reflected = radiance * PI / irradiance.max(Vec3::splat(1e-9));
@@ -107,22 +123,47 @@ pub fn light_of_room(
     known.zip(irradiances).map(light).collect()
 }
 
-/// Mean of what the probe sees of a patch; `None` where it sees less than a quarter of it, or its back.
+/// Radiance of a patch that sends to the probe what came from there; `None` where the probe sees too little of it, or its
+/// back.
 fn seen_radiance(
     patches: &RoomPatches,
     patch: &RoomPatch,
+    carried: &Carried,
     caster: &RayCaster,
-    placed: PlacedProbe<'_>,
+    placed: &PlacedProbe<'_>,
+    mean: f32,
 ) -> Option<Vec3> {
-    let to_probe = placed.position_m.as_vec3() - patches.center(patch);
-    if patches.normal(patch).dot(to_probe) <= 0.0 {
+    let origin = placed.position_m.as_vec3();
+    if patches.normal(patch).dot(origin - patches.center(patch)) <= 0.0 {
         return None;
     }
-    let seen: Vec<Vec3> = points_on(patches.corners(patch), SAMPLES)
+    let corners = patches.corners(patch);
+    let seen: Vec<Vec3> = points_on(corners, SAMPLES)
         .filter(|&point| placed.sees(caster, point))
-        .map(|point| placed.radiance_of(point))
         .collect();
-    (seen.len() * 4 >= SAMPLES).then(|| seen.iter().sum::<Vec3>() / seen.len() as f32)
+    let over =
+        |solid_angle_sr: f64| (carried.radiance_solid_angle / solid_angle_sr.max(1e-30)).as_vec3();
+    let mean_of_rays = over(carried.solid_angle_sr);
+    if seen.len() == SAMPLES {
+        // All of it is seen: what came from there is what it sends. Where it is dim the mean of its rays does not tell of how
+        // they fell.
+        let whole = over(solid_angle(corners.map(|corner| corner - origin)));
+        if luminance(whole) > BRIGHT * mean {
+            return Some(whole);
+        }
+    }
+    let needed = match seen.len() * 4 >= SAMPLES {
+        true => ENOUGH_RAYS,
+        false => MANY_RAYS,
+    };
+    if carried.rays >= needed {
+        return Some(mean_of_rays);
+    }
+    let at_points = || {
+        let sum: Vec3 = seen.iter().map(|&point| placed.radiance_of(point)).sum();
+        sum / seen.len() as f32
+    };
+    (seen.len() * 4 >= SAMPLES).then(at_points)
 }
 
 /// Mean of the nearest seen patches of the same thing that face the same way, the nearer ones weighing more.
@@ -144,27 +185,65 @@ fn of_neighbours(patches: &RoomPatches, patch: &RoomPatch, seen: &[Option<Vec3>]
     (!near.is_empty()).then(|| sum / weight)
 }
 
-/// Irradiance at the centres of some patches, by rays to what is known.
+/// Irradiance at the centres of some patches from what is known: from bright patches one by one, by rays from the others.
 fn irradiances(
     patches: &RoomPatches,
     caster: &RayCaster,
     chosen: &[usize],
     radiance: &[Option<Vec3>],
+    (compact, mean): (&[Light], f32),
 ) -> Vec<Vec3> {
-    let irradiance = |&index: &usize| {
+    let radiance: Vec<Vec3> = radiance
+        .iter()
+        .map(|radiance| radiance.unwrap_or_default())
+        .collect();
+    let bright = BrightPatches::new(patches, &radiance, mean);
+    let gathered = |&index: &usize| {
         let patch = &patches.patches[index];
         let normal = patches.normal(patch);
         let start = patches.center(patch) + normal * START_OFFSET_M;
         let arriving = |direction: Vec3| {
             let hit = caster.first_hit(start, direction, f32::INFINITY)?;
             let sender = &patches.patches[hit.triangle];
-            (patches.normal(sender).dot(direction) < 0.0)
-                .then_some(radiance[hit.triangle].unwrap_or(Vec3::ZERO))
+            (patches.normal(sender).dot(direction) < 0.0 && !bright.has(hit.triangle))
+                .then_some(radiance[hit.triangle])
         };
         hemisphere(normal, RAYS).filter_map(arriving).sum::<Vec3>() * (PI / RAYS as f32)
+            + bright.irradiance(start, normal, caster)
+            + compact_irradiance(compact, start, normal, |way| {
+                caster.is_hidden(start, way, REACH)
+            })
     };
-    chosen.par_iter().map(irradiance).collect()
+    chosen.par_iter().map(gathered).collect()
 }
+
+/// Part of the way to a lamp within which something hides it: it may lie on a wall.
+pub const REACH: f32 = 1.0 - 1e-3;
+
+/// Irradiance from compact lights of a place with a unit normal, where nothing hides them: `is_hidden` is asked of ways to
+/// them, very long ones to those from afar.
+pub fn compact_irradiance(
+    lights: &[Light],
+    place: Vec3,
+    normal: Vec3,
+    is_hidden: impl Fn(Vec3) -> bool,
+) -> Vec3 {
+    let arriving = |light: &Light| {
+        let given = irradiance(light, place.as_dvec3(), normal.as_dvec3()).as_vec3();
+        let way = match *light {
+            Light::Point { position_m, .. } => (position_m - place.as_dvec3()).as_vec3(),
+            Light::Directional { direction, .. } => direction.as_vec3() * -FAR_M,
+        };
+        match given != Vec3::ZERO && !is_hidden(way) {
+            true => given,
+            false => Vec3::ZERO,
+        }
+    };
+    lights.iter().map(arriving).sum()
+}
+
+/// Light from infinitely far away is looked for up to here, metres: within what stands for the sky.
+const FAR_M: f32 = 100.0;
 
 /// The distance off a surface at which rays start, metres.
 pub const START_OFFSET_M: f32 = 2e-5;

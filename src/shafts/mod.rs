@@ -2,6 +2,8 @@
 //! each sends to each place, and which of it a moving thing may hide. World space, metres, linear radiance.
 
 pub mod bounding;
+pub mod bright_patches;
+mod carried_light;
 pub mod casters;
 pub mod difference;
 mod form_factor;
@@ -20,6 +22,7 @@ pub mod room_transport;
 pub mod selection;
 pub mod shadow_atlas;
 mod shaft;
+mod solid_angle;
 pub mod source_tree;
 pub mod surfels;
 pub mod transfer;

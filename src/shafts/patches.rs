@@ -52,21 +52,24 @@ pub struct RoomPatches {
 const NEAREST_M: f64 = 0.04;
 /// Part of the weight that darkness leaves.
 const WEIGHT_OF_DARKNESS: f32 = 0.3;
+/// Edges that look smaller than this from where things are stay whole, radians: a sun is then cut into a few.
+const SMALLEST_EDGE: f32 = 0.005;
 
 /// Mean brightness of some triangles, by how large they look from a distance.
 fn mean_seen(
     triangles: &[RoomTriangle],
     distance: impl Fn(Vec3) -> f32,
-    brightness: impl Fn(Vec3) -> f32,
+    brightness: impl Fn(Vec3, f32) -> f32,
 ) -> f32 {
     const POINTS: usize = 64;
     let (mut sum, mut whole) = (0.0, 0.0);
     for &RoomTriangle { corners, .. } in triangles {
         let [a, b, c] = corners;
         let area = (b - a).cross(c - a).length() / 2.0;
+        let radius = (area / POINTS as f32).sqrt() / 2.0;
         for place in points_on(corners, POINTS) {
             let looks = area / distance(place).powi(2);
-            sum += looks * brightness(place);
+            sum += looks * brightness(place, radius);
             whole += looks;
         }
     }
@@ -75,12 +78,13 @@ fn mean_seen(
 
 impl RoomPatches {
     /// Cuts triangles until there are about `budget` patches, never more unless there are more triangles. Edges are
-    /// judged by how large they look from the nearest of `focuses`, and by `brightness` there (in any unit).
+    /// judged by how large they look from the nearest of `focuses`, and by the mean `brightness` (in any unit) of a ball around
+    /// them, which has a centre and a radius.
     pub fn new(
         triangles: &[RoomTriangle],
         budget: usize,
         focuses: &[Bounds],
-        brightness: impl Fn(Vec3) -> f32,
+        brightness: impl Fn(Vec3, f32) -> f32,
     ) -> Self {
         let distance = |place: Vec3| {
             let point = place.as_dvec3();
@@ -90,13 +94,19 @@ impl RoomPatches {
             distances.fold(f64::INFINITY, f64::min).max(NEAREST_M) as f32
         };
         let mean = mean_seen(triangles, distance, &brightness);
-        let weight = |middle: Vec3| {
-            let bright = WEIGHT_OF_DARKNESS + brightness(middle) / mean.max(1e-9);
-            bright.sqrt() / distance(middle)
+        // (The balls around a triangle's edges cover it: nothing bright is missed.)
+        let weight = |a: Vec3, b: Vec3| {
+            let (middle, length) = (a.midpoint(b), a.distance(b));
+            let looks = length / distance(middle);
+            if looks < SMALLEST_EDGE {
+                return 0.0;
+            }
+            let bright = WEIGHT_OF_DARKNESS + brightness(middle, length / 2.0) / mean.max(1e-9);
+            bright.sqrt() * looks
         };
         let too_large = |limit: f32| {
             let weight = &weight;
-            move |a: Vec3, b: Vec3| a.distance(b) * weight(a.midpoint(b)) > limit
+            move |a: Vec3, b: Vec3| weight(a, b) > limit
         };
         // The limit on an edge's look that just spends the budget.
         let (mut low, mut high) = (1e-3_f32, 1e3_f32);
@@ -309,7 +319,7 @@ mod tests {
         let focus = Bounds::around([DVec3::new(0.0, 0.0, 2.0)]).expect("a point");
         // In the middle of a triangle, and aside.
         let counts = [Vec3::new(0.667, -0.667, 0.0), Vec3::new(0.667, 0.667, 0.0)].map(|spot| {
-            let brightness = |place: Vec3| match place.distance(spot) < 0.3 {
+            let brightness = |place: Vec3, _| match place.distance(spot) < 0.3 {
                 true => 100.0,
                 false => 1.0,
             };
@@ -326,7 +336,7 @@ mod tests {
     fn patches_keep_the_area_have_no_gaps_and_are_finer_near_the_focus() {
         let focus =
             Bounds::around([DVec3::new(0.5, 0.5, 0.0), DVec3::new(0.6, 0.6, 0.1)]).expect("points");
-        let patches = RoomPatches::new(&square(1.0, 0.0, 0), 500, &[focus], |_| 1.0);
+        let patches = RoomPatches::new(&square(1.0, 0.0, 0), 500, &[focus], |_, _| 1.0);
         assert!(
             (250..=500).contains(&patches.patches.len()),
             "{}",
@@ -364,7 +374,7 @@ mod tests {
     #[test]
     fn bright_places_are_cut_finer() {
         let focus = Bounds::around([DVec3::new(0.0, 0.0, 1.0)]).expect("a point");
-        let brightness = |place: Vec3| if place.x > 0.0 { 30.0 } else { 0.1 };
+        let brightness = |place: Vec3, _| if place.x > 0.0 { 30.0 } else { 0.1 };
         let patches = RoomPatches::new(&square(1.0, 0.0, 0), 400, &[focus], brightness);
         let bright = patches
             .patches
@@ -375,7 +385,7 @@ mod tests {
 
     #[test]
     fn a_budget_below_the_triangles_keeps_them() {
-        let patches = RoomPatches::new(&square(1.0, 0.0, 0), 1, &[], |_| 1.0);
+        let patches = RoomPatches::new(&square(1.0, 0.0, 0), 1, &[], |_, _| 1.0);
         assert_eq!(patches.patches.len(), 2);
     }
 }

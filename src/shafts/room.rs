@@ -5,6 +5,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use glam::Vec3;
 
 use crate::geometry::bounds::Bounds;
+use crate::light::Light;
 
 use super::patches::RoomTriangle;
 use super::room_transport::{PlacedProbe, RoomOptions, RoomTransport};
@@ -14,18 +15,22 @@ pub struct Room<'a> {
     /// The table and phantoms that stand in the world, and the parts of the room. Phantoms on moving anchors have no part
     /// in it.
     pub triangles: Vec<RoomTriangle>,
+    /// The table's and the phantoms' pieces come before this one.
+    pub standing: u32,
     /// Around what is there to be lit: all phantoms that cast, and the virtual things, where they are.
     pub things: Vec<Bounds>,
     /// How finely it is worked out.
     pub options: RoomOptions,
-    /// The light.
+    /// The broad light.
     pub probe: PlacedProbe<'a>,
+    /// Lights that are drawn by themselves, and whose light is reflected like the other.
+    pub compact: Vec<Light>,
 }
 
 impl Room<'_> {
     /// Works its light out: seconds.
     pub fn transport(&self) -> RoomTransport {
-        RoomTransport::new(&self.triangles, self.probe, &self.things, &self.options)
+        RoomTransport::new(self)
     }
 
     /// Rooms with the same key have the same light wherever their things stand.
@@ -49,11 +54,15 @@ impl Room<'_> {
             probe,
             position_m,
             exposure,
-        } = self.probe;
-        hash_numbers(&mut hasher, [source_power, least_part, f64::from(exposure)]);
+        } = &self.probe;
+        hash_numbers(
+            &mut hasher,
+            [source_power, least_part, f64::from(*exposure)],
+        );
         hash_numbers(&mut hasher, position_m.to_array());
         probe.size_px().hash(&mut hasher);
         hash_vectors(&mut hasher, probe.pixels());
+        hasher.write(format!("{:?}", self.compact).as_bytes());
         hasher.finish()
     }
 

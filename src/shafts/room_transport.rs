@@ -8,16 +8,20 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::bounds::Bounds;
 use crate::geometry::ray_caster::RayCaster;
+use crate::light::Light;
+use crate::light::probe_power::ProbePower;
 
 use super::bounding::Aabb;
+use super::bright_patches::BrightPatches;
 use super::hierarchy::{Arriving, Marks, ShaftHierarchy};
 use super::irradiance_volume::IrradianceVolume;
 pub use super::light_of_room::{PatchLight, PlacedProbe};
-use super::light_of_room::{hemisphere, light_of_room};
+use super::light_of_room::{REACH, compact_irradiance, hemisphere, light_of_room};
 use super::luminance;
-use super::patches::{RoomPatches, RoomTriangle};
+use super::patches::RoomPatches;
 use super::points::points_on;
 use super::receiver_tree::ReceiverTree;
+use super::room::Room;
 use super::selection::{Representative, WeighedSource, triangle_spread};
 use super::source_tree::{PatchSource, SourceTree};
 use super::surfels::{LitSurfel, Surfel};
@@ -59,6 +63,9 @@ pub struct RoomTransport {
     pub hierarchy: ShaftHierarchy,
     /// The light where virtual things may be.
     pub volume: IrradianceVolume,
+    /// Lights that are drawn by themselves, beside what the probe saw.
+    #[serde(skip)]
+    pub compact: Vec<Light>,
     /// The patches' triangles.
     #[serde(skip, default = "no_triangles")]
     pub caster: RayCaster,
@@ -74,20 +81,29 @@ const VOLUME_SPACING_M: f32 = 0.06;
 const VOLUME_MARGIN_M: f64 = 0.15;
 
 impl RoomTransport {
-    /// Works a room out. `things` is around all phantoms but the table, and all virtual things where they first stand.
-    pub fn new(
-        triangles: &[RoomTriangle],
-        probe: PlacedProbe<'_>,
-        things: &[Bounds],
-        options: &RoomOptions,
-    ) -> Self {
-        let brightness = |place: Vec3| luminance(probe.radiance_of(place));
+    /// Works a room out.
+    pub fn new(room: &Room<'_>) -> Self {
+        let Room {
+            triangles,
+            things,
+            options,
+            probe,
+            compact,
+            standing: _,
+        } = room;
+        let power = ProbePower::new(&probe.probe);
+        let brightness = |place: Vec3, radius_m: f32| {
+            let way = place.as_dvec3() - probe.position_m;
+            let half_angle = f64::from(radius_m).atan2(way.length());
+            power.mean_around(way, half_angle) as f32
+        };
+        let mean = power.mean() as f32 * probe.exposure;
         let mut focuses = things.to_vec();
         focuses.extend(Bounds::around([probe.position_m]));
         let patches = RoomPatches::new(triangles, options.patches, &focuses, brightness);
         let corners: Vec<[Vec3; 3]> = patches.patches.iter().map(|p| patches.corners(p)).collect();
         let caster = RayCaster::new(&corners);
-        let light = light_of_room(&patches, &caster, probe);
+        let light = light_of_room(&patches, &caster, probe, compact, mean);
 
         let power =
             |patch: usize| luminance(light[patch].radiance) * patches.area(&patches.patches[patch]);
@@ -132,7 +148,8 @@ impl RoomTransport {
         let hierarchy =
             ShaftHierarchy::new(&sources, &receivers, &arriving, options.least_part as f32);
         let radiance: Vec<Vec3> = light.iter().map(|light| light.radiance).collect();
-        let volume = volume_around(things, &patches, &caster, &radiance);
+        let bright = BrightPatches::new(&patches, &radiance, mean);
+        let volume = volume_around(things, &patches, &caster, &radiance, bright);
         Self {
             source_radiance: sender_radiance[..source_count].to_vec(),
             patches,
@@ -144,16 +161,18 @@ impl RoomTransport {
             receivers,
             hierarchy,
             volume,
+            compact: compact.clone(),
             caster,
         }
     }
 
     /// Ready for rays again, after it was read.
-    pub fn with_caster(self) -> Self {
+    pub fn with_caster(self, compact: &[Light]) -> Self {
         let patches = self.patches.patches.iter();
         let corners: Vec<[Vec3; 3]> = patches.map(|patch| self.patches.corners(patch)).collect();
         Self {
             caster: RayCaster::new(&corners),
+            compact: compact.to_vec(),
             ..self
         }
     }
@@ -161,7 +180,8 @@ impl RoomTransport {
     /// The light where other things are, or are now.
     pub fn gather_volume(&mut self, things: &[Bounds]) {
         let radiance: Vec<Vec3> = self.light.iter().map(|light| light.radiance).collect();
-        self.volume = volume_around(things, &self.patches, &self.caster, &radiance);
+        let bright = self.volume.bright().clone();
+        self.volume = volume_around(things, &self.patches, &self.caster, &radiance, bright);
     }
 
     /// Marks what things in boxes may hide, and which receivers may get their shadows.
@@ -255,7 +275,7 @@ impl RoomTransport {
             .map(|(&part, &radiance)| luminance(radiance) * part)
             .collect();
         let all: f32 = arriving.iter().sum();
-        if all <= 0.0 {
+        if all <= 0.0 && self.compact.is_empty() {
             return 1.0;
         }
         let start = self.patches.center(patch) + self.patches.normal(patch) * SURFEL_OFFSET_M;
@@ -273,7 +293,18 @@ impl RoomTransport {
                 tried = due;
             }
         }
-        1.0 - hidden as f32 / tried.max(1) as f32
+        let hidden = hidden as f32 / tried.max(1) as f32;
+        // Lights of their own are hidden or not.
+        let normal = self.patches.normal(patch);
+        let in_room = |way: Vec3| self.caster.is_hidden(start, way, REACH);
+        let in_both = |way: Vec3| in_room(way) || caster.is_hidden(start, way, REACH);
+        let before = luminance(compact_irradiance(&self.compact, start, normal, in_room));
+        let after = luminance(compact_irradiance(&self.compact, start, normal, in_both));
+        let broad = all * PI;
+        match broad + before > 0.0 {
+            true => (broad * (1.0 - hidden) + after) / (broad + before),
+            false => 1.0,
+        }
     }
 
     /// Irradiance that a vertex loses with the light that patches lose.
@@ -358,7 +389,12 @@ impl RoomTransport {
             (!caster.is_hidden(start, direction, distance)).then_some(radiance * left)
         };
         let near: Vec3 = hemisphere(surfel.normal, rays).filter_map(from_near).sum();
-        sources.iter().map(from_source).sum::<Vec3>() + near * (PI / rays as f32)
+        let hides = |way: Vec3| {
+            caster.is_hidden(start, way, REACH) || self.caster.is_hidden(start, way, REACH)
+        };
+        sources.iter().map(from_source).sum::<Vec3>()
+            + near * (PI / rays as f32)
+            + compact_irradiance(&self.compact, start, surfel.normal, hides)
     }
 }
 
@@ -394,9 +430,10 @@ fn volume_around(
     patches: &RoomPatches,
     caster: &RayCaster,
     radiance: &[Vec3],
+    bright: BrightPatches,
 ) -> IrradianceVolume {
     let bounds = around(things, VOLUME_MARGIN_M);
-    IrradianceVolume::new(bounds, VOLUME_SPACING_M, patches, caster, radiance)
+    IrradianceVolume::new(bounds, VOLUME_SPACING_M, patches, caster, radiance, bright)
 }
 
 fn around(things: &[Bounds], margin_m: f64) -> Aabb {

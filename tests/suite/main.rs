@@ -21,6 +21,7 @@ mod light_from_picture;
 mod motion;
 mod picture;
 mod probe;
+mod probe_light;
 mod scene;
 mod shading;
 mod shafts;

@@ -1,6 +1,7 @@
 //! Shafts held against closed forms, brute force and what light has to do: rooms, hierarchies, and pictures of the room that
 //! ships. How near pictures come to the truth is in accuracy.rs.
 
+use std::borrow::Cow;
 use std::f32::consts::PI;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::path::Path;
@@ -28,7 +29,7 @@ const OPTIONS: RoomOptions = RoomOptions {
 };
 
 /// The faces of a box, seen from within.
-fn inside_of(low: Vec3, high: Vec3, albedo: f32) -> Vec<RoomTriangle> {
+pub(super) fn inside_of(low: Vec3, high: Vec3, albedo: Option<f32>) -> Vec<RoomTriangle> {
     let corner = |x: usize, y: usize, z: usize| {
         let pick = |index: usize, axis: usize| [low, high][index][axis];
         Vec3::new(pick(x, 0), pick(y, 1), pick(z, 2))
@@ -45,7 +46,7 @@ fn inside_of(low: Vec3, high: Vec3, albedo: f32) -> Vec<RoomTriangle> {
         let [a, b, c, d] = quad.map(|(x, y, z)| corner(x, y, z));
         [[a, b, c], [a, c, d]].map(|corners| RoomTriangle {
             corners,
-            albedo: Some(Vec3::splat(albedo)),
+            albedo: albedo.map(Vec3::splat),
             piece,
         })
     });
@@ -61,11 +62,17 @@ fn a_room_of_one_brightness_lights_every_place_with_pi_times_it() {
     let color = Vec3::new(1.0, 0.5, 0.25);
     let probe = Probe::new([64, 32], vec![color; 64 * 32]).expect("a probe");
     let room = Room {
-        triangles: inside_of(Vec3::new(-1.0, -1.2, -0.5), Vec3::new(1.1, 1.0, 1.3), 0.4),
+        triangles: inside_of(
+            Vec3::new(-1.0, -1.2, -0.5),
+            Vec3::new(1.1, 1.0, 1.3),
+            Some(0.4),
+        ),
+        standing: 0,
+        compact: Vec::new(),
         things: vec![bounds(DVec3::splat(-0.1), DVec3::splat(0.1))],
         options: OPTIONS,
         probe: PlacedProbe {
-            probe: &probe,
+            probe: Cow::Borrowed(&probe),
             position_m: DVec3::ZERO,
             exposure: 2.0,
         },
@@ -81,7 +88,7 @@ fn a_room_of_one_brightness_lights_every_place_with_pi_times_it() {
         let mut part = |size: f64| random.between(-size, size) as f32;
         let place = Vec3::new(part(0.2), part(0.2), part(0.2));
         let normal = Vec3::new(part(1.0), part(1.0), part(1.0)).normalize();
-        let irradiance = prepared.volume.radiance(place).irradiance(normal);
+        let irradiance = prepared.volume.irradiance(place, normal);
         let error = (irradiance / expected - 1.0).abs().max_element();
         assert!(error < 0.01, "{place} {normal}: {irradiance}");
     }

@@ -17,7 +17,7 @@ use crate::app::truth::changed_by;
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
 use crate::render::Shown;
-use crate::scene::{Scene, ShadowTechnique, VolumeCounting};
+use crate::scene::{Scene, VolumeCounting};
 
 /// By how many pixels silhouettes may move.
 const ERRORS_PX: [f64; 6] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
@@ -140,7 +140,7 @@ impl Chart for LeftOut {
         scene.shadows.max_silhouette_error_px = 0.0;
         scene.shadows.counting = VolumeCounting::DepthFail;
         scene.shadows.shafts.sources = None;
-        let is_soft = scene.chosen_technique().0 == ShadowTechnique::Shafts;
+        let is_soft = scene.chosen_technique().0.has_shafts();
         let step = lab.step();
         let all = draw(lab, &looks)?;
         let mut ways = Vec::new();

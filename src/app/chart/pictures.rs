@@ -14,7 +14,7 @@ use crate::app::stages::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
 use crate::app::truth::{Drawn, LinearPicture};
 use crate::render::{Renderer, Shown, VIRTUAL};
-use crate::scene::{Quality, Scene, ShadowSettings, ShadowTechnique};
+use crate::scene::{Quality, Scene, ShadowSettings};
 
 const NAME: &str = "shadow-pictures";
 /// The error is shown so much stronger, about a middle grey.
@@ -90,7 +90,7 @@ impl AnyChart for PicturesChart {
 /// What the technique of a scene has to offer: the qualities, or so many sources (Gibson et al. 2003, fig. 9).
 fn ways(scene: &Scene, quick: bool) -> Vec<(String, ShadowSettings)> {
     let technique = scene.shadows.technique;
-    if scene.chosen_technique().0 != ShadowTechnique::Shafts {
+    if !scene.chosen_technique().0.has_shafts() {
         let qualities = Quality::BY_NAME.into_iter();
         return qualities
             .map(|(name, quality)| {

@@ -2,11 +2,13 @@
 
 use super::super::accumulated::Accumulated;
 use super::super::background::Background;
+use super::super::combined::Combined;
 use super::super::direct::Direct;
 use super::super::gpu::Gpu;
 use super::super::gpu_scene::GpuScene;
 use super::super::light_piece::LitBy;
-use super::super::shafts::Shafts;
+use super::super::shafts::{Shafts, ShaftsAlone};
+use super::super::surfaces::First;
 use super::super::technique::TechniquePasses;
 use crate::geometry::camera::Intrinsics;
 use crate::scene::{Scene, SceneLight, ShadowTechnique, Shortcut};
@@ -20,7 +22,9 @@ pub(super) enum ChosenTechnique {
     /// Several lights or samples, added up.
     Accumulated(Accumulated),
     /// A room's light.
-    Shafts(Box<Shafts>),
+    Shafts(Box<ShaftsAlone>),
+    /// A room's broad light, and compact lights.
+    Combined(Box<Combined>),
 }
 
 impl ChosenTechnique {
@@ -33,14 +37,25 @@ impl ChosenTechnique {
         transport: impl FnOnce(&Room<'_>) -> RoomTransport,
     ) -> (Self, GpuScene) {
         match (scene.chosen_technique().0, &scene.probe) {
-            (ShadowTechnique::Shafts, Some(probe)) => {
+            (ShadowTechnique::Shafts | ShadowTechnique::Both, Some(probe)) => {
                 let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Room);
                 let kinds = gpu_scene.kinds;
-                let shafts = Shafts::new(gpu, scene, probe, background, kinds, transport);
-                (Self::Shafts(Box::new(shafts)), gpu_scene)
+                let shafts = Shafts::new(gpu, scene, probe, kinds, transport);
+                let technique = match gpu_scene.light_count() {
+                    0 => {
+                        let alone = ShaftsAlone::new(gpu, scene, background, shafts);
+                        Self::Shafts(Box::new(alone))
+                    }
+                    _ => {
+                        let (samples, first) = (scene.shadows.samples, First::DepthAlone);
+                        let compact = Accumulated::new(gpu, background, samples, kinds, first);
+                        Self::Combined(Box::new(Combined::new(compact, shafts)))
+                    }
+                };
+                (technique, gpu_scene)
             }
             // (No scene that was read has shafts without a probe.)
-            (ShadowTechnique::Volumes | ShadowTechnique::Shafts, _) => {
+            (_, _) => {
                 let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Lights);
                 let (samples, kinds) = (scene.shadows.samples, gpu_scene.kinds);
                 // (A lamp that moves along may be lost, and one of some size has soft shadows.)
@@ -50,7 +65,10 @@ impl ChosenTechnique {
                     && matches!(&scene.lights[..], [one] if is_plain(one));
                 let technique = match is_single && !scene.shadows.without.has(Shortcut::Direct) {
                     true => Self::Direct(Direct::new(gpu, background, kinds)),
-                    false => Self::Accumulated(Accumulated::new(gpu, background, samples, kinds)),
+                    false => {
+                        let first = First::Ambient;
+                        Self::Accumulated(Accumulated::new(gpu, background, samples, kinds, first))
+                    }
                 };
                 (technique, gpu_scene)
             }
@@ -63,6 +81,7 @@ impl ChosenTechnique {
             Self::Direct(direct) => direct,
             Self::Accumulated(accumulated) => accumulated,
             Self::Shafts(shafts) => shafts.as_ref(),
+            Self::Combined(combined) => combined.as_ref(),
         }
     }
 
@@ -72,6 +91,7 @@ impl ChosenTechnique {
             Self::Direct(direct) => direct,
             Self::Accumulated(accumulated) => accumulated,
             Self::Shafts(shafts) => shafts.as_mut(),
+            Self::Combined(combined) => combined.as_mut(),
         }
     }
 }

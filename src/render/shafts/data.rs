@@ -10,10 +10,8 @@ use crate::shafts::receiver_patches::{PatchCorner, ReflectedCorner};
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub struct ShaftFrame {
     pub world_from_camera: Mat4,
+    pub moving_irradiance: Vec3,
     pub source_count: u32,
-    pub padding_1: u32,
-    pub padding_2: u32,
-    pub padding_3: u32,
 }
 
 /// Vertex layout of [`ReflectedCorner`].
@@ -24,6 +22,13 @@ pub(super) const REFLECTED_CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> =
         attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3],
     };
 
+/// Vertex layout of places alone.
+pub(super) const PLACE_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
+    array_stride: size_of::<Vec3>() as u64,
+    step_mode: wgpu::VertexStepMode::Vertex,
+    attributes: &wgpu::vertex_attr_array![0 => Float32x3],
+};
+
 /// Vertex layout of [`PatchCorner`].
 pub(super) const PATCH_CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> =
     wgpu::VertexBufferLayout {
@@ -33,10 +38,3 @@ pub(super) const PATCH_CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> =
             0 => Float32x3, 1 => Uint32x3, 2 => Float32x2, 3 => Uint32x2
         ],
     };
-
-/// Vertex layout of places alone.
-pub(super) const PLACE_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
-    array_stride: size_of::<Vec3>() as u64,
-    step_mode: wgpu::VertexStepMode::Vertex,
-    attributes: &wgpu::vertex_attr_array![0 => Float32x3],
-};

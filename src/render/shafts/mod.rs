@@ -9,7 +9,7 @@ mod maps;
 mod pipelines;
 
 use bytemuck::Zeroable;
-use glam::{DAffine3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 use wgpu::util::DeviceExt as _;
 
 use crate::geometry::bounds::Bounds;
@@ -18,6 +18,8 @@ use crate::scene::{Difference, ProbeScene, Scene, ShaftSettings};
 use crate::shafts::bounding::Aabb;
 use crate::shafts::casters::{PlacedCasters, ShaftCasters};
 use crate::shafts::hidden_light::{HiddenLight, ShadowOptions};
+use crate::shafts::patches::RoomPatch;
+use crate::shafts::receiver_patches::ReflectedCorner;
 use crate::shafts::room::Room;
 use crate::shafts::room_transport::RoomTransport;
 use crate::shafts::shadow_atlas::Tiling;
@@ -41,7 +43,13 @@ use environment::Environment;
 use maps::Maps;
 use pipelines::{Pipelines, SHAFT_GROUP};
 
-/// The technique that shades a room's light by shafts.
+/// The technique that shades all of a room's light by shafts.
+pub(super) struct ShaftsAlone {
+    shafts: Shafts,
+    sums: LightSums,
+}
+
+/// A room's broad light.
 pub(super) struct Shafts {
     room: RoomTransport,
     /// Of the room that `room` is the transport of.
@@ -49,11 +57,14 @@ pub(super) struct Shafts {
     settings: ShaftSettings,
     casters: ShaftCasters,
     pipelines: Pipelines,
-    sums: LightSums,
     maps: Maps,
-    /// Places of all patches' corners, three each.
+    /// Corners of all patches and their irradiance without virtual things, three each: the phantoms' and the table's first.
     places: wgpu::Buffer,
     place_count: u32,
+    /// Those of the room's parts alone begin here.
+    first_of_room: u32,
+    /// Mean irradiance where things stand, for what moves.
+    moving_irradiance: Vec3,
     frame: wgpu::Buffer,
     sampler: wgpu::Sampler,
     environment: Environment,
@@ -88,7 +99,6 @@ impl Shafts {
         gpu: &Gpu,
         scene: &Scene,
         probe: &ProbeScene,
-        background: &Background,
         kinds: SurfaceKinds,
         transport: impl FnOnce(&Room<'_>) -> RoomTransport,
     ) -> Self {
@@ -96,19 +106,28 @@ impl Shafts {
         let surfaces_key = parts.surfaces_key();
         let room = transport(&parts);
         let device = &gpu.device;
-        let patches = room.patches.patches.iter();
-        let places: Vec<Vec3> = patches
-            .flat_map(|patch| room.patches.corners(patch))
+        let standing = parts.standing;
+        let is_standing = |patch: &&RoomPatch| patch.piece < standing;
+        let patches = || room.patches.patches.iter();
+        let ordered = patches()
+            .filter(is_standing)
+            .chain(patches().filter(|it| !is_standing(it)));
+        let places: Vec<ReflectedCorner> = ordered
+            .flat_map(|patch| patch.vertices)
+            .map(|vertex| ReflectedCorner {
+                position: room.patches.vertices[vertex as usize].position,
+                irradiance: room.irradiance[vertex as usize],
+            })
             .collect();
+        let first_of_room = 3 * patches().filter(is_standing).count() as u32;
         let settings = scene.shadows.shafts;
         let samples = scene.shadows.samples;
         let tiling = Tiling::new(1, settings.map_px, device.limits().max_texture_dimension_2d);
         let environment = kinds
             .glossy
-            .then_some((&probe.probe, probe.exposure as f32));
+            .then_some((parts.probe.probe.as_ref(), parts.probe.exposure));
         Self {
             pipelines: Pipelines::new(gpu, samples, kinds),
-            sums: LightSums::new(gpu, background, samples, composite(settings.difference)),
             maps: Maps::new(gpu, tiling),
             casters: ShaftCasters::new(&scene.occluders()),
             places: buffer(
@@ -118,6 +137,8 @@ impl Shafts {
                 wgpu::BufferUsages::VERTEX,
             ),
             place_count: places.len() as u32,
+            first_of_room,
+            moving_irradiance: mean_irradiance(&room, &parts.things),
             frame: device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("shafts"),
                 size: size_of::<ShaftFrame>() as u64,
@@ -141,7 +162,7 @@ impl Shafts {
     }
 
     /// Works out what is hidden where things are now. Returns the pixels that it can change, `None` if none.
-    fn update(&mut self, gpu: &Gpu, gpu_scene: &GpuScene) -> Option<PixelRect> {
+    pub fn update(&mut self, gpu: &Gpu, gpu_scene: &GpuScene) -> Option<PixelRect> {
         let camera_from_anchor = gpu_scene.camera_from_anchor();
         let camera_from_world = (*camera_from_anchor.first()?)?;
         let world_from_camera = camera_from_world.inverse();
@@ -158,8 +179,7 @@ impl Shafts {
             let volume = &self.room.volume;
             gpu_scene.set_indirect(&gpu.queue, &world_from_anchor, |place, normal| {
                 let surfels = self.hidden.iter().flat_map(|hidden| hidden.surfels.all());
-                volume.radiance(place).irradiance(normal)
-                    + interreflected_irradiance(place, normal, surfels)
+                volume.irradiance(place, normal) + interreflected_irradiance(place, normal, surfels)
             });
             self.world_from_anchor = world_from_anchor;
         }
@@ -167,6 +187,7 @@ impl Shafts {
         let frame = ShaftFrame {
             world_from_camera: glam::DMat4::from(world_from_camera).as_mat4(),
             source_count: hidden.source_count,
+            moving_irradiance: self.moving_irradiance,
             ..Zeroable::zeroed()
         };
         gpu.queue
@@ -231,7 +252,7 @@ impl Shafts {
     }
 
     /// Draws the sources' maps where they are not drawn yet.
-    fn draw_maps(&mut self, gpu: &Gpu, passes: &mut Passes<'_>) {
+    pub fn draw_maps(&mut self, gpu: &Gpu, passes: &mut Passes<'_>) {
         let Some(hidden) = self.hidden.as_mut().filter(|hidden| !hidden.is_drawn) else {
             return;
         };
@@ -245,8 +266,15 @@ impl Shafts {
         hidden.is_drawn = true;
     }
 
-    /// Draws what is real into depth, what is virtual over it, and the light on both.
-    fn draw_light(&self, pass: &mut wgpu::RenderPass<'_>, gpu_scene: &GpuScene, within: PixelRect) {
+    /// Draws what is real into depth, what is virtual over it, and the light on both; where other lights are added to it, on
+    /// all that is real.
+    pub fn draw_light(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        gpu_scene: &GpuScene,
+        within: PixelRect,
+        receivers: Receivers,
+    ) {
         let Some(hidden) = &self.hidden else {
             return;
         };
@@ -255,7 +283,11 @@ impl Shafts {
         pass.set_pipeline(&self.pipelines.depth_of_room);
         pass.set_vertex_buffer(0, self.places.slice(..));
         pass.draw(0..self.place_count, 0..1);
-        gpu_scene.draw_moving_real(pass, &self.pipelines.depth_of_real, within);
+        let moving = match receivers {
+            Receivers::Shadowed => &self.pipelines.depth_of_real,
+            Receivers::All => &self.pipelines.light_on_moving,
+        };
+        gpu_scene.draw_moving_real(pass, moving, within);
         gpu_scene.draw_surfaces(
             pass,
             &self.pipelines.light_on_virtual,
@@ -264,6 +296,11 @@ impl Shafts {
             within,
         );
         gpu_scene.set_world(pass);
+        if receivers == Receivers::All {
+            pass.set_pipeline(&self.pipelines.whole_light_on_patch);
+            pass.set_vertex_buffer(0, self.places.slice(..));
+            pass.draw(0..self.place_count, 0..1);
+        }
         pass.set_pipeline(&self.pipelines.light_on_patch);
         pass.set_vertex_buffer(0, hidden.corners.slice(..));
         pass.draw(0..hidden.corner_count, 0..1);
@@ -271,11 +308,21 @@ impl Shafts {
         pass.set_vertex_buffer(0, hidden.reflected.slice(..));
         pass.draw(0..hidden.reflected_count, 0..1);
     }
-}
 
-impl TechniquePasses for Shafts {
+    /// Draws the room's own parts, which no other pass knows, into depth.
+    pub fn draw_depth_of_room(&self, pass: &mut wgpu::RenderPass<'_>, gpu_scene: &GpuScene) {
+        let Some(hidden) = &self.hidden else {
+            return;
+        };
+        pass.set_bind_group(2, &hidden.group, &[]);
+        gpu_scene.set_world(pass);
+        pass.set_pipeline(&self.pipelines.depth_of_room);
+        pass.set_vertex_buffer(0, self.places.slice(..));
+        pass.draw(self.first_of_room..self.place_count, 0..1);
+    }
+
     /// Takes the places of virtual things. False where the room is another one.
-    fn follow(&mut self, scene: &Scene) -> bool {
+    pub fn follow(&mut self, scene: &Scene) -> bool {
         let Some(probe) = &scene.probe else {
             return false;
         };
@@ -293,9 +340,40 @@ impl TechniquePasses for Shafts {
         true
     }
 
-    fn set_sources(&mut self, sources: Option<u32>) {
+    /// So many sources at most get a shadow from now on; `None`: all.
+    pub fn set_sources(&mut self, sources: Option<u32>) {
         self.settings.sources = sources;
         self.world_from_anchor.clear();
+    }
+}
+
+/// The real surfaces whose light is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Receivers {
+    /// Those that may get a shadow of the room's light.
+    Shadowed,
+    /// All.
+    All,
+}
+
+impl ShaftsAlone {
+    /// Around a room's light.
+    pub fn new(gpu: &Gpu, scene: &Scene, background: &Background, shafts: Shafts) -> Self {
+        let shader = composite(scene.shadows.shafts.difference);
+        Self {
+            sums: LightSums::new(gpu, background, scene.shadows.samples, shader),
+            shafts,
+        }
+    }
+}
+
+impl TechniquePasses for ShaftsAlone {
+    fn follow(&mut self, scene: &Scene) -> bool {
+        self.shafts.follow(scene)
+    }
+
+    fn set_sources(&mut self, sources: Option<u32>) {
+        self.shafts.set_sources(sources);
     }
 
     fn prepare(
@@ -306,13 +384,16 @@ impl TechniquePasses for Shafts {
     ) -> Option<ScreenBounds> {
         match shown {
             Shown::Bare => None,
-            Shown::Composite => self.update(gpu, gpu_scene).map(ScreenBounds::pixels_alone),
+            Shown::Composite => {
+                let pixels = self.shafts.update(gpu, gpu_scene);
+                pixels.map(ScreenBounds::pixels_alone)
+            }
         }
     }
 
     /// Gibson et al. 2003, section 7, in as few passes over the pixels as there are: one.
     fn draw(&mut self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) {
-        self.draw_maps(frame.gpu, passes);
+        self.shafts.draw_maps(frame.gpu, passes);
         let mut pass = passes.begin(
             "shafts",
             Some(GpuSpan::Light.whole()),
@@ -320,7 +401,9 @@ impl TechniquePasses for Shafts {
             Some(depth_stencil(&self.sums.depth_stencil, true, true)),
         );
         set_scissor(&mut pass, frame.bounds.pixels);
-        self.draw_light(&mut pass, frame.gpu_scene, frame.bounds.pixels);
+        let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
+        self.shafts
+            .draw_light(&mut pass, gpu_scene, pixels, Receivers::Shadowed);
         drop(pass);
         self.sums.composite(passes, frame);
     }
@@ -333,6 +416,22 @@ impl TechniquePasses for Shafts {
     ) {
         self.sums.draw_gain(passes, frame, gain);
     }
+}
+
+/// Mean irradiance of a place amid things, over all normals.
+fn mean_irradiance(room: &RoomTransport, things: &[Bounds]) -> Vec3 {
+    let places = things.iter().map(|bounds| (bounds.low + bounds.high) / 2.0);
+    let middle = places.sum::<DVec3>() / things.len().max(1) as f64;
+    let sides = [
+        Vec3::X,
+        Vec3::Y,
+        Vec3::Z,
+        Vec3::NEG_X,
+        Vec3::NEG_Y,
+        Vec3::NEG_Z,
+    ];
+    let of_side = |normal| room.volume.irradiance(middle.as_vec3(), normal);
+    sides.into_iter().map(of_side).sum::<Vec3>() / 6.0
 }
 
 /// The shader that takes light out of the video.

@@ -9,7 +9,7 @@ use super::super::pipelines::{
 use super::super::stencil::depth_stencil_state;
 use super::super::surfaces::{Sided, SurfaceKinds};
 use super::super::uniforms::GEOMETRY_GROUPS;
-use super::data::{PATCH_CORNER_LAYOUT, PLACE_LAYOUT, REFLECTED_CORNER_LAYOUT};
+use super::data::{PATCH_CORNER_LAYOUT, REFLECTED_CORNER_LAYOUT};
 
 /// Group 2: the frame, the sources, what they give to the vertices, their maps and the environment.
 pub(super) const SHAFT_GROUP: GroupLayout = GroupLayout {
@@ -49,8 +49,12 @@ pub(super) struct Pipelines {
     pub depth_of_room: wgpu::RenderPipeline,
     /// What is real on moving anchors, depth alone.
     pub depth_of_real: Sided,
+    /// The same with the light on it.
+    pub light_on_moving: Sided,
     /// Virtual things: depth and light.
     pub light_on_virtual: Sided,
+    /// All light of patches, where they are seen.
+    pub whole_light_on_patch: wgpu::RenderPipeline,
     /// Patches that sources light, where they are seen.
     pub light_on_patch: wgpu::RenderPipeline,
     /// Adds what virtual things reflect on to patches.
@@ -98,7 +102,7 @@ impl Pipelines {
         Self {
             depth_of_room: gpu.pipeline(&PipelineDescription {
                 vertex: "place_depth",
-                vertex_buffers: vec![PLACE_LAYOUT],
+                vertex_buffers: vec![REFLECTED_CORNER_LAYOUT],
                 ..depth_alone.clone()
             }),
             depth_of_real: Sided::both(
@@ -107,6 +111,16 @@ impl Pipelines {
                     vertex: "place",
                     vertex_buffers: corners.clone(),
                     ..depth_alone
+                },
+            ),
+            light_on_moving: Sided::both(
+                gpu,
+                &PipelineDescription {
+                    vertex: "place",
+                    fragment: "light_on_moving",
+                    vertex_buffers: corners.clone(),
+                    targets: vec![overwritten(format), overwritten(format)],
+                    ..into_depth.clone()
                 },
             ),
             light_on_virtual: Sided::both(
@@ -119,6 +133,13 @@ impl Pipelines {
                     ..into_depth
                 }),
             ),
+            whole_light_on_patch: gpu.pipeline(&PipelineDescription {
+                vertex: "place_reflected",
+                fragment: "whole_light_on_patch",
+                vertex_buffers: vec![REFLECTED_CORNER_LAYOUT],
+                targets: vec![overwritten(format), overwritten(format)],
+                ..on_patch.clone()
+            }),
             light_on_patch: gpu.pipeline(&PipelineDescription {
                 vertex: "place_patch",
                 fragment: "light_on_patch",

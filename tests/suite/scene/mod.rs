@@ -137,6 +137,7 @@ fn a_small_scene_has_the_defaults() {
             ambient_samples: 0,
             counting: VolumeCounting::Auto,
             max_silhouette_error_px: 0.5,
+            compact_penumbra_px: 8.0,
             frame_budget_ms: None,
             shafts: Default::default(),
         }
@@ -303,6 +304,7 @@ frame_budget_ms = 16
             ambient_samples: 0,
             counting: VolumeCounting::DepthFail,
             max_silhouette_error_px: 0.0,
+            compact_penumbra_px: 8.0,
             frame_budget_ms: Some(16.0),
             // All of them: what this quality means.
             shafts: ShaftSettings {

@@ -3,7 +3,45 @@
 use crate::app::room_transport_cache;
 use crate::app::scene_warnings::counted;
 use crate::app::stopwatch::Stopwatch;
-use crate::scene::{ProbeScene, Scene, ShadowTechnique};
+use crate::scene::{ProbeLight, ProbeLightKind, ProbeScene, Scene, ShadowTechnique};
+
+/// What stands out of the probe, and what it is taken for.
+fn compact_lines(scene: &Scene, probe: &ProbeScene) -> Vec<(&'static str, String)> {
+    if scene.chosen_technique().0 != ShadowTechnique::Both {
+        return Vec::new();
+    }
+    let told = |found: ProbeLight| {
+        let azimuth = found.direction.y.atan2(found.direction.x).to_degrees();
+        let elevation = found.direction.z.clamp(-1.0, 1.0).asin().to_degrees();
+        let seen = format!(
+            "azimuth {azimuth:.1}, elevation {elevation:.1}, {:.1} degrees wide, {:.1} % of the power",
+            found.width_rad.to_degrees(),
+            100.0 * found.share,
+        );
+        let edges = format!("edges of {:.1} px", found.penumbra_px);
+        match found.kind {
+            ProbeLightKind::Compact => ("compact", format!("{seen}: {edges}, drawn with outlines")),
+            ProbeLightKind::Broad => (
+                "broad",
+                format!("{seen}: {edges}, a part of the broad light"),
+            ),
+            ProbeLightKind::SameAs {
+                light,
+                beside_rad,
+                ratio,
+            } => (
+                "same lamp",
+                format!(
+                    "{seen}: taken for light {light}, {:.1} degrees beside it and {ratio:.2} times as strong; its pixels are \
+                     taken out",
+                    beside_rad.to_degrees()
+                ),
+            ),
+        }
+    };
+    let found = scene.split_light(probe).found.into_iter();
+    found.map(told).collect()
+}
 
 /// Labels and what stands behind them. Works the room out where that has not been done yet.
 pub fn room_lines(scene: &Scene, probe: &ProbeScene) -> Vec<(&'static str, String)> {
@@ -30,9 +68,10 @@ pub fn room_lines(scene: &Scene, probe: &ProbeScene) -> Vec<(&'static str, Strin
             ),
         ),
     ];
-    if scene.chosen_technique().0 != ShadowTechnique::Shafts {
+    if !scene.chosen_technique().0.has_shafts() {
         return lines;
     }
+    lines.extend(compact_lines(scene, probe));
     let folder = room_transport_cache::folder();
     let (ready, took_ms) =
         Stopwatch::time(|| room_transport_cache::ready(&room, folder.as_deref()));

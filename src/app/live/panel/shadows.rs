@@ -7,8 +7,7 @@ use crate::app::authoring::Edit;
 use crate::app::live::command::Commands;
 use crate::scene::format::{AnyKey, DIFFERENCE, SHADOWS, SHAFTS};
 use crate::scene::{
-    Difference, Quality, Scene, ShadowChange, ShadowTechnique, ShaftSettings, Technique,
-    VolumeCounting,
+    Difference, Quality, Scene, ShadowChange, ShaftSettings, Technique, VolumeCounting,
 };
 
 /// What a frame may take when a limit is first asked for, milliseconds.
@@ -59,7 +58,7 @@ pub fn show(ui: &mut Ui, scene: &Scene, editing: &mut Editing, commands: &mut Co
         }
         shadows.frame_budget_ms = limited.then_some(budget_ms);
     });
-    if technique == ShadowTechnique::Shafts {
+    if technique.has_shafts() {
         shaft_knobs(ui, &mut shadows.shafts);
     }
     if shadows != scene.shadows {
