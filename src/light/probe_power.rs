@@ -51,7 +51,7 @@ impl ProbePower {
         let polar = PI / 2.0 - polar;
         let (low, high) = (
             (polar - half_angle).max(0.0),
-            (polar + half_angle).min(PI).max(1e-9),
+            (polar + half_angle).clamp(1e-9, PI),
         );
         let reaches_pole = polar - half_angle <= 0.0 || polar + half_angle >= PI;
         let half_width = match reaches_pole {

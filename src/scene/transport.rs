@@ -9,8 +9,8 @@ use crate::light::bounce::Reflector;
 use crate::light::material::Encoding;
 use crate::shafts::casters::Occluder;
 use crate::shafts::patches::RoomTriangle;
-use crate::shafts::room::Room;
-use crate::shafts::room_transport::{PlacedProbe, RoomOptions};
+use crate::shafts::placed_probe::PlacedProbe;
+use crate::shafts::room::{Room, RoomOptions};
 
 impl Object {
     /// The positions of its mesh, or of a coarser one, in its anchor's space.

@@ -9,9 +9,9 @@ use rayon::prelude::*;
 use crate::geometry::ray_caster::RayCaster;
 use crate::light::probe::Probe;
 
-use super::light_of_room::PlacedProbe;
 use super::luminance;
 use super::patches::RoomPatches;
+use super::placed_probe::PlacedProbe;
 
 /// Side of what one ray stands for at most, radians.
 const LARGEST_RAY: f64 = 0.006;

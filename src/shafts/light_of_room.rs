@@ -2,21 +2,20 @@
 //! where it came from. What it did not see is taken from what it saw of the same thing close by, or else from the light
 //! that falls there.
 
-use std::borrow::Cow;
 use std::f32::consts::{PI, TAU};
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::ray_caster::RayCaster;
-use crate::light::probe::Probe;
 use crate::light::{Light, irradiance};
 
 use super::bright_patches::BrightPatches;
 use super::carried_light::{Carried, carried_light};
 use super::luminance;
 use super::patches::{RoomPatch, RoomPatches};
+use super::placed_probe::PlacedProbe;
 use super::points::points_on;
 use super::solid_angle::solid_angle;
 
@@ -38,29 +37,6 @@ const PASSES: usize = 3;
 const USUAL_ALBEDO: f32 = 0.5;
 /// Most that paint reflects; what sends out more shines by itself.
 const MOST_ALBEDO: f32 = 0.95;
-
-/// A probe, and where it was taken.
-#[derive(Clone)]
-pub struct PlacedProbe<'a> {
-    /// Radiance by direction.
-    pub probe: Cow<'a, Probe>,
-    /// Where it was taken, metres.
-    pub position_m: DVec3,
-    /// Display white over the probe's unit of radiance.
-    pub exposure: f32,
-}
-
-impl PlacedProbe<'_> {
-    /// Radiance of a place that the probe sees.
-    pub fn radiance_of(&self, place: Vec3) -> Vec3 {
-        self.probe.radiance(place.as_dvec3() - self.position_m) * self.exposure
-    }
-
-    fn sees(&self, caster: &RayCaster, place: Vec3) -> bool {
-        let origin = self.position_m.as_vec3();
-        !caster.is_hidden(origin, place - origin, 1.0 - 1e-4)
-    }
-}
 
 /// Light that a patch sends out, and what it reflects.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -14,6 +14,7 @@ pub mod intensity_transfers;
 pub mod irradiance_volume;
 mod light_of_room;
 pub mod patches;
+pub mod placed_probe;
 mod points;
 pub mod receiver_patches;
 mod receiver_tree;

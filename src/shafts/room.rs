@@ -8,7 +8,20 @@ use crate::geometry::bounds::Bounds;
 use crate::light::Light;
 
 use super::patches::RoomTriangle;
-use super::room_transport::{PlacedProbe, RoomOptions, RoomTransport};
+use super::placed_probe::PlacedProbe;
+
+/// The fineness in which a room is worked out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RoomOptions {
+    /// Patches, about.
+    pub patches: usize,
+    /// Part of all power that the sources send out, the brightest first, in (0, 1].
+    pub source_power: f64,
+    /// Patches in a leaf of the receivers' octree.
+    pub receivers_per_leaf: usize,
+    /// Shafts that bring every vertex less than this part of its light are cut no further.
+    pub least_part: f64,
+}
 
 /// All that the light of a scene's room depends on.
 pub struct Room<'a> {
@@ -28,11 +41,6 @@ pub struct Room<'a> {
 }
 
 impl Room<'_> {
-    /// Works its light out: seconds.
-    pub fn transport(&self) -> RoomTransport {
-        RoomTransport::new(self)
-    }
-
     /// Rooms with the same key have the same light wherever their things stand.
     pub fn surfaces_key(&self) -> u64 {
         let mut hasher = DefaultHasher::new();

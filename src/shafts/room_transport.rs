@@ -15,7 +15,7 @@ use super::bounding::Aabb;
 use super::bright_patches::BrightPatches;
 use super::hierarchy::{Arriving, Marks, ShaftHierarchy};
 use super::irradiance_volume::IrradianceVolume;
-pub use super::light_of_room::{PatchLight, PlacedProbe};
+pub use super::light_of_room::PatchLight;
 use super::light_of_room::{REACH, compact_irradiance, hemisphere, light_of_room};
 use super::luminance;
 use super::patches::RoomPatches;
@@ -26,19 +26,6 @@ use super::selection::{Representative, WeighedSource, triangle_spread};
 use super::source_tree::{PatchSource, SourceTree};
 use super::surfels::{LitSurfel, Surfel};
 use super::transfer::{Transfers, irradiance};
-
-/// The fineness in which a room is worked out.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RoomOptions {
-    /// Patches, about.
-    pub patches: usize,
-    /// Part of all power that the sources send out, the brightest first, in (0, 1].
-    pub source_power: f64,
-    /// Patches in a leaf of the receivers' octree.
-    pub receivers_per_leaf: usize,
-    /// Shafts that bring every vertex less than this part of its light are cut no further.
-    pub least_part: f64,
-}
 
 /// The transport of light in a room: who lights whom, and who may hide what.
 #[derive(Serialize, Deserialize)]
@@ -79,6 +66,13 @@ fn no_triangles() -> RayCaster {
 const VOLUME_SPACING_M: f32 = 0.06;
 /// The margin that it has around where things stand.
 const VOLUME_MARGIN_M: f64 = 0.15;
+
+impl Room<'_> {
+    /// Works its light out: seconds.
+    pub fn transport(&self) -> RoomTransport {
+        RoomTransport::new(self)
+    }
+}
 
 impl RoomTransport {
     /// Works a room out.

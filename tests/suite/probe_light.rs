@@ -9,8 +9,9 @@ use gnomon::light::probe::Probe;
 use gnomon::light::{Light, irradiance};
 use gnomon::scene::{ProbeLightKind, Scene, SceneLight, Technique};
 use gnomon::shafts::patches::RoomTriangle;
-use gnomon::shafts::room::Room;
-use gnomon::shafts::room_transport::{PlacedProbe, RoomOptions, RoomTransport};
+use gnomon::shafts::placed_probe::PlacedProbe;
+use gnomon::shafts::room::{Room, RoomOptions};
+use gnomon::shafts::room_transport::RoomTransport;
 
 /// As a scene has them that says nothing.
 const OPTIONS: RoomOptions = RoomOptions {

@@ -18,8 +18,9 @@ use gnomon::render::{Layers, Renderer, Shown, VIRTUAL};
 use gnomon::scene::{Difference, Scene};
 use gnomon::shafts::bounding::Aabb;
 use gnomon::shafts::patches::RoomTriangle;
-use gnomon::shafts::room::Room;
-use gnomon::shafts::room_transport::{PlacedProbe, RoomOptions, RoomTransport};
+use gnomon::shafts::placed_probe::PlacedProbe;
+use gnomon::shafts::room::{Room, RoomOptions};
+use gnomon::shafts::room_transport::RoomTransport;
 
 const OPTIONS: RoomOptions = RoomOptions {
     patches: 600,

@@ -14,7 +14,20 @@ const MOST_VALUES: usize = 200_000;
 
 /// The entries of a TOML file.
 pub(super) fn of_toml(text: &str) -> Result<Map<String, Value>, String> {
-    toml::from_str(text).map_err(|error| error.to_string())
+    // (The whole message shows the line, which may be a megabyte long.)
+    toml::from_str(text).map_err(|error| {
+        let before = error.span().and_then(|span| text.get(..span.start));
+        let before = before.unwrap_or_default();
+        let line = before.matches('\n').count() + 1;
+        let column = before
+            .rsplit('\n')
+            .next()
+            .unwrap_or_default()
+            .chars()
+            .count()
+            + 1;
+        format!("line {line} column {column}: {}", error.message())
+    })
 }
 
 /// The entries of a JSON file.

@@ -8,7 +8,6 @@ mod environment;
 mod maps;
 mod pipelines;
 
-use bytemuck::Zeroable;
 use glam::{DAffine3, DVec3, Vec3};
 use wgpu::util::DeviceExt as _;
 
@@ -188,7 +187,6 @@ impl Shafts {
             world_from_camera: glam::DMat4::from(world_from_camera).as_mat4(),
             source_count: hidden.source_count,
             moving_irradiance: self.moving_irradiance,
-            ..Zeroable::zeroed()
         };
         gpu.queue
             .write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
