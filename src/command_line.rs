@@ -736,6 +736,7 @@ mod tests {
             "family",
             "format",
             "fps",
+            "inverted",
             // Of the pictures that a probe is made from, not of the probe.
             "kind",
             // A file to write.

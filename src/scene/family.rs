@@ -263,6 +263,9 @@ impl Family {
         self.codes.bits()
     }
 
+    /// Of a family with a lower [`Family::false_rate`] the code is proof enough.
+    pub const STRONG_RATE: f64 = 1e-5;
+
     /// The part of all random codes that are taken for one of the family's, however they are turned, when so many wrong
     /// bits are corrected.
     pub fn false_rate(self, corrected_bits: u32) -> f64 {

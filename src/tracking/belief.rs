@@ -11,8 +11,6 @@ use super::marker_template::MarkerTemplate;
 use super::reading::agreement_at_corners;
 use crate::scene::Family;
 
-/// Of a family with a lower rate the code is proof enough.
-const STRONG_RATE: f64 = 1e-5;
 /// A marker that looks so much like itself is believed at once, whatever its family.
 const AT_ONCE: f64 = 0.8;
 /// Another sight of a marker that was not yet believed confirms it within this time, seconds.
@@ -91,7 +89,7 @@ impl Belief {
 /// .55; of 570 real markers of 10 to 100 pixels one in a hundred stays below .7.
 fn least_agreement(false_rate: f64) -> Option<f64> {
     match false_rate {
-        rate if rate < STRONG_RATE => None,
+        rate if rate < Family::STRONG_RATE => None,
         rate if rate < 1e-3 => Some(0.5),
         rate if rate < 1e-2 => Some(0.68),
         _ => Some(0.72),

@@ -18,6 +18,8 @@ pub(crate) struct Sightings {
     frames: u32,
     looks: u32,
     seen: BTreeMap<Family, BTreeSet<u32>>,
+    /// Markers of weak families, which one look among several does not prove.
+    seen_once: BTreeSet<(Family, u32)>,
 }
 
 /// Something that is looked for.
@@ -60,6 +62,7 @@ impl Sightings {
             frames: 0,
             looks: 0,
             seen: BTreeMap::new(),
+            seen_once: BTreeSet::new(),
         }
     }
 
@@ -80,9 +83,14 @@ impl Sightings {
                 Some(survey) => survey,
                 none => none.insert(Survey::new()?),
             };
-            for detection in survey.look(frame)? {
-                let ids = self.seen.entry(detection.family).or_default();
-                ids.insert(detection.id);
+            let looked: BTreeSet<(Family, u32)> = (survey.look(frame)?.into_iter())
+                .map(|detection| (detection.family, detection.id))
+                .collect();
+            for (family, id) in looked {
+                let is_strong = family.false_rate(0) < Family::STRONG_RATE;
+                if is_strong || !self.seen_once.insert((family, id)) {
+                    self.seen.entry(family).or_default().insert(id);
+                }
             }
         }
         Ok(())
@@ -90,15 +98,31 @@ impl Sightings {
 
     /// Whether anything was seen in place of what is looked for.
     pub(crate) fn saw_others(&self) -> bool {
-        !self.seen.is_empty()
+        !self.seen().is_empty()
+    }
+
+    /// What was seen: in two looks where the code alone proves little, unless there was but one.
+    fn seen(&self) -> BTreeMap<Family, BTreeSet<u32>> {
+        let mut seen = self.seen.clone();
+        if self.looks == 1 {
+            for &(family, id) in &self.seen_once {
+                seen.entry(family).or_default().insert(id);
+            }
+        }
+        seen
     }
 
     /// What was never found, and what was seen instead, in words; `None` where all was.
     pub(crate) fn never_found(&self) -> Option<String> {
-        let seen: Vec<String> = self.seen.iter().map(in_words).collect();
+        let seen = self.seen();
+        let is_or_are = match seen.values().map(BTreeSet::len).sum() {
+            1 => "is",
+            _ => "are",
+        };
+        let seen: Vec<String> = seen.iter().map(in_words).collect();
         let seen = match seen.is_empty() {
             true => "no marker of any family is seen".to_owned(),
-            false => format!("{} {} seen", listed(&seen), self.is_or_are()),
+            false => format!("{} {is_or_are} seen", listed(&seen)),
         };
         // Nobody said that there is any marker where every one is wanted.
         let is_told = |wanted: &&Wanted| !wanted.markers.is_empty() || self.saw_others();
@@ -115,13 +139,6 @@ impl Sightings {
             })
             .collect();
         (!told.is_empty()).then(|| told.join("\n"))
-    }
-
-    fn is_or_are(&self) -> &'static str {
-        match self.seen.values().map(BTreeSet::len).sum() {
-            1 => "is",
-            _ => "are",
-        }
     }
 }
 
@@ -183,6 +200,13 @@ mod tests {
             in_words((&dictionary, &BTreeSet::from([3]))),
             "DICT_4X4_50 3"
         );
+        // A weak code in one of several looks proves nothing; in the only one it is told.
+        sightings.seen.clear();
+        sightings.seen_once.insert((dictionary, 3));
+        sightings.looks = 8;
+        assert!(!sightings.saw_others());
+        sightings.looks = 1;
+        assert!(sightings.saw_others());
         sightings.wanted[0].is_found = true;
         assert_eq!(sightings.never_found(), None);
     }
