@@ -242,7 +242,7 @@ impl GpuScene {
             let (things, poses) = (&self.things, &self.camera_from_anchor);
             let width_px = widest_penumbra_px(things, light, poses, &self.intrinsics);
             match width_px > 1.0 {
-                true => (2 * (0.5 * width_px).ceil() as usize).clamp(2, most),
+                true => (2 * (0.5 * width_px).ceil() as usize).min(most),
                 false => 1,
             }
         };

@@ -25,6 +25,7 @@ mod probe_light;
 mod scene;
 mod shading;
 mod shafts;
+mod sized_lights;
 mod stability;
 mod tracking;
 mod tracking_families;

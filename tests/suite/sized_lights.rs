@@ -1,0 +1,87 @@
+//! Lights of some size, held against the many small ones that they are.
+
+use glam::{DVec2, DVec3};
+use gnomon::geometry::camera::{Distortion, Intrinsics};
+use gnomon::light::{Light, Rect, Shape};
+use gnomon::render::{REAL, Shown};
+use gnomon::scene::{Scene, SceneLight};
+
+use crate::common::{Picture, Stage, look_at, project_file};
+
+const CAMERA: Intrinsics = Intrinsics {
+    size_px: [160, 120],
+    focal_px: DVec2::splat(180.0),
+    center_px: DVec2::new(79.5, 59.5),
+    distortion: Distortion::NONE,
+};
+
+/// The scene that ships, under other lights of which each is so many pieces at most.
+fn scene(lights: Vec<Light>, light_samples: u32) -> Scene {
+    let file = project_file("config/lamp.toml");
+    let mut scene = Scene::load(&file).expect("the scene of the demo");
+    scene.lights = lights.into_iter().map(SceneLight::from).collect();
+    scene.shadows.samples = 1;
+    scene.shadows.light_samples = light_samples;
+    scene
+}
+
+fn drawn(scene: &Scene) -> (Picture, Vec<u8>) {
+    let mut renderer = Stage::of_scene(scene.clone()).renderer(CAMERA);
+    let camera_from_world = look_at(DVec3::new(0.1, -0.5, 0.4), DVec3::new(0.03, 0.0, 0.03));
+    let nodes = scene.camera_from_nodes(&[Some(camera_from_world)], 0.0);
+    renderer.draw(&nodes, Shown::Composite);
+    let picture = Picture::new(renderer.read_picture().expect("a picture"));
+    (picture, renderer.layers().expect("layers").role)
+}
+
+fn lights() -> [Light; 3] {
+    let lamp = |shape| Light::Point {
+        position_m: DVec3::new(-0.26, 0.24, 0.46),
+        intensity: DVec3::ONE,
+        shape,
+    };
+    let facing = DVec3::new(0.26, -0.24, -0.46).normalize();
+    let rect = Rect::upright(facing, DVec3::Z, DVec2::new(0.2, 0.1));
+    let sun = Light::Directional {
+        direction: DVec3::new(0.3, -0.3, -0.5).normalize(),
+        irradiance: DVec3::splat(3.0),
+        angle_rad: 0.1,
+    };
+    [
+        lamp(Shape::Sphere { radius_m: 0.06 }),
+        lamp(Shape::Rect(rect)),
+        sun,
+    ]
+}
+
+#[test]
+fn a_light_of_some_size_shades_as_its_pieces_do() {
+    for light in lights() {
+        let (whole, role) = drawn(&scene(vec![light], 16));
+        // Each of them is one light, that casts one shadow.
+        let (pieces, _) = drawn(&scene(light.pieces(16), 1));
+        let (mut changed, mut worst) = (0, 0);
+        for index in (0..role.len()).filter(|&index| role[index] == REAL) {
+            let [a, b] = [&whole, &pieces].map(|picture| picture.pixel(index));
+            changed += usize::from(a != [255; 3]);
+            let off = a.iter().zip(b).map(|(a, b)| a.abs_diff(b)).max();
+            worst = worst.max(off.unwrap_or(0));
+        }
+        assert!(changed > 100, "{light:?}: {changed} changed");
+        // 16 of a light's steps are 16 levels each; what they give differs by some percent.
+        assert!(worst <= 5, "{light:?}: {worst} levels off");
+    }
+}
+
+#[test]
+fn any_number_of_pieces_is_drawn() {
+    for light in lights() {
+        for count in [1, 2, 3, 5] {
+            let (picture, role) = drawn(&scene(vec![light], count));
+            let shaded = (0..role.len())
+                .filter(|&index| role[index] == REAL && picture.pixel(index) != [255; 3])
+                .count();
+            assert!(shaded > 100, "{light:?} of {count}: {shaded}");
+        }
+    }
+}
