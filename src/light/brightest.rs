@@ -2,8 +2,9 @@
 
 use std::f64::consts::PI;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
+use super::REC_709;
 use super::probe::Probe;
 
 /// A light is this many times as bright as the median direction.
@@ -12,7 +13,6 @@ const STANDS_OUT: f32 = 8.0;
 const EDGE: f32 = 0.1;
 /// Weaker ones are not told, part of the power of all directions.
 const LEAST_SHARE: f64 = 0.003;
-const REC_709: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 
 /// A bright part of a probe.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,7 +49,7 @@ pub fn bright_regions(probe: &Probe, most: usize) -> Vec<BrightRegion> {
     let luminance: Vec<f32> = probe
         .pixels()
         .iter()
-        .map(|pixel| pixel.dot(REC_709))
+        .map(|pixel| pixel.dot(REC_709.as_vec3()))
         .collect();
     let [width, _] = probe.size_px();
     let direction =
@@ -147,6 +147,7 @@ fn median(probe: &Probe, luminance: &[f32]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec3;
 
     /// Round lights (direction, half angle, radiance) in a surrounding of radiance 1.
     fn environment(lights: &[(DVec3, f64, f32)]) -> Probe {

@@ -5,10 +5,9 @@ use std::collections::HashSet;
 
 use glam::{DMat3, DVec3, Vec3};
 
+use super::REC_709;
 use super::brightest::{BrightRegion, neighbours};
 use super::probe::Probe;
-
-const REC_709: DVec3 = DVec3::new(0.2126, 0.7152, 0.0722);
 
 /// What a light gave to the probe beyond what is around it.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -22,6 +22,9 @@ use glam::{DAffine3, DVec2, DVec3};
 
 pub use material::Material;
 
+/// Linear RGB's parts of luminance (ITU-R BT.709).
+pub(crate) const REC_709: DVec3 = DVec3::new(0.2126, 0.7152, 0.0722);
+
 /// A light that shines by itself, in one space (as a rule the world's).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Light {

@@ -4,6 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
+use super::REC_709;
 use super::probe::Probe;
 
 /// Luminous power of a probe's directions, summed up over its rows and columns.
@@ -23,7 +24,7 @@ impl ProbePower {
             let mut left = 0.0;
             for column in 0..width {
                 let pixel = probe.pixels()[row * width + column].as_dvec3();
-                left += pixel.dot(DVec3::new(0.2126, 0.7152, 0.0722)) * solid_angle;
+                left += pixel.dot(REC_709) * solid_angle;
                 let above = sums[row * (width + 1) + column + 1];
                 sums[(row + 1) * (width + 1) + column + 1] = above + left;
             }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
 use crate::light::{Light, Shape};
-use crate::scene::{Scene, ShadowSettings, Shortcut};
+use crate::scene::{Scene, SceneLight, ShadowSettings, Shortcut};
 
 use super::anchor_geometry::{
     AnchorGeometry, AnchoredModel, KnownLevels, Role, SurfaceBatch, VirtualCorners,
@@ -124,10 +124,9 @@ impl GpuScene {
     }
 
     /// Takes another state of the same scene: lights otherwise, things elsewhere, shown or hidden. What surroundings
-    /// reflect stays as it was gathered, where the same corners are there to get it.
-    pub fn follow(&mut self, gpu: &Gpu, scene: &Scene) {
+    /// reflect stays as it was gathered, where the same corners are there to get it. `lights` are those that cast shadow volumes.
+    pub fn follow(&mut self, gpu: &Gpu, scene: &Scene, lights: Vec<SceneLight>) {
         let surroundings = hidden_surroundings(scene, self.lit_by);
-        let lights = scene.outlined_lights();
         self.kinds.shaped = lights.iter().any(|light| is_shaped(&light.light));
         self.lights.follow(lights, surroundings);
         let standing = standing(scene);

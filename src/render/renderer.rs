@@ -76,7 +76,8 @@ struct Shape {
 }
 
 impl Shape {
-    fn of(scene: &Scene) -> Self {
+    /// `lights` are those that cast shadow volumes.
+    fn of(scene: &Scene, lights: &[SceneLight]) -> Self {
         let things = || scene.phantoms.iter().chain(&scene.virtuals);
         let kind = |SceneLight { anchor, light }: &SceneLight| {
             (*anchor, light.has_size(), is_shaped(light))
@@ -88,7 +89,7 @@ impl Shape {
         Self {
             technique: scene.chosen_technique().0,
             shadows: scene.shadows,
-            lights: scene.outlined_lights().iter().map(kind).collect(),
+            lights: lights.iter().map(kind).collect(),
             ambient_radiance: scene.ambient_radiance,
             nodes: scene.node_count(),
             things: things().map(shape).collect(),
@@ -131,7 +132,7 @@ impl Renderer {
         let background = Background::new(&gpu, &intrinsics);
         let (technique, gpu_scene) =
             ChosenTechnique::new(&gpu, scene, intrinsics, &background, transport);
-        let made_for = Shape::of(scene);
+        let made_for = Shape::of(scene, &scene.outlined_lights());
         Ok(Self {
             technique,
             quality_controller: QualityController::new(scene, made_for.technique),
@@ -169,10 +170,11 @@ impl Renderer {
     /// elsewhere, are shown or hidden. Light that surroundings reflect is not gathered anew. False where more has
     /// changed: that takes a new renderer.
     pub fn follow(&mut self, scene: &Scene) -> bool {
+        let lights = scene.outlined_lights();
         let follows =
-            self.made_for == Shape::of(scene) && self.technique.passes_mut().follow(scene);
+            self.made_for == Shape::of(scene, &lights) && self.technique.passes_mut().follow(scene);
         if follows {
-            self.gpu_scene.follow(&self.gpu, scene);
+            self.gpu_scene.follow(&self.gpu, scene, lights);
             self.stale = PixelRect::whole(self.size_px);
         }
         follows

@@ -10,7 +10,7 @@ use crate::geometry::ray_caster::RayCaster;
 use crate::light::brightest::{BrightRegion, bright_regions};
 use crate::light::compact::{TakenLight, take, width_rad};
 use crate::light::probe::Probe;
-use crate::light::{Light, Shape, irradiance};
+use crate::light::{Light, REC_709, Shape, irradiance};
 
 /// Lights of a probe that are looked at, the strongest first.
 const MOST_FOUND: usize = 8;
@@ -20,7 +20,6 @@ const SEEN_PX: f64 = 320.0;
 const SAME_PLACE_RAD: f64 = 0.045;
 /// Its irradiance may be so many times the light's, or as many times less.
 const SAME_POWER: f64 = 3.0;
-const REC_709: DVec3 = DVec3::new(0.2126, 0.7152, 0.0722);
 
 /// A light that stands out of the probe, and what became of it.
 #[derive(Debug, Clone, Copy, PartialEq)]

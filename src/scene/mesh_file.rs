@@ -12,6 +12,7 @@ use super::plain_file::{self, MOST_MESH};
 use super::raw_model::RawModel;
 use super::reader::Value;
 use super::{gltf, obj, ply, stl, texture_file};
+use crate::geometry::bounds::Bounds;
 use crate::geometry::mesh::{Mesh, MeshReport};
 use crate::light::Material;
 use crate::light::material::{Coverage, Map};
@@ -262,17 +263,10 @@ fn place(model: &mut RawModel, path: &Path, up: Up, fit_m: Option<f64>) -> Resul
         look.tangent = upright(look.tangent.truncate()).extend(look.tangent.w);
     }
     let Some(fit_m) = fit_m else { return Ok(()) };
-    let corners = || {
-        let vertices = model
-            .triangles
-            .iter()
-            .flat_map(|triangle| triangle.vertices);
-        vertices.map(|vertex| model.positions[vertex as usize].as_dvec3())
-    };
-    let least = corners().fold(DVec3::INFINITY, DVec3::min);
-    let most = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
-    let longest = (most - least).max_element();
-    // (Also where there is no corner.)
+    let vertices = (model.triangles.iter()).flat_map(|triangle| triangle.vertices);
+    let corners = vertices.map(|vertex| model.positions[vertex as usize].as_dvec3());
+    let size = Bounds::around(corners).map(|bounds| bounds.high - bounds.low);
+    let longest = size.map_or(0.0, DVec3::max_element);
     if longest <= 0.0 {
         let message = "no triangle has an area; a mesh is expected";
         return Err(SceneError::of_file(path, message));

@@ -99,7 +99,7 @@ impl Object {
     }
 
     /// The smallest box around it, in its anchor's space; `None` without triangles.
-    pub(super) fn bounds_in_anchor(&self) -> Option<Bounds> {
+    pub fn bounds_in_anchor(&self) -> Option<Bounds> {
         let positions = self.mesh.positions.iter();
         Bounds::around(positions.map(|position| {
             self.anchor_from_object

@@ -30,7 +30,9 @@ pub mod transfer;
 
 use glam::Vec3;
 
+use crate::light::REC_709;
+
 /// Luminance of linear RGB (Rec. 709).
 pub(crate) fn luminance(color: Vec3) -> f32 {
-    color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
+    color.dot(REC_709.as_vec3())
 }

@@ -68,7 +68,7 @@ fn a_light_of_some_size_shades_as_its_pieces_do() {
             worst = worst.max(off.unwrap_or(0));
         }
         assert!(changed > 100, "{light:?}: {changed} changed");
-        // 16 of a light's steps are 16 levels each; what they give differs by some percent.
+        // (One piece of 16 is 16 levels and more; the whole light's closed form and its pieces' sum differ by a percent.)
         assert!(worst <= 5, "{light:?}: {worst} levels off");
     }
 }

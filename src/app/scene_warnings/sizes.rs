@@ -18,16 +18,8 @@ const LIKELY_M: [f64; 2] = [5e-3, 2.0];
 
 /// The sides of the smallest box around an object in its anchor's space, metres.
 pub fn sides_m(object: &Object) -> DVec3 {
-    let positions = || {
-        let positions = object.mesh.positions.iter();
-        positions.map(|position| {
-            let position = position.as_dvec3();
-            object.anchor_from_object.transform_point3(position)
-        })
-    };
-    let least = positions().fold(DVec3::INFINITY, DVec3::min);
-    let most = positions().fold(DVec3::NEG_INFINITY, DVec3::max);
-    (most - least).max(DVec3::ZERO)
+    let bounds = object.bounds_in_anchor();
+    bounds.map_or(DVec3::ZERO, |bounds| bounds.high - bounds.low)
 }
 
 /// What there is to warn of.
