@@ -493,8 +493,9 @@ impl GpuScene {
         let groups = [&self.view_group, self.casters.light_group()];
         let (things, insides) = (&self.things, &self.insides);
         let slot = self.slot(piece);
+        // Not the views that win ties.
         let counted = self.casters.counted(things, role, slot, insides, |thing| {
-            self.views.offset(self.view_of(thing))
+            self.views.offset(thing.anchor)
         });
         volumes.count(pass, among, role, groups, within, counted)
     }

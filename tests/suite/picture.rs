@@ -444,6 +444,30 @@ fn virtual_sheet_at_the_table_s_own_height() {
     );
 }
 
+/// A lamp so close above both that what is moved by some micrometres throws a shadow.
+#[test]
+fn light_grazing_a_virtual_card_beside_a_real_one() {
+    let card = || Thing::made(shapes::rectangle([-0.04, -0.06], [0.04, 0.06])).faceted();
+    let world_from_card = DAffine3::from_translation(DVec3::new(0.1, 0.02, 0.0));
+    let stage = Stage::new(
+        &[table().without_shadow(), card().at([0.03, -0.08, 0.04])],
+        &[card().at([-0.15, -0.1, 0.04])],
+        Some(world_from_card),
+        vec![lamp([-0.036_666_666, -0.1, 0.040_1], [0.02; 3])],
+        DVec3::splat(0.05),
+    );
+    let view = View {
+        intrinsics: Intrinsics {
+            size_px: [144, 108],
+            focal_px: DVec2::splat(160.0),
+            center_px: DVec2::new(71.5, 53.5),
+            distortion: Distortion::NONE,
+        },
+        camera_from_world: look_at(DVec3::new(0.02, -0.33, 0.34), DVec3::new(0.0, -0.07, 0.04)),
+    };
+    hold("cards edge to edge", stage, view, 500);
+}
+
 /// The scene that ships, with a card in the torus's place.
 #[test]
 fn flat_card_above_the_lamp_s_table() {
