@@ -182,14 +182,15 @@ impl Casters {
         }
     }
 
-    /// The volumes of a role and the piece of a slot, for [`super::volumes::Volumes::count`].
+    /// The volumes of a role and the piece of a slot, for [`super::volumes::Volumes::count`]; `views` are the dynamic offsets of
+    /// the views of a thing's sides and caps.
     pub fn counted<'a>(
         &'a self,
         things: &'a [AnchoredModel],
         role: Role,
         slot: usize,
         insides: &'a [Insides],
-        view_offset: impl Fn(&AnchoredModel) -> u32 + 'a,
+        views: impl Fn(&AnchoredModel) -> [u32; 2] + 'a,
     ) -> impl Iterator<Item = CountedVolume<'a>> {
         let shadows = self.shadows.get(slot).map_or(&[][..], Vec::as_slice);
         let shadows = things.iter().zip(shadows).enumerate();
@@ -202,7 +203,8 @@ impl Casters {
                     counting: shadow.counting?,
                     insides: insides[number],
                     scissor: shadow.scissor?,
-                    offsets: [view_offset(thing), self.lights.offset(place)],
+                    views: views(thing),
+                    light: self.lights.offset(place),
                     vertices: &thing.levels[shadow.level].caster.as_ref()?.vertices,
                 })
             })

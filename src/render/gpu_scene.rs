@@ -493,9 +493,8 @@ impl GpuScene {
         let groups = [&self.view_group, self.casters.light_group()];
         let (things, insides) = (&self.things, &self.insides);
         let slot = self.slot(piece);
-        // Not the views that win ties.
         let counted = self.casters.counted(things, role, slot, insides, |thing| {
-            self.views.offset(thing.anchor)
+            [thing.anchor, self.view_of(thing)].map(|view| self.views.offset(view))
         });
         volumes.count(pass, among, role, groups, within, counted)
     }

@@ -6,7 +6,7 @@ use super::anchor_geometry::Role;
 pub(super) const COUNT: u32 = 0x1f;
 /// The largest number that the count can hold: a batch never has more volumes one in another.
 pub(super) const MOST_LAYERS: u32 = COUNT;
-/// The light is added already: of two surfaces in the same place one gets it.
+/// The light is added already: of two surfaces in the same place one gets it. More than any count that leaves it.
 pub(super) const ADDED: u32 = 0x20;
 /// Whatever the counts say: a virtual thing of an earlier batch hides the light.
 const VIRTUAL_HIDES: u32 = 0x40;

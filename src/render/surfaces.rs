@@ -157,11 +157,10 @@ impl Surfaces {
         // Coplanar surfaces land on the same depth, and each sample is to get a light once.
         let once = (wgpu::StencilOperation::Invert, ADDED);
         let taken = (wgpu::StencilOperation::Zero, VIRTUAL_SHADOW);
-        let nothing = (wgpu::StencilOperation::Keep, 0);
         let reaching = stencil(equal, REAL_HIDES | ADDED, once);
         let kept = stencil(equal, REAL_HIDES | ADDED, once);
         let hidden = stencil(other, VIRTUAL_SHADOW, taken);
-        let unshadowed = stencil(at_most, SHADOW, nothing);
+        let unshadowed = stencil(at_most, SHADOW | ADDED, once);
         Self {
             ambient_on_real: build("ambient_on_real", None, before()),
             ambient_on_virtual: build_virtual("ambient_on_virtual", None, before()),

@@ -37,8 +37,8 @@ impl AnchorView {
     /// than depths differ by rounding, and less than anybody can model or see. (A quarter of it lost ties with the eye a
     /// millimetre above the surface.)
     ///
-    /// Shadow volumes stay where they are: a lit surface that is nearer to the camera lies the farther outside its own, and
-    /// what a light grazes beside a nearer caster would be in a shadow that nothing throws.
+    /// The sides of shadow volumes stay where they are: a lit surface that is nearer to the camera lies the farther outside its
+    /// own, and what a light grazes beside a nearer caster would be in a shadow that nothing throws.
     pub fn winning_ties(mut self, number: usize) -> Self {
         let nearer = 1.0 + TIE * (1.0 + 0.25 * number.min(MOST_TIES) as f32);
         // Depth is near / z, and this row alone makes the near.

@@ -114,9 +114,9 @@ impl Counters {
     ) {
         pass.set_stencil_reference(0);
         set_scissor(pass, counted.scissor);
-        for (index, (group, offset)) in groups.iter().zip(counted.offsets).enumerate() {
-            pass.set_bind_group(index as u32, *group, &[offset]);
-        }
+        let ([view_group, light_group], [of_sides, of_caps]) = (groups, counted.views);
+        pass.set_bind_group(0, view_group, &[of_sides]);
+        pass.set_bind_group(1, light_group, &[counted.light]);
         pass.set_vertex_buffer(0, counted.vertices.slice(..));
         let [sides, outward, turned] = part.ends;
         match counted.counting {
@@ -127,6 +127,7 @@ impl Counters {
             Counting::DepthFail => {
                 pass.set_pipeline(&self.depth_fail);
                 part.indices.draw(pass, 0..sides);
+                pass.set_bind_group(0, view_group, &[of_caps]);
                 let ranges = [sides..outward, outward..turned];
                 for (caps, range) in self.caps.iter().zip(ranges) {
                     caps.draw(pass, counted, &part.indices, range);
@@ -210,8 +211,12 @@ pub(super) struct CountedVolume<'a> {
     pub insides: Insides,
     /// Pixels outside which it cannot matter.
     pub scissor: PixelRect,
-    /// Dynamic offsets of its anchor's view and of the light in its anchor.
-    pub offsets: [u32; 2],
+    /// Dynamic offsets of the view of its sides, as things stand, and of that of its caps, which is its surface's own
+    /// ([`AnchorView::winning_ties`](super::uniforms::AnchorView::winning_ties)): seen edge-on, a cap of other depths would
+    /// lie before the surface here and there.
+    pub views: [u32; 2],
+    /// Dynamic offset of the light in its anchor.
+    pub light: u32,
     pub vertices: &'a wgpu::Buffer,
 }
 

@@ -468,6 +468,22 @@ fn light_grazing_a_virtual_card_beside_a_real_one() {
     hold("cards edge to edge", stage, view, 500);
 }
 
+/// Triangles that lie on one another, folded: no place gets the light twice.
+#[test]
+fn virtual_sheet_folded_on_to_itself() {
+    let corners = [[-0.05, -0.04], [0.06, -0.03], [0.0, 0.05], [0.03, 0.05]];
+    let positions = corners.map(|[x, y]: [f32; 2]| glam::Vec3::new(x, y, 0.0));
+    let folded = shapes::Soup::new(positions.to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
+    for tilt in [0.0, 0.3, 0.7] {
+        let turned = DAffine3::from_rotation_translation(
+            DQuat::from_rotation_x(tilt),
+            DVec3::new(0.03, 0.02, 0.08),
+        );
+        let sheet = Thing::made(folded.clone()).placed(turned).faceted();
+        hold_on_desk("folded", &[table()], &[sheet], desk_lamp());
+    }
+}
+
 /// The scene that ships, with a card in the torus's place.
 #[test]
 fn flat_card_above_the_lamp_s_table() {
