@@ -1,8 +1,12 @@
 // What a light gives to a surface. The CPU twin of the irradiance is `light::irradiance`.
 //!include "common.wgsl"
 
-// Set when the shader is built: whether any light is more than a point or a direction.
-override SHAPED: bool = true;
+// Set when the shader is built: what its light is.
+override LIGHT_KIND: u32 = 0;
+const PLAIN: u32 = 0;
+const SPOT: u32 = 1;
+const ROUND: u32 = 2;
+const RECT: u32 = 3;
 
 struct Incidence {
     // Unit direction to the middle of what of the light is above the horizon, about.
@@ -19,16 +23,16 @@ fn incidence(light: CameraLight, point: vec3f, normal: vec3f) -> Incidence {
     let direction = to_light * inverseSqrt(distance_squared);
     let falloff = select(1.0, 1.0 / distance_squared, light.place_in_camera.w > 0.0);
     let cosine = dot(normal, direction);
-    if !SHAPED {
+    if LIGHT_KIND == PLAIN {
         return Incidence(direction, light.power.rgb * falloff * max(cosine, 0.0), 0.0);
     }
     // Irradiance over what the light gives to a surface that faces it.
     var mean_cosine = max(cosine, 0.0);
     var sine_squared = min(light.power.w * light.power.w * falloff, 1.0);
-    if light.axis_in_camera.w == SPOT {
+    if LIGHT_KIND == SPOT {
         let ramp = clamp(-dot(direction, light.axis_in_camera.xyz) * light.half_width.x + light.half_width.y, 0.0, 1.0);
         mean_cosine *= ramp * ramp;
-    } else if light.axis_in_camera.w == RECT {
+    } else if LIGHT_KIND == RECT {
         let area = 4.0 * length(light.half_width.xyz) * length(light.half_height.xyz);
         let ahead = max(-dot(direction, light.axis_in_camera.xyz), 0.0);
         sine_squared = min(area * ahead * falloff / PI, 1.0);

@@ -11,17 +11,12 @@ struct CameraLight {
     // Radiant intensity (of a rectangle straight ahead), or irradiance of distant light. w: the radius of a sphere, metres, or
     // the sine of half the width of distant light.
     power: vec4f,
-    // Of a spot and of a rectangle the direction straight ahead; w: which of the three below it is.
+    // Of a spot and of a rectangle the direction straight ahead.
     axis_in_camera: vec4f,
     // From a rectangle's middle to those of two sides, metres; a spot's factor and summand (light::spot_ramp) in xy.
     half_width: vec4f,
     half_height: vec4f,
 }
-
-// A point, a sphere, distant light of a disc.
-const ROUND: f32 = 0.0;
-const SPOT: f32 = 1.0;
-const RECT: f32 = 2.0;
 
 const PI: f32 = 3.14159265358979;
 

@@ -14,7 +14,7 @@ use super::light_sums::{BY_GAIN, LightSums};
 use super::passes::Passes;
 use super::screen_bounds::ScreenBounds;
 use super::shown::Shown;
-use super::surfaces::{First, SurfaceKinds, Surfaces};
+use super::surfaces::{First, LitSurfaces, SurfaceKinds, Surfaces};
 use super::technique::{FrameContext, TechniquePasses};
 use super::uniforms::GEOMETRY_GROUPS;
 use super::volumes::{Among, Volumes, set_scissor};
@@ -115,8 +115,8 @@ impl Accumulated {
             0 => {}
             1 => self.draw_sharp(pass, frame, pieces.start),
             _ => {
-                let reaching = &surfaces.light_reaching_real;
-                gpu_scene.draw_surfaces(pass, reaching, Role::Real, whole, pixels);
+                let lit = surfaces.lit.of(gpu_scene.light_kind(whole));
+                gpu_scene.draw_surfaces(pass, &lit.reaching_real, Role::Real, whole, pixels);
                 for piece in pieces {
                     self.draw_piece(pass, frame, piece);
                 }
@@ -127,40 +127,40 @@ impl Accumulated {
     /// Draws a light that is one piece.
     fn draw_sharp(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>, piece: usize) {
         let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
-        let (surfaces, volumes) = (&self.surfaces, &self.volumes);
+        let (lit, volumes) = (self.lit(frame, piece), &self.volumes);
         if gpu_scene.count_volumes(pass, volumes, Among::All, Role::Real, piece, pixels) {
             volumes.keep(pass, Role::Real, pixels);
         }
-        gpu_scene.draw_surfaces(
-            pass,
-            &surfaces.light_reaching_real,
-            Role::Real,
-            DrawnLight::Piece(piece),
-            pixels,
-        );
+        let drawn = DrawnLight::Piece(piece);
+        gpu_scene.draw_surfaces(pass, &lit.reaching_real, Role::Real, drawn, pixels);
         self.draw_taken(pass, frame, piece);
-        gpu_scene.draw_virtuals_facing(pass, &surfaces.light_on_virtual, piece, pixels);
+        gpu_scene.draw_virtuals_facing(pass, &lit.on_virtual, piece, pixels);
     }
 
     /// Draws one of several pieces of a light, of which all has reached the real surfaces already.
     fn draw_piece(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>, piece: usize) {
         self.draw_hidden(pass, frame, piece);
-        let on_virtual = &self.surfaces.light_on_virtual;
-        frame
-            .gpu_scene
-            .draw_virtuals_facing(pass, on_virtual, piece, frame.bounds.pixels);
+        let (on_virtual, pixels) = (&self.lit(frame, piece).on_virtual, frame.bounds.pixels);
+        let gpu_scene = frame.gpu_scene;
+        gpu_scene.draw_virtuals_facing(pass, on_virtual, piece, pixels);
+    }
+
+    /// The pipelines of a piece.
+    fn lit(&self, frame: &FrameContext<'_>, piece: usize) -> &LitSurfaces {
+        let kind = frame.gpu_scene.light_kind(DrawnLight::Piece(piece));
+        self.surfaces.lit.of(kind)
     }
 
     /// Draws what is hidden of a piece from real surfaces, which all of it has reached.
     fn draw_hidden(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>, piece: usize) {
         let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
-        let (surfaces, volumes) = (&self.surfaces, &self.volumes);
+        let (lit, volumes) = (self.lit(frame, piece), &self.volumes);
         volumes.forget(pass, pixels);
         if gpu_scene.count_volumes(pass, volumes, Among::All, Role::Real, piece, pixels) {
             volumes.keep(pass, Role::Real, pixels);
             gpu_scene.draw_surfaces(
                 pass,
-                &surfaces.light_kept_from_real,
+                &lit.kept_from_real,
                 Role::Real,
                 DrawnLight::HiddenPiece(piece),
                 pixels,
@@ -181,12 +181,12 @@ impl Accumulated {
     /// Draws what virtual things take of a piece from real surfaces; what real ones hide of it is known.
     fn draw_taken(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>, piece: usize) {
         let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
-        let (surfaces, volumes) = (&self.surfaces, &self.volumes);
-        let lit = Among::LitByReal;
-        if gpu_scene.count_volumes(pass, volumes, lit, Role::Virtual, piece, pixels) {
+        let (lit, volumes) = (self.lit(frame, piece), &self.volumes);
+        let among = Among::LitByReal;
+        if gpu_scene.count_volumes(pass, volumes, among, Role::Virtual, piece, pixels) {
             gpu_scene.draw_surfaces(
                 pass,
-                &surfaces.light_hidden_from_real,
+                &lit.hidden_from_real,
                 Role::Real,
                 DrawnLight::Taken(piece),
                 pixels,

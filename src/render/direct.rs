@@ -9,6 +9,7 @@ use super::background::{Background, PICTURE_FORMAT, VIDEO_GROUP};
 use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
 use super::gpu_scene::{DrawnLight, GpuScene};
+use super::light_kind::LightKind;
 use super::light_sums::GAIN_FORMAT;
 use super::passes::Passes;
 use super::pipelines::{GroupLayout, PipelineDescription, overwritten, texels, untouched};
@@ -63,7 +64,8 @@ pub(super) struct Direct {
 }
 
 impl Direct {
-    pub fn new(gpu: &Gpu, background: &Background, kinds: SurfaceKinds) -> Self {
+    /// `light` is what the scene's light is.
+    pub fn new(gpu: &Gpu, background: &Background, kinds: SurfaceKinds, light: LightKind) -> Self {
         let target =
             |label, format, usage| target(&gpu.device, label, background.size_px, format, 1, usage);
         let read = wgpu::TextureUsages::TEXTURE_BINDING;
@@ -74,7 +76,7 @@ impl Direct {
             // What a scene does not have costs nothing.
             constants: vec![
                 ("GLOSSY", f64::from(kinds.glossy)),
-                ("SHAPED", f64::from(kinds.shaped)),
+                light.constant(),
                 ("DISTORTS", f64::from(background.distorts)),
             ],
         };

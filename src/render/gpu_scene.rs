@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
-use crate::light::{Light, Shape};
+use crate::light::Light;
 use crate::scene::{Scene, SceneLight, ShadowSettings, Shortcut};
 
 use super::anchor_geometry::{
@@ -18,6 +18,7 @@ use super::detail::{chosen_levels, widest_penumbra_px};
 use super::gpu::Gpu;
 use super::indirect::Indirect;
 use super::insides::{Insides, insides};
+use super::light_kind::LightKind;
 use super::light_piece::LitBy;
 use super::lights::Lights;
 use super::materials::{materials_group, needs_looks};
@@ -87,7 +88,8 @@ impl GpuScene {
         } = AnchorGeometry::new(device, scene, &mut known_levels);
         let world_virtuals = virtual_corners.iter().find(|(anchor, _)| *anchor == 0);
         let looks = scene.virtuals.iter().any(needs_looks);
-        let shaped = lights.iter().any(|light| is_shaped(&light.light));
+        let light_kinds = lights.iter().map(|light| LightKind::of(&light.light));
+        let light_kinds = light_kinds.collect();
         Self {
             lit_by,
             standing: standing(scene),
@@ -114,7 +116,7 @@ impl GpuScene {
                     let mut materials = object.materials.iter();
                     materials.any(|material| material.roughness.is_some())
                 }),
-                shaped,
+                lights: light_kinds,
                 looks,
             },
             materials: looks.then(|| materials_group(gpu, scene)),
@@ -127,7 +129,6 @@ impl GpuScene {
     /// reflect stays as it was gathered, where the same corners are there to get it. `lights` are those that cast shadow volumes.
     pub fn follow(&mut self, gpu: &Gpu, scene: &Scene, lights: Vec<SceneLight>) {
         let surroundings = hidden_surroundings(scene, self.lit_by);
-        self.kinds.shaped = lights.iter().any(|light| is_shaped(&light.light));
         self.lights.follow(lights, surroundings);
         let standing = standing(scene);
         if self.standing == standing {
@@ -382,6 +383,16 @@ impl GpuScene {
         }
     }
 
+    /// What a light is that is drawn.
+    pub fn light_kind(&self, light: DrawnLight) -> LightKind {
+        match light {
+            DrawnLight::Whole(light) => self.lights.kind_of_whole(light),
+            DrawnLight::Piece(piece)
+            | DrawnLight::HiddenPiece(piece)
+            | DrawnLight::Taken(piece) => self.lights.kind_of_piece(piece),
+        }
+    }
+
     /// Draws virtual surfaces by what a light can give them: in the open, at the terminator, and turned away.
     pub fn draw_virtuals(
         &self,
@@ -561,14 +572,6 @@ impl GpuScene {
             pass.set_bind_group(3, materials, &[]);
         }
         pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
-    }
-}
-
-/// Whether a light is more than a point or a direction.
-pub(super) fn is_shaped(light: &Light) -> bool {
-    match light {
-        Light::Point { shape, .. } => *shape != Shape::Point,
-        Light::Directional { angle_rad, .. } => *angle_rad > 0.0,
     }
 }
 

@@ -5,6 +5,8 @@ use glam::DAffine3;
 use crate::geometry::shadow_volume::LightPlace;
 use crate::light::Light;
 
+use super::light_kind::LightKind;
+
 /// The origin of a scene's light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum LitBy {
@@ -19,6 +21,7 @@ pub(super) enum LitBy {
 pub(super) struct Piece {
     /// In world space.
     pub light: Light,
+    pub kind: LightKind,
     /// Its number, which stays the same from frame to frame.
     pub slot: usize,
     /// What a real surface loses where a virtual thing hides the piece, if that is something else, and the slot of that.

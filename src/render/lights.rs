@@ -13,6 +13,7 @@ use crate::light::{Light, Shape};
 use crate::scene::SceneLight;
 
 use super::gpu::Gpu;
+use super::light_kind::LightKind;
 use super::light_piece::{Piece, light_place};
 use super::uniforms::{CameraLight, LIGHT_GROUP, UniformRow};
 
@@ -105,8 +106,12 @@ impl Lights {
                     self.slot_count += 1;
                 }
                 let slot = slots[index];
-                let taken = None;
-                self.pieces.push(Piece { light, slot, taken });
+                self.pieces.push(Piece {
+                    light,
+                    kind: LightKind::of(&light),
+                    slot,
+                    taken: None,
+                });
             }
             placed.pieces = first..self.pieces.len();
         }
@@ -173,6 +178,18 @@ impl Lights {
         self.pieces.len().saturating_sub(self.surroundings.len())..self.pieces.len()
     }
 
+    /// What a whole light is.
+    pub fn kind_of_whole(&self, light: usize) -> LightKind {
+        let light = self.scene.get(light);
+        light.map_or(LightKind::Plain, |light| LightKind::of(&light.light))
+    }
+
+    /// What a piece is.
+    pub fn kind_of_piece(&self, piece: usize) -> LightKind {
+        let piece = self.pieces.get(piece);
+        piece.map_or(LightKind::Plain, |piece| piece.kind)
+    }
+
     /// Puts a whole light into group 1.
     pub fn set_whole(&self, pass: &mut wgpu::RenderPass<'_>, light: usize) {
         pass.set_bind_group(1, &self.group, &[self.uniforms.offset(light)]);
@@ -198,6 +215,7 @@ fn surrounding_pieces(surroundings: Vec<[Light; 2]>) -> Vec<Piece> {
     let count = surroundings.len();
     let piece = |(slot, [light, taken]): (usize, [Light; 2])| Piece {
         light,
+        kind: LightKind::Plain,
         slot,
         taken: Some((taken, count + slot)),
     };

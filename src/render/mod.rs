@@ -18,6 +18,7 @@ mod gpu_scene;
 mod indirect;
 mod insides;
 mod layers;
+mod light_kind;
 mod light_piece;
 mod light_sums;
 mod lights;

@@ -23,8 +23,9 @@ use super::background::{Background, PICTURE_FORMAT};
 use super::fade::{self, Fade};
 use super::gpu::{Gpu, RenderError};
 use super::gpu_clock::{GpuClock, GpuTimes};
-use super::gpu_scene::{GpuScene, is_shaped};
+use super::gpu_scene::GpuScene;
 use super::layers::LayerPasses;
+use super::light_kind::LightKind;
 use super::passes::{Passes, RecordedPasses};
 use super::quality_controller::{QualityController, Setting};
 use super::readback::Readback;
@@ -65,8 +66,8 @@ pub struct Renderer {
 struct Shape {
     technique: ShadowTechnique,
     shadows: ShadowSettings,
-    /// Of each light what it stands on, whether it has a size and whether it has a shape.
-    lights: Vec<(usize, bool, bool)>,
+    /// Of each light what it stands on, whether it has a size and what it is.
+    lights: Vec<(usize, bool, LightKind)>,
     ambient_radiance: DVec3,
     nodes: usize,
     /// Of each thing its name, its anchor, its mesh's triangles and whether it casts.
@@ -80,7 +81,7 @@ impl Shape {
     fn of(scene: &Scene, lights: &[SceneLight]) -> Self {
         let things = || scene.phantoms.iter().chain(&scene.virtuals);
         let kind = |SceneLight { anchor, light }: &SceneLight| {
-            (*anchor, light.has_size(), is_shaped(light))
+            (*anchor, light.has_size(), LightKind::of(light))
         };
         let shape = |thing: &Object| {
             let triangles = thing.mesh.triangles.len();

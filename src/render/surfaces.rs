@@ -3,6 +3,7 @@
 
 use super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT, LOOK_LAYOUT};
 use super::gpu::Gpu;
+use super::light_kind::{ByLightKind, LightKind, LightKinds};
 use super::materials::MATERIALS_GROUP;
 use super::pipelines::{PipelineDescription, added, overwritten, taken_off, untouched};
 use super::stencil::{ADDED, REAL_HIDES, SHADOW, VIRTUAL_SHADOW, depth_stencil_state, stencil};
@@ -23,15 +24,21 @@ pub(super) struct Surfaces {
     pub ambient_on_real: Sided,
     /// Depth and ambient light of virtual surfaces.
     pub ambient_on_virtual: Sided,
+    /// What a light does.
+    pub lit: ByLightKind<LitSurfaces>,
+}
+
+/// Pipelines that draw what one light gives and loses.
+pub(super) struct LitSurfaces {
     /// A light as it reaches real surfaces in the video.
-    pub light_reaching_real: Sided,
+    pub reaching_real: Sided,
     /// A piece of a light that has reached real surfaces, taken off where real things hide it; the stencil's reference says so.
-    pub light_kept_from_real: Sided,
+    pub kept_from_real: Sided,
     /// A light where virtual things hide it from real surfaces.
-    pub light_hidden_from_real: Sided,
+    pub hidden_from_real: Sided,
     /// A light on virtual surfaces past all casters; the stencil's reference is 0, or 1 for surfaces that lie in no
     /// shadow but perhaps their own.
-    pub light_on_virtual: Sided,
+    pub on_virtual: Sided,
 }
 
 /// What the materials of virtual surfaces and the lights on them have; what a scene does not have is left out when pipelines are built.
@@ -39,8 +46,8 @@ pub(super) struct Surfaces {
 pub(super) struct SurfaceKinds {
     /// Whether any has a glossy layer.
     pub glossy: bool,
-    /// Whether any light is more than a point or a direction.
-    pub shaped: bool,
+    /// Of the lights that cast shadow volumes.
+    pub lights: LightKinds,
     /// Whether any has pictures, colours at corners, metal or emission (materials.wgsl).
     pub looks: bool,
 }
@@ -117,27 +124,28 @@ impl Surfaces {
     /// `first` says what the pass begins with.
     pub fn new(gpu: &Gpu, samples: u32, kinds: SurfaceKinds, first: First) -> Self {
         let described =
-            |fragment, stencil, targets: [wgpu::ColorTargetState; 2]| PipelineDescription {
-                shader: "surfaces.wgsl",
-                vertex: "place_sampled",
-                fragment,
-                constants: vec![
-                    ("GLOSSY", f64::from(kinds.glossy)),
-                    ("SHAPED", f64::from(kinds.shaped)),
-                    ("MULTISAMPLED", f64::from(samples > 1)),
-                ],
-                groups: GEOMETRY_GROUPS.map(Some).to_vec(),
-                targets: targets.to_vec(),
-                samples,
-                ..surface_description(gpu, stencil)
+            |kind: LightKind, fragment, stencil, targets: [wgpu::ColorTargetState; 2]| {
+                PipelineDescription {
+                    shader: "surfaces.wgsl",
+                    vertex: "place_sampled",
+                    fragment,
+                    constants: vec![
+                        ("GLOSSY", f64::from(kinds.glossy)),
+                        kind.constant(),
+                        ("MULTISAMPLED", f64::from(samples > 1)),
+                    ],
+                    groups: GEOMETRY_GROUPS.map(Some).to_vec(),
+                    targets: targets.to_vec(),
+                    samples,
+                    ..surface_description(gpu, stencil)
+                }
             };
-        let build =
-            |fragment, stencil, targets| Sided::new(gpu, &described(fragment, stencil, targets));
-        let build_virtual = |fragment, stencil, targets| {
-            Sided::new(
-                gpu,
-                &kinds.of_virtual(described(fragment, stencil, targets)),
-            )
+        let build = |kind, fragment, stencil, targets| {
+            Sided::new(gpu, &described(kind, fragment, stencil, targets))
+        };
+        let build_virtual = |kind, fragment, stencil, targets| {
+            let description = described(kind, fragment, stencil, targets);
+            Sided::new(gpu, &kinds.of_virtual(description))
         };
         let format = gpu.light_format;
         let (added, untouched) = (
@@ -161,21 +169,37 @@ impl Surfaces {
         let kept = stencil(equal, REAL_HIDES | ADDED, once);
         let hidden = stencil(other, VIRTUAL_SHADOW, taken);
         let unshadowed = stencil(at_most, SHADOW | ADDED, once);
-        Self {
-            ambient_on_real: build("ambient_on_real", None, before()),
-            ambient_on_virtual: build_virtual("ambient_on_virtual", None, before()),
-            light_reaching_real: build("light_on_real", Some(reaching), [added(), untouched()]),
-            light_kept_from_real: build(
+        let of_kind = |kind| LitSurfaces {
+            reaching_real: build(
+                kind,
                 "light_on_real",
-                Some(kept),
+                Some(reaching.clone()),
+                [added(), untouched()],
+            ),
+            kept_from_real: build(
+                kind,
+                "light_on_real",
+                Some(kept.clone()),
                 [taken_off(format), untouched()],
             ),
-            light_hidden_from_real: build("light_on_real", Some(hidden), [untouched(), added()]),
-            light_on_virtual: build_virtual(
-                "light_on_virtual",
-                Some(unshadowed),
+            hidden_from_real: build(
+                kind,
+                "light_on_real",
+                Some(hidden.clone()),
                 [untouched(), added()],
             ),
+            on_virtual: build_virtual(
+                kind,
+                "light_on_virtual",
+                Some(unshadowed.clone()),
+                [untouched(), added()],
+            ),
+        };
+        let any = LightKind::Plain;
+        Self {
+            ambient_on_real: build(any, "ambient_on_real", None, before()),
+            ambient_on_virtual: build_virtual(any, "ambient_on_virtual", None, before()),
+            lit: ByLightKind::new(kinds.lights, of_kind),
         }
     }
 }

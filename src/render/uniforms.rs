@@ -65,17 +65,12 @@ pub(super) struct CameraLight {
     pub half_height: Vec4,
 }
 
-/// Values of `axis_in_camera.w`, as in common.wgsl.
-const ROUND: f32 = 0.0;
-const SPOT: f32 = 1.0;
-const RECT: f32 = 2.0;
-
 impl CameraLight {
     pub fn new(light: &Light, camera_from_world: &DAffine3) -> Self {
-        let round = Self {
+        let plain = Self {
             place_in_camera: Vec4::ZERO,
             power: Vec4::ZERO,
-            axis_in_camera: Vec4::ZERO.with_w(ROUND),
+            axis_in_camera: Vec4::ZERO,
             half_width: Vec4::ZERO,
             half_height: Vec4::ZERO,
         };
@@ -88,7 +83,7 @@ impl CameraLight {
                 let at = Self {
                     place_in_camera: position_m.as_vec3().extend(1.0),
                     power: intensity.as_vec3().extend(0.0),
-                    ..round
+                    ..plain
                 };
                 match shape {
                     Shape::Point => at,
@@ -103,7 +98,7 @@ impl CameraLight {
                     } => {
                         let [scale, offset] = spot_ramp(inner_rad, outer_rad);
                         Self {
-                            axis_in_camera: direction.as_vec3().extend(SPOT),
+                            axis_in_camera: direction.as_vec3().extend(0.0),
                             half_width: Vec4::new(scale as f32, offset as f32, 0.0, 0.0),
                             ..at
                         }
@@ -111,7 +106,7 @@ impl CameraLight {
                     Shape::Rect(rect) => {
                         let [half_width, half_height] = rect.half_sides_m();
                         Self {
-                            axis_in_camera: rect.facing.as_vec3().extend(RECT),
+                            axis_in_camera: rect.facing.as_vec3().extend(0.0),
                             half_width: half_width.as_vec3().extend(0.0),
                             half_height: half_height.as_vec3().extend(0.0),
                             ..at
@@ -126,7 +121,7 @@ impl CameraLight {
             } => Self {
                 place_in_camera: -direction.as_vec3().extend(0.0),
                 power: irradiance.as_vec3().extend((0.5 * angle_rad).sin() as f32),
-                ..round
+                ..plain
             },
         }
     }

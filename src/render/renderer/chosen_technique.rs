@@ -6,6 +6,7 @@ use super::super::combined::Combined;
 use super::super::direct::Direct;
 use super::super::gpu::Gpu;
 use super::super::gpu_scene::GpuScene;
+use super::super::light_kind::LightKind;
 use super::super::light_piece::LitBy;
 use super::super::shafts::{Shafts, ShaftsAlone};
 use super::super::surfaces::First;
@@ -60,12 +61,15 @@ impl ChosenTechnique {
                 let (samples, kinds) = (scene.shadows.samples, gpu_scene.kinds);
                 // (A lamp that moves along may be lost, and one of some size has soft shadows.)
                 let is_plain = |light: &SceneLight| light.anchor == 0 && !light.light.has_size();
-                let is_single = samples == 1
+                let is_direct = samples == 1
                     && gpu_scene.surroundings_count() == 0
-                    && matches!(&scene.lights[..], [one] if is_plain(one));
-                let technique = match is_single && !scene.shadows.without.has(Shortcut::Direct) {
-                    true => Self::Direct(Direct::new(gpu, background, kinds)),
-                    false => {
+                    && !scene.shadows.without.has(Shortcut::Direct);
+                let technique = match &scene.lights[..] {
+                    [one] if is_direct && is_plain(one) => {
+                        let light = LightKind::of(&one.light);
+                        Self::Direct(Direct::new(gpu, background, kinds, light))
+                    }
+                    _ => {
                         let first = First::Ambient;
                         Self::Accumulated(Accumulated::new(gpu, background, samples, kinds, first))
                     }
