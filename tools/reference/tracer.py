@@ -95,12 +95,49 @@ def print_of(marker, world_from_anchor):
     return {**made, "bsdf": {"type": "twosided", "inner": {"type": "diffuse", "reflectance": reflectance}}}
 
 
+# Distant light of some width shines from a disc so far away, metres.
+FAR_M = 1000.0
+
+
 def emitter(light):
-    if light["kind"] == "point":
+    """A light as Mitsuba has it; one of some size is a surface of the radiance that adds up to its intensity."""
+    kind = light["kind"]
+    if kind == "point":
         return {"type": "point", "position": light["position_m"], "intensity": colour(_three(light["intensity"]))}
-    if light["kind"] == "directional":
+    if kind == "directional" and light.get("angle_deg", 0) > 0:
+        sine = math.sin(math.radians(light["angle_deg"]) / 2)
+        forth = unit(light["direction"])
+        return {"type": "disk", "to_world": facing(-forth * FAR_M, forth, FAR_M * math.tan(math.asin(sine)), [0, 0, 1]),
+                "emitter": area(light["irradiance"], math.pi * sine**2)}
+    if kind == "directional":
         return {"type": "directional", "direction": light["direction"], "irradiance": colour(_three(light["irradiance"]))}
-    raise SceneError(f"a light of kind {light['kind']} is not known here; allowed: point, directional")
+    if kind == "sphere":
+        return {"type": "sphere", "center": light["position_m"], "radius": light["radius_m"],
+                "emitter": area(light["intensity"], math.pi * light["radius_m"] ** 2)}
+    if kind == "rect":
+        width, height = light["size_m"]
+        place = facing(np.array(light["position_m"], float), unit(light["direction"]), [width / 2, height / 2],
+                       light.get("up", [0, 0, 1]))
+        return {"type": "rectangle", "to_world": place, "emitter": area(light["intensity"], width * height)}
+    raise SceneError(f"a light of kind {kind} is not known here; allowed: point, directional, sphere, rect")
+
+
+def area(power, share):
+    return {"type": "area", "radiance": colour(np.array(_three(power)) / share)}
+
+
+def unit(way):
+    return np.array(way, float) / np.linalg.norm(way)
+
+
+def facing(middle, forth, half_sizes, up):
+    """A shape of Mitsuba's, which lies in xy and faces z, where it faces `forth`; its y goes along `up`, as near as may be."""
+    sides = [np.cross(unit(way), forth) for way in (up, [0, 1, 0], [1, 0, 0])]
+    along = next(unit(side) for side in sides if np.linalg.norm(side) > 1e-6)
+    place = np.eye(4)
+    place[:3, :3] = np.stack([along, np.cross(forth, along), forth], 1) * np.append(np.broadcast_to(half_sizes, 2), 1)
+    place[:3, 3] = middle
+    return matrix(place)
 
 
 def _three(value):
@@ -194,7 +231,8 @@ def roles_and_shadows(camera, stage, camera_from_world):
     roles = np.where(seeming, VIRTUAL, np.where(valid, REAL, 0)).astype(np.uint8)
     masks = []
     for light in stage.scene.lights:
-        if light["kind"] == "point":
+        if "position_m" in light:
+            # (Of a light of some size its middle.)
             to_light = mi.Point3f(*light["position_m"]) - hit.p
             reach = dr.norm(to_light)
             to_light /= reach

@@ -31,24 +31,18 @@ impl Codec {
 
     fn arguments(self) -> &'static [&'static str] {
         match self {
-            // 4:2:0 needs even sides. The matrix is converted to what the tags say.
+            // 4:2:0 needs even sides. The matrix is converted to what the tags say; the frames bear them, for FFmpeg 7 passes
+            // options of primaries and transfer over.
             Self::H264 => &[
                 "-vf",
-                "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv,format=yuv420p",
+                "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv,format=yuv420p,\
+                 setparams=range=tv:colorspace=bt709:color_primaries=bt709:color_trc=bt709",
                 "-c:v",
                 "libx264",
                 "-preset",
                 "veryfast",
                 "-crf",
                 "18",
-                "-colorspace",
-                "bt709",
-                "-color_primaries",
-                "bt709",
-                "-color_trc",
-                "bt709",
-                "-color_range",
-                "tv",
                 "-movflags",
                 "+faststart",
             ],
@@ -279,7 +273,9 @@ impl Pace {
         let words = match self {
             Self::Even { .. } => return Vec::new(),
             Self::Stamped { nominal_fps } if is_avi(path) => {
-                format!("-fps_mode passthrough -r {nominal_fps}")
+                // (FFmpeg 7 refuses a rate beside frames of their own times.)
+                let per_million_secs = (1e6 * nominal_fps).round();
+                format!("-fps_mode passthrough -enc_time_base 1000000:{per_million_secs}")
             }
             Self::Stamped { .. } => format!(
                 "-fps_mode passthrough -enc_time_base 1:{MP4_TICKS} -video_track_timescale {MP4_TICKS}"

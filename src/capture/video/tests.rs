@@ -196,35 +196,36 @@ fn colours_are_those_that_the_stream_says() {
             image::Rgb(colours[(x * 6 / size[0]) as usize])
         })
     };
+    let untagged = "colorspace=unknown:color_primaries=unknown:color_trc=unknown";
     let codings = [
         (
             "bt601.mp4",
             "smpte170m",
             "tv",
-            "-colorspace smpte170m -color_primaries smpte170m -color_trc smpte170m",
+            "colorspace=smpte170m:color_primaries=smpte170m:color_trc=smpte170m",
             [192, 64],
         ),
         (
             "bt709.mp4",
             "bt709",
             "tv",
-            "-colorspace bt709 -color_primaries bt709 -color_trc bt709",
+            "colorspace=bt709:color_primaries=bt709:color_trc=bt709",
             [192, 64],
         ),
         (
             "full.mp4",
             "bt709",
             "pc",
-            "-color_range pc -colorspace bt709 -color_primaries bt709 -color_trc bt709",
+            "range=pc:colorspace=bt709:color_primaries=bt709:color_trc=bt709",
             [192, 64],
         ),
-        ("small_untagged.mkv", "smpte170m", "tv", "", [192, 64]),
-        ("large_untagged.mkv", "bt709", "tv", "", [192, 720]),
+        ("small_untagged.mkv", "smpte170m", "tv", untagged, [192, 64]),
+        ("large_untagged.mkv", "bt709", "tv", untagged, [192, 720]),
         (
             "bt2020_matrix.mp4",
-            "bt2020nc",
+            "bt2020",
             "tv",
-            "-colorspace bt2020nc -color_primaries bt709 -color_trc bt709",
+            "colorspace=bt2020nc:color_primaries=bt709:color_trc=bt709",
             [192, 64],
         ),
     ];
@@ -236,8 +237,8 @@ fn colours_are_those_that_the_stream_says() {
             ffmpeg(
                 folder,
                 &format!(
-                    "-loop 1 -i bars.png -frames:v 2 -vf scale=out_color_matrix={matrix}:out_range={range}:flags=accurate_rnd+full_chroma_int,format={pixels} \
-                 -c:v libx264 -qp 1 {tags} {name}"
+                    "-loop 1 -i bars.png -frames:v 2 -vf scale=out_color_matrix={matrix}:out_range={range}:flags=accurate_rnd+full_chroma_int,format={pixels},setparams={tags} \
+                 -c:v libx264 -qp 1 {name}"
                 ),
             );
             let (frames, notices) = all(&folder.join(name));
@@ -259,7 +260,7 @@ fn hlg_is_tone_mapped_with_a_word() {
     ffmpeg(
         folder.path(),
         &format!(
-            "{SOURCE} -frames:v 2 -pix_fmt yuv420p10le -colorspace bt2020nc -color_primaries bt2020 -color_trc arib-std-b67 -c:v ffv1 hlg.mkv"
+            "{SOURCE} -frames:v 2 -vf format=yuv420p10le,setparams=colorspace=bt2020nc:color_primaries=bt2020:color_trc=arib-std-b67 -c:v ffv1 hlg.mkv"
         ),
     );
     let source = FrameSource::open(path.to_str().unwrap()).unwrap();
