@@ -3,7 +3,7 @@
 # Mesa's layer that asks the desktop for its favourite card complains on machines without a desktop; gnomon chooses itself.
 export NODEVICE_SELECT = 1
 
-.PHONY: demo install uninstall test test-camera soak charts reference bench bench-volumes bench-tracking setup setup-tests
+.PHONY: demo install uninstall test test-camera soak fuzz charts reference bench bench-volumes bench-tracking setup setup-tests
 
 demo: setup
 	cargo build --release
@@ -60,6 +60,10 @@ soak: setup
 charts: setup
 	cargo build --release
 	target/release/gnomon chart
+
+# All readers, for an hour: what crashes, hangs or fills memory is kept in fuzz/artifacts (a nightly compiler and cargo-fuzz).
+fuzz:
+	tools/fuzz.sh 60
 
 # What a camera would have seen of a scene of your own, path-traced: make reference SCENE=config/lamp.toml ARGS="--frames 30".
 # Nothing else needs it. tools/reference/README.md tells more.

@@ -167,9 +167,7 @@ fn walls_of(scene: &ProbeScene) -> RayCaster {
     RayCaster::new(&corners)
 }
 
-/// A light where it shines from: on the room's wall, or from afar. It has no size: its edges are narrower than
-/// `compact_penumbra_px`, and drawn soft a frame took 20 times as long for .002 less error
-/// (docs/shafts.md).
+/// A light where it shines from: on the room's wall, or from afar.
 fn placed(taken: &TakenLight, scene: &ProbeScene, walls: &RayCaster) -> Light {
     let irradiance = taken.irradiance * scene.exposure;
     let origin = scene.position_m.as_vec3();
@@ -183,13 +181,15 @@ fn placed(taken: &TakenLight, scene: &ProbeScene, walls: &RayCaster) -> Light {
             Light::Point {
                 position_m: scene.position_m + taken.direction * distance_m,
                 intensity: irradiance * distance_m * distance_m,
-                shape: Shape::Point,
+                shape: Shape::Sphere {
+                    radius_m: distance_m * (taken.width_rad / 2.0).sin(),
+                },
             }
         }
         None => Light::Directional {
             direction: -taken.direction,
             irradiance,
-            angle_rad: 0.0,
+            angle_rad: taken.width_rad,
         },
     }
 }

@@ -222,8 +222,10 @@ def roles_and_shadows(camera, stage, camera_from_world):
     """What is seen at each pixel's centre, and for each light who takes it away there."""
     width, height = camera.size_px
     seen = centres(camera, camera_from_world)
-    hit = stage.with_virtual().ray_intersect(seen)
-    nearest = stage.virtual_alone().ray_intersect(seen) if stage.virtual else None
+    # (What is asked is worked out when it is read: the scenes must live as long.)
+    whole, alone = stage.with_virtual(), stage.virtual_alone()
+    hit = whole.ray_intersect(seen)
+    nearest = alone.ray_intersect(seen) if stage.virtual else None
     valid = np.array(hit.is_valid())
     seeming = np.zeros_like(valid)
     if nearest is not None:

@@ -1,0 +1,4 @@
+//! Light probes: .hdr.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| gnomon_fuzz::probe("a.hdr", bytes));
