@@ -38,7 +38,7 @@ keys! {
     pub static SHAPE: ShapeKeys;
 
     /// Its shape: glTF, OBJ, PLY or STL. Counter-clockwise seen from outside; materials from its file or MTL file (Kd is
-    /// taken as linear reflectance, Ns or Pr as roughness; see docs/gltf.md). A phantom is
+    /// taken as linear reflectance, Ns or Pr as roughness; see docs/models.md). A phantom is
     /// always flat: normals in the file are passed over.
     mesh: Option<PathBuf>, FileKind::Mesh => Means(None, "none: a phantom may have rect_m");
     /// Which axis of the mesh's file points up, along z of what it stands on.
