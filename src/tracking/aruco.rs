@@ -6,6 +6,7 @@ use opencv::core::{Mat, Point2f, Vector};
 use super::aruco_dictionary::{DetectorDictionary, installed_codes, quarter_turns};
 use super::conventions::{corners_as_drawn, corners_from_aruco};
 use super::light::Grey;
+use super::reading::border_ends;
 use super::{Detection, TrackingError};
 use crate::capture::Frame;
 use crate::scene::{ArucoRefinement, Family, Ink, TrackingSettings};
@@ -75,6 +76,9 @@ impl ArucoDetector {
             };
             let picture = Grey { levels, size_px };
             for found in search.found_in(picture, self.refinement) {
+                if !border_ends(picture, search.family.cells_across(), found.corners_px) {
+                    continue;
+                }
                 let corners =
                     corners_from_aruco(found.corners_px, search.quarter_turns, found.refinement);
                 let Ok(id) = u32::try_from(found.id) else {

@@ -36,7 +36,15 @@ pub(super) fn agreement_at_corners(
     template: &MarkerTemplate,
     corners_px: [DVec2; 4],
 ) -> Option<f64> {
-    let side = f64::from(template.side);
+    agreement(
+        picture,
+        template,
+        place_by_corners(f64::from(template.side), corners_px)?,
+    )
+}
+
+/// Where a point in cells from the top left corner of a square of `side` cells is, pixels.
+fn place_by_corners(side: f64, corners_px: [DVec2; 4]) -> Option<impl Fn(DVec2) -> Option<DVec2>> {
     let cells = [(0.0, 0.0), (side, 0.0), (side, side), (0.0, side)].map(DVec2::from);
     // Coordinates of about one keep the equations well conditioned.
     let middle_px = corners_px.iter().sum::<DVec2>() / 4.0;
@@ -47,10 +55,53 @@ pub(super) fn agreement_at_corners(
         .map(|(cell, corner_px)| (*cell / side, (corner_px - middle_px) / scale_px))
         .collect();
     let homography = linear_homography(&pairs)?;
-    agreement(picture, template, |cells| {
+    Some(move |cells: DVec2| {
         let DVec3 { x, y, z } = homography * (cells / side).extend(1.0);
         Some(DVec2::new(x, y) / z * scale_px + middle_px)
     })
+}
+
+/// Whether a marker's black border ends where its corners were found: along at least two of its sides, a quarter of a cell
+/// outside is lighter than as much inside. Within a wider border of the same code a detector (OpenCV 4.10) finds the
+/// narrower one as well, where it is black on both sides. What leaves the picture counts as ending there.
+pub(super) fn border_ends(picture: Grey<'_>, side: u32, corners_px: [DVec2; 4]) -> bool {
+    /// Of the difference between the lightest and the darkest of what is looked at.
+    const LEAST: f32 = 0.1;
+    const BESIDE_CELLS: f64 = 0.25;
+    let side = f64::from(side);
+    let Some(place) = place_by_corners(side, corners_px) else {
+        return true;
+    };
+    let level = |along: f64, up: f64, quarter: usize| {
+        let mut point = DVec2::new(along - side / 2.0, up - side / 2.0);
+        for _ in 0..quarter {
+            point = point.perp();
+        }
+        picture.level(place(point + side / 2.0)?)
+    };
+    let (mut lightest, mut darkest) = (f32::MIN, f32::MAX);
+    let mut differences: Vec<f32> = Vec::with_capacity(4);
+    for quarter in 0..4 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for step in 0..side as usize {
+            let along = step as f64 + 0.5;
+            let outside = level(along, -BESIDE_CELLS, quarter);
+            let inside = level(along, BESIDE_CELLS, quarter);
+            let within = level(along, side / 2.0, quarter);
+            for seen in [outside, inside, within].into_iter().flatten() {
+                lightest = lightest.max(seen);
+                darkest = darkest.min(seen);
+            }
+            if let (Some(outside), Some(inside)) = (outside, inside) {
+                sum += outside - inside;
+                count += 1.0;
+            }
+        }
+        differences.push(if count > 0.0 { sum / count } else { f32::MAX });
+    }
+    let least = LEAST * (lightest - darkest);
+    let ending = differences.iter().filter(|&&difference| difference > least);
+    ending.count() >= 2
 }
 
 /// The same, where `place` puts a point in cells from the square's top left corner, pixels.
@@ -100,4 +151,38 @@ pub(super) fn agreement(
         }
     };
     Some(expected.differences.iter().map(of_blur).fold(0.0, f64::max))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_border_ends_where_paper_begins() {
+        // A black square from 20 to 80 with a white middle from 40 to 60, at 10 pixels a cell.
+        let is_black = |x: usize, y: usize| {
+            let within = |low, high| (low..high).contains(&x) && (low..high).contains(&y);
+            within(20, 80) && !within(40, 60)
+        };
+        let level = |index: usize| {
+            if is_black(index % 100, index / 100) {
+                20
+            } else {
+                200
+            }
+        };
+        let levels: Vec<u8> = (0..100 * 100).map(level).collect();
+        let picture = Grey {
+            levels: &levels,
+            size_px: [100, 100],
+        };
+        let square = |low: f64, high: f64| {
+            let (low, high) = (low - 0.5, high - 0.5);
+            [(low, low), (high, low), (high, high), (low, high)].map(DVec2::from)
+        };
+        assert!(border_ends(picture, 6, square(20.0, 80.0)));
+        assert!(!border_ends(picture, 4, square(30.0, 70.0)));
+        // Half out of the picture.
+        assert!(border_ends(picture, 6, square(70.0, 130.0)));
+    }
 }
