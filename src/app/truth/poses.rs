@@ -25,7 +25,8 @@ impl TruePoses {
             .with_context(|| format!("{} cannot be read", path.display()))?;
         let mut truth: Value = serde_json::from_str(&text)
             .with_context(|| format!("{} is not JSON", path.display()))?;
-        let Value::Array(frames) = truth["frames"].take() else {
+        let frames = truth.get_mut("frames").map(Value::take);
+        let Some(Value::Array(frames)) = frames else {
             bail!("{} has no list of \"frames\"", path.display());
         };
         Ok(Self {
