@@ -91,12 +91,14 @@ impl Kind {
             || at(0, b"RIFF") && at(8, b"WEBP")
             || at(0, b"II*\0")
             || at(0, b"MM\0*");
-        match () {
-            () if names_model || at(0, b"glTF") => Some(Self::Model),
-            () if video => Some(Self::Video),
-            () if picture => Some(Self::Picture),
-            () => None,
-        }
+        let model = names_model || at(0, b"glTF");
+        let kinds = [
+            (model, Self::Model),
+            (video, Self::Video),
+            (picture, Self::Picture),
+        ];
+        let found = kinds.into_iter().find(|(is_it, _)| *is_it);
+        found.map(|(_, kind)| kind)
     }
 }
 

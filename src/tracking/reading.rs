@@ -45,19 +45,12 @@ pub(super) fn agreement_at_corners(
 
 /// Where a point in cells from the top left corner of a square of `side` cells is, pixels.
 fn place_by_corners(side: f64, corners_px: [DVec2; 4]) -> Option<impl Fn(DVec2) -> Option<DVec2>> {
-    let cells = [(0.0, 0.0), (side, 0.0), (side, side), (0.0, side)].map(DVec2::from);
-    // Coordinates of about one keep the equations well conditioned.
-    let middle_px = corners_px.iter().sum::<DVec2>() / 4.0;
-    let scale_px = corners_px[0].distance(corners_px[2]).max(1.0);
-    let pairs: Vec<(DVec2, DVec2)> = cells
-        .iter()
-        .zip(corners_px)
-        .map(|(cell, corner_px)| (*cell / side, (corner_px - middle_px) / scale_px))
-        .collect();
+    let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(DVec2::from);
+    let pairs: Vec<(DVec2, DVec2)> = corners.into_iter().zip(corners_px).collect();
     let homography = linear_homography(&pairs)?;
     Some(move |cells: DVec2| {
         let DVec3 { x, y, z } = homography * (cells / side).extend(1.0);
-        Some(DVec2::new(x, y) / z * scale_px + middle_px)
+        Some(DVec2::new(x, y) / z)
     })
 }
 

@@ -185,7 +185,7 @@ mod tests {
                 "-v",
                 "error",
                 "-show_entries",
-                "stream=codec_name,pix_fmt,color_space,color_range,nb_frames",
+                "stream=codec_name,pix_fmt,color_space,color_range,color_transfer,color_primaries,nb_frames",
                 "-of",
                 "csv=p=0",
             ])
@@ -194,7 +194,7 @@ mod tests {
             .unwrap();
         assert_eq!(
             String::from_utf8_lossy(&probe.stdout).trim(),
-            "h264,yuv420p,tv,bt709,5"
+            "h264,yuv420p,tv,bt709,bt709,bt709,5"
         );
         let back = std::process::Command::new("ffmpeg")
             .args(["-v", "error", "-i"])

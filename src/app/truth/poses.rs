@@ -70,3 +70,17 @@ pub fn affine(matrix: &Value) -> Result<DAffine3> {
         translation: transposed.w_axis.truncate(),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_list_of_frames_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        for text in ["3", "[]", "null", "{}", "{\"frames\": 1}"] {
+            std::fs::write(folder.path().join("truth.json"), text).unwrap();
+            assert!(TruePoses::read(folder.path()).is_err(), "{text}");
+        }
+    }
+}
