@@ -22,10 +22,33 @@ struct SampledSurface {
     @location(13) @interpolate(flat) first_color: vec4f,
     @location(14) @interpolate(flat) first_tangent: vec4f,
 //!end
+//!if OCCLUSION
+    // Which directions the thing itself leaves open: 16 harmonics.
+    @location(15) @interpolate(perspective, centroid) visibility_0: vec4f,
+    @location(16) @interpolate(perspective, centroid) visibility_1: vec4f,
+    @location(17) @interpolate(perspective, centroid) visibility_2: vec4f,
+    @location(18) @interpolate(perspective, centroid) visibility_3: vec4f,
+    // Number of the thing.
+    @location(19) @interpolate(flat) thing: u32,
+//!end
 }
 
+//!if OCCLUSION
+struct OcclusionCorner {
+    @location(8) visibility_0: vec4f,
+    @location(9) visibility_1: vec4f,
+    @location(10) visibility_2: vec4f,
+    @location(11) visibility_3: vec4f,
+    @location(12) thing: u32,
+}
+//!end
+
 @vertex
+//!if OCCLUSION
+fn place_sampled(corner: SurfaceCorner, occlusion: OcclusionCorner, @builtin(vertex_index) index: u32) -> SampledSurface {
+//!else
 fn place_sampled(corner: SurfaceCorner, @builtin(vertex_index) index: u32) -> SampledSurface {
+//!end
     let placed = placed(corner);
     return SampledSurface(
         placed.clip,
@@ -45,6 +68,13 @@ fn place_sampled(corner: SurfaceCorner, @builtin(vertex_index) index: u32) -> Sa
         placed.uv,
         placed.color,
         placed.tangent_in_camera,
+//!end
+//!if OCCLUSION
+        occlusion.visibility_0,
+        occlusion.visibility_1,
+        occlusion.visibility_2,
+        occlusion.visibility_3,
+        occlusion.thing,
 //!end
     );
 }

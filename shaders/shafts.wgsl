@@ -3,6 +3,7 @@
 //!include "sampled_surface.wgsl"
 //!include "light_sums.wgsl"
 //!include "mapped_source.wgsl"
+//!include "mirrored.wgsl"
 
 struct ShaftFrame {
     world_from_camera: mat4x4f,
@@ -21,10 +22,6 @@ struct ShaftFrame {
 @group(2) @binding(4) var<storage, read> lists: array<u32>;
 @group(2) @binding(5) var maps: texture_2d<f32>;
 @group(2) @binding(6) var map_sampler: sampler;
-// The probe's light as glossy surfaces mirror it, latitude-longitude; the square root of their roughness rises evenly with
-// the level.
-@group(2) @binding(7) var environment: texture_2d<f32>;
-@group(2) @binding(8) var environment_sampler: sampler;
 
 // Least variance of depths in a map: a surface hides itself by no more than its own slope.
 const LEAST_SPREAD: f32 = 0.0004;
@@ -209,49 +206,10 @@ fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: boo
         }
     }
     let arriving = max(surface.indirect - taken, vec3f(0.0));
-//!if LOOKS
-    let diffuse = look.albedo / PI * arriving * look.occlusion;
-    if look.roughness <= 0.0 {
-        return LightSums(vec4f(0.0), vec4f(diffuse + look.emission, 1.0));
-    }
-//!else
-    let diffuse = look.albedo / PI * arriving;
-    if !GLOSSY || look.roughness <= 0.0 {
-        return LightSums(vec4f(0.0), vec4f(diffuse, 1.0));
-    }
-//!end
     let to_camera = normalize(frame.world_from_camera[3].xyz - point_in_world);
-    let cos_camera = max(dot(normal, to_camera), 1e-3);
     // What hides light hides it from the layer as well; more is not known of where it comes from.
     let left = arriving / max(surface.indirect, vec3f(1e-6));
-    let direction = reflect(-to_camera, normal);
-    let mirrored = mirrored(direction, sqrt(look.roughness), cos_camera, vec3f(0.04)) * left;
-    let dielectric = diffuse * (1.0 - fresnel(cos_camera)) + mirrored;
-//!if LOOKS
-    let metal = mirrored_by_metal(direction, look, cos_camera) * left * look.occlusion;
-    return LightSums(vec4f(0.0), vec4f(mix(dielectric, metal, look.metallic) + look.emission, 1.0));
-//!else
-    return LightSums(vec4f(0.0), vec4f(dielectric, 1.0));
-//!end
-}
-
-// Radiance that the glossy layer mirrors of the environment (Karis 2013: a mean over the lobe times what the layer reflects
-// of light from everywhere, here as fitted by Karis 2014).
-//!if LOOKS
-fn mirrored_by_metal(direction: vec3f, look: Look, cos_camera: f32) -> vec3f {
-    return mirrored(direction, sqrt(look.roughness), cos_camera, look.albedo);
-}
-//!end
-
-// `head_on` is what the surface mirrors of light that comes head-on.
-fn mirrored(direction: vec3f, evenness: f32, cos_camera: f32, head_on: vec3f) -> vec3f {
-    let place = vec2f(atan2(direction.y, direction.x) / (2.0 * PI) + 0.5, acos(clamp(direction.z, -1.0, 1.0)) / PI);
-    let level = evenness * f32(textureNumLevels(environment) - 1u);
-    let mean = textureSampleLevel(environment, environment_sampler, place, level).rgb;
-    let fit = evenness * vec4f(-1.0, -0.0275, -0.572, 0.022) + vec4f(1.0, 0.0425, 1.04, -0.04);
-    let grazing = min(fit.x * fit.x, exp2(-9.28 * cos_camera)) * fit.x + fit.y;
-    let reflected = vec2f(-1.04, 1.04) * grazing + fit.zw;
-    return mean * (head_on * reflected.x + reflected.y);
+    return LightSums(vec4f(0.0), vec4f(radiance_in_probe(look, normal, to_camera, arriving, left), 1.0));
 }
 
 // For what is drawn into depth alone.

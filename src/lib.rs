@@ -8,6 +8,7 @@
 pub mod app;
 pub mod calibration;
 pub mod capture;
+pub mod environment;
 pub mod geometry;
 pub mod light;
 pub mod render;

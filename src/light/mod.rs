@@ -6,6 +6,7 @@ pub mod chromaticities;
 pub mod compact;
 pub mod contrast;
 pub mod form_factor;
+pub mod harmonics;
 pub mod material;
 pub mod pieces;
 pub mod prefiltered;
@@ -13,6 +14,7 @@ pub mod probe;
 pub mod probe_maps;
 pub mod probe_power;
 pub mod radiance_picture;
+pub mod regions;
 pub mod response;
 pub mod texture;
 

@@ -81,7 +81,28 @@ pub(super) struct SurfaceBatch {
     pub indices: wgpu::Buffer,
     /// For each corner a [`CornerOfMaterial`], where the scene needs them.
     pub looks: Option<wgpu::Buffer>,
+    /// For each corner its self-occlusion, where a technique gives it ([`OCCLUSION_LAYOUT`]).
+    pub occlusion: Option<wgpu::Buffer>,
+    /// The same corners as values.
+    pub places: BatchCorners,
 }
+
+/// A batch's corners, in its anchor's space.
+pub(super) struct BatchCorners {
+    /// Place and unit normal of each, and the triangles that join them.
+    pub corners: Corners,
+    /// For each corner the number of its thing, phantoms first.
+    pub thing_of: Vec<u32>,
+}
+
+/// Vertex layout of [`SurfaceBatch::occlusion`]: visibility in 16 harmonics, and the number of the thing.
+pub(super) const OCCLUSION_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
+    array_stride: 68,
+    step_mode: wgpu::VertexStepMode::Vertex,
+    attributes: &wgpu::vertex_attr_array![
+        8 => Float32x4, 9 => Float32x4, 10 => Float32x4, 11 => Float32x4, 12 => Uint32
+    ],
+};
 
 /// One thing, in its anchor's space.
 pub(super) struct AnchoredModel {
@@ -125,16 +146,14 @@ pub(super) struct LevelCaster {
     pub smooth_normals: Option<Vec<[Vec3; 3]>>,
 }
 
-/// Corners of a virtual batch (place and unit normal, in its anchor's space) and the triangles that join them.
-pub(super) type VirtualCorners = (Vec<(Vec3, Vec3)>, Vec<[u32; 3]>);
+/// Corners of a batch (place and unit normal, in its anchor's space) and the triangles that join them.
+pub(super) type Corners = (Vec<(Vec3, Vec3)>, Vec<[u32; 3]>);
 
 /// Everything that stands on anchors.
 pub(super) struct AnchorGeometry {
     pub batches: Vec<SurfaceBatch>,
     /// The real ones first.
     pub things: Vec<AnchoredModel>,
-    /// For each virtual batch its anchor and corners.
-    pub virtual_corners: Vec<(usize, VirtualCorners)>,
 }
 
 /// Coarser versions of meshes, which take long to make: each with the mesh that it is of.
@@ -159,7 +178,6 @@ impl AnchorGeometry {
         let mut geometry = Self {
             batches: Vec::new(),
             things: Vec::new(),
-            virtual_corners: Vec::new(),
         };
         let things = scene.phantoms.iter().chain(&scene.virtuals);
         let surfaces: Vec<_> = things.map(triangles_in_anchor).collect();
@@ -190,6 +208,10 @@ impl AnchorGeometry {
                     let before = objects.iter().take(index);
                     shared.first_material =
                         before.map(|object| object.materials.len() as u32).sum();
+                    shared.thing = match role {
+                        Role::Real => index,
+                        Role::Virtual => scene.phantoms.len() + index,
+                    } as u32;
                     let thing = thing(device, (role, tie), object, coarser, &mut shared);
                     geometry.things.extend(thing);
                 }
@@ -199,12 +221,6 @@ impl AnchorGeometry {
                 geometry
                     .batches
                     .push(shared.batch(device, role, anchor, ambient));
-                if role == Role::Virtual {
-                    let places = shared.corners.iter();
-                    let places = places.map(|corner| (corner.position, corner.normal));
-                    let corners = (places.collect(), shared.triangles);
-                    geometry.virtual_corners.push((anchor, corners));
-                }
             }
         }
         geometry
@@ -302,8 +318,12 @@ fn thing(
 struct SharedCorners {
     corners: Vec<SurfaceCorner>,
     triangles: Vec<[u32; 3]>,
-    /// By place, normal and material, and by what else the corner has.
-    index_of: HashMap<([u32; 10], [u32; 13]), u32>,
+    /// By thing, place, normal and material, and by what else the corner has.
+    index_of: HashMap<(u32, [u32; 10], [u32; 13]), u32>,
+    /// For each corner the number of its thing.
+    thing_of: Vec<u32>,
+    /// Number of the thing at hand, phantoms first.
+    thing: u32,
     /// What corners have besides, where any virtual thing needs it.
     looks: Option<Vec<CornerOfMaterial>>,
     /// Number of the first material of the thing at hand.
@@ -328,17 +348,18 @@ impl SharedCorners {
 
     fn index(&mut self, corner: SurfaceCorner, look: CornerOfMaterial) -> u32 {
         let next = self.corners.len() as u32;
-        let key = (bytemuck::cast(corner), bytemuck::cast(look));
+        let key = (self.thing, bytemuck::cast(corner), bytemuck::cast(look));
         let index = *self.index_of.entry(key).or_insert(next);
         if index == next {
             self.corners.push(corner);
+            self.thing_of.push(self.thing);
             self.looks.iter_mut().for_each(|looks| looks.push(look));
         }
         index
     }
 
     fn batch(
-        &self,
+        self,
         device: &wgpu::Device,
         role: Role,
         anchor: usize,
@@ -351,9 +372,16 @@ impl SharedCorners {
                 usage,
             })
         };
+        let places = self.corners.iter();
+        let places = places.map(|corner| (corner.position, corner.normal));
         SurfaceBatch {
             role,
             anchor,
+            occlusion: None,
+            places: BatchCorners {
+                corners: (places.collect(), self.triangles.clone()),
+                thing_of: self.thing_of,
+            },
             corners: buffer(
                 "surface corners",
                 bytemuck::cast_slice(&self.corners),

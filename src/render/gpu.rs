@@ -2,6 +2,8 @@
 
 use std::sync::{Arc, Mutex};
 
+use wgpu::util::DeviceExt as _;
+
 use super::pipelines::{GroupLayout, PipelineCache, PipelineDescription};
 
 /// A failure on the way to a drawn frame.
@@ -207,6 +209,26 @@ impl Gpu {
             layout: &self.pipelines.group_layout(&self.device, layout),
             entries: &entries,
         })
+    }
+
+    /// A buffer of a content that may be empty, which no binding can be.
+    pub(super) fn buffer(
+        &self,
+        label: &str,
+        contents: &[u8],
+        usage: wgpu::BufferUsages,
+    ) -> wgpu::Buffer {
+        let contents = match contents.is_empty() {
+            true => &[0; 256],
+            false => contents,
+        };
+        let label = Some(label);
+        self.device
+            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label,
+                contents,
+                usage,
+            })
     }
 
     /// What a window needs to show pictures of this device without a detour.

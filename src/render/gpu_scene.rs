@@ -11,7 +11,7 @@ use crate::light::Light;
 use crate::scene::{Scene, SceneLight, ShadowSettings, Shortcut};
 
 use super::anchor_geometry::{
-    AnchorGeometry, AnchoredModel, KnownLevels, Role, SurfaceBatch, VirtualCorners,
+    AnchorGeometry, AnchoredModel, BatchCorners, Corners, KnownLevels, Role, SurfaceBatch,
 };
 use super::casters::{Casters, LitSides};
 use super::detail::{chosen_levels, widest_penumbra_px};
@@ -64,7 +64,6 @@ pub(super) struct GpuScene {
     casters: Casters,
     /// Of shadow volumes alone.
     indirect: Option<Indirect>,
-    virtual_corners: Vec<(usize, VirtualCorners)>,
     /// The camera as what stands on each anchor meets it, and after that as each virtual thing does.
     views: UniformRow,
     view_group: wgpu::BindGroup,
@@ -81,12 +80,8 @@ impl GpuScene {
         let view_count = scene.node_count() + scene.virtuals.len();
         let views = UniformRow::new::<AnchorView>(device, "views", view_count);
         let mut known_levels = KnownLevels::default();
-        let AnchorGeometry {
-            batches,
-            things,
-            virtual_corners,
-        } = AnchorGeometry::new(device, scene, &mut known_levels);
-        let world_virtuals = virtual_corners.iter().find(|(anchor, _)| *anchor == 0);
+        let AnchorGeometry { batches, things } =
+            AnchorGeometry::new(device, scene, &mut known_levels);
         let looks = scene.virtuals.iter().any(needs_looks);
         let light_kinds = lights.iter().map(|light| LightKind::of(&light.light));
         let light_kinds = light_kinds.collect();
@@ -97,11 +92,10 @@ impl GpuScene {
             casters: Casters::new(gpu, things.len(), &scene.shadows),
             indirect: match lit_by {
                 LitBy::Lights => {
-                    world_virtuals.and_then(|(_, corners)| Indirect::new(scene, corners))
+                    world_virtuals(&batches).and_then(|corners| Indirect::new(scene, corners))
                 }
                 LitBy::Room => None,
             },
-            virtual_corners,
             max_silhouette_error_px: scene.shadows.max_silhouette_error_px,
             shadows: scene.shadows,
             levels: vec![0; things.len()],
@@ -134,19 +128,14 @@ impl GpuScene {
         if self.standing == standing {
             return;
         }
-        let AnchorGeometry {
-            batches,
-            things,
-            virtual_corners,
-        } = AnchorGeometry::new(&gpu.device, scene, &mut self.known_levels);
+        let AnchorGeometry { batches, things } =
+            AnchorGeometry::new(&gpu.device, scene, &mut self.known_levels);
         self.casters = Casters::new(gpu, things.len(), &scene.shadows);
-        let world_virtuals = virtual_corners.iter().find(|(anchor, _)| *anchor == 0);
         self.indirect = self
             .indirect
             .take()
-            .zip(world_virtuals)
-            .and_then(|(gathered, (_, corners))| gathered.for_corners(corners));
-        self.virtual_corners = virtual_corners;
+            .zip(world_virtuals(&batches))
+            .and_then(|(gathered, corners)| gathered.for_corners(corners));
         self.levels = vec![0; things.len()];
         self.insides = vec![Insides::Anywhere; things.len()];
         self.batches = batches;
@@ -273,11 +262,12 @@ impl GpuScene {
         world_from_anchor: &[Option<DAffine3>],
         irradiance: impl Fn(Vec3, Vec3) -> Vec3 + Sync,
     ) {
-        for (anchor, (corners, _)) in &self.virtual_corners {
-            let batch = self.batch(Role::Virtual, *anchor);
-            let (Some(pose), Some(batch)) = (world_from_anchor[*anchor], batch) else {
+        let batches = self.batches.iter();
+        for batch in batches.filter(|batch| batch.role == Role::Virtual) {
+            let Some(pose) = world_from_anchor[batch.anchor] else {
                 continue;
             };
+            let (corners, _) = &batch.places.corners;
             let pose = pose.as_affine3();
             let of_corner = |&(place, normal): &(Vec3, Vec3)| {
                 irradiance(pose.transform_point3(place), pose.transform_vector3(normal))
@@ -285,6 +275,32 @@ impl GpuScene {
             let arriving: Vec<_> = corners.par_iter().map(of_corner).collect();
             queue.write_buffer(&batch.indirect, 0, bytemuck::cast_slice(&arriving));
         }
+    }
+
+    /// All batches' corners as values: what they are of, their anchor, and they.
+    pub fn corners(&self) -> impl Iterator<Item = (Role, usize, &BatchCorners)> {
+        let batches = self.batches.iter();
+        batches.map(|batch| (batch.role, batch.anchor, &batch.places))
+    }
+
+    /// Gives each batch, in their order, what its corners hide from themselves (as [`OCCLUSION_LAYOUT`] has it).
+    ///
+    /// [`OCCLUSION_LAYOUT`]: super::anchor_geometry::OCCLUSION_LAYOUT
+    pub fn set_occlusion(&mut self, occlusions: impl Iterator<Item = wgpu::Buffer>) {
+        for (batch, occlusion) in self.batches.iter_mut().zip(occlusions) {
+            batch.occlusion = Some(occlusion);
+        }
+    }
+
+    /// Gives a batch's corners their irradiance; `number` counts the batches.
+    pub fn write_indirect(&self, queue: &wgpu::Queue, number: usize, irradiances: &[Vec3]) {
+        let contents = bytemuck::cast_slice(irradiances);
+        queue.write_buffer(&self.batches[number].indirect, 0, contents);
+    }
+
+    /// The lights that cast shadow volumes and shine, in world space.
+    pub fn shining(&self) -> Vec<Light> {
+        self.lights.shining()
     }
 
     /// What passes draw from here on stands in the world.
@@ -564,6 +580,10 @@ impl GpuScene {
         if let Some(looks) = &batch.looks {
             pass.set_vertex_buffer(2, looks.slice(..));
         }
+        if let Some(occlusion) = &batch.occlusion {
+            let slot = 2 + u32::from(batch.looks.is_some());
+            pass.set_vertex_buffer(slot, occlusion.slice(..));
+        }
         if let Some(materials) = self
             .materials
             .as_ref()
@@ -573,6 +593,13 @@ impl GpuScene {
         }
         pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
     }
+}
+
+/// The corners of the virtual things that stand in the world.
+fn world_virtuals(batches: &[SurfaceBatch]) -> Option<&Corners> {
+    let mut batches = batches.iter();
+    let found = batches.find(|batch| (batch.role, batch.anchor) == (Role::Virtual, 0));
+    found.map(|batch| &batch.places.corners)
 }
 
 /// Where a scene's things stand, and which are there.

@@ -10,7 +10,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use crate::light::bounce::{Gathering, Mover, Surroundings};
 use crate::scene::{Object, Scene};
 
-use super::anchor_geometry::VirtualCorners;
+use super::anchor_geometry::Corners;
 
 /// Rays for a scene in which nothing moves: gathered once, in a second or so.
 const STANDING_BUDGET: usize = 1_000_000;
@@ -33,7 +33,7 @@ pub(super) struct Indirect {
 
 impl Indirect {
     /// Sends the rays; `None` where nothing virtual stands in the world.
-    pub fn new(scene: &Scene, (corners, triangles): &VirtualCorners) -> Option<Self> {
+    pub fn new(scene: &Scene, (corners, triangles): &Corners) -> Option<Self> {
         if corners.is_empty() {
             return None;
         }
@@ -64,7 +64,7 @@ impl Indirect {
     }
 
     /// The same light for things that stand elsewhere; `None` where those are not the same things.
-    pub fn for_corners(self, (corners, _): &VirtualCorners) -> Option<Self> {
+    pub fn for_corners(self, (corners, _): &Corners) -> Option<Self> {
         (self.point_of_corner.len() == corners.len()).then_some(Self {
             settled: false,
             ..self
@@ -102,7 +102,10 @@ impl Indirect {
 }
 
 /// One point for all corners that share place and normal, and for each corner its point.
-fn points(corners: &[(Vec3, Vec3)], triangles: &[[u32; 3]]) -> (Vec<(DVec3, DVec3)>, Vec<usize>) {
+pub(super) fn points(
+    corners: &[(Vec3, Vec3)],
+    triangles: &[[u32; 3]],
+) -> (Vec<(DVec3, DVec3)>, Vec<usize>) {
     let mut point_at: HashMap<[u32; 6], usize> = HashMap::new();
     let mut points = Vec::new();
     let mut point_of_corner = vec![0; corners.len()];

@@ -39,7 +39,9 @@ impl QualityController {
             ShadowTechnique::Shafts | ShadowTechnique::Both => {
                 sources(scene.shadows.shafts.sources).unzip()
             }
-            ShadowTechnique::Volumes => outlines(scene.shadows.max_silhouette_error_px).unzip(),
+            ShadowTechnique::Volumes | ShadowTechnique::Environment => {
+                outlines(scene.shadows.max_silhouette_error_px).unzip()
+            }
         };
         Some(Self {
             budget_ms,

@@ -11,19 +11,23 @@ macro_rules! files {
 }
 
 /// All files under `shaders/`.
-const FILES: [(&str, &str); 22] = files![
+const FILES: [(&str, &str); 26] = files![
     "area_lights.wgsl",
     "background.wgsl",
     "common.wgsl",
     "composite.wgsl",
     "difference.wgsl",
     "direct.wgsl",
+    "environment.wgsl",
     "fade.wgsl",
     "fullscreen.wgsl",
     "layers.wgsl",
     "light_sums.wgsl",
     "mapped_source.wgsl",
     "materials.wgsl",
+    "mirrored.wgsl",
+    "occlusion_map.wgsl",
+    "occlusion_maps.wgsl",
     "partly_covered.wgsl",
     "pixel_sums.wgsl",
     "sampled_surface.wgsl",
@@ -190,6 +194,11 @@ mod tests {
             FILES.iter().any(|(_, text)| text.contains(&line))
         };
         for (name, _) in FILES.iter().filter(|(name, _)| !includes(name)) {
+            // (Always built with it.)
+            let always = match *name {
+                "environment.wgsl" => Some("OCCLUSION"),
+                _ => None,
+            };
             for flags in [
                 &[][..],
                 &["MULTISAMPLED"],
@@ -197,7 +206,8 @@ mod tests {
                 &["MULTISAMPLED", "ENCODED"],
                 &["LOOKS"],
             ] {
-                let text = source(name, flags).unwrap();
+                let flags: Vec<&str> = flags.iter().copied().chain(always).collect();
+                let text = source(name, &flags).unwrap();
                 assert_eq!(error(name, &text), None, "{flags:?}");
             }
         }

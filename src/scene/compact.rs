@@ -74,7 +74,7 @@ impl Scene {
             rest: Cow::Borrowed(&scene.probe),
             found: Vec::new(),
         };
-        if self.chosen_technique().0 != ShadowTechnique::Both {
+        if !self.chosen_technique().0.has_compact_and_broad() {
             return split;
         }
         split.compact.extend(&self.lights);
@@ -110,7 +110,9 @@ impl Scene {
     /// The lights that cast shadow volumes.
     pub fn outlined_lights(&self) -> Vec<SceneLight> {
         match (self.chosen_technique().0, &self.probe) {
-            (ShadowTechnique::Both, Some(probe)) => self.split_light(probe).compact,
+            (ShadowTechnique::Both | ShadowTechnique::Environment, Some(probe)) => {
+                self.split_light(probe).compact
+            }
             (ShadowTechnique::Shafts, _) => Vec::new(),
             _ => self.lights.clone(),
         }

@@ -20,11 +20,13 @@ pub use super::objects::{
 pub use super::placement::{PLACEMENT, PlacementKeys};
 pub use super::probe::{PROBE, PROBE_SECTION, ROOM, ROOM_SECTION, ROOM_SURFACE};
 pub use super::schema::section::AnyKey;
-pub use super::shadows::{DIFFERENCE, SHADOWS, SHADOWS_SECTION, SHAFTS};
+pub use super::shadows::{
+    DIFFERENCE, ENVIRONMENT, ENVIRONMENT_SECTION, SHADOWS, SHADOWS_SECTION, SHAFTS,
+};
 pub use super::tracking::{TRACKING, TRACKING_SECTION};
 
 /// What may stand at the outermost level, in the reference's order; a light of each kind.
-pub const SECTIONS: [&Section; 16] = [
+pub const SECTIONS: [&Section; 17] = [
     &CAMERA_SECTION,
     &TRACKING_SECTION,
     &BOARD_SECTION,
@@ -39,6 +41,7 @@ pub const SECTIONS: [&Section; 16] = [
     &AMBIENT_SECTION,
     &TABLE_SECTION,
     &SHADOWS_SECTION,
+    &ENVIRONMENT_SECTION,
     &PROBE_SECTION,
     &ROOM_SECTION,
 ];

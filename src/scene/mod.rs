@@ -66,6 +66,7 @@ pub use quality::Quality;
 pub use ranges::{Digits, Numbers, Whole};
 pub use reference::reference;
 pub use shadows::{
+    EnvironmentMethod, EnvironmentSettings,
     ShadowChange, ShadowSettings, ShadowTechnique, ShaftSettings, Technique, VolumeCounting,
 };
 pub use shortcuts::{Shortcut, Shortcuts};

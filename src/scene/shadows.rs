@@ -22,6 +22,19 @@ choices! {
         Volumes = "volumes",
         /// Soft shadows of a probe's light in a room (Gibson, Cook, Howard & Hubbold 2003).
         Shafts = "shafts",
+        /// Soft shadows of a probe's light from afar, of things that move and turn (Tamura, Johan & Nishita 2005), beside
+        /// shadow volumes of what is compact in it.
+        Environment = "environment",
+    }
+}
+
+choices! {
+    /// How the environment's shadows are made of what its regions see.
+    pub enum EnvironmentMethod, "method" {
+        /// As soft at each place as things are far from it.
+        Penumbrae = "penumbrae",
+        /// As in the paper: as soft over a whole thing as its middle is far, and taken off.
+        Maps = "maps",
     }
 }
 
@@ -64,6 +77,8 @@ pub enum ShadowTechnique {
     Shafts,
     /// Shadow volumes of compact lights, soft shadows of the rest of the probe's light.
     Both,
+    /// Shadow volumes of compact lights, the rest of the probe's light from afar.
+    Environment,
 }
 
 impl ShadowTechnique {
@@ -73,12 +88,18 @@ impl ShadowTechnique {
             Self::Volumes => Technique::Volumes.name(),
             Self::Shafts => Technique::Shafts.name(),
             Self::Both => "volumes and shafts",
+            Self::Environment => Technique::Environment.name(),
         }
     }
 
-    /// Whether a probe's light is worked out for it.
+    /// Whether a room's light is worked out for it.
     pub fn has_shafts(self) -> bool {
-        self != Self::Volumes
+        matches!(self, Self::Shafts | Self::Both)
+    }
+
+    /// Whether lights of the probe are drawn beside its rest.
+    pub fn has_compact_and_broad(self) -> bool {
+        matches!(self, Self::Both | Self::Environment)
     }
 }
 
@@ -113,6 +134,8 @@ settings! {
     besides {
         /// What technique shafts alone is asked for.
         shafts: ShaftSettings => ShaftSettings::default();
+        /// What technique environment is asked for.
+        environment: EnvironmentSettings => EnvironmentSettings::default();
         /// Shortcuts that technique volumes is not to take; no key of a scene file.
         without: Shortcuts => Shortcuts::NONE;
     }
@@ -141,6 +164,29 @@ settings! {
         difference: Difference => Difference::Ratio;
     }
 }
+
+settings! {
+    /// How finely an environment makes soft shadows.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct EnvironmentSettings, ENVIRONMENT: EnvironmentKeys;
+
+    /// How shadows are made of what the regions see.
+    method: EnvironmentMethod => Is(EnvironmentMethod::Penumbrae);
+    /// Regions that the probe's broad light is cut into, each with a shadow of its own (q of Tamura et al. 2005).
+    regions: u32, Whole::between(1, 256) => Is(32);
+    /// Side of the map of a thing as a region sees it, pixels.
+    map_px: u32, Whole::one_of("side of maps", &[16, 32, 64, 128, 256, 512]) => Is(128);
+}
+
+/// `[environment]`.
+pub static ENVIRONMENT_SECTION: Section = Section {
+    name: "environment",
+    says: "How technique environment makes soft shadows. docs/environment.md compares the ways.",
+    times: Times::UpToOnce,
+    groups: &[EnvironmentKeys::ALL],
+    shown: &[],
+    is_aside: false,
+};
 
 keys! {
     /// The two keys that are one setting, [`ShaftSettings::difference`].
@@ -240,8 +286,15 @@ impl ShadowChange {
 
 /// Reads it.
 pub fn shadows(root: &Table, probe: Option<&ProbeScene>) -> Result<ShadowSettings, SceneError> {
+    let environment = match ENVIRONMENT_SECTION.table(root)? {
+        Some(table) => EnvironmentSettings::read(&table, &EnvironmentSettings::default())?,
+        None => EnvironmentSettings::default(),
+    };
     let Some(table) = SHADOWS_SECTION.table(root)? else {
-        return Ok(ShadowSettings::default());
+        return Ok(ShadowSettings {
+            environment,
+            ..ShadowSettings::default()
+        });
     };
     let quality = SHADOWS.quality.read(&table)?;
     let default = quality.map_or_else(ShadowSettings::default, Quality::shadows);
@@ -251,6 +304,7 @@ pub fn shadows(root: &Table, probe: Option<&ProbeScene>) -> Result<ShadowSetting
             difference: difference(&table)?,
             ..ShaftSettings::read(&table, &default.shafts)?
         },
+        environment,
         ..ShadowSettings::read(&table, &default)?
     })
 }
@@ -261,9 +315,9 @@ fn check_technique(table: &Table, probe: Option<&ProbeScene>) -> Result<(), Scen
         return Ok(());
     };
     match (value.text()?, probe) {
-        ("environment", _) => {
-            Err(value.error("this version does not render it; allowed: auto, volumes, shafts"))
-        }
+        ("environment", None) => Err(value.error(
+            "the scene has no [probe], which is the environment; allowed: auto, volumes",
+        )),
         ("shafts", None) => Err(value.error(
             "the scene has no [probe], which shafts take their light from; allowed: auto, volumes",
         )),
@@ -332,6 +386,7 @@ impl Scene {
             },
             Technique::Shafts => (ShadowTechnique::Shafts, "the scene asks for it"),
             Technique::Volumes => (ShadowTechnique::Volumes, "the scene asks for it"),
+            Technique::Environment => (ShadowTechnique::Environment, "the scene asks for it"),
         }
     }
 }

@@ -36,6 +36,19 @@ impl Object {
             })
     }
 
+    /// It as it hides light.
+    fn occluder(&self) -> Occluder<'_> {
+        let albedos = self.mean_albedos();
+        Occluder {
+            mesh: &self.mesh,
+            albedos: albedos.iter().map(|albedo| albedo.as_vec3()).collect(),
+            anchor: self.anchor,
+            anchor_from_object: self.anchor_from_object,
+            casts: self.casts,
+            visible: self.visible,
+        }
+    }
+
     /// Mean diffuse reflectance of a triangle: its material's, its picture's in its middle and halfway to its corners,
     /// and its corners' colours.
     ///
@@ -171,20 +184,13 @@ impl Scene {
         virtuals.filter_map(Object::bounds_in_anchor)
     }
 
-    /// The virtual things as they hide a room's light.
+    /// The virtual things as they hide light.
     pub fn occluders(&self) -> Vec<Occluder<'_>> {
-        let virtuals = self.virtuals.iter().map(|object| Occluder {
-            mesh: &object.mesh,
-            albedos: object
-                .mean_albedos()
-                .iter()
-                .map(|albedo| albedo.as_vec3())
-                .collect(),
-            anchor: object.anchor,
-            anchor_from_object: object.anchor_from_object,
-            casts: object.casts,
-            visible: object.visible,
-        });
-        virtuals.collect()
+        self.virtuals.iter().map(Object::occluder).collect()
+    }
+
+    /// The phantoms as they hide light.
+    pub fn real_occluders(&self) -> Vec<Occluder<'_>> {
+        self.phantoms.iter().map(Object::occluder).collect()
     }
 }

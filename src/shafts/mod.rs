@@ -12,7 +12,7 @@ pub mod hidden_light;
 pub mod hierarchy;
 pub mod intensity_transfers;
 pub mod irradiance_volume;
-mod light_of_room;
+pub mod light_of_room;
 pub mod patches;
 pub mod placed_probe;
 mod points;

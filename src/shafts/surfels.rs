@@ -222,7 +222,7 @@ pub fn open_directions(surfel: &Surfel, is_hidden: impl Fn(Vec3, Vec3) -> bool) 
 }
 
 /// Irradiance at a place from a disc that sends out radiance 1, nothing between them.
-fn from_disc(place: Vec3, normal: Vec3, surfel: &Surfel) -> f32 {
+pub fn from_disc(place: Vec3, normal: Vec3, surfel: &Surfel) -> f32 {
     let way = surfel.position - place;
     let distance_squared = way.length_squared();
     let direction = way * distance_squared.max(1e-12).sqrt().recip();

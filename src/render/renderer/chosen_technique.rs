@@ -4,6 +4,7 @@ use super::super::accumulated::Accumulated;
 use super::super::background::Background;
 use super::super::combined::Combined;
 use super::super::direct::Direct;
+use super::super::environment::Environment;
 use super::super::gpu::Gpu;
 use super::super::gpu_scene::GpuScene;
 use super::super::light_kind::LightKind;
@@ -24,7 +25,7 @@ pub(super) enum ChosenTechnique {
     Accumulated(Accumulated),
     /// A room's light.
     Shafts(Box<ShaftsAlone>),
-    /// A room's broad light, and compact lights.
+    /// Broad light of a room or an environment, and compact lights.
     Combined(Box<Combined>),
 }
 
@@ -50,12 +51,20 @@ impl ChosenTechnique {
                     _ => {
                         let (samples, first) = (scene.shadows.samples, First::DepthAlone);
                         let compact = Accumulated::new(gpu, background, samples, kinds, first);
-                        Self::Combined(Box::new(Combined::new(compact, shafts)))
+                        Self::Combined(Box::new(Combined::new(compact, Box::new(shafts))))
                     }
                 };
                 (technique, gpu_scene)
             }
-            // (No scene that was read has shafts without a probe.)
+            (ShadowTechnique::Environment, Some(probe)) => {
+                let mut gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Room);
+                let (samples, kinds) = (scene.shadows.samples, gpu_scene.kinds);
+                let broad = Environment::new(gpu, scene, probe, &mut gpu_scene);
+                let compact = Accumulated::new(gpu, background, samples, kinds, First::DepthAlone);
+                let combined = Combined::new(compact, Box::new(broad));
+                (Self::Combined(Box::new(combined)), gpu_scene)
+            }
+            // (No scene that was read has shafts or an environment without a probe.)
             (_, _) => {
                 let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Lights);
                 let (samples, kinds) = (scene.shadows.samples, gpu_scene.kinds);

@@ -22,13 +22,6 @@ pub(super) const REFLECTED_CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> =
         attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3],
     };
 
-/// Vertex layout of places alone.
-pub(super) const PLACE_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
-    array_stride: size_of::<Vec3>() as u64,
-    step_mode: wgpu::VertexStepMode::Vertex,
-    attributes: &wgpu::vertex_attr_array![0 => Float32x3],
-};
-
 /// Vertex layout of [`PatchCorner`].
 pub(super) const PATCH_CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> =
     wgpu::VertexBufferLayout {

@@ -4,12 +4,9 @@
 //! What depends on where things are in the world is worked out when they move, not when the camera does.
 
 pub(super) mod data;
-mod environment;
-mod maps;
 mod pipelines;
 
 use glam::{DAffine3, DVec3, Vec3};
-use wgpu::util::DeviceExt as _;
 
 use crate::geometry::bounds::Bounds;
 use crate::geometry::reach::{self, PixelRect};
@@ -27,10 +24,13 @@ use crate::shafts::surfels::{GroupedSurfels, interreflected_irradiance};
 use super::anchor_geometry::Role;
 use super::attachments::{cleared, depth_stencil};
 use super::background::Background;
+use super::combined::BroadLight;
 use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
 use super::gpu_scene::{DrawnLight, GpuScene};
 use super::light_sums::{BY_GAIN, CompositeShader, LightSums};
+use super::map_atlas::MapAtlas;
+use super::mirrored_probe::MirroredProbe;
 use super::passes::Passes;
 use super::screen_bounds::ScreenBounds;
 use super::shown::Shown;
@@ -38,8 +38,6 @@ use super::surfaces::SurfaceKinds;
 use super::technique::{FrameContext, TechniquePasses};
 use super::volumes::set_scissor;
 use data::ShaftFrame;
-use environment::Environment;
-use maps::Maps;
 use pipelines::{Pipelines, SHAFT_GROUP};
 
 /// The technique that shades all of a room's light by shafts.
@@ -56,7 +54,7 @@ pub(super) struct Shafts {
     settings: ShaftSettings,
     casters: ShaftCasters,
     pipelines: Pipelines,
-    maps: Maps,
+    maps: MapAtlas,
     /// Corners of all patches and their irradiance without virtual things, three each: the phantoms' and the table's first.
     places: wgpu::Buffer,
     place_count: u32,
@@ -66,7 +64,7 @@ pub(super) struct Shafts {
     moving_irradiance: Vec3,
     frame: wgpu::Buffer,
     sampler: wgpu::Sampler,
-    environment: Environment,
+    environment: MirroredProbe,
     /// Where the casters' anchors were when `hidden` was worked out.
     world_from_anchor: Vec<Option<DAffine3>>,
     hidden: Option<Hidden>,
@@ -127,10 +125,9 @@ impl Shafts {
             .then_some((parts.probe.probe.as_ref(), parts.probe.exposure));
         Self {
             pipelines: Pipelines::new(gpu, samples, kinds),
-            maps: Maps::new(gpu, tiling),
+            maps: MapAtlas::new(gpu, tiling, "shaft_maps.wgsl"),
             casters: ShaftCasters::new(&scene.occluders()),
-            places: buffer(
-                gpu,
+            places: gpu.buffer(
                 "patches",
                 bytemuck::cast_slice(&places),
                 wgpu::BufferUsages::VERTEX,
@@ -151,7 +148,7 @@ impl Shafts {
                 mipmap_filter: wgpu::MipmapFilterMode::Linear,
                 ..Default::default()
             }),
-            environment: Environment::new(device, &gpu.queue, environment),
+            environment: MirroredProbe::new(device, &gpu.queue, environment),
             world_from_anchor: Vec::new(),
             hidden: None,
             settings,
@@ -209,8 +206,8 @@ impl Shafts {
         };
         let hidden = HiddenLight::new(&self.room, placed, &options);
         self.maps.resize(&gpu.device, hidden.tiling);
-        let storage = |label, contents| buffer(gpu, label, contents, wgpu::BufferUsages::STORAGE);
-        let vertices = |label, contents| buffer(gpu, label, contents, wgpu::BufferUsages::VERTEX);
+        let storage = |label, contents| gpu.buffer(label, contents, wgpu::BufferUsages::STORAGE);
+        let vertices = |label, contents| gpu.buffer(label, contents, wgpu::BufferUsages::VERTEX);
         let receivers = &hidden.receivers;
         let sources = storage("sources", bytemuck::cast_slice(&hidden.sources));
         let buffers = [
@@ -259,14 +256,15 @@ impl Shafts {
             passes,
             &hidden.sources,
             hidden.source_count,
-            (&hidden.casters, hidden.caster_vertices),
+            &hidden.casters,
+            |_| 0..hidden.caster_vertices,
         );
         hidden.is_drawn = true;
     }
 
     /// Draws what is real into depth, what is virtual over it, and the light on both; where other lights are added to it, on
     /// all that is real.
-    pub fn draw_light(
+    fn draw_light(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         gpu_scene: &GpuScene,
@@ -319,8 +317,11 @@ impl Shafts {
         pass.draw(self.first_of_room..self.place_count, 0..1);
     }
 
-    /// Takes the places of virtual things. False where the room is another one.
-    pub fn follow(&mut self, scene: &Scene) -> bool {
+}
+
+impl BroadLight for Shafts {
+    /// False where the room is another one.
+    fn follow(&mut self, scene: &Scene) -> bool {
         let Some(probe) = &scene.probe else {
             return false;
         };
@@ -338,16 +339,36 @@ impl Shafts {
         true
     }
 
-    /// So many sources at most get a shadow from now on; `None`: all.
-    pub fn set_sources(&mut self, sources: Option<u32>) {
+    fn set_sources(&mut self, sources: Option<u32>) {
         self.settings.sources = sources;
         self.world_from_anchor.clear();
+    }
+
+    fn update(&mut self, gpu: &Gpu, gpu_scene: &GpuScene) -> Option<PixelRect> {
+        self.update(gpu, gpu_scene)
+    }
+
+    fn draw_maps(&mut self, gpu: &Gpu, passes: &mut Passes<'_>) {
+        self.draw_maps(gpu, passes);
+    }
+
+    fn draw_all_light(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        gpu_scene: &GpuScene,
+        within: PixelRect,
+    ) {
+        self.draw_light(pass, gpu_scene, within, Receivers::All);
+    }
+
+    fn draw_own_depth(&self, pass: &mut wgpu::RenderPass<'_>, gpu_scene: &GpuScene) {
+        self.draw_depth_of_room(pass, gpu_scene);
     }
 }
 
 /// The real surfaces whose light is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Receivers {
+enum Receivers {
     /// Those that may get a shadow of the room's light.
     Shadowed,
     /// All.
@@ -443,18 +464,4 @@ fn composite(difference: Difference) -> CompositeShader {
             flag: Some("ENCODED"),
         },
     }
-}
-
-/// A buffer of a content that may be empty, which no binding can be.
-fn buffer(gpu: &Gpu, label: &str, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
-    let contents = match contents.is_empty() {
-        true => &[0; 256],
-        false => contents,
-    };
-    gpu.device
-        .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some(label),
-            contents,
-            usage,
-        })
 }

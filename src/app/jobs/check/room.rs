@@ -3,11 +3,11 @@
 use crate::app::room_transport_cache;
 use crate::app::scene_warnings::counted;
 use crate::app::stopwatch::Stopwatch;
-use crate::scene::{ProbeLight, ProbeLightKind, ProbeScene, Scene, ShadowTechnique};
+use crate::scene::{ProbeLight, ProbeLightKind, ProbeScene, Scene};
 
 /// What stands out of the probe, and what it is taken for.
 fn compact_lines(scene: &Scene, probe: &ProbeScene) -> Vec<(&'static str, String)> {
-    if scene.chosen_technique().0 != ShadowTechnique::Both {
+    if !scene.chosen_technique().0.has_compact_and_broad() {
         return Vec::new();
     }
     let told = |found: ProbeLight| {

@@ -1,32 +1,42 @@
-//! The sources' shadow maps: a tile each in one atlas, averaged in coarser levels.
-//! Reads the casters' triangles and the sources. Writes the atlas.
+//! Maps of casters as lights see them: a tile each in one atlas, averaged in coarser levels.
+//! Reads the casters' triangles and how they are seen. Writes the atlas.
+
+use std::ops::Range;
+
+use glam::Vec3;
 
 use crate::shafts::shadow_atlas::Tiling;
 
-use super::super::attachments::cleared;
-use super::super::gpu::Gpu;
-use super::super::passes::Passes;
-use super::super::pipelines::{GroupLayout, PipelineDescription, overwritten, storage, texels};
-use super::super::stencil::depth_stencil_state;
-use super::data::PLACE_LAYOUT;
+use super::attachments::cleared;
+use super::gpu::Gpu;
+use super::passes::Passes;
+use super::pipelines::{GroupLayout, PipelineDescription, overwritten, storage, texels};
+use super::stencil::depth_stencil_state;
 
 /// Format of the maps: whether there is a caster, how far off, and that squared.
 const MAP_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-/// The sources, for those who draw their maps.
+/// How each tile sees the casters.
 const SOURCES_GROUP: GroupLayout = GroupLayout {
-    label: "shaft maps",
+    label: "maps",
     entries: &[storage(0, wgpu::ShaderStages::VERTEX)],
+};
+
+/// Vertex layout of places alone.
+const PLACE_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
+    array_stride: size_of::<Vec3>() as u64,
+    step_mode: wgpu::VertexStepMode::Vertex,
+    attributes: &wgpu::vertex_attr_array![0 => Float32x3],
 };
 
 /// The next finer level.
 const FINER_GROUP: GroupLayout = GroupLayout {
-    label: "shaft mips",
+    label: "map mips",
     entries: &[texels(0, false)],
 };
 
 /// The atlas, and how it is drawn.
-pub(super) struct Maps {
+pub(super) struct MapAtlas {
     tiling: Tiling,
     atlas: wgpu::Texture,
     depth: wgpu::TextureView,
@@ -35,8 +45,9 @@ pub(super) struct Maps {
     halve: wgpu::RenderPipeline,
 }
 
-impl Maps {
-    pub fn new(gpu: &Gpu, tiling: Tiling) -> Self {
+impl MapAtlas {
+    /// `shader` has `see` and `seen`: a caster's corner in the tile of an instance's number, and what is written there.
+    pub fn new(gpu: &Gpu, tiling: Tiling, shader: &'static str) -> Self {
         let (atlas, depth) = textures(&gpu.device, &tiling);
         Self {
             tiling,
@@ -44,7 +55,7 @@ impl Maps {
             atlas,
             depth,
             cast: gpu.pipeline(&PipelineDescription {
-                shader: "shaft_maps.wgsl",
+                shader,
                 vertex: "see",
                 fragment: "seen",
                 groups: vec![Some(SOURCES_GROUP)],
@@ -79,14 +90,15 @@ impl Maps {
         true
     }
 
-    /// Draws the casters' triangles as each of `count` sources sees them.
+    /// Draws into each of `count` tiles the casters' triangles that it sees, as a range of corners for each.
     pub fn draw(
         &self,
         gpu: &Gpu,
         passes: &mut Passes<'_>,
-        sources: &wgpu::Buffer,
+        seen_by: &wgpu::Buffer,
         count: u32,
-        casters: (&wgpu::Buffer, u32),
+        casters: &wgpu::Buffer,
+        seen: impl Fn(u32) -> Range<u32>,
     ) {
         let level = |level| {
             self.atlas.create_view(&wgpu::TextureViewDescriptor {
@@ -104,17 +116,17 @@ impl Maps {
             }),
             stencil_ops: None,
         };
-        let mut pass = passes.begin("shaft maps", None, &[cleared(&finest)], Some(depth));
-        let group = gpu.bind_group(&SOURCES_GROUP, [sources.as_entire_binding()]);
+        let mut pass = passes.begin("maps", None, &[cleared(&finest)], Some(depth));
+        let group = gpu.bind_group(&SOURCES_GROUP, [seen_by.as_entire_binding()]);
         pass.set_pipeline(&self.cast);
         pass.set_bind_group(0, &group, &[]);
-        pass.set_vertex_buffer(0, casters.0.slice(..));
+        pass.set_vertex_buffer(0, casters.slice(..));
         let side = self.tiling.tile_px;
         for index in 0..count {
             let [x, y] = self.tiling.corner_px(index);
             pass.set_viewport(x as f32, y as f32, side as f32, side as f32, 0.0, 1.0);
             pass.set_scissor_rect(x, y, side, side);
-            pass.draw(0..casters.1, index..index + 1);
+            pass.draw(seen(index), index..index + 1);
         }
         drop(pass);
         for coarser in 1..self.tiling.levels() {
@@ -122,7 +134,7 @@ impl Maps {
             let finer = wgpu::BindingResource::TextureView(&finer);
             let group = gpu.bind_group(&FINER_GROUP, [finer]);
             let target = level(coarser);
-            let mut pass = passes.begin("shaft mips", None, &[cleared(&target)], None);
+            let mut pass = passes.begin("map mips", None, &[cleared(&target)], None);
             pass.set_pipeline(&self.halve);
             pass.set_bind_group(0, &group, &[]);
             pass.draw(0..3, 0..1);
@@ -149,13 +161,13 @@ fn textures(device: &wgpu::Device, tiling: &Tiling) -> (wgpu::Texture, wgpu::Tex
         })
     };
     let atlas = texture(
-        "shaft maps",
+        "maps",
         MAP_FORMAT,
         tiling.levels(),
         wgpu::TextureUsages::TEXTURE_BINDING,
     );
     let depth = texture(
-        "shaft maps' depth",
+        "maps' depth",
         DEPTH_FORMAT,
         1,
         wgpu::TextureUsages::empty(),

@@ -7,12 +7,12 @@ use crate::light::prefiltered::{LEVELS, SHARPEST_PX, prefiltered};
 use crate::light::probe::Probe;
 
 /// The texture and how it is read: around in azimuth, to the poles in elevation.
-pub(super) struct Environment {
+pub(super) struct MirroredProbe {
     pub view: wgpu::TextureView,
     pub sampler: wgpu::Sampler,
 }
 
-impl Environment {
+impl MirroredProbe {
     /// Of a probe's radiance times `exposure`; a black pixel where nothing is glossy.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, glossy: Option<(&Probe, f32)>) -> Self {
         let (width, levels) = match glossy {

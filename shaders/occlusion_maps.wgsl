@@ -1,0 +1,24 @@
+// What each region of the environment sees of each thing: a tile of the atlas for each. Red: 1 where the thing is; green: how
+// far, in parts of its depth; blue: its square; all averaged in the coarser levels.
+//!include "occlusion_map.wgsl"
+
+@group(0) @binding(0) var<storage, read> maps: array<OcclusionMap>;
+
+struct Seen {
+    @builtin(position) clip: vec4f,
+    @location(0) depth: f32,
+}
+
+@vertex
+fn see(@location(0) point_in_anchor: vec3f, @builtin(instance_index) index: u32) -> Seen {
+    let map = maps[index];
+    let placed = map.tile_from_anchor * vec4f(point_in_anchor, 1.0);
+    let depth = placed.z / map.range_m;
+    // (Rounding may put the nearest and the farthest place a little beyond.)
+    return Seen(vec4f(2.0 * placed.x - 1.0, 1.0 - 2.0 * placed.y, clamp(depth, 0.0, 1.0), 1.0), depth);
+}
+
+@fragment
+fn seen(seen: Seen) -> @location(0) vec4f {
+    return vec4f(1.0, seen.depth, seen.depth * seen.depth, 0.0);
+}

@@ -1,0 +1,49 @@
+//! A probe's light as it comes from afar: as regions, whose shadows are drawn, and as harmonics, for what a thing hides from itself.
+
+use glam::DVec3;
+
+use crate::light::harmonics::{basis, count};
+use crate::light::probe::Probe;
+use crate::light::regions::{Region, regions};
+
+use super::self_occlusion::TRANSFER_DEGREE;
+
+/// Light from all directions, the same everywhere.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DistantLight {
+    /// Its parts, each as a light from one direction (the W of Tamura et al. 2005, section 4.2.1), linear radiance up to the
+    /// camera's exposure.
+    pub regions: Vec<Region>,
+    /// Coefficients of its radiance, world space (L of their equation 2).
+    pub harmonics: Vec<DVec3>,
+}
+
+impl DistantLight {
+    /// Of a probe's radiance times `exposure`, in `count` regions.
+    pub fn new(probe: &Probe, exposure: f64, count_of_regions: usize) -> Self {
+        let regions = regions(probe, count_of_regions);
+        let exposed = |region: Region| Region {
+            irradiance: region.irradiance * exposure,
+            ..region
+        };
+        Self {
+            regions: regions.into_iter().map(exposed).collect(),
+            harmonics: harmonics(probe, exposure),
+        }
+    }
+}
+
+/// The integral of radiance times each harmonic.
+fn harmonics(probe: &Probe, exposure: f64) -> Vec<DVec3> {
+    let [width, _] = probe.size_px();
+    let mut sums = vec![DVec3::ZERO; count(TRANSFER_DEGREE)];
+    for (index, pixel) in probe.pixels().iter().enumerate() {
+        let (column, row) = ((index % width) as f64 + 0.5, index / width);
+        let light = pixel.as_dvec3() * (exposure * probe.pixel_solid_angle(row));
+        let direction = probe.direction(column, row as f64 + 0.5);
+        for (sum, value) in sums.iter_mut().zip(basis(direction, TRANSFER_DEGREE)) {
+            *sum += light * value;
+        }
+    }
+    sums
+}

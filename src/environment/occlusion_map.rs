@@ -1,0 +1,90 @@
+//! Maps of what a thing hides of the light of a region (Tamura et al. 2005, section 4.2.2), as values: which tile of an atlas each
+//! has, and how the region looks at the thing.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{Mat4, Vec2, Vec3, Vec4};
+
+use crate::light::regions::Region;
+use crate::shafts::shadow_atlas::Tiling;
+
+use super::placed::PlacedThing;
+
+/// Penumbras reach at most this many times a thing's size beyond its outline in a map.
+const WIDEST_MARGIN: f32 = 2.0;
+
+/// A thing's map for a region, as the shaders read it: the twin of `OcclusionMap` in occlusion_map.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub struct OcclusionMap {
+    /// World to (u, v, depth, 1): u and v run from 0 to 1 over the tile, depth from 0 where the thing begins, metres away from
+    /// the light.
+    pub tile_from_world: Mat4,
+    /// The same from the thing's anchor.
+    pub tile_from_anchor: Mat4,
+    /// Where the tile begins, in parts of the atlas.
+    pub tile_corner: Vec2,
+    /// Its side, in parts of the atlas.
+    pub tile_side: Vec2,
+    /// Texels of a metre.
+    pub texels_per_m: f32,
+    /// How deep the thing is, metres.
+    pub range_m: f32,
+    /// Side of the tile, texels.
+    pub tile_px: f32,
+    /// Number of the thing.
+    pub thing: u32,
+}
+
+impl OcclusionMap {
+    /// Of a thing that is nowhere.
+    pub const NOWHERE: Self = Self {
+        tile_from_world: Mat4::ZERO,
+        tile_from_anchor: Mat4::ZERO,
+        tile_corner: Vec2::ZERO,
+        tile_side: Vec2::ZERO,
+        texels_per_m: 0.0,
+        range_m: 0.0,
+        tile_px: 1.0,
+        thing: u32::MAX,
+    };
+
+    /// Of a thing and a region, in the tile of a number; `reach_m` is how far behind the thing receivers can be.
+    pub fn new(
+        placed: &PlacedThing<'_>,
+        region: &Region,
+        reach_m: f32,
+        (tiling, index): (&Tiling, u32),
+        thing: u32,
+    ) -> Self {
+        let ball = &placed.thing.ball;
+        let center = placed.world_from_anchor.transform_point3(ball.center);
+        let radius = ball.radius.max(1e-6);
+        let along = -region.toward.as_vec3();
+        let (right, down) = along.any_orthonormal_pair();
+        let margin = region.width() as f32 * reach_m;
+        let half = radius + margin.min(WIDEST_MARGIN * radius);
+        let row = |direction: Vec3, scale: f32, offset: f32| {
+            (direction * scale).extend(offset - direction.dot(center) * scale)
+        };
+        let tile_from_world = Mat4::from_cols(
+            row(right, 0.5 / half, 0.5),
+            row(down, 0.5 / half, 0.5),
+            row(along, 1.0, radius),
+            Vec4::W,
+        )
+        .transpose();
+        let [width, height] = tiling.size_px().map(|side| side as f32);
+        let [x, y] = tiling.corner_px(index).map(|place| place as f32);
+        let side = tiling.tile_px as f32;
+        Self {
+            tile_from_anchor: tile_from_world * Mat4::from(placed.world_from_anchor),
+            tile_from_world,
+            tile_corner: Vec2::new(x / width, y / height),
+            tile_side: Vec2::new(side / width, side / height),
+            texels_per_m: side / (2.0 * half),
+            range_m: 2.0 * radius,
+            tile_px: side,
+            thing,
+        }
+    }
+}

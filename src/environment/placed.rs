@@ -1,0 +1,219 @@
+//! Things where they are in a frame, and the light on them.
+
+use std::f32::consts::FRAC_1_PI;
+
+use glam::{Affine3, DVec3, Vec3};
+
+use crate::geometry::bounds::Bounds;
+use crate::light::regions::Region;
+use crate::light::{Light, irradiance};
+
+use super::distant_light::DistantLight;
+use super::thing::Thing;
+
+/// Rays start so far off a surface, metres: past the rounding of a simplified thing.
+pub const OFFSET_M: f32 = 1e-4;
+/// Of so many regions a place that reflects light is asked whether it sees them; places beside each other ask others.
+const ASKED_REGIONS: usize = 4;
+
+/// A thing in the world.
+pub struct PlacedThing<'a> {
+    /// It.
+    pub thing: &'a Thing,
+    /// Its pose.
+    pub world_from_anchor: Affine3,
+    /// The inverse.
+    pub anchor_from_world: Affine3,
+}
+
+/// The things that hide light.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Among {
+    /// Phantoms alone: as it is in the video.
+    Real,
+    /// Virtual ones too.
+    All,
+}
+
+/// What a ray meets.
+#[derive(Debug, Clone, Copy)]
+pub struct SeenSurface {
+    /// Number of the thing.
+    pub thing: usize,
+    /// In the world.
+    pub place: Vec3,
+    /// Unit length, on the side that is seen.
+    pub normal: Vec3,
+    /// Diffuse reflectance.
+    pub albedo: Vec3,
+}
+
+/// All things where they are, and what shines on them.
+pub struct PlacedScene<'a> {
+    /// Those whose anchors have a pose.
+    pub things: Vec<PlacedThing<'a>>,
+    /// Broad light.
+    pub distant: &'a DistantLight,
+    /// Compact lights, in the world.
+    pub compact: &'a [Light],
+}
+
+impl PlacedThing<'_> {
+    /// A box around it, in the world.
+    pub fn bounds(&self) -> Bounds {
+        let corners = self.thing.bounds.corners();
+        let placed = corners.map(|corner| self.world_from_anchor.transform_point3(corner.as_vec3()).as_dvec3());
+        Bounds {
+            low: placed.into_iter().fold(DVec3::MAX, DVec3::min),
+            high: placed.into_iter().fold(DVec3::MIN, DVec3::max),
+        }
+    }
+
+    fn first_hit(&self, origin: Vec3, direction: Vec3, reach: f32) -> Option<(usize, f32)> {
+        let origin = self.anchor_from_world.transform_point3(origin);
+        let direction = self.anchor_from_world.transform_vector3(direction);
+        let hit = self.thing.caster.first_hit(origin, direction, reach)?;
+        Some((hit.triangle, hit.distance))
+    }
+
+    /// Whether it hides what lies `reach` along a direction.
+    pub fn hides(&self, origin: Vec3, direction: Vec3, reach: f32) -> bool {
+        let origin = self.anchor_from_world.transform_point3(origin);
+        let direction = self.anchor_from_world.transform_vector3(direction);
+        self.thing.caster.is_hidden(origin, direction, reach)
+    }
+}
+
+impl PlacedScene<'_> {
+    /// How far behind a caster what casts shadows and catches them can be: across all casters.
+    pub fn reach_m(&self) -> f32 {
+        let casting = self.things.iter().filter(|placed| placed.thing.casts);
+        let boxes = casting.map(PlacedThing::bounds);
+        let around = boxes.reduce(|one, other| Bounds {
+            low: one.low.min(other.low),
+            high: one.high.max(other.high),
+        });
+        around.map_or(0.0, |around| (around.high - around.low).length() as f32)
+    }
+
+    /// For each of `count` things, numbered by `numbers`, and region 1 where what throws no shadow, as the table, leaves it open from the
+    /// thing's middle.
+    pub fn open_regions(&self, numbers: &[usize], count: usize) -> Vec<u32> {
+        let regions = &self.distant.regions;
+        let mut open = vec![1; count * regions.len()];
+        for (index, &number) in numbers.iter().enumerate() {
+            let own = &self.things[index];
+            let middle = own.world_from_anchor.transform_point3(own.thing.ball.center);
+            let row = &mut open[number * regions.len()..(number + 1) * regions.len()];
+            for (open, region) in row.iter_mut().zip(regions) {
+                let toward = region.toward.as_vec3();
+                // (A sheet of paper on it does not hide the sky from all of a table.)
+                let counts = |thing: &Thing| {
+                    !thing.casts && thing.ball.radius > own.thing.ball.radius
+                };
+                *open = u32::from(self.seen(middle, toward, counts).is_none());
+            }
+        }
+        open
+    }
+
+    /// What a ray of unit direction meets first of the things that `counts` says yes of.
+    pub fn seen(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        counts: impl Fn(&Thing) -> bool,
+    ) -> Option<SeenSurface> {
+        let mut nearest: Option<(usize, usize, f32)> = None;
+        for (index, placed) in self.things.iter().enumerate() {
+            if !counts(placed.thing) {
+                continue;
+            }
+            let reach = nearest.map_or(f32::INFINITY, |(_, _, distance)| distance);
+            if let Some((triangle, distance)) = placed.first_hit(origin, direction, reach) {
+                nearest = Some((index, triangle, distance));
+            }
+        }
+        let (index, triangle, distance) = nearest?;
+        let placed = &self.things[index];
+        let [a, b, c] = placed.thing.triangles[triangle];
+        let outward = placed
+            .world_from_anchor
+            .transform_vector3((b - a).cross(c - a));
+        let normal = outward.normalize_or_zero();
+        Some(SeenSurface {
+            thing: index,
+            place: origin + direction * distance,
+            normal: match outward.dot(direction) > 0.0 {
+                true => -normal,
+                false => normal,
+            },
+            albedo: placed.thing.albedos[triangle],
+        })
+    }
+
+    /// Whether a thing that casts shadows hides what lies `reach` along a direction.
+    fn is_hidden(&self, among: Among, origin: Vec3, direction: Vec3, reach: f32) -> bool {
+        let mut casting = self.things.iter().filter(|placed| {
+            placed.thing.casts && (among == Among::All || placed.thing.is_real)
+        });
+        casting.any(|placed| placed.hides(origin, direction, reach))
+    }
+
+    /// Irradiance of a place past things: of compact lights and of all regions.
+    pub fn irradiance(&self, among: Among, place: Vec3, normal: Vec3) -> Vec3 {
+        let start = place + normal * OFFSET_M;
+        let regions = self.distant.regions.iter();
+        let broad: Vec3 = regions
+            .map(|region| self.of_region(among, start, normal, region))
+            .sum();
+        broad + self.of_compact(among, start, normal)
+    }
+
+    /// What a surface that a ray met reflects; `turn` is the ray's number, and says which regions are asked for.
+    pub fn radiance(&self, among: Among, seen: &SeenSurface, turn: usize) -> Vec3 {
+        let start = seen.place + seen.normal * OFFSET_M;
+        let regions = &self.distant.regions;
+        let asked = ASKED_REGIONS.min(regions.len());
+        let broad: Vec3 = (0..asked)
+            .map(|index| {
+                // Each asks for regions that lie far apart in their order, and rays beside each other for others.
+                let region = (turn * asked + index * regions.len() / asked) % regions.len();
+                self.of_region(among, start, seen.normal, &regions[region])
+            })
+            .sum();
+        let scale = regions.len() as f32 / asked.max(1) as f32;
+        let arriving = broad * scale + self.of_compact(among, start, seen.normal);
+        seen.albedo * arriving * FRAC_1_PI
+    }
+
+    fn of_region(
+        &self,
+        among: Among,
+        start: Vec3,
+        normal: Vec3,
+        region: &Region,
+    ) -> Vec3 {
+        let toward = region.toward.as_vec3();
+        let cosine = toward.dot(normal);
+        match cosine > 0.0 && !self.is_hidden(among, start, toward, f32::INFINITY) {
+            true => region.irradiance.as_vec3() * cosine,
+            false => Vec3::ZERO,
+        }
+    }
+
+    fn of_compact(&self, among: Among, start: Vec3, normal: Vec3) -> Vec3 {
+        let of_light = |light: &Light| {
+            let (way, reach) = match *light {
+                Light::Point { position_m, .. } => (position_m.as_vec3() - start, 1.0),
+                Light::Directional { direction, .. } => (-direction.as_vec3(), f32::INFINITY),
+            };
+            let arriving = irradiance(light, start.as_dvec3(), normal.as_dvec3());
+            match arriving == DVec3::ZERO || self.is_hidden(among, start, way, reach) {
+                true => Vec3::ZERO,
+                false => arriving.as_vec3(),
+            }
+        };
+        self.compact.iter().map(of_light).sum()
+    }
+}

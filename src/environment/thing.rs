@@ -1,0 +1,101 @@
+//! A thing as light from afar meets it: simplified, in its anchor's space.
+
+use glam::{DAffine3, Vec3};
+
+use crate::geometry::bounds::Bounds;
+use crate::geometry::levels::levels;
+use crate::geometry::ray_caster::RayCaster;
+use crate::shafts::bounding::Ball;
+use crate::shafts::casters::Occluder;
+use crate::shafts::surfels::{Surfel, surfels};
+
+/// The limit to how far outlines may move for fewer triangles, in parts of a thing's size.
+const COARSE_PART: f64 = 0.004;
+/// Discs that a thing's surface reflects light from.
+const SURFELS: usize = 256;
+
+/// A phantom or a virtual thing.
+pub struct Thing {
+    /// Whether it is a phantom.
+    pub is_real: bool,
+    /// Whether it takes light away from others.
+    pub casts: bool,
+    /// Number of its anchor.
+    pub anchor: usize,
+    /// Its triangles, in the anchor's space, metres.
+    pub triangles: Vec<[Vec3; 3]>,
+    /// Mean diffuse reflectance of each.
+    pub albedos: Vec<Vec3>,
+    /// Rays against them.
+    pub caster: RayCaster,
+    /// Around them.
+    pub ball: Ball,
+    /// Around them too.
+    pub bounds: Bounds,
+    /// Its surface as discs of one area; none where it casts no shadow: what a table reflects is known otherwise.
+    pub surfels: Vec<Surfel>,
+}
+
+impl Thing {
+    /// `None` where nothing of it is there.
+    pub fn new(thing: &Occluder<'_>, is_real: bool) -> Option<Self> {
+        if !thing.visible {
+            return None;
+        }
+        let shape = thing.mesh.without_looks();
+        let around = Bounds::around(shape.positions.iter().map(|place| place.as_dvec3()))?;
+        let error_m = COARSE_PART * (around.high - around.low).length();
+        let coarse_enough = levels(&shape)
+            .into_iter()
+            .rfind(|level| level.max_error_m <= error_m);
+        let mesh = coarse_enough.map_or(shape, |level| level.mesh);
+        let placed = |index: u32| {
+            let place = mesh.positions[index as usize].as_dvec3();
+            thing.anchor_from_object.transform_point3(place).as_vec3()
+        };
+        let triangles: Vec<[Vec3; 3]> = mesh
+            .triangles
+            .iter()
+            .map(|triangle| triangle.map(placed))
+            .collect();
+        let albedos: Vec<Vec3> = mesh
+            .triangle_materials
+            .iter()
+            .map(|&material| thing.albedos[material as usize])
+            .collect();
+        let corners = || triangles.iter().flatten();
+        let bounds = Bounds::around(corners().map(|corner| corner.as_dvec3()))?;
+        let center = ((bounds.low + bounds.high) / 2.0).as_vec3();
+        let radius = corners()
+            .map(|corner| corner.distance(center))
+            .fold(0.0, f32::max);
+        let with_albedo: Vec<([Vec3; 3], Vec3)> = triangles
+            .iter()
+            .copied()
+            .zip(albedos.iter().copied())
+            .collect();
+        Some(Self {
+            is_real,
+            casts: thing.casts,
+            anchor: thing.anchor,
+            caster: RayCaster::new(&triangles),
+            ball: Ball { center, radius },
+            bounds,
+            surfels: match thing.casts {
+                true => surfels(&with_albedo, SURFELS),
+                false => Vec::new(),
+            },
+            triangles,
+            albedos,
+        })
+    }
+
+    /// Where it is, given where its anchor is.
+    pub fn placed(&self, world_from_anchor: &DAffine3) -> super::placed::PlacedThing<'_> {
+        super::placed::PlacedThing {
+            thing: self,
+            world_from_anchor: world_from_anchor.as_affine3(),
+            anchor_from_world: world_from_anchor.inverse().as_affine3(),
+        }
+    }
+}

@@ -1,0 +1,414 @@
+//! An environment's broad light on things that move and turn (Tamura et al. 2005): what regions of it each thing hides, from maps.
+//! Reads the probe and poses. Writes the things' maps, and light sums.
+//!
+//! What depends on where things are in the world is worked out when they move, not when the camera does.
+
+mod data;
+mod pipelines;
+
+use glam::{DAffine3, DVec3, Vec3};
+
+use crate::environment::distant_light::DistantLight;
+use crate::environment::occlusion_map::OcclusionMap;
+use crate::environment::placed::PlacedScene;
+use crate::environment::reflected::DiscGroup;
+use crate::environment::self_occlusion::{SelfOcclusion, self_occlusions};
+use crate::environment::surroundings::LocalLight;
+use crate::environment::thing::Thing;
+use crate::geometry::bounds::Bounds;
+use crate::geometry::ray_caster::RayCaster;
+use crate::geometry::reach::{self, PixelRect};
+use crate::light::Light;
+use crate::scene::{Object, ProbeScene, Scene};
+use crate::shafts::shadow_atlas::Tiling;
+
+use super::anchor_geometry::Role;
+use super::combined::BroadLight;
+use super::gpu::Gpu;
+use super::gpu_scene::{DrawnLight, GpuScene};
+use super::indirect::points;
+use super::map_atlas::MapAtlas;
+use super::mirrored_probe::MirroredProbe;
+use super::passes::Passes;
+use data::{EnvironmentFrame, GpuDisc, GpuReceiver, GpuRegion, occlusion_corners};
+use pipelines::{ENVIRONMENT_GROUP, Pipelines};
+
+/// Rays start this part of a thing's size off its surface.
+const START_OFFSET: f64 = 1e-4;
+
+/// The broad light of a probe.
+pub(super) struct Environment {
+    distant: DistantLight,
+    /// By their numbers in the scene, phantoms first; `None`: not there.
+    things: Vec<Option<Thing>>,
+    /// Those that have maps, the real ones first.
+    casters: Vec<usize>,
+    /// Triangles of all casters, each in its anchor's space, and which are whose.
+    triangles: wgpu::Buffer,
+    ranges: Vec<std::ops::Range<u32>>,
+    /// For each batch what its corners hide from themselves.
+    occlusions: Vec<BatchOcclusion>,
+    pipelines: Pipelines,
+    tiling: Tiling,
+    atlas: MapAtlas,
+    frame: wgpu::Buffer,
+    sampler: wgpu::Sampler,
+    mirrored: MirroredProbe,
+    /// What `placed` was worked out for: where anchors are in the world, and the compact lights.
+    placed_for: Option<(Vec<Option<DAffine3>>, Vec<Light>)>,
+    placed: Option<Placed>,
+}
+
+/// A batch's corners as light from afar meets them.
+struct BatchOcclusion {
+    anchor: usize,
+    points: Vec<(DVec3, DVec3)>,
+    occlusions: Vec<SelfOcclusion>,
+    point_of_corner: Vec<usize>,
+    /// Number of each point's thing.
+    thing_of_point: Vec<usize>,
+}
+
+/// What depends on where things are.
+struct Placed {
+    maps: wgpu::Buffer,
+    group: wgpu::BindGroup,
+    disc_group_count: u32,
+    /// Boxes around all things, in the world.
+    bounds: Vec<Bounds>,
+    are_maps_drawn: bool,
+}
+
+impl Environment {
+    /// Works out what the things hide from themselves, which takes a while.
+    pub fn new(gpu: &Gpu, scene: &Scene, probe: &ProbeScene, gpu_scene: &mut GpuScene) -> Self {
+        let settings = scene.shadows.environment;
+        let rest = scene.split_light(probe).rest;
+        let distant = DistantLight::new(&rest, probe.exposure, settings.regions as usize);
+        let real = scene.real_occluders();
+        let virtuals = scene.occluders();
+        let things: Vec<Option<Thing>> = real
+            .iter()
+            .map(|thing| Thing::new(thing, true))
+            .chain(virtuals.iter().map(|thing| Thing::new(thing, false)))
+            .collect();
+        let casters: Vec<usize> = (0..things.len())
+            .filter(|&number| things[number].as_ref().is_some_and(|thing| thing.casts))
+            .collect();
+        let mut triangles: Vec<[Vec3; 3]> = Vec::new();
+        let ranges = casters.iter().filter_map(|&number| things[number].as_ref());
+        let ranges = ranges
+            .map(|thing| {
+                let first = 3 * triangles.len() as u32;
+                triangles.extend(&thing.triangles);
+                first..3 * triangles.len() as u32
+            })
+            .collect();
+        let objects: Vec<&Object> = scene.phantoms.iter().chain(&scene.virtuals).collect();
+        let occlusions = occlusions(&objects, gpu_scene);
+        let buffers: Vec<wgpu::Buffer> = gpu_scene
+            .corners()
+            .zip(&occlusions)
+            .map(|((_, _, corners), batch)| {
+                let visibility = |corner: usize| {
+                    batch.occlusions[batch.point_of_corner[corner]].visibility
+                };
+                let contents = occlusion_corners(&corners.thing_of, visibility);
+                gpu.buffer("self-occlusion", &contents, wgpu::BufferUsages::VERTEX)
+            })
+            .collect();
+        gpu_scene.set_occlusion(buffers.into_iter());
+        let count = casters.len() * distant.regions.len();
+        let largest_px = gpu.device.limits().max_texture_dimension_2d;
+        let tiling = Tiling::new(count, settings.map_px, largest_px);
+        let kinds = gpu_scene.kinds;
+        let glossy = kinds
+            .glossy
+            .then(|| (rest.as_ref(), probe.exposure as f32));
+        Self {
+            pipelines: Pipelines::new(gpu, scene.shadows.samples, kinds, settings.method),
+            atlas: MapAtlas::new(gpu, tiling, "occlusion_maps.wgsl"),
+            tiling,
+            triangles: gpu.buffer(
+                "environment's casters",
+                bytemuck::cast_slice(&triangles),
+                wgpu::BufferUsages::VERTEX,
+            ),
+            ranges,
+            frame: gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("environment"),
+                size: size_of::<EnvironmentFrame>() as u64,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }),
+            sampler: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("occlusion maps"),
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                mipmap_filter: wgpu::MipmapFilterMode::Linear,
+                ..Default::default()
+            }),
+            mirrored: MirroredProbe::new(&gpu.device, &gpu.queue, glossy),
+            distant,
+            things,
+            casters,
+            occlusions,
+            placed_for: None,
+            placed: None,
+        }
+    }
+
+    /// Works out what things hide and reflect where they are.
+    fn place(
+        &self,
+        gpu: &Gpu,
+        gpu_scene: &GpuScene,
+        world_from_anchor: &[Option<DAffine3>],
+        compact: &[Light],
+    ) -> Placed {
+        let mut numbers = Vec::new();
+        let mut scene = PlacedScene {
+            things: Vec::new(),
+            distant: &self.distant,
+            compact,
+        };
+        for (number, thing) in self.things.iter().enumerate() {
+            let Some(thing) = thing else { continue };
+            if let Some(pose) = &world_from_anchor[thing.anchor] {
+                numbers.push(number);
+                scene.things.push(thing.placed(pose));
+            }
+        }
+        let bounds: Vec<Bounds> = scene.things.iter().map(|placed| placed.bounds()).collect();
+        let discs = scene.reflecting();
+        let lit = self.light_of_corners(&scene, &numbers, &bounds, &discs, world_from_anchor);
+        for (number, irradiances) in lit.iter().enumerate() {
+            gpu_scene.write_indirect(&gpu.queue, number, irradiances);
+        }
+        let maps = self.maps(&scene, &numbers);
+        let storage = |label, contents| gpu.buffer(label, contents, wgpu::BufferUsages::STORAGE);
+        let maps = storage("occlusion maps", bytemuck::cast_slice(&maps));
+        let regions: Vec<GpuRegion> = self.distant.regions.iter().map(GpuRegion::new).collect();
+        let open = scene.open_regions(&numbers, self.things.len());
+        let harmonics = data::harmonics_of_regions(&self.distant.regions, world_from_anchor);
+        let receivers: Vec<GpuReceiver> = self
+            .things
+            .iter()
+            .map(|thing| GpuReceiver::new(thing.as_ref(), world_from_anchor, &self.distant))
+            .collect();
+        let buffers = [
+            storage("regions", bytemuck::cast_slice(&regions)),
+            storage("open regions", bytemuck::cast_slice(&open)),
+            storage("harmonics", bytemuck::cast_slice(&harmonics)),
+            storage("receivers", bytemuck::cast_slice(&receivers)),
+            storage("discs", bytemuck::cast_slice(&GpuDisc::of_groups(&discs))),
+        ];
+        let [regions, open, harmonics, receivers, lit] =
+            buffers.each_ref().map(|buffer| buffer.as_entire_binding());
+        let group = gpu.bind_group(
+            &ENVIRONMENT_GROUP,
+            [
+                self.frame.as_entire_binding(),
+                regions,
+                maps.as_entire_binding(),
+                open,
+                harmonics,
+                wgpu::BindingResource::TextureView(&self.atlas.view),
+                wgpu::BindingResource::Sampler(&self.sampler),
+                wgpu::BindingResource::TextureView(&self.mirrored.view),
+                wgpu::BindingResource::Sampler(&self.mirrored.sampler),
+                receivers,
+                lit,
+            ],
+        );
+        Placed {
+            maps,
+            group,
+            disc_group_count: discs.len() as u32,
+            bounds,
+            are_maps_drawn: false,
+        }
+    }
+
+    /// For each caster and region its map.
+    fn maps(&self, scene: &PlacedScene<'_>, numbers: &[usize]) -> Vec<OcclusionMap> {
+        let reach_m = scene.reach_m();
+        let mut maps = Vec::new();
+        for &caster in &self.casters {
+            let placed = numbers.iter().position(|&number| number == caster);
+            for region in &self.distant.regions {
+                let index = maps.len() as u32;
+                maps.push(match placed {
+                    Some(placed) => OcclusionMap::new(
+                        &scene.things[placed],
+                        region,
+                        reach_m,
+                        (&self.tiling, index),
+                        caster as u32,
+                    ),
+                    None => OcclusionMap::NOWHERE,
+                });
+            }
+        }
+        maps
+    }
+
+    /// For each batch the irradiance of its corners: on virtual things of all broad light that they do not hide from themselves,
+    /// on real ones of what others reflect.
+    fn light_of_corners(
+        &self,
+        scene: &PlacedScene<'_>,
+        numbers: &[usize],
+        bounds: &[Bounds],
+        discs: &[DiscGroup],
+        world_from_anchor: &[Option<DAffine3>],
+    ) -> Vec<Vec<Vec3>> {
+        let lights: Vec<LocalLight> = (0..numbers.len())
+            .map(|index| LocalLight::new(scene, bounds[index], index))
+            .collect();
+        let of_batch = |batch: &BatchOcclusion| {
+            let Some(pose) = &world_from_anchor[batch.anchor] else {
+                return vec![Vec3::ZERO; batch.point_of_corner.len()];
+            };
+            let lights: Vec<LocalLight> =
+                lights.iter().map(|light| light.seen_from(pose)).collect();
+            let points = batch.points.iter().zip(&batch.occlusions).zip(&batch.thing_of_point);
+            let of_point = |((point, occlusion), thing): ((&(DVec3, DVec3), &SelfOcclusion), &usize)| {
+                let Some(index) = numbers.iter().position(|number| number == thing) else {
+                    return Vec3::ZERO;
+                };
+                let place = pose.transform_point3(point.0);
+                let around = occlusion.irradiance(&lights[index].at(place));
+                let of_itself = match scene.things[index].thing.is_real {
+                    true => Vec3::ZERO,
+                    false => {
+                        let normal = pose.transform_vector3(point.1).as_vec3();
+                        let own = discs.iter().filter(|group| group.thing == index);
+                        own.map(|group| group.irradiance(place.as_vec3(), normal)).sum()
+                    }
+                };
+                around + of_itself
+            };
+            let at_points: Vec<Vec3> = points.map(of_point).collect();
+            let corners = batch.point_of_corner.iter();
+            corners.map(|&point| at_points[point]).collect()
+        };
+        self.occlusions.iter().map(of_batch).collect()
+    }
+}
+
+/// For each batch what its corners hide from themselves; `objects` by their numbers.
+fn occlusions(objects: &[&Object], gpu_scene: &GpuScene) -> Vec<BatchOcclusion> {
+    let casters: Vec<(RayCaster, f64)> = objects
+        .iter()
+        .map(|object| {
+            let positions = object.positions_in_anchor(&object.mesh);
+            let triangles = object.mesh.triangles.iter();
+            let corners: Vec<[Vec3; 3]> = triangles
+                .map(|triangle| triangle.map(|index| positions[index as usize]))
+                .collect();
+            let size_m = object
+                .bounds_in_anchor()
+                .map_or(0.0, |bounds| (bounds.high - bounds.low).length());
+            (RayCaster::new(&corners), size_m)
+        })
+        .collect();
+    let of_batch = |(_, anchor, corners): (Role, usize, &super::anchor_geometry::BatchCorners)| {
+        let (points, point_of_corner) = points(&corners.corners.0, &corners.corners.1);
+        let mut thing_of_point = vec![0; points.len()];
+        for (&point, &thing) in point_of_corner.iter().zip(&corners.thing_of) {
+            thing_of_point[point] = thing as usize;
+        }
+        let occlusions = self_occlusions(&points, |point| {
+            let (caster, size_m) = &casters[thing_of_point[point]];
+            (caster, size_m * START_OFFSET)
+        });
+        BatchOcclusion {
+            anchor,
+            points,
+            occlusions,
+            point_of_corner,
+            thing_of_point,
+        }
+    };
+    gpu_scene.corners().map(of_batch).collect()
+}
+
+impl BroadLight for Environment {
+    /// Things that are elsewhere on their anchors take a new renderer.
+    fn follow(&mut self, _scene: &Scene) -> bool {
+        false
+    }
+
+    fn update(&mut self, gpu: &Gpu, gpu_scene: &GpuScene) -> Option<PixelRect> {
+        let camera_from_anchor = gpu_scene.camera_from_anchor();
+        let camera_from_world = (*camera_from_anchor.first()?)?;
+        let world_from_camera = camera_from_world.inverse();
+        let mut world_from_anchor: Vec<Option<DAffine3>> = camera_from_anchor
+            .iter()
+            .map(|pose| pose.map(|camera_from_anchor| world_from_camera * camera_from_anchor))
+            .collect();
+        world_from_anchor[0] = Some(DAffine3::IDENTITY);
+        let placed_for = (world_from_anchor, gpu_scene.shining());
+        if self.placed_for.as_ref() != Some(&placed_for) {
+            let (anchors, compact) = &placed_for;
+            self.placed = Some(self.place(gpu, gpu_scene, anchors, compact));
+            self.placed_for = Some(placed_for);
+        }
+        let placed = self.placed.as_ref()?;
+        let is_real = |&&number: &&usize| {
+            self.things[number].as_ref().is_some_and(|thing| thing.is_real)
+        };
+        let frame = EnvironmentFrame {
+            world_from_camera: glam::DMat4::from(world_from_camera).as_mat4(),
+            region_count: self.distant.regions.len() as u32,
+            caster_count: self.casters.len() as u32,
+            real_caster_count: self.casters.iter().filter(is_real).count() as u32,
+            disc_group_count: placed.disc_group_count,
+        };
+        gpu.queue
+            .write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
+        let has_virtual = self.things.iter().flatten().any(|thing| !thing.is_real);
+        let covered = |bounds: &Bounds| {
+            reach::covered(&bounds.corners(), &camera_from_world, gpu_scene.intrinsics())
+        };
+        let pixels = placed.bounds.iter().map(covered);
+        let pixels = pixels.fold(PixelRect::NONE, PixelRect::union);
+        (has_virtual && !pixels.is_empty()).then_some(pixels)
+    }
+
+    fn draw_maps(&mut self, gpu: &Gpu, passes: &mut Passes<'_>) {
+        let Some(placed) = self.placed.as_mut().filter(|placed| !placed.are_maps_drawn) else {
+            return;
+        };
+        let regions = self.distant.regions.len();
+        self.atlas.draw(
+            gpu,
+            passes,
+            &placed.maps,
+            (self.casters.len() * regions) as u32,
+            &self.triangles,
+            |tile| self.ranges[tile as usize / regions].clone(),
+        );
+        placed.are_maps_drawn = true;
+    }
+
+    fn draw_all_light(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        gpu_scene: &GpuScene,
+        within: PixelRect,
+    ) {
+        let Some(placed) = &self.placed else {
+            return;
+        };
+        pass.set_bind_group(2, &placed.group, &[]);
+        let drawn = [
+            (&self.pipelines.light_on_real, Role::Real),
+            (&self.pipelines.light_on_virtual, Role::Virtual),
+        ];
+        for (pipelines, role) in drawn {
+            gpu_scene.draw_surfaces(pass, pipelines, role, DrawnLight::Whole(0), within);
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! How the environment's passes are built.
+
+use super::super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT, OCCLUSION_LAYOUT};
+use super::super::gpu::Gpu;
+use super::super::pipelines::{
+    GroupLayout, PipelineDescription, filtered, overwritten, sampler, storage, uniform,
+};
+use super::super::stencil::depth_stencil_state;
+use super::super::surfaces::{Sided, SurfaceKinds};
+use super::super::uniforms::GEOMETRY_GROUPS;
+use crate::scene::EnvironmentMethod;
+
+/// Group 2 of environment.wgsl.
+pub(super) const ENVIRONMENT_GROUP: GroupLayout = GroupLayout {
+    label: "environment",
+    entries: &[
+        uniform(0, wgpu::ShaderStages::FRAGMENT, false),
+        storage(1, wgpu::ShaderStages::FRAGMENT),
+        storage(2, wgpu::ShaderStages::FRAGMENT),
+        storage(3, wgpu::ShaderStages::FRAGMENT),
+        storage(4, wgpu::ShaderStages::FRAGMENT),
+        filtered(5),
+        sampler(6),
+        filtered(7),
+        sampler(8),
+        storage(9, wgpu::ShaderStages::FRAGMENT),
+        storage(10, wgpu::ShaderStages::FRAGMENT),
+    ],
+};
+
+/// The pipelines.
+pub(super) struct Pipelines {
+    /// Depth of real surfaces, the light that reaches them and what virtual things take of it.
+    pub light_on_real: Sided,
+    /// Depth of virtual surfaces, and their light.
+    pub light_on_virtual: Sided,
+}
+
+impl Pipelines {
+    pub fn new(gpu: &Gpu, samples: u32, kinds: SurfaceKinds, method: EnvironmentMethod) -> Self {
+        let format = gpu.light_format;
+        let described = |fragment| PipelineDescription {
+            shader: "environment.wgsl",
+            flags: vec!["OCCLUSION"],
+            vertex: "place_sampled",
+            fragment,
+            constants: vec![
+                ("GLOSSY", f64::from(kinds.glossy)),
+                ("MULTISAMPLED", f64::from(samples > 1)),
+                ("BY_PLANES", f64::from(method == EnvironmentMethod::Maps)),
+            ],
+            groups: [GEOMETRY_GROUPS[0], GEOMETRY_GROUPS[1], ENVIRONMENT_GROUP]
+                .map(Some)
+                .to_vec(),
+            vertex_buffers: vec![CORNER_LAYOUT, INDIRECT_LAYOUT],
+            targets: vec![overwritten(format), overwritten(format)],
+            depth_stencil: Some(depth_stencil_state(
+                gpu.depth_format,
+                true,
+                wgpu::CompareFunction::Greater,
+                wgpu::StencilState::default(),
+            )),
+            samples,
+            ..Default::default()
+        };
+        let with_occlusion = |mut description: PipelineDescription| {
+            description.vertex_buffers.push(OCCLUSION_LAYOUT);
+            Sided::new(gpu, &description)
+        };
+        Self {
+            light_on_real: with_occlusion(described("light_on_real")),
+            light_on_virtual: with_occlusion(kinds.of_virtual(described("light_on_virtual"))),
+        }
+    }
+}
