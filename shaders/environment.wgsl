@@ -11,7 +11,7 @@ struct EnvironmentFrame {
     // Things with maps: the real ones first.
     caster_count: u32,
     real_caster_count: u32,
-    disc_group_count: u32,
+    disc_count: u32,
 }
 
 struct Region {
@@ -44,8 +44,10 @@ struct Disc {
     open_high: u32,
     // What of it virtual things take, or give where it is less than nothing.
     lost: vec3f,
-    // Of a group.
+    // Of a group; 0 for a disc.
     radius: f32,
+    // Where it goes on after the group.
+    next: u32,
 }
 
 @group(2) @binding(0) var<uniform> frame: EnvironmentFrame;
@@ -59,15 +61,14 @@ struct Disc {
 @group(2) @binding(5) var atlas: texture_2d<f32>;
 @group(2) @binding(6) var atlas_sampler: sampler;
 @group(2) @binding(9) var<storage, read> receivers: array<Receiver>;
-// Each group, and then its discs.
+// A tree: each group, then what is in it.
 @group(2) @binding(10) var<storage, read> discs: array<Disc>;
 
 // Set when the shader is built: whether a thing's shadow on another is as wide as at the other's middle, as in the paper.
 override BY_PLANES: bool = false;
 // Least variance of depths in a map: a thing shades what touches it.
 const LEAST_SPREAD: f32 = 0.0004;
-// Discs of a group, which is seen as one from so many of its radii.
-const GROUP: u32 = 8u;
+// A group is seen as one disc from so many of its radii (reflected.rs).
 const SEEN_AS_ONE: f32 = 5.0;
 // Part of a pixel's light below which what is taken from it is left.
 const LEAST_TAKEN: f32 = 0.001;
@@ -75,31 +76,35 @@ const LEAST_TAKEN: f32 = 0.001;
 // Part of a region's light that a thing hides from a place of another, 0 to 1.
 fn hidden(caster: u32, index: u32, point_in_world: vec3f, receiver: u32) -> f32 {
     let number = caster * frame.region_count + index;
+    let point = vec4f(point_in_world, 1.0);
+    // (Most places lie beside most tiles.)
+    let u = dot(maps[number].tile_from_world[0], point);
+    if u < 0.0 || u > 1.0 {
+        return 0.0;
+    }
+    let v = dot(maps[number].tile_from_world[1], point);
+    if v < 0.0 || v > 1.0 || maps[number].thing == receiver {
+        return 0.0;
+    }
+    let in_tile = vec2f(u, v);
     let range_m = maps[number].range_m;
-    if range_m <= 0.0 || maps[number].thing == receiver {
-        return 0.0;
-    }
-    let placed = maps[number].tile_from_world * vec4f(point_in_world, 1.0);
-    if any(placed.xy < vec2f(0.0)) || any(placed.xy > vec2f(1.0)) {
-        return 0.0;
-    }
     if BY_PLANES {
         // Equations 5 and 6: between the planes through both middles.
-        let middle = (maps[number].tile_from_world * vec4f(receivers[receiver].center, 1.0)).z;
+        let middle = dot(maps[number].tile_from_world[2], vec4f(receivers[receiver].center, 1.0));
         let distance = middle - 0.5 * range_m;
         if distance <= 0.0 {
             return 0.0;
         }
         // (A box of this width has this deviation.)
-        return map_at(number, placed.xy, 0.2887 * regions[index].width * distance).x;
+        return map_at(number, in_tile, 0.2887 * regions[index].width * distance).x;
     }
-    let depth = placed.z;
+    let depth = dot(maps[number].tile_from_world[2], point);
     if depth <= 0.0 {
         return 0.0;
     }
     // As wide as the penumbra of the nearest part, then of what lies before the place on the average (Fernando 2005).
     let spread = regions[index].spread;
-    let around = map_at(number, placed.xy, spread * depth);
+    let around = map_at(number, in_tile, spread * depth);
     if around.x < 1e-3 {
         return 0.0;
     }
@@ -110,7 +115,7 @@ fn hidden(caster: u32, index: u32, point_in_world: vec3f, receiver: u32) -> f32 
     }
     // What lies before the place, as if all else lay at its depth (Yang et al. 2010).
     let blocker = max(mean - spread_of(around) / behind, 0.0);
-    let seen = map_at(number, placed.xy, spread * (depth - range_m * blocker));
+    let seen = map_at(number, in_tile, spread * (depth - range_m * blocker));
     let behind_seen = max(depth / range_m - seen.y / max(seen.x, 1e-3), 0.0);
     let squared = behind_seen * behind_seen;
     return seen.x * squared / (squared + spread_of(seen));
@@ -189,22 +194,21 @@ struct Reflected {
 // Irradiance from discs, and what virtual things take of it.
 fn reflected(point_in_world: vec3f, normal: vec3f) -> Reflected {
     var sums = Reflected(vec3f(0.0), vec3f(0.0));
-    for (var group = 0u; group < frame.disc_group_count; group++) {
-        let first = group * (1u + GROUP);
-        let way = discs[first].position - point_in_world;
-        let radius = discs[first].radius;
-        // (All of it lies behind the surface.)
-        if dot(normal, way) < -radius {
+    var index = 0u;
+    while index < frame.disc_count {
+        let way = discs[index].position - point_in_world;
+        let radius = discs[index].radius;
+        let is_behind = dot(normal, way) < -radius;
+        if !is_behind && dot(way, way) < SEEN_AS_ONE * SEEN_AS_ONE * radius * radius {
+            index++;
             continue;
         }
-        let is_near = dot(way, way) < SEEN_AS_ONE * SEEN_AS_ONE * radius * radius;
-        let begin = select(first, first + 1u, is_near);
-        let end = select(first + 1u, first + 1u + GROUP, is_near);
-        for (var index = begin; index < end; index++) {
+        if !is_behind {
             let part = from_disc(index, point_in_world, normal);
             sums.reaching += part * discs[index].without;
             sums.taken += part * discs[index].lost;
         }
+        index = discs[index].next;
     }
     return sums;
 }

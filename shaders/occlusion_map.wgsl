@@ -1,10 +1,10 @@
 // A thing's map for a region of the environment, and its tile in the atlas.
 
 struct OcclusionMap {
-    // World to (u, v, depth, 1): u and v from 0 to 1 over the tile, depth in metres from where the thing begins.
-    tile_from_world: mat4x4f,
+    // World to u, v and depth, a row each: u and v from 0 to 1 over the tile, depth in metres from where the thing begins.
+    tile_from_world: array<vec4f, 3>,
     // The same from the thing's anchor.
-    tile_from_anchor: mat4x4f,
+    tile_from_anchor: array<vec4f, 3>,
     // The tile in the atlas: its corner and its side, in parts of the atlas.
     tile_corner: vec2f,
     tile_side: vec2f,

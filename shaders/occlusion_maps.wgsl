@@ -12,7 +12,9 @@ struct Seen {
 @vertex
 fn see(@location(0) point_in_anchor: vec3f, @builtin(instance_index) index: u32) -> Seen {
     let map = maps[index];
-    let placed = map.tile_from_anchor * vec4f(point_in_anchor, 1.0);
+    let point = vec4f(point_in_anchor, 1.0);
+    let rows = map.tile_from_anchor;
+    let placed = vec3f(dot(rows[0], point), dot(rows[1], point), dot(rows[2], point));
     let depth = placed.z / map.range_m;
     // (Rounding may put the nearest and the farthest place a little beyond.)
     return Seen(vec4f(2.0 * placed.x - 1.0, 1.0 - 2.0 * placed.y, clamp(depth, 0.0, 1.0), 1.0), depth);

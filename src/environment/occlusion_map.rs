@@ -16,11 +16,11 @@ const WIDEST_MARGIN: f32 = 2.0;
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub struct OcclusionMap {
-    /// World to (u, v, depth, 1): u and v run from 0 to 1 over the tile, depth from 0 where the thing begins, metres away from
-    /// the light.
-    pub tile_from_world: Mat4,
+    /// World to u, v and depth, a row each: u and v run from 0 to 1 over the tile, depth from 0 where the thing begins, metres
+    /// away from the light.
+    pub tile_from_world: [Vec4; 3],
     /// The same from the thing's anchor.
-    pub tile_from_anchor: Mat4,
+    pub tile_from_anchor: [Vec4; 3],
     /// Where the tile begins, in parts of the atlas.
     pub tile_corner: Vec2,
     /// Its side, in parts of the atlas.
@@ -38,8 +38,9 @@ pub struct OcclusionMap {
 impl OcclusionMap {
     /// Of a thing that is nowhere.
     pub const NOWHERE: Self = Self {
-        tile_from_world: Mat4::ZERO,
-        tile_from_anchor: Mat4::ZERO,
+        // (Every place lies beside the tile.)
+        tile_from_world: [Vec4::NEG_W, Vec4::NEG_W, Vec4::ZERO],
+        tile_from_anchor: [Vec4::NEG_W, Vec4::NEG_W, Vec4::ZERO],
         tile_corner: Vec2::ZERO,
         tile_side: Vec2::ZERO,
         texels_per_m: 0.0,
@@ -66,18 +67,18 @@ impl OcclusionMap {
         let row = |direction: Vec3, scale: f32, offset: f32| {
             (direction * scale).extend(offset - direction.dot(center) * scale)
         };
-        let tile_from_world = Mat4::from_cols(
+        let tile_from_world = [
             row(right, 0.5 / half, 0.5),
             row(down, 0.5 / half, 0.5),
             row(along, 1.0, radius),
-            Vec4::W,
-        )
-        .transpose();
+        ];
+        // A row times a matrix is the transposed matrix times it.
+        let world_from_anchor = Mat4::from(placed.world_from_anchor).transpose();
         let [width, height] = tiling.size_px().map(|side| side as f32);
         let [x, y] = tiling.corner_px(index).map(|place| place as f32);
         let side = tiling.tile_px as f32;
         Self {
-            tile_from_anchor: tile_from_world * Mat4::from(placed.world_from_anchor),
+            tile_from_anchor: tile_from_world.map(|row| world_from_anchor * row),
             tile_from_world,
             tile_corner: Vec2::new(x / width, y / height),
             tile_side: Vec2::new(side / width, side / height),

@@ -11,8 +11,8 @@ use crate::shafts::surfels::{Surfel, from_disc, open_directions};
 
 use super::placed::{Among, OFFSET_M, PlacedScene, PlacedThing};
 
-/// Neighbours in a group.
-pub const GROUP: usize = 8;
+/// Parts that a group is cut into.
+const PARTS: usize = 4;
 /// Rays that gather what others reflect on to a disc.
 const RAYS: usize = 32;
 /// A group is seen as one disc from so many of its radii; environment.wgsl has the same number.
@@ -31,29 +31,36 @@ pub struct ReflectingDisc {
     pub with: Vec3,
 }
 
-/// Neighbours, and a disc that stands for all of them where they are seen from afar.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DiscGroup {
+/// A disc, or a group of neighbours with a disc that stands for all of them where they are seen from afar.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DiscNode {
     /// All as one.
     pub whole: ReflectingDisc,
-    /// Around its middle.
+    /// Around its middle; 0 for a disc.
     pub radius: f32,
-    /// Up to [`GROUP`] of them.
-    pub discs: Vec<ReflectingDisc>,
-    /// What they are on, its place among the scene's things.
+    /// Number of the node that comes after all that is in it.
+    pub next: u32,
+    /// What it is on, its place among the scene's things.
     pub thing: usize,
+}
+
+/// The discs of all things as trees: each group, then what is in it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct DiscTree {
+    /// The nodes.
+    pub nodes: Vec<DiscNode>,
 }
 
 impl PlacedScene<'_> {
     /// What casting things reflect of all light that reaches them, one bounce of it from others among it.
-    pub fn reflecting(&self) -> Vec<DiscGroup> {
-        let of_thing = |(thing, placed): (usize, &PlacedThing<'_>)| {
+    pub fn reflecting(&self) -> DiscTree {
+        let mut tree = DiscTree::default();
+        for (thing, placed) in self.things.iter().enumerate() {
             let surfels = placed.thing.surfels.par_iter();
-            let discs: Vec<ReflectingDisc> = surfels.map(|surfel| self.lit(placed, surfel)).collect();
-            let groups = discs.chunks(GROUP);
-            groups.map(|discs| DiscGroup::new(discs, thing)).collect::<Vec<_>>()
-        };
-        self.things.iter().enumerate().flat_map(of_thing).collect()
+            let lit = surfels.map(|surfel| self.lit(placed, surfel));
+            tree.add(&lit.collect::<Vec<_>>(), thing);
+        }
+        tree
     }
 
     fn lit(&self, placed: &PlacedThing<'_>, surfel: &Surfel) -> ReflectingDisc {
@@ -90,8 +97,56 @@ impl PlacedScene<'_> {
     }
 }
 
-impl DiscGroup {
-    fn new(discs: &[ReflectingDisc], thing: usize) -> Self {
+impl DiscTree {
+    /// Adds discs of a thing, of which neighbours lie beside each other in their order.
+    fn add(&mut self, discs: &[ReflectingDisc], thing: usize) {
+        match discs {
+            [] => {}
+            [one] => self.nodes.push(DiscNode {
+                whole: *one,
+                radius: 0.0,
+                next: self.nodes.len() as u32 + 1,
+                thing,
+            }),
+            several => {
+                let first = self.nodes.len();
+                self.nodes.push(DiscNode {
+                    thing,
+                    ..DiscNode::around(several)
+                });
+                for part in several.chunks(several.len().div_ceil(PARTS)) {
+                    self.add(part, thing);
+                }
+                self.nodes[first].next = self.nodes.len() as u32;
+            }
+        }
+    }
+
+    /// Irradiance, with virtual things there, of a place on a thing from its own discs that it faces and that face it, as those
+    /// of a hollow do.
+    pub fn irradiance_from_itself(&self, thing: usize, place: Vec3, normal: Vec3) -> Vec3 {
+        let mut sum = Vec3::ZERO;
+        let mut index = 0;
+        while let Some(node) = self.nodes.get(index) {
+            let disc = &node.whole;
+            let way = disc.surfel.position - place;
+            let is_near = way.length_squared() < (SEEN_AS_ONE * node.radius).powi(2);
+            match node.thing == thing && is_near {
+                true => index += 1,
+                false => {
+                    if node.thing == thing {
+                        sum += disc.with * from_disc(place, normal, &disc.surfel);
+                    }
+                    index = node.next as usize;
+                }
+            }
+        }
+        sum
+    }
+}
+
+impl DiscNode {
+    fn around(discs: &[ReflectingDisc]) -> Self {
         let area: f32 = discs.iter().map(|disc| disc.surfel.area).sum();
         let mean = |of: &dyn Fn(&ReflectingDisc) -> Vec3| {
             let sum: Vec3 = discs.iter().map(|disc| of(disc) * disc.surfel.area).sum();
@@ -117,21 +172,8 @@ impl DiscGroup {
                 with: mean(&|disc| disc.with),
             },
             radius: farthest + (area / discs.len().max(1) as f32 / PI).sqrt(),
-            discs: discs.to_vec(),
-            thing,
-        }
-    }
-
-    /// Irradiance, with virtual things there, of a place on the thing itself: from the discs that it faces and that face it, as those of
-    /// a hollow do.
-    pub fn irradiance(&self, place: Vec3, normal: Vec3) -> Vec3 {
-        let distance = place.distance(self.whole.surfel.position);
-        match distance > SEEN_AS_ONE * self.radius {
-            true => self.whole.with * from_disc(place, normal, &self.whole.surfel),
-            false => {
-                let discs = self.discs.iter();
-                discs.map(|disc| disc.with * from_disc(place, normal, &disc.surfel)).sum()
-            }
+            next: 0,
+            thing: 0,
         }
     }
 }

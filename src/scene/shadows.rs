@@ -173,7 +173,7 @@ settings! {
     /// How shadows are made of what the regions see.
     method: EnvironmentMethod => Is(EnvironmentMethod::Penumbrae);
     /// Regions that the probe's broad light is cut into, each with a shadow of its own (q of Tamura et al. 2005).
-    regions: u32, Whole::between(1, 256) => Is(32);
+    regions: u32, Whole::between(1, 256) => Is(64);
     /// Side of the map of a thing as a region sees it, pixels.
     map_px: u32, Whole::one_of("side of maps", &[16, 32, 64, 128, 256, 512]) => Is(128);
 }

@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, Mat4, Vec3};
 
 use crate::environment::distant_light::DistantLight;
-use crate::environment::reflected::{DiscGroup, GROUP, ReflectingDisc};
+use crate::environment::reflected::DiscNode;
 use crate::environment::self_occlusion::{VISIBILITIES, VISIBILITY_DEGREE};
 use crate::environment::thing::Thing;
 use crate::light::harmonics::basis;
@@ -18,7 +18,7 @@ pub(super) struct EnvironmentFrame {
     pub region_count: u32,
     pub caster_count: u32,
     pub real_caster_count: u32,
-    pub disc_group_count: u32,
+    pub disc_count: u32,
 }
 
 /// The twin of `Region`.
@@ -81,12 +81,15 @@ pub(super) struct GpuDisc {
     without: Vec3,
     open_high: u32,
     lost: Vec3,
-    /// Of a group; 0 for a disc.
     radius: f32,
+    next: u32,
+    padding: [u32; 3],
 }
 
 impl GpuDisc {
-    fn new(disc: &ReflectingDisc, radius: f32) -> Self {
+    /// Of a node of the tree of discs.
+    pub fn new(node: &DiscNode) -> Self {
+        let disc = &node.whole;
         Self {
             position: disc.surfel.position,
             area: disc.surfel.area,
@@ -95,21 +98,10 @@ impl GpuDisc {
             without: disc.without,
             open_high: (disc.open >> 32) as u32,
             lost: disc.without - disc.with,
-            radius,
+            radius: node.radius,
+            next: node.next,
+            padding: [0; 3],
         }
-    }
-
-    /// Each group, and after it its discs: as many for each, where there are fewer some without a size.
-    pub fn of_groups(groups: &[DiscGroup]) -> Vec<Self> {
-        let of_group = |group: &DiscGroup| {
-            let mut row = vec![Self::zeroed(); 1 + GROUP];
-            row[0] = Self::new(&group.whole, group.radius);
-            for (place, disc) in row[1..].iter_mut().zip(&group.discs) {
-                *place = Self::new(disc, 0.0);
-            }
-            row
-        };
-        groups.iter().flat_map(of_group).collect()
     }
 }
 

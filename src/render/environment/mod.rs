@@ -11,7 +11,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use crate::environment::distant_light::DistantLight;
 use crate::environment::occlusion_map::OcclusionMap;
 use crate::environment::placed::PlacedScene;
-use crate::environment::reflected::DiscGroup;
+use crate::environment::reflected::DiscTree;
 use crate::environment::self_occlusion::{SelfOcclusion, self_occlusions};
 use crate::environment::surroundings::LocalLight;
 use crate::environment::thing::Thing;
@@ -73,7 +73,7 @@ struct BatchOcclusion {
 struct Placed {
     maps: wgpu::Buffer,
     group: wgpu::BindGroup,
-    disc_group_count: u32,
+    disc_count: u32,
     /// Boxes around all things, in the world.
     bounds: Vec<Bounds>,
     are_maps_drawn: bool,
@@ -196,12 +196,13 @@ impl Environment {
             .iter()
             .map(|thing| GpuReceiver::new(thing.as_ref(), world_from_anchor, &self.distant))
             .collect();
+        let reflecting: Vec<GpuDisc> = discs.nodes.iter().map(GpuDisc::new).collect();
         let buffers = [
             storage("regions", bytemuck::cast_slice(&regions)),
             storage("open regions", bytemuck::cast_slice(&open)),
             storage("harmonics", bytemuck::cast_slice(&harmonics)),
             storage("receivers", bytemuck::cast_slice(&receivers)),
-            storage("discs", bytemuck::cast_slice(&GpuDisc::of_groups(&discs))),
+            storage("discs", bytemuck::cast_slice(&reflecting)),
         ];
         let [regions, open, harmonics, receivers, lit] =
             buffers.each_ref().map(|buffer| buffer.as_entire_binding());
@@ -224,7 +225,7 @@ impl Environment {
         Placed {
             maps,
             group,
-            disc_group_count: discs.len() as u32,
+            disc_count: discs.nodes.len() as u32,
             bounds,
             are_maps_drawn: false,
         }
@@ -260,7 +261,7 @@ impl Environment {
         scene: &PlacedScene<'_>,
         numbers: &[usize],
         bounds: &[Bounds],
-        discs: &[DiscGroup],
+        discs: &DiscTree,
         world_from_anchor: &[Option<DAffine3>],
     ) -> Vec<Vec<Vec3>> {
         let lights: Vec<LocalLight> = (0..numbers.len())
@@ -283,8 +284,7 @@ impl Environment {
                     true => Vec3::ZERO,
                     false => {
                         let normal = pose.transform_vector3(point.1).as_vec3();
-                        let own = discs.iter().filter(|group| group.thing == index);
-                        own.map(|group| group.irradiance(place.as_vec3(), normal)).sum()
+                        discs.irradiance_from_itself(index, place.as_vec3(), normal)
                     }
                 };
                 around + of_itself
@@ -364,7 +364,7 @@ impl BroadLight for Environment {
             region_count: self.distant.regions.len() as u32,
             caster_count: self.casters.len() as u32,
             real_caster_count: self.casters.iter().filter(is_real).count() as u32,
-            disc_group_count: placed.disc_group_count,
+            disc_count: placed.disc_count,
         };
         gpu.queue
             .write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
