@@ -2,7 +2,6 @@
 // hides of it from itself and what others hide.
 //!include "sampled_surface.wgsl"
 //!include "light_sums.wgsl"
-//!include "occlusion_map.wgsl"
 //!include "mirrored.wgsl"
 
 struct EnvironmentFrame {
@@ -25,86 +24,90 @@ struct Region {
     spread: f32,
 }
 
-struct Receiver {
-    // Middle of the thing, in the world.
-    center: vec3f,
-    // First of its anchor's rows in `harmonics`.
-    first_harmonics: u32,
-}
-
-// A disc that reflects light, or a group of them.
-struct Disc {
-    position: vec3f,
-    area: f32,
-    normal: vec3f,
-    // Bits of the cells of an octahedron's map of directions in which its thing does not hide it (surfels.rs).
-    open_low: u32,
-    // Radiance without virtual things.
-    without: vec3f,
-    open_high: u32,
-    // What of it virtual things take, or give where it is less than nothing.
-    lost: vec3f,
-    // Of a group; 0 for a disc.
-    radius: f32,
-    // Where it goes on after the group.
-    next: u32,
-}
-
+// The tables are textures of words (data.rs): Mesa's software driver reads a texel ten times as fast as it reads a storage
+// buffer at a place that it does not know to be the same for all pixels.
 @group(2) @binding(0) var<uniform> frame: EnvironmentFrame;
-@group(2) @binding(1) var<storage, read> regions: array<Region>;
-// For each caster as many as there are regions.
-@group(2) @binding(2) var<storage, read> maps: array<OcclusionMap>;
-// For each thing and region whether what throws no shadow (the table) leaves it open.
-@group(2) @binding(3) var<storage, read> open: array<u32>;
-// For each anchor and region the harmonics in its direction, four rows of four.
-@group(2) @binding(4) var<storage, read> harmonics: array<vec4f>;
+// Two texels for each region.
+@group(2) @binding(1) var region_table: texture_2d<u32>;
+// Five for each map, of which each caster has as many as there are regions.
+@group(2) @binding(2) var map_table: texture_2d<u32>;
+// For each thing one with its middle, and four for each region: the harmonics in its direction as the thing sees it, or nothing
+// where what throws no shadow (the table) hides it.
+@group(2) @binding(3) var receiver_table: texture_2d<u32>;
+// Five for each node of a tree: each group, then what is in it.
+@group(2) @binding(4) var disc_table: texture_2d<u32>;
 @group(2) @binding(5) var atlas: texture_2d<f32>;
 @group(2) @binding(6) var atlas_sampler: sampler;
-@group(2) @binding(9) var<storage, read> receivers: array<Receiver>;
-// A tree: each group, then what is in it.
-@group(2) @binding(10) var<storage, read> discs: array<Disc>;
+
+// Texels in a row of a table.
+const TABLE_WIDTH: u32 = 1024u;
+
+fn place_in_table(number: u32) -> vec2u {
+    return vec2u(number % TABLE_WIDTH, number / TABLE_WIDTH);
+}
+
+fn region(index: u32) -> Region {
+    let first = bitcast<vec4f>(textureLoad(region_table, place_in_table(2u * index), 0));
+    let second = bitcast<vec4f>(textureLoad(region_table, place_in_table(2u * index + 1u), 0));
+    return Region(first.xyz, first.w, second.xyz, second.w);
+}
+
+fn map_words(number: u32, part: u32) -> vec4u {
+    return textureLoad(map_table, place_in_table(5u * number + part), 0);
+}
+
+fn receiver_row(number: u32) -> vec4f {
+    return bitcast<vec4f>(textureLoad(receiver_table, place_in_table(number), 0));
+}
+
+fn disc_words(index: u32, part: u32) -> vec4u {
+    return textureLoad(disc_table, place_in_table(5u * index + part), 0);
+}
 
 // Set when the shader is built: whether a thing's shadow on another is as wide as at the other's middle, as in the paper.
 override BY_PLANES: bool = false;
 // Least variance of depths in a map: a thing shades what touches it.
 const LEAST_SPREAD: f32 = 0.0004;
 // A group is seen as one disc from so many of its radii (reflected.rs).
-const SEEN_AS_ONE: f32 = 5.0;
+const SEEN_AS_ONE: f32 = 4.0;
 // Part of a pixel's light below which what is taken from it is left.
 const LEAST_TAKEN: f32 = 0.001;
 
 // Part of a region's light that a thing hides from a place of another, 0 to 1.
-fn hidden(caster: u32, index: u32, point_in_world: vec3f, receiver: u32) -> f32 {
-    let number = caster * frame.region_count + index;
-    let point = vec4f(point_in_world, 1.0);
+fn hidden(number: u32, region: Region, point: vec4f, receiver: u32) -> f32 {
     // (Most places lie beside most tiles.)
-    let u = dot(maps[number].tile_from_world[0], point);
+    let u = dot(bitcast<vec4f>(map_words(number, 0u)), point);
     if u < 0.0 || u > 1.0 {
         return 0.0;
     }
-    let v = dot(maps[number].tile_from_world[1], point);
-    if v < 0.0 || v > 1.0 || maps[number].thing == receiver {
+    let v = dot(bitcast<vec4f>(map_words(number, 1u)), point);
+    if v < 0.0 || v > 1.0 {
         return 0.0;
     }
-    let in_tile = vec2f(u, v);
-    let range_m = maps[number].range_m;
+    let words = map_words(number, 4u);
+    if words.w == receiver {
+        return 0.0;
+    }
+    let depth_row = bitcast<vec4f>(map_words(number, 2u));
+    let sizes = bitcast<vec3f>(words.xyz);
+    let range_m = sizes.y;
+    let tile = MapTile(bitcast<vec4f>(map_words(number, 3u)), sizes.z, sizes.x, vec2f(u, v));
     if BY_PLANES {
         // Equations 5 and 6: between the planes through both middles.
-        let middle = dot(maps[number].tile_from_world[2], vec4f(receivers[receiver].center, 1.0));
-        let distance = middle - 0.5 * range_m;
+        let middle = receiver_row(receiver * (1u + 4u * frame.region_count)).xyz;
+        let distance = dot(depth_row, vec4f(middle, 1.0)) - 0.5 * range_m;
         if distance <= 0.0 {
             return 0.0;
         }
         // (A box of this width has this deviation.)
-        return map_at(number, in_tile, 0.2887 * regions[index].width * distance).x;
+        return map_at(tile, 0.2887 * region.width * distance).x;
     }
-    let depth = dot(maps[number].tile_from_world[2], point);
+    let depth = dot(depth_row, point);
     if depth <= 0.0 {
         return 0.0;
     }
     // As wide as the penumbra of the nearest part, then of what lies before the place on the average (Fernando 2005).
-    let spread = regions[index].spread;
-    let around = map_at(number, in_tile, spread * depth);
+    let around = map_at(tile, region.spread * depth);
     if around.x < 1e-3 {
         return 0.0;
     }
@@ -115,7 +118,7 @@ fn hidden(caster: u32, index: u32, point_in_world: vec3f, receiver: u32) -> f32 
     }
     // What lies before the place, as if all else lay at its depth (Yang et al. 2010).
     let blocker = max(mean - spread_of(around) / behind, 0.0);
-    let seen = map_at(number, in_tile, spread * (depth - range_m * blocker));
+    let seen = map_at(tile, region.spread * (depth - range_m * blocker));
     let behind_seen = max(depth / range_m - seen.y / max(seen.x, 1e-3), 0.0);
     let squared = behind_seen * behind_seen;
     return seen.x * squared / (squared + spread_of(seen));
@@ -127,31 +130,39 @@ fn spread_of(seen: vec3f) -> f32 {
     return max(seen.z / max(seen.x, 1e-3) - mean * mean, LEAST_SPREAD);
 }
 
+struct MapTile {
+    // Where it begins in the atlas, and its side there.
+    corner_side: vec4f,
+    // Texels along its side, and of a metre.
+    side_px: f32,
+    texels_per_m: f32,
+    place: vec2f,
+}
+
 // The map around a place, averaged over a deviation of so many metres.
-fn map_at(number: u32, in_tile: vec2f, spread_m: f32) -> vec3f {
-    let tile_px = maps[number].tile_px;
-    let level = clamp(log2(2.0 * spread_m * maps[number].texels_per_m), 0.0, log2(tile_px));
-    let margin = 0.5 * exp2(level) / tile_px;
-    let inside = clamp(in_tile, vec2f(margin), vec2f(1.0 - margin));
-    let place = maps[number].tile_corner + inside * maps[number].tile_side;
+fn map_at(tile: MapTile, spread_m: f32) -> vec3f {
+    let level = clamp(log2(2.0 * spread_m * tile.texels_per_m), 0.0, log2(tile.side_px));
+    let margin = 0.5 * exp2(level) / tile.side_px;
+    let inside = clamp(tile.place, vec2f(margin), vec2f(1.0 - margin));
+    let place = tile.corner_side.xy + inside * tile.corner_side.zw;
     return textureSampleLevel(atlas, atlas_sampler, place, level).xyz;
 }
 
 // Part of a region's light that a thing itself leaves to a place of it.
 fn self_visibility(sampled: SampledSurface, index: u32) -> f32 {
-    let row = receivers[sampled.thing].first_harmonics + 4u * index;
-    let sum = dot(sampled.visibility_0, harmonics[row])
-        + dot(sampled.visibility_1, harmonics[row + 1u])
-        + dot(sampled.visibility_2, harmonics[row + 2u])
-        + dot(sampled.visibility_3, harmonics[row + 3u]);
+    let row = sampled.thing * (1u + 4u * frame.region_count) + 1u + 4u * index;
+    let sum = dot(sampled.visibility_0, receiver_row(row))
+        + dot(sampled.visibility_1, receiver_row(row + 1u))
+        + dot(sampled.visibility_2, receiver_row(row + 2u))
+        + dot(sampled.visibility_3, receiver_row(row + 3u));
     return clamp(recovered(vec3f(sum), vec3f(1.0), sampled.one).x, 0.0, 1.0);
 }
 
 // What of a region's light the casters from one to another leave to a place.
-fn left_by(first: u32, end: u32, index: u32, point_in_world: vec3f, receiver: u32) -> f32 {
+fn left_by(first: u32, end: u32, index: u32, region: Region, point: vec4f, receiver: u32) -> f32 {
     var left = 1.0;
     for (var caster = first; caster < end; caster++) {
-        left *= 1.0 - hidden(caster, index, point_in_world, receiver);
+        left *= 1.0 - hidden(caster * frame.region_count + index, region, point, receiver);
     }
     return left;
 }
@@ -164,19 +175,21 @@ fn light_on_real(sampled: SampledSurface, @builtin(front_facing) outside: bool) 
     let normal = (frame.world_from_camera * vec4f(unit(surface.normal_in_camera) * side, 0.0)).xyz;
     var reaching = surface.indirect;
     var taken = vec3f(0.0);
-    let first_open = sampled.thing * frame.region_count;
+    let point = vec4f(point_in_world, 1.0);
     for (var index = 0u; index < frame.region_count; index++) {
-        let cosine = dot(normal, regions[index].toward);
-        if cosine <= 0.0 || open[first_open + index] == 0u {
+        let region = region(index);
+        let cosine = dot(normal, region.toward);
+        if cosine <= 0.0 {
             continue;
         }
-        var part = cosine * left_by(0u, frame.real_caster_count, index, point_in_world, sampled.thing);
-        if outside {
-            part *= self_visibility(sampled, index);
+        let by_itself = cosine * self_visibility(sampled, index);
+        if by_itself <= 0.0 {
+            continue;
         }
-        let arriving = regions[index].irradiance * part;
+        let part = by_itself * left_by(0u, frame.real_caster_count, index, region, point, sampled.thing);
+        let arriving = region.irradiance * part;
         reaching += arriving;
-        let left = left_by(frame.real_caster_count, frame.caster_count, index, point_in_world, sampled.thing);
+        let left = left_by(frame.real_caster_count, frame.caster_count, index, region, point, sampled.thing);
         taken += arriving * (1.0 - left);
     }
     let reflected = reflected(point_in_world, normal);
@@ -196,45 +209,47 @@ fn reflected(point_in_world: vec3f, normal: vec3f) -> Reflected {
     var sums = Reflected(vec3f(0.0), vec3f(0.0));
     var index = 0u;
     while index < frame.disc_count {
-        let way = discs[index].position - point_in_world;
-        let radius = discs[index].radius;
-        let is_behind = dot(normal, way) < -radius;
-        if !is_behind && dot(way, way) < SEEN_AS_ONE * SEEN_AS_ONE * radius * radius {
+        let first = bitcast<vec4f>(disc_words(index, 0u));
+        let last = disc_words(index, 4u);
+        let way = first.xyz - point_in_world;
+        let radius = bitcast<f32>(last.x);
+        let facing = dot(normal, way);
+        if facing >= -radius && dot(way, way) < SEEN_AS_ONE * SEEN_AS_ONE * radius * radius {
             index++;
             continue;
         }
-        if !is_behind {
-            let part = from_disc(index, point_in_world, normal);
-            sums.reaching += part * discs[index].without;
-            sums.taken += part * discs[index].lost;
+        if facing > 0.0 {
+            let part = from_disc(index, first.w, way, facing);
+            if part > 0.0 {
+                sums.reaching += part * bitcast<vec3f>(disc_words(index, 2u).xyz);
+                sums.taken += part * bitcast<vec3f>(disc_words(index, 3u).xyz);
+            }
         }
-        index = discs[index].next;
+        index = last.y;
     }
     return sums;
 }
 
-// Irradiance of a place for each unit of a disc's radiance.
-fn from_disc(index: u32, point_in_world: vec3f, normal: vec3f) -> f32 {
-    let way = discs[index].position - point_in_world;
-    let facing = dot(normal, way);
-    let leaving = -dot(discs[index].normal, way);
-    if facing <= 0.0 || leaving <= 0.0 || !is_open(index, -way) {
+// Irradiance of a place for each unit of a disc's radiance; `way` leads from the place to the disc.
+fn from_disc(index: u32, area: f32, way: vec3f, facing: f32) -> f32 {
+    let second = disc_words(index, 1u);
+    let leaving = -dot(bitcast<vec3f>(second.xyz), way);
+    if leaving <= 0.0 || !is_open(index, second.w, -way) {
         return 0.0;
     }
     let squared = dot(way, way);
-    let area = discs[index].area;
     return facing * leaving * area / (max(squared, 1e-12) * (squared + area / PI));
 }
 
 // Whether a disc's thing leaves a direction open.
-fn is_open(index: u32, direction: vec3f) -> bool {
+fn is_open(index: u32, open_low: u32, direction: vec3f) -> bool {
     let whole = abs(direction);
     let flat = direction.xy / max(whole.x + whole.y + whole.z, 1e-20);
     let sign = select(vec2f(-1.0), vec2f(1.0), direction.xy >= vec2f(0.0));
     let folded = select((1.0 - abs(flat.yx)) * sign, flat, direction.z >= 0.0);
     let cell = min(vec2u((folded * 0.5 + 0.5) * 8.0), vec2u(7u));
     let bit = cell.y * 8u + cell.x;
-    let bits = select(discs[index].open_high, discs[index].open_low, bit < 32u);
+    let bits = select(disc_words(index, 2u).w, open_low, bit < 32u);
     return (bits >> (bit & 31u) & 1u) == 1u;
 }
 
@@ -255,16 +270,17 @@ fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: boo
     var taken = vec3f(0.0);
     var whole_gloss = vec3f(1e-6);
     var taken_gloss = vec3f(0.0);
-    let first_open = sampled.thing * frame.region_count;
+    let point = vec4f(point_in_world, 1.0);
     for (var index = 0u; index < frame.region_count; index++) {
-        let toward = regions[index].toward;
+        let region = region(index);
+        let toward = region.toward;
         let cosine = dot(normal, toward);
-        if cosine <= 0.0 || open[first_open + index] == 0u {
+        if cosine <= 0.0 {
             continue;
         }
-        let arriving = regions[index].irradiance * (cosine * self_visibility(sampled, index));
-        let hidden = 1.0 - left_by(0u, frame.caster_count, index, point_in_world, sampled.thing);
-        let gloss = arriving * lobe(look.roughness, normal, toward, to_camera, regions[index].spread);
+        let arriving = region.irradiance * (cosine * self_visibility(sampled, index));
+        let hidden = 1.0 - left_by(0u, frame.caster_count, index, region, point, sampled.thing);
+        let gloss = arriving * lobe(look.roughness, normal, toward, to_camera, region.spread);
         whole += arriving;
         taken += arriving * hidden;
         whole_gloss += gloss;

@@ -12,7 +12,7 @@ use super::placed::PlacedThing;
 /// Penumbras reach at most this many times a thing's size beyond its outline in a map.
 const WIDEST_MARGIN: f32 = 2.0;
 
-/// A thing's map for a region, as the shaders read it: the twin of `OcclusionMap` in occlusion_map.wgsl.
+/// A thing's map for a region, as the shaders read it: the twin of `OcclusionMap` in occlusion_maps.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub struct OcclusionMap {

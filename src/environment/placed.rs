@@ -96,11 +96,11 @@ impl PlacedScene<'_> {
         around.map_or(0.0, |around| (around.high - around.low).length() as f32)
     }
 
-    /// For each of `count` things, numbered by `numbers`, and region 1 where what throws no shadow, as the table, leaves it open from the
+    /// For each of `count` things, numbered by `numbers`, and region whether what throws no shadow, as the table, leaves it open from the
     /// thing's middle.
-    pub fn open_regions(&self, numbers: &[usize], count: usize) -> Vec<u32> {
+    pub fn open_regions(&self, numbers: &[usize], count: usize) -> Vec<bool> {
         let regions = &self.distant.regions;
-        let mut open = vec![1; count * regions.len()];
+        let mut open = vec![true; count * regions.len()];
         for (index, &number) in numbers.iter().enumerate() {
             let own = &self.things[index];
             let middle = own.world_from_anchor.transform_point3(own.thing.ball.center);
@@ -111,7 +111,7 @@ impl PlacedScene<'_> {
                 let counts = |thing: &Thing| {
                     !thing.casts && thing.ball.radius > own.thing.ball.radius
                 };
-                *open = u32::from(self.seen(middle, toward, counts).is_none());
+                *open = self.seen(middle, toward, counts).is_none();
             }
         }
         open

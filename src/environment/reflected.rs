@@ -16,7 +16,7 @@ const PARTS: usize = 4;
 /// Rays that gather what others reflect on to a disc.
 const RAYS: usize = 32;
 /// A group is seen as one disc from so many of its radii; environment.wgsl has the same number.
-const SEEN_AS_ONE: f32 = 5.0;
+const SEEN_AS_ONE: f32 = 4.0;
 
 /// A disc that reflects light on to real surfaces.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -43,6 +43,16 @@ pub(super) const fn texels(binding: u32, multisampled: bool) -> wgpu::BindGroupL
     texture(binding, false, multisampled)
 }
 
+/// Entry of a texture of whole numbers that fragments read texel by texel.
+pub(super) const fn words(binding: u32) -> wgpu::BindGroupLayoutEntry {
+    let ty = wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Uint,
+        view_dimension: wgpu::TextureViewDimension::D2,
+        multisampled: false,
+    };
+    entry(binding, wgpu::ShaderStages::FRAGMENT, ty)
+}
+
 /// Entry of a texture that fragments read through a filtering sampler.
 pub(super) const fn filtered(binding: u32) -> wgpu::BindGroupLayoutEntry {
     texture(binding, true, false)

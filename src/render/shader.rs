@@ -11,7 +11,7 @@ macro_rules! files {
 }
 
 /// All files under `shaders/`.
-const FILES: [(&str, &str); 26] = files![
+const FILES: [(&str, &str); 25] = files![
     "area_lights.wgsl",
     "background.wgsl",
     "common.wgsl",
@@ -26,7 +26,6 @@ const FILES: [(&str, &str); 26] = files![
     "mapped_source.wgsl",
     "materials.wgsl",
     "mirrored.wgsl",
-    "occlusion_map.wgsl",
     "occlusion_maps.wgsl",
     "partly_covered.wgsl",
     "pixel_sums.wgsl",

@@ -1,14 +1,17 @@
 //! What the environment's shaders read.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DAffine3, Mat4, Vec3};
+use glam::{DAffine3, DVec4, Mat4, Vec3, Vec4};
+use wgpu::util::DeviceExt as _;
 
-use crate::environment::distant_light::DistantLight;
+use crate::environment::occlusion_map::OcclusionMap;
 use crate::environment::reflected::DiscNode;
 use crate::environment::self_occlusion::{VISIBILITIES, VISIBILITY_DEGREE};
 use crate::environment::thing::Thing;
 use crate::light::harmonics::basis;
 use crate::light::regions::Region;
+
+use super::super::gpu::Gpu;
 
 /// A frame's part of group 2: the twin of `EnvironmentFrame` in environment.wgsl.
 #[repr(C)]
@@ -21,105 +24,104 @@ pub(super) struct EnvironmentFrame {
     pub disc_count: u32,
 }
 
-/// The twin of `Region`.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(super) struct GpuRegion {
-    toward: Vec3,
-    width: f32,
-    irradiance: Vec3,
-    spread: f32,
+/// Texels in a row of a table: `TABLE_WIDTH` in environment.wgsl.
+const TABLE_WIDTH: usize = 1024;
+
+/// A texture of four words a texel, rows of [`TABLE_WIDTH`].
+pub(super) fn table(gpu: &Gpu, label: &str, texels: &[[u32; 4]]) -> wgpu::TextureView {
+    let rows = texels.len().div_ceil(TABLE_WIDTH).max(1);
+    let mut padded = texels.to_vec();
+    padded.resize(rows * TABLE_WIDTH, [0; 4]);
+    let texture = gpu.device.create_texture_with_data(
+        &gpu.queue,
+        &wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d {
+                width: TABLE_WIDTH as u32,
+                height: rows as u32,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba32Uint,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        },
+        wgpu::util::TextureDataOrder::LayerMajor,
+        bytemuck::cast_slice(&padded),
+    );
+    texture.create_view(&Default::default())
 }
 
-impl GpuRegion {
-    pub fn new(region: &Region) -> Self {
-        Self {
-            toward: region.toward.as_vec3(),
-            width: region.width() as f32,
-            irradiance: region.irradiance.as_vec3(),
-            spread: region.spread as f32,
-        }
-    }
+fn words(values: Vec4) -> [u32; 4] {
+    values.to_array().map(f32::to_bits)
 }
 
-/// The twin of `Receiver`.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(super) struct GpuReceiver {
-    center: Vec3,
-    first_harmonics: u32,
+/// A texel of three numbers and a word.
+fn with_word(values: Vec3, word: u32) -> [u32; 4] {
+    let [x, y, z] = values.to_array().map(f32::to_bits);
+    [x, y, z, word]
 }
 
-impl GpuReceiver {
-    /// Of a thing that may not be there.
-    pub fn new(
-        thing: Option<&Thing>,
-        world_from_anchor: &[Option<DAffine3>],
-        distant: &DistantLight,
-    ) -> Self {
-        let rows = (VISIBILITIES / 4 * distant.regions.len()) as u32;
-        let placed = thing.and_then(|thing| Some((thing, world_from_anchor[thing.anchor]?)));
-        let center = placed.map(|(thing, pose)| {
-            let center = thing.ball.center.as_dvec3();
-            pose.transform_point3(center).as_vec3()
-        });
-        Self {
-            center: center.unwrap_or_default(),
-            first_harmonics: thing.map_or(0, |thing| thing.anchor as u32 * rows),
-        }
-    }
+/// Two texels.
+pub(super) fn region_texels(region: &Region) -> [[u32; 4]; 2] {
+    [
+        words(region.toward.as_vec3().extend(region.width() as f32)),
+        words(region.irradiance.as_vec3().extend(region.spread as f32)),
+    ]
 }
 
-/// The twin of `Disc`.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(super) struct GpuDisc {
-    position: Vec3,
-    area: f32,
-    normal: Vec3,
-    open_low: u32,
-    without: Vec3,
-    open_high: u32,
-    lost: Vec3,
-    radius: f32,
-    next: u32,
-    padding: [u32; 3],
+/// Five texels.
+pub(super) fn map_texels(map: &OcclusionMap) -> [[u32; 4]; 5] {
+    let [u, v, depth] = map.tile_from_world.map(words);
+    let (corner, side) = (map.tile_corner, map.tile_side);
+    [
+        u,
+        v,
+        depth,
+        words(Vec4::new(corner.x, corner.y, side.x, side.y)),
+        with_word(
+            Vec3::new(map.texels_per_m, map.range_m, map.tile_px),
+            map.thing,
+        ),
+    ]
 }
 
-impl GpuDisc {
-    /// Of a node of the tree of discs.
-    pub fn new(node: &DiscNode) -> Self {
-        let disc = &node.whole;
-        Self {
-            position: disc.surfel.position,
-            area: disc.surfel.area,
-            normal: disc.surfel.normal,
-            open_low: disc.open as u32,
-            without: disc.without,
-            open_high: (disc.open >> 32) as u32,
-            lost: disc.without - disc.with,
-            radius: node.radius,
-            next: node.next,
-            padding: [0; 3],
-        }
-    }
+/// Five texels.
+pub(super) fn disc_texels(node: &DiscNode) -> [[u32; 4]; 5] {
+    let disc = &node.whole;
+    [
+        words(disc.surfel.position.extend(disc.surfel.area)),
+        with_word(disc.surfel.normal, disc.open as u32),
+        with_word(disc.without, (disc.open >> 32) as u32),
+        words((disc.without - disc.with).extend(0.0)),
+        [node.radius.to_bits(), node.next, 0, 0],
+    ]
 }
 
-/// For each anchor and region the harmonics in the region's direction, as the anchor sees it: turning a thing turns them.
-pub(super) fn harmonics_of_regions(
-    regions: &[Region],
+/// For a thing its middle, and for each region the harmonics in its direction as the thing's anchor sees it: turning the thing
+/// turns them. `open` says which regions the table leaves open.
+pub(super) fn receiver_texels(
+    thing: Option<&Thing>,
     world_from_anchor: &[Option<DAffine3>],
-) -> Vec<f32> {
-    let mut values = Vec::new();
-    for pose in world_from_anchor {
-        let turn = pose.map(|pose| pose.matrix3.transpose());
-        for region in regions {
-            let toward = turn.map_or(region.toward, |turn| (turn * region.toward).normalize());
-            let basis = basis(toward, VISIBILITY_DEGREE);
-            values.extend(basis.into_iter().map(|value| value as f32));
-        }
+    regions: &[Region],
+    open: &[bool],
+) -> Vec<[u32; 4]> {
+    let placed = thing.and_then(|thing| Some((thing, world_from_anchor[thing.anchor]?)));
+    let Some((thing, pose)) = placed else {
+        return vec![[0; 4]; 1 + VISIBILITIES / 4 * regions.len()];
+    };
+    let center = pose.transform_point3(thing.ball.center.as_dvec3());
+    let mut texels = vec![words(center.as_vec3().extend(0.0))];
+    let turn = pose.matrix3.transpose();
+    for (region, &is_open) in regions.iter().zip(open) {
+        let basis = basis((turn * region.toward).normalize(), VISIBILITY_DEGREE);
+        let scale = f64::from(u8::from(is_open));
+        let rows = basis.as_chunks::<4>().0.iter();
+        texels.extend(rows.map(|row| words(DVec4::from_array(*row).as_vec4() * scale as f32)));
     }
-    values
+    texels
 }
 
 /// The contents of a batch's buffer of self-occlusion.

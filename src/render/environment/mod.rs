@@ -30,7 +30,10 @@ use super::indirect::points;
 use super::map_atlas::MapAtlas;
 use super::mirrored_probe::MirroredProbe;
 use super::passes::Passes;
-use data::{EnvironmentFrame, GpuDisc, GpuReceiver, GpuRegion, occlusion_corners};
+use data::{
+    EnvironmentFrame, disc_texels, map_texels, occlusion_corners, receiver_texels, region_texels,
+    table,
+};
 use pipelines::{ENVIRONMENT_GROUP, Pipelines};
 
 /// Rays start this part of a thing's size off its surface.
@@ -186,41 +189,45 @@ impl Environment {
             gpu_scene.write_indirect(&gpu.queue, number, irradiances);
         }
         let maps = self.maps(&scene, &numbers);
-        let storage = |label, contents| gpu.buffer(label, contents, wgpu::BufferUsages::STORAGE);
-        let maps = storage("occlusion maps", bytemuck::cast_slice(&maps));
-        let regions: Vec<GpuRegion> = self.distant.regions.iter().map(GpuRegion::new).collect();
+        let regions = &self.distant.regions;
         let open = scene.open_regions(&numbers, self.things.len());
-        let harmonics = data::harmonics_of_regions(&self.distant.regions, world_from_anchor);
-        let receivers: Vec<GpuReceiver> = self
-            .things
-            .iter()
-            .map(|thing| GpuReceiver::new(thing.as_ref(), world_from_anchor, &self.distant))
+        let receivers = self.things.iter().zip(open.chunks(regions.len().max(1)));
+        let receivers: Vec<[u32; 4]> = receivers
+            .flat_map(|(thing, open)| {
+                receiver_texels(thing.as_ref(), world_from_anchor, regions, open)
+            })
             .collect();
-        let reflecting: Vec<GpuDisc> = discs.nodes.iter().map(GpuDisc::new).collect();
-        let buffers = [
-            storage("regions", bytemuck::cast_slice(&regions)),
-            storage("open regions", bytemuck::cast_slice(&open)),
-            storage("harmonics", bytemuck::cast_slice(&harmonics)),
-            storage("receivers", bytemuck::cast_slice(&receivers)),
-            storage("discs", bytemuck::cast_slice(&reflecting)),
+        let flat = |texels: Vec<[[u32; 4]; 5]>| texels.into_flattened();
+        let tables = [
+            table(
+                gpu,
+                "regions",
+                &regions.iter().flat_map(region_texels).collect::<Vec<_>>(),
+            ),
+            table(gpu, "maps", &flat(maps.iter().map(map_texels).collect())),
+            table(gpu, "receivers", &receivers),
+            table(
+                gpu,
+                "discs",
+                &flat(discs.nodes.iter().map(disc_texels).collect()),
+            ),
         ];
-        let [regions, open, harmonics, receivers, lit] =
-            buffers.each_ref().map(|buffer| buffer.as_entire_binding());
+        let maps = gpu.buffer(
+            "occlusion maps",
+            bytemuck::cast_slice(&maps),
+            wgpu::BufferUsages::STORAGE,
+        );
+        let tables = tables.iter().map(wgpu::BindingResource::TextureView);
+        let frame = [self.frame.as_entire_binding()];
+        let rest = [
+            wgpu::BindingResource::TextureView(&self.atlas.view),
+            wgpu::BindingResource::Sampler(&self.sampler),
+            wgpu::BindingResource::TextureView(&self.mirrored.view),
+            wgpu::BindingResource::Sampler(&self.mirrored.sampler),
+        ];
         let group = gpu.bind_group(
             &ENVIRONMENT_GROUP,
-            [
-                self.frame.as_entire_binding(),
-                regions,
-                maps.as_entire_binding(),
-                open,
-                harmonics,
-                wgpu::BindingResource::TextureView(&self.atlas.view),
-                wgpu::BindingResource::Sampler(&self.sampler),
-                wgpu::BindingResource::TextureView(&self.mirrored.view),
-                wgpu::BindingResource::Sampler(&self.mirrored.sampler),
-                receivers,
-                lit,
-            ],
+            frame.into_iter().chain(tables).chain(rest),
         );
         Placed {
             maps,

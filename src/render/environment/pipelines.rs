@@ -3,7 +3,7 @@
 use super::super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT, OCCLUSION_LAYOUT};
 use super::super::gpu::Gpu;
 use super::super::pipelines::{
-    GroupLayout, PipelineDescription, filtered, overwritten, sampler, storage, uniform,
+    GroupLayout, PipelineDescription, filtered, overwritten, sampler, uniform, words,
 };
 use super::super::stencil::depth_stencil_state;
 use super::super::surfaces::{Sided, SurfaceKinds};
@@ -15,16 +15,14 @@ pub(super) const ENVIRONMENT_GROUP: GroupLayout = GroupLayout {
     label: "environment",
     entries: &[
         uniform(0, wgpu::ShaderStages::FRAGMENT, false),
-        storage(1, wgpu::ShaderStages::FRAGMENT),
-        storage(2, wgpu::ShaderStages::FRAGMENT),
-        storage(3, wgpu::ShaderStages::FRAGMENT),
-        storage(4, wgpu::ShaderStages::FRAGMENT),
+        words(1),
+        words(2),
+        words(3),
+        words(4),
         filtered(5),
         sampler(6),
         filtered(7),
         sampler(8),
-        storage(9, wgpu::ShaderStages::FRAGMENT),
-        storage(10, wgpu::ShaderStages::FRAGMENT),
     ],
 };
 
