@@ -6,6 +6,7 @@ pub mod chromaticities;
 pub mod compact;
 pub mod contrast;
 pub mod form_factor;
+pub mod irradiance_records;
 pub mod material;
 pub mod pieces;
 pub mod prefiltered;
