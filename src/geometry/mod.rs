@@ -31,6 +31,7 @@ pub mod reach;
 pub mod robust;
 pub mod shadow_outline;
 pub mod shadow_volume;
+pub mod shapes;
 pub mod solid;
 mod soup;
 pub mod surface_distance;

@@ -7,6 +7,7 @@ pub mod compact;
 pub mod contrast;
 pub mod form_factor;
 pub mod harmonics;
+pub mod irradiance_records;
 pub mod material;
 pub mod pieces;
 pub mod prefiltered;

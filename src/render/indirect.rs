@@ -8,24 +8,39 @@ use std::collections::HashMap;
 use glam::{DAffine3, DVec3, Vec3};
 
 use crate::light::bounce::{Gathering, Mover, Surroundings};
+use crate::light::irradiance_records::IrradianceRecords;
 use crate::scene::{Object, Scene};
 
 use super::anchor_geometry::Corners;
 
 /// Rays for a scene in which nothing moves: gathered once, in a second or so.
-const STANDING_BUDGET: usize = 1_000_000;
+const STANDING: Budget = Budget {
+    rays: 1_000_000,
+    rays_per_record: 256,
+};
 /// Rays where things move: held against them in every frame, in some milliseconds.
-const MOVING_BUDGET: usize = 75_000;
+const MOVING: Budget = Budget {
+    rays: 75_000,
+    rays_per_record: 64,
+};
 /// Part of the way to its triangle's middle at which a corner's surroundings are gathered: a corner that stands on the
 /// table would see into it.
 const CORNER_INSET: f64 = 0.05;
 
+/// How many rays there are, and from how many of them on more places tell less than more rays.
+struct Budget {
+    rays: usize,
+    rays_per_record: usize,
+}
+
 /// The gathered light of the world's virtual things.
 pub(super) struct Indirect {
     gathering: Gathering,
+    /// Where it was gathered, and what of it each point has.
+    records: IrradianceRecords,
     /// What stands on each moving anchor.
     movers: Vec<(usize, Mover)>,
-    /// For each corner of the batch its point of the gathering.
+    /// For each corner of the batch its point.
     point_of_corner: Vec<usize>,
     /// Whether the batch has light that fits; without movers once is enough.
     settled: bool,
@@ -49,14 +64,14 @@ impl Indirect {
         let surroundings =
             Surroundings::new(on_anchor(0), scene.world_lights(), scene.ambient_radiance);
         let (points, point_of_corner) = points(corners, triangles);
-        let budget = if movers.is_empty() {
-            STANDING_BUDGET
-        } else {
-            MOVING_BUDGET
-        };
-        let gathering = surroundings.gather(&points, budget);
+        let Budget {
+            rays,
+            rays_per_record,
+        } = if movers.is_empty() { STANDING } else { MOVING };
+        let records = IrradianceRecords::new(&points, rays / rays_per_record);
         Some(Self {
-            gathering,
+            gathering: surroundings.gather(&records.places, rays),
+            records,
             movers,
             point_of_corner,
             settled: false,
@@ -90,7 +105,7 @@ impl Indirect {
                 Some((mover, world_from_camera * camera_from_anchor[*anchor]?))
             })
             .collect();
-        let irradiances = self.gathering.irradiances(&placed);
+        let irradiances = self.records.at_points(&self.gathering.irradiances(&placed));
         let corners: Vec<Vec3> = self
             .point_of_corner
             .iter()

@@ -14,8 +14,8 @@ pub use super::lights::{
 };
 pub use super::motion::{MOTION, STATION, STATION_SECTION};
 pub use super::objects::{
-    MATERIAL, MATERIAL_SECTION, PHANTOM_SECTION, RECTANGLE, SHAPE, STANDING, TABLE, TABLE_SECTION,
-    THING, THING_NAME, VIRTUAL, VIRTUAL_SECTION,
+    MATERIAL, MATERIAL_SECTION, PHANTOM_SECTION, STANDING, TABLE, TABLE_SECTION, THING, THING_NAME,
+    VIRTUAL, VIRTUAL_SECTION,
 };
 pub use super::placement::{PLACEMENT, PlacementKeys};
 pub use super::probe::{PROBE, PROBE_SECTION, ROOM, ROOM_SECTION, ROOM_SURFACE};
@@ -23,6 +23,7 @@ pub use super::schema::section::AnyKey;
 pub use super::shadows::{
     DIFFERENCE, ENVIRONMENT, ENVIRONMENT_SECTION, SHADOWS, SHADOWS_SECTION, SHAFTS,
 };
+pub use super::shapes::{PRISM, PRISM_SECTION, REVOLVED, REVOLVED_SECTION, SHAPE, ShapeKeys};
 pub use super::tracking::{TRACKING, TRACKING_SECTION};
 
 /// What may stand at the outermost level, in the reference's order; a light of each kind.

@@ -45,6 +45,7 @@ pub mod raw_model;
 mod reader;
 mod reference;
 mod shadows;
+mod shapes;
 mod shortcuts;
 mod stl;
 mod texture_file;
@@ -69,6 +70,7 @@ pub use shadows::{
     EnvironmentMethod, EnvironmentSettings,
     ShadowChange, ShadowSettings, ShadowTechnique, ShaftSettings, Technique, VolumeCounting,
 };
+pub use shapes::ShapeKind;
 pub use shortcuts::{Shortcut, Shortcuts};
 pub use tracking::{ArucoRefinement, DetectorKind, SearchArea, TrackingSettings};
 
@@ -161,6 +163,8 @@ impl Anchor {
 pub struct Object {
     /// Its name, unique among the things.
     pub name: String,
+    /// What its mesh was made from.
+    pub shape: ShapeKind,
     /// Its triangles are counter-clockwise seen from outside *in the anchor's frame*: where `anchor_from_object` mirrors,
     /// they are turned round against the file's.
     pub mesh: Mesh,

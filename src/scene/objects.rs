@@ -1,15 +1,13 @@
 //! `[[phantom]]`, `[[virtual]]` and `[table]`: the things.
 
 use std::collections::HashMap;
-use std::path::PathBuf;
 
 use glam::{DAffine3, DVec3, Vec3};
 
 use super::anchors::unique_name;
 use super::error::{SceneError, suggestion};
-use super::mesh_file::{self, LoadedMesh, MeshReading, Up};
+use super::mesh_file;
 use super::motion::{MotionKeys, motion};
-use super::named_files::FileKind;
 use super::placement::{POSITION, PlacementKeys, placement};
 use super::ranges::Numbers;
 use super::raw_model::DEFAULT_ALBEDO;
@@ -17,8 +15,9 @@ use super::reader::{Table, Value};
 use super::schema::key::Missing::{Is, Means};
 use super::schema::section::{Example, Section, Times};
 use super::schema::values::{InWords, Vectors, Written};
+use super::shapes::{ShapeKeys, ShapeKind, of_basic_shape, rectangle, shape};
 use super::{Anchor, Object};
-use crate::geometry::mesh::{Mesh, RawTriangle};
+use crate::geometry::mesh::Mesh;
 use crate::light::Material;
 
 /// Diffuse reflectance.
@@ -31,28 +30,6 @@ keys! {
         /// No other phantom or virtual thing may have it.
         name: String => "a name in quotes is expected";
     }
-}
-
-keys! {
-    /// The shape of a thing.
-    pub static SHAPE: ShapeKeys;
-
-    /// Its shape: glTF, OBJ, PLY or STL. Counter-clockwise seen from outside; materials from its file or MTL file (Kd is
-    /// taken as linear reflectance, Ns or Pr as roughness; see docs/models.md). A phantom is
-    /// always flat: normals in the file are passed over.
-    mesh: Option<PathBuf>, FileKind::Mesh => Means(None, "none: a phantom may have rect_m");
-    /// Which axis of the mesh's file points up, along z of what it stands on.
-    up: Option<Up> => Means(None, "\"z\"; glTF: \"y\"");
-    /// What the longest side of the mesh is scaled to; the file's origin stays.
-    fit_m: Option<f64>, Numbers::above(0.0, 1e5).unit("m") => Means(None, "the numbers in the file are metres");
-}
-
-keys! {
-    /// The other shape, of phantoms.
-    pub static RECTANGLE: RectangleKeys;
-
-    /// Instead of a mesh: a flat rectangle x0, y0, x1, y1 that faces +z.
-    rect_m: Written, InWords::new("[x0, y0, x1, y1] in metres") => Means(Written, "none: it has a mesh");
 }
 
 keys! {
@@ -79,7 +56,8 @@ keys! {
     /// What only virtual things have.
     pub static VIRTUAL: VirtualKeys;
 
-    /// Where the file has no normals, faces that meet at up to this angle look like one smooth surface; 0 is flat.
+    /// Where the file has no normals, faces that meet at up to this angle look like one smooth surface, and so do sides of an
+    /// outline or of a profile; 0 is flat.
     smooth_deg: f64, Numbers::between(0.0, 180.0).unit("degrees") => Is(30.0);
 }
 
@@ -140,7 +118,6 @@ pub static PHANTOM_SECTION: Section = Section {
     groups: &[
         ThingNameKeys::ALL,
         ShapeKeys::ALL,
-        RectangleKeys::ALL,
         StandingKeys::ALL,
         PlacementKeys::ALL,
         MotionKeys::ALL,
@@ -151,7 +128,19 @@ pub static PHANTOM_SECTION: Section = Section {
         ("mesh", Example::Live("\"models/house.obj\"")),
         ("up", Example::Aside("\"y\"")),
         ("fit_m", Example::Aside("0.1")),
-        ("rect_m", Example::Aside("[-0.21, -0.1485, 0.21, 0.1485]")),
+        ("box_m", Example::Aside("[0.15, 0.21, 0.03]")),
+        ("cylinder_m", Example::Aside("[0.04, 0.1]")),
+        ("cone_m", Example::Aside("[0.03, 0.08]")),
+        ("sphere_m", Example::Aside("0.025")),
+        ("rect_m", Example::Aside("[0.297, 0.21]")),
+        (
+            "prism",
+            Example::Aside("{ outline_m = [[0, 0], [0.08, 0], [0, 0.05]], height_m = 0.02 }"),
+        ),
+        (
+            "revolved",
+            Example::Aside("{ profile_m = [[0, 0], [0.03, 0], [0.035, 0.1], [0.015, 0.14]] }"),
+        ),
         ("on", Example::Live("\"table\"")),
         ("position_m", Example::Live("[-0.055, 0.035, 0.0]")),
         ("rotation_deg", Example::Live("[0, 0, 20]")),
@@ -185,6 +174,19 @@ pub static VIRTUAL_SECTION: Section = Section {
         ("mesh", Example::Live("\"models/torus.obj\"")),
         ("up", Example::Aside("\"y\"")),
         ("fit_m", Example::Aside("0.1")),
+        ("box_m", Example::Aside("[0.15, 0.21, 0.03]")),
+        ("cylinder_m", Example::Aside("[0.04, 0.1]")),
+        ("cone_m", Example::Aside("[0.03, 0.08]")),
+        ("sphere_m", Example::Aside("0.025")),
+        ("rect_m", Example::Aside("[0.297, 0.21]")),
+        (
+            "prism",
+            Example::Aside("{ outline_m = [[0, 0], [0.08, 0], [0, 0.05]], height_m = 0.02 }"),
+        ),
+        (
+            "revolved",
+            Example::Aside("{ profile_m = [[0, 0], [0.03, 0], [0.035, 0.1], [0.015, 0.14]] }"),
+        ),
         ("on", Example::Live("\"table\"")),
         ("position_m", Example::Live("[0.022, 0.0, 0.036]")),
         ("rotation_deg", Example::Live("[70, 0, 35]")),
@@ -245,19 +247,14 @@ fn table_top(table: &Table) -> Result<Object, SceneError> {
     let rect = TABLE.rect_m.require(table)?;
     let albedo = TABLE.albedo.read(table)?;
     let height_m = TABLE.height_m.read(table)?;
-    let LoadedMesh {
-        mesh,
-        report,
-        materials,
-        material_names,
-        ..
-    } = rectangle(&rect, albedo)?;
+    let loaded = of_basic_shape(&rectangle(&rect)?, mesh_file::Normals::Flat, &rect)?;
     Ok(Object {
         name: TABLE_SECTION.name.to_owned(),
-        mesh,
-        mesh_report: report,
-        materials,
-        material_names,
+        shape: ShapeKind::Rectangle,
+        mesh: loaded.mesh,
+        mesh_report: loaded.report,
+        materials: vec![Material::matt(albedo)],
+        material_names: loaded.material_names,
         textures: Vec::new(),
         notes: Vec::new(),
         anchor: 0,
@@ -289,24 +286,7 @@ fn object(
             crease_rad: VIRTUAL.smooth_deg.read(table)?.to_radians(),
         },
     };
-    let loaded = match (SHAPE.mesh.value(table), RECTANGLE.rect_m.value(table)) {
-        (Some(_), Some(rect)) => {
-            return Err(rect.error("the thing has a mesh; allowed: mesh or rect_m, not both"));
-        }
-        (Some(mesh), None) => {
-            let reading = MeshReading {
-                normals,
-                up: SHAPE.up.read(table)?,
-                fit_m: SHAPE.fit_m.read(table)?,
-            };
-            mesh_file::load(&mesh, SHAPE.mesh.takes, reading)?
-        }
-        (None, Some(rect)) => rectangle(&rect, DVec3::splat(DEFAULT_ALBEDO))?,
-        (None, None) if kind == ThingKind::Phantom => {
-            return Err(table.error(format!("\"{name}\": no shape; mesh or rect_m is expected")));
-        }
-        (None, None) => return Err(table.error(format!("\"{name}\": no shape; mesh is expected"))),
-    };
+    let (shape, loaded) = shape(table, &name, normals)?;
     let mut materials = loaded.materials;
     let mut mesh = loaded.mesh;
     if let Some(material) = MATERIAL_SECTION.table(table)? {
@@ -321,6 +301,7 @@ fn object(
     };
     Ok(Object {
         name,
+        shape,
         mesh,
         mesh_report: loaded.report,
         materials,
@@ -375,35 +356,4 @@ fn override_materials(
         }
     }
     Ok(())
-}
-
-/// A flat rectangle in the plane z = 0 that faces +z.
-fn rectangle(value: &Value, albedo: DVec3) -> Result<LoadedMesh, SceneError> {
-    let [x0, y0, x1, y1] = value
-        .numbers::<4>(&POSITION)?
-        .map(|coordinate| coordinate as f32);
-    if x0 >= x1 || y0 >= y1 {
-        return Err(value.error("no area; allowed: [x0, y0, x1, y1] with x0 < x1 and y0 < y1"));
-    }
-    let positions = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)].map(|(x, y)| Vec3::new(x, y, 0.0));
-    let triangles = [[0, 1, 2], [0, 2, 3]].map(|vertices| RawTriangle {
-        vertices,
-        normals: [None; 3],
-        material: 0,
-    });
-    let (mesh, report) = Mesh::weld(&positions, &triangles, 0.0);
-    if mesh.triangles.len() < 2 {
-        return Err(value.error(
-            "too thin to have an area; allowed: [x0, y0, x1, y1] with x0 < x1 and y0 < y1",
-        ));
-    }
-    Ok(LoadedMesh {
-        mesh,
-        report,
-        materials: vec![Material::matt(albedo)],
-        material_names: vec![String::new()],
-        is_given: vec![true],
-        textures: Vec::new(),
-        notes: Vec::new(),
-    })
 }

@@ -25,7 +25,7 @@ use gnomon::geometry::camera::Intrinsics;
 use gnomon::geometry::mesh::{Mesh, MeshReport};
 use gnomon::light::{Light, Material};
 use gnomon::render::{Gpu, Layers, REAL, Renderer, Shown, VIRTUAL};
-use gnomon::scene::{Anchor, Object, Scene, ShadowSettings, Technique};
+use gnomon::scene::{Anchor, Object, Scene, ShadowSettings, ShapeKind, Technique};
 
 use shapes::Soup;
 
@@ -92,6 +92,7 @@ pub fn read_obj(path: &Path) -> Mesh {
 pub fn object(name: &str, mesh: Mesh, albedo: DVec3, world_from_object: DAffine3) -> Object {
     Object {
         name: name.to_owned(),
+        shape: ShapeKind::Mesh,
         mesh,
         mesh_report: MeshReport::default(),
         materials: vec![Material::matt(albedo)],

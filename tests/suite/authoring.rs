@@ -92,6 +92,70 @@ mod edits {
     }
 
     #[test]
+    fn things_of_shapes_are_edited_as_those_of_meshes() {
+        let shapes = "\n[[phantom]]\nname = \"book\"   # the blue one\nbox_m = [0.15, 0.21, 0.03]  # lies flat\n\
+             position_m = [0.1, 0.0, 0.0]\n\n[[virtual]]\nname = \"bottle\"\n# as drawn on paper\nrevolved = { profile_m = [\n    \
+             [0.0, 0.0], # the bottom\n    [0.03, 0.0],\n    [0.03, 0.1],\n    [0.01, 0.15],\n] }\n\
+             path = [{ time_s = 0 }, { time_s = 1, position_m = [0.1, 0, 0] }] # to the right\n";
+        let project = Project::with(|text| text + shapes);
+        let before = project.text();
+        let mut document = project.open();
+        let mut changed_to = |edit: &Edit, old: &str, new: &str| {
+            document.commit(edit).unwrap();
+            assert!(before.contains(old), "{old}");
+            assert_eq!(project.text(), before.replace(old, new), "{edit:?}");
+            document.undo().unwrap();
+            assert_eq!(project.text(), before);
+        };
+        let placed = |thing: &str, x_m: f64, scale: f64| Edit::Place {
+            thing: thing.to_owned(),
+            placement: Placement {
+                position_m: DVec3::X * x_m,
+                scale: DVec3::splat(scale),
+                ..Placement::default()
+            },
+        };
+        let lies = "position_m = [0.1, 0.0, 0.0]\n";
+        changed_to(
+            &placed("book", 0.12, 1.0),
+            lies,
+            "position_m = [0.12, 0.0, 0.0]\n",
+        );
+        let to_the_right = "# to the right\n";
+        changed_to(
+            &placed("bottle", 0.05, 2.0),
+            to_the_right,
+            &format!("{to_the_right}position_m = [0.05, 0.0, 0.0]\nscale = [2.0, 2.0, 2.0]\n"),
+        );
+        let hidden = Edit::Show {
+            thing: "bottle".to_owned(),
+            visible: false,
+        };
+        changed_to(
+            &hidden,
+            to_the_right,
+            &format!("{to_the_right}visible = false\n"),
+        );
+        let bottle = &before[before.find("\n[[virtual]]\nname = \"bottle\"").unwrap()..];
+        changed_to(&Edit::RemoveVirtual("bottle".to_owned()), bottle, "");
+        // What another editor makes of the shape meanwhile is kept, and a place that it gave wins.
+        let cube = before.replace("[0.15, 0.21, 0.03]", "[0.1, 0.1, 0.1]");
+        fs::write(project.file(), &cube).unwrap();
+        let mut document = project.open();
+        document.commit(&placed("book", 0.12, 1.0)).unwrap();
+        assert_eq!(
+            project.text(),
+            cube.replace(lies, "position_m = [0.12, 0.0, 0.0]\n")
+        );
+        let book = document
+            .scene()
+            .phantoms
+            .iter()
+            .find(|thing| thing.name == "book");
+        assert_eq!(book.unwrap().mesh.positions[7].z, 0.1);
+    }
+
+    #[test]
     fn each_kind_of_edit_is_written_as_a_person_would() {
         let project = Project::new();
         let before = project.text();

@@ -11,8 +11,8 @@ use crate::scene::format::{AIMED_LIGHT, RECT_LIGHT, SPHERE_LIGHT, SPOT_LIGHT};
 use crate::scene::format::{
     AMBIENT, AMBIENT_SECTION, BOARD, BOARD_SECTION, DIRECTIONAL_LIGHT, LIGHT, LIGHT_SECTION,
     LightKind, MARKER, MARKER_SECTION, ON_BOARD, PHANTOM_SECTION, PLACEMENT, POINT_LIGHT,
-    PlacementKeys, SHADOWS_SECTION, SHAPE, STANDING, TABLE, TABLE_SECTION, THING, THING_NAME,
-    VIRTUAL_SECTION,
+    PlacementKeys, SHADOWS_SECTION, SHAPE, STANDING, ShapeKeys, TABLE, TABLE_SECTION, THING,
+    THING_NAME, VIRTUAL_SECTION,
 };
 use crate::scene::schema::key::{Absent, Key};
 use crate::scene::schema::section::Section;
@@ -118,8 +118,9 @@ pub fn touched_by(text: &str, edit: &Edit) -> Option<String> {
         Edit::Light { .. } | Edit::RemoveLight(_) => Some(all_of(&LIGHT_SECTION)),
         Edit::Ambient(_) => Some(all_of(&AMBIENT_SECTION)),
         Edit::Place { thing: name, .. } => {
-            let mut keys = vec![TABLE.height_m.name, STANDING.on.name, SHAPE.mesh.name];
-            keys.extend(PlacementKeys::ALL.iter().map(|key| key.name()));
+            let mut keys = vec![TABLE.height_m.name, STANDING.on.name];
+            let of_thing = ShapeKeys::ALL.iter().chain(PlacementKeys::ALL);
+            keys.extend(of_thing.map(|key| key.name()));
             thing(name, &keys)
         }
         Edit::Show { thing: name, .. } => thing(name, &[THING.visible.name]),

@@ -8,7 +8,7 @@ use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::cuboid;
 use crate::geometry::mesh::{Mesh, RawTriangle};
 use crate::light::{Light, Material};
-use crate::scene::{Anchor, Object, Scene, ShadowSettings};
+use crate::scene::{Anchor, Object, Scene, ShadowSettings, ShapeKind};
 
 /// Where the lamp of the peers' scenes stands, metres in world space.
 pub const LIGHT_M: DVec3 = DVec3::new(-0.35, 0.15, 0.6);
@@ -150,6 +150,7 @@ fn object(name: &str, mesh: Mesh, albedo: DVec3, anchor: usize, position_m: DVec
     let mesh_report = Default::default();
     Object {
         name: name.to_owned(),
+        shape: ShapeKind::Mesh,
         mesh,
         mesh_report,
         materials: vec![Material::matt(albedo)],

@@ -364,6 +364,24 @@ mod tests {
     }
 
     #[test]
+    fn things_without_a_file_are_copied_by_their_text() {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = folder.path().join("a.toml");
+        let text = "[camera]\nsource = \"webcam:0\"\n[[marker]]\nname = \"m\"\nid = 1\nsize_m = 0.04\n[[phantom]]\nname = \"book\"\n\
+                    box_m = [0.15, 0.21, 0.03]  # closed\n[[virtual]]\nname = \"mug\"\nrevolved = { profile_m = [[0.03, 0], [0.04, 0.1]] }\n\
+                    path = [{ time_s = 0 }, { time_s = 2, position_m = [0.1, 0, 0] }]\n";
+        fs::write(&scene, text).unwrap();
+        let session = tempfile::tempdir().unwrap();
+        copy_scene(&scene, session.path()).unwrap();
+        let path = session.path().join(SCENE_NAME);
+        let written = fs::read_to_string(&path).unwrap();
+        assert_eq!(written, text.replace("\"webcam:0\"", "\".\""));
+        let [copy, original] = [&path, &scene].map(|path| Scene::load(path).unwrap());
+        let things = |scene: &Scene| format!("{:?} {:?}", scene.phantoms, scene.virtuals);
+        assert!(things(&copy) == things(&original));
+    }
+
+    #[test]
     fn what_holds_for_the_camera_alone_is_left_out_but_for_its_comments() {
         let folder = tempfile::tempdir().unwrap();
         let scene = folder.path().join("a.toml");

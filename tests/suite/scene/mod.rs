@@ -4,6 +4,7 @@ mod meshes;
 mod mistakes;
 mod models;
 mod mutations;
+mod shapes;
 
 use std::f64::consts::FRAC_PI_2;
 use std::fs;

@@ -56,6 +56,37 @@ fn damaged_scenes() {
 }
 
 #[test]
+fn damaged_shapes() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/scene/shapes.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    let words = [
+        "", "[", "]", "{", "}", "-", "e9", "e-9", ",", "0", "0.04", "[0, 0], ", "1e5", "nan", "\n",
+    ];
+    let whole = Scene::parse(&path, &text).unwrap();
+    assert_eq!((whole.phantoms.len(), whole.virtuals.len()), (2, 5));
+    let mut damage = Damage(3);
+    let mut refused = 0;
+    for _ in 0..150 {
+        match Scene::parse(&path, &damage.done_to(&text, &words)) {
+            Err(error) => {
+                assert!(error.to_string().contains("shapes.toml"), "{error}");
+                refused += 1;
+            }
+            Ok(scene) => {
+                for thing in scene.phantoms.iter().chain(&scene.virtuals) {
+                    let places = || thing.mesh.positions.iter();
+                    assert!(places().all(|place| place.is_finite()), "{}", thing.name);
+                    let normals = thing.mesh.corner_normals.iter().flatten();
+                    assert!(normals.clone().all(|normal| normal.is_normalized()));
+                    assert!(!thing.mesh.triangles.is_empty());
+                }
+            }
+        }
+    }
+    assert!((50..150).contains(&refused), "{refused}");
+}
+
+#[test]
 fn damaged_meshes() {
     let project = project();
     let scene = format!("{HEAD}[[virtual]]\nname = \"v\"\nmesh = \"models/cube.obj\"\n");

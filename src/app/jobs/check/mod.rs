@@ -17,7 +17,7 @@ use crate::light::{Light, Shape};
 use crate::scene::SceneLight;
 use crate::scene::format::LightKind;
 use crate::scene::format::{SHADOWS, SHADOWS_SECTION};
-use crate::scene::{Anchor, DetectorKind, Object, Quality, Scene, ShadowSettings};
+use crate::scene::{Anchor, DetectorKind, Object, Quality, Scene, ShadowSettings, ShapeKind};
 use budget::budget_line;
 use room::room_lines;
 
@@ -331,7 +331,11 @@ fn mesh_cell(object: &Object) -> String {
             "signed edge multiplicity",
         )
     };
-    let size = counted(object.mesh.triangles.len(), "triangle");
+    let triangles = counted(object.mesh.triangles.len(), "triangle");
+    let size = match object.shape {
+        ShapeKind::Mesh => triangles,
+        shape => format!("{} of {triangles}", shape.name()),
+    };
     if object.casts {
         format!("{size}, {topology}: {method}")
     } else {
