@@ -83,13 +83,14 @@ impl LearntCamera {
         self.focal_deviation <= SURE && self.basis != CameraBasis::Guess
     }
 
-    /// Whether it is so much better than another that it is worth a jump of all that is shown; or contradicts it.
+    /// Whether it is so much better than another that it is worth a jump of all that is shown, or is sure and contradicts it.
     pub fn replaces(&self, other: &Self) -> bool {
         let apart = (self.intrinsics.focal_px.x / other.intrinsics.focal_px.x)
             .ln()
             .abs();
-        let contradicts = self.is_sure() && apart > 3.0 * other.focal_deviation.max(SURE);
-        self.focal_deviation < 0.5 * other.focal_deviation || contradicts
+        let contradicts = apart > 3.0 * other.focal_deviation.max(SURE);
+        self.focal_deviation < 0.5 * other.focal_deviation
+            || self.is_sure() && (contradicts || !other.is_sure())
     }
 
     /// The focal length, and how it is known.
