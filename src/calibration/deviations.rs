@@ -17,13 +17,6 @@ pub(super) type Parameters = [f64; 9];
 /// The number of a pose's unknowns.
 const POSE: usize = 6;
 
-/// The camera's parameters in their order.
-pub(super) fn parameters_of(intrinsics: &Intrinsics) -> Parameters {
-    let [k1, k2, p1, p2, k3] = polynomial_of(intrinsics);
-    let (focal, center) = (intrinsics.focal_px, intrinsics.center_px);
-    [focal.x, focal.y, center.x, center.y, k1, k2, p1, p2, k3]
-}
-
 /// The distortion `k1 k2 p1 p2 k3` of a camera that has been calibrated here.
 pub(super) fn polynomial_of(intrinsics: &Intrinsics) -> [f64; 5] {
     std::array::from_fn(|k| intrinsics.distortion.coefficients()[k])
@@ -36,10 +29,7 @@ pub(super) fn deviations<'a>(
     views: impl Iterator<Item = (&'a [TargetCorner], DAffine3)>,
     free: [bool; 9],
 ) -> Parameters {
-    let free: Vec<usize> = (0..9).filter(|&k| free[k]).collect();
-    let views: Option<Vec<ReducedView>> = views
-        .map(|(corners, pose)| ReducedView::of(intrinsics, corners, &pose, &free))
-        .collect();
+    let views = reduced_views(intrinsics, views, free);
     let steps = views.and_then(|views| steps_without_each(&views));
     let mut deviations = [f64::INFINITY; 9];
     let Some(steps) = steps else {
@@ -47,7 +37,7 @@ pub(super) fn deviations<'a>(
     };
     deviations = [0.0; 9];
     let count = steps.len() as f64;
-    for (at, &k) in free.iter().enumerate() {
+    for (at, k) in (0..9).filter(|&k| free[k]).enumerate() {
         let mean = steps.iter().map(|step| step[at]).sum::<f64>() / count;
         let squared: f64 = steps.iter().map(|step| (step[at] - mean).powi(2)).sum();
         deviations[k] = ((count - 1.0) / count * squared).sqrt();
@@ -55,8 +45,20 @@ pub(super) fn deviations<'a>(
     deviations
 }
 
+/// The views' parts in the normal equations of those parameters that are `free`.
+pub(super) fn reduced_views<'a>(
+    intrinsics: &Intrinsics,
+    views: impl Iterator<Item = (&'a [TargetCorner], DAffine3)>,
+    free: [bool; 9],
+) -> Option<Vec<ReducedView>> {
+    let free: Vec<usize> = (0..9).filter(|&k| free[k]).collect();
+    views
+        .map(|(corners, pose)| ReducedView::of(intrinsics, corners, &pose, &free))
+        .collect()
+}
+
 /// What each view left out would change; `None` where the others do not determine the camera.
-fn steps_without_each(views: &[ReducedView]) -> Option<Vec<Vec<f64>>> {
+pub(super) fn steps_without_each(views: &[ReducedView]) -> Option<Vec<Vec<f64>>> {
     let side = views.first()?.slope.len();
     let mut all = ReducedView::zero(side);
     for view in views {
@@ -74,9 +76,11 @@ fn steps_without_each(views: &[ReducedView]) -> Option<Vec<Vec<f64>>> {
 
 /// A view's part in the normal equations of the camera's parameters, its pose eliminated (Schur complement).
 #[derive(Clone)]
-struct ReducedView {
-    curvature: DynamicMatrix,
-    slope: Vec<f64>,
+pub(super) struct ReducedView {
+    pub(super) curvature: DynamicMatrix,
+    pub(super) slope: Vec<f64>,
+    /// The corners' squared distances where the pose fits best, square pixels.
+    pub(super) squares: f64,
 }
 
 impl ReducedView {
@@ -84,6 +88,7 @@ impl ReducedView {
         Self {
             curvature: DynamicMatrix::zero(side),
             slope: vec![0.0; side],
+            squares: 0.0,
         }
     }
 
@@ -106,11 +111,13 @@ impl ReducedView {
         let (shared, side) = (free.len(), free.len() + POSE);
         let mut curvature = DynamicMatrix::zero(side);
         let mut slope = vec![0.0; side];
+        let mut squares = 0.0;
         for corner in corners {
             let slopes = slopes(intrinsics, camera_from_target, corner.target_m, free)?;
             let target_m = corner.target_m.extend(0.0);
             let expected_px = intrinsics.pixel_of(camera_from_target.transform_point3(target_m))?;
             let off_px = corner.pixel - expected_px;
+            squares += off_px.length_squared();
             for i in 0..side {
                 slope[i] += slopes[i].dot(off_px);
                 for j in 0..side {
@@ -127,6 +134,7 @@ impl ReducedView {
         let of_pose = of_pose.cholesky()?;
         let along_pose = of_pose.solve(&slope[shared..]);
         let mut reduced = Self::zero(shared);
+        reduced.squares = squares - dot(&slope[shared..], &along_pose);
         let row = |i: usize| (0..POSE).map(|k| curvature.at(i, shared + k)).collect();
         let rows: Vec<Vec<f64>> = (0..shared).map(row).collect();
         for (i, row) in rows.iter().enumerate() {

@@ -23,6 +23,8 @@ pub struct TargetFinder {
     target: Target,
     /// The detector of a ChArUco board's markers.
     detector: Option<Detector>,
+    /// Pictures that show a board of as many rows as this one has columns, and the other way round.
+    swapped: u32,
 }
 
 /// A marker's corners, as printed, in the target's frame and in the picture.
@@ -34,6 +36,12 @@ const SOFTNESS_PX: f64 = 1.0;
 const REACH: f64 = 0.4;
 /// A layout whose markers are off by less than this part of the other's squares fits better.
 const DISTINCT: f64 = 0.5;
+/// Fewer markers tell no layout from another.
+const FEWEST_MARKERS: usize = 4;
+/// A layout fits whose markers are off by less than this on the whole (root mean square), as a part of a square…
+const FITS: f64 = 0.1;
+/// …and another does not whose markers are off by more.
+const DOES_NOT_FIT: f64 = 0.3;
 /// A homography from fewer corners is none to trust.
 const FEWEST_CORNERS: usize = 6;
 
@@ -51,12 +59,18 @@ impl TargetFinder {
         Ok(Self {
             target,
             detector: target.markers.as_ref().map(detector).transpose()?,
+            swapped: 0,
         })
     }
 
     /// What is looked for.
     pub fn target(&self) -> &Target {
         &self.target
+    }
+
+    /// How many of the pictures so far show a ChArUco board whose columns and rows are given the wrong way round.
+    pub fn swapped(&self) -> u32 {
+        self.swapped
     }
 
     /// The corners that an 8-bit grey picture (rows from the top, no padding) shows: all of a chessboard's, or those of a
@@ -83,6 +97,10 @@ impl TargetFinder {
         let corners = match (&mut self.detector, &self.target.markers) {
             (Some(detector), Some(markers)) => {
                 let seen = seen_markers(detector, grey, size_px, markers)?;
+                if is_swapped(&self.target, markers, &seen)? {
+                    self.swapped += 1;
+                    return Ok(Vec::new());
+                }
                 charuco_corners(&self.target, markers, &seen, &soft)?
             }
             _ => chessboard_corners(&self.target, &picture, &soft)?,
@@ -159,7 +177,7 @@ fn charuco_corners(
     seen: &BTreeMap<u32, [DVec2; 4]>,
     soft: &Mat,
 ) -> opencv::Result<Vec<TargetCorner>> {
-    let Some(placed) = placed_markers(target, markers, seen)? else {
+    let Some((_, placed)) = placed_markers(target, markers, seen)? else {
         return Ok(Vec::new());
     };
     // From a corner of the board to the next marker's, along an axis: what is refined must not reach so far.
@@ -198,14 +216,42 @@ fn charuco_corners(
     Ok(corners)
 }
 
-/// The markers that are seen, where they lie on the board; `None` where they make up no board.
+/// Whether the markers that are seen make up a board with as many rows as this one has columns, and not this one.
+fn is_swapped(
+    target: &Target,
+    markers: &TargetMarkers,
+    seen: &BTreeMap<u32, [DVec2; 4]>,
+) -> opencv::Result<bool> {
+    let swapped = target.swapped();
+    if swapped.squares == target.squares {
+        return Ok(false);
+    }
+    let misfit = |target: &Target| -> opencv::Result<Option<f64>> {
+        let placed = placed_markers(target, markers, seen)?;
+        Ok(placed
+            .filter(|(_, placed)| placed.len() >= FEWEST_MARKERS)
+            .map(|(misfit, placed)| {
+                let side_px = |pairs: &MarkerPairs| pairs[0].1.distance(pairs[1].1);
+                let sides_px: f64 = placed.iter().map(side_px).sum();
+                let square_px = sides_px / placed.len() as f64 * target.square_m / markers.size_m;
+                (misfit / (4 * placed.len()) as f64).sqrt() / square_px
+            }))
+    };
+    Ok(match (misfit(target)?, misfit(&swapped)?) {
+        (Some(given), Some(swapped)) => given > DOES_NOT_FIT && swapped < FITS,
+        _ => false,
+    })
+}
+
+/// The markers that are seen, where they lie on the board, and the squared distances that leaves, in pixels; `None` where
+/// they make up no board.
 ///
 /// OpenCV before 4.6 began boards with an even number of rows with a white square: the layout that fits is taken.
 fn placed_markers(
     target: &Target,
     markers: &TargetMarkers,
     seen: &BTreeMap<u32, [DVec2; 4]>,
-) -> opencv::Result<Option<Vec<MarkerPairs>>> {
+) -> opencv::Result<Option<(f64, Vec<MarkerPairs>)>> {
     let mut best: Option<(f64, Vec<MarkerPairs>)> = None;
     for starts_white in [false, true] {
         if starts_white && target.squares[1] % 2 == 1 {
@@ -234,7 +280,7 @@ fn placed_markers(
             best = Some((misfit, placed));
         }
     }
-    Ok(best.map(|(_, placed)| placed))
+    Ok(best)
 }
 
 /// As printed: top left, top right, bottom right, bottom left.

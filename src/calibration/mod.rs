@@ -5,6 +5,7 @@
 
 mod coverage;
 mod coverage_picture;
+mod cross_validation;
 mod deviations;
 mod finder;
 mod solve;
@@ -22,7 +23,7 @@ pub use finder::TargetFinder;
 pub use solve::{Calibration, FittedView, LensTerms, solve};
 pub use taker::{Moment, Taker};
 pub use target::{Target, TargetError, TargetMarkers};
-pub use views::{FEWEST_VIEWS, Lack, TargetLook, TargetView, Views};
+pub use views::{FEWEST_VIEWS, Lack, Placing, TargetLook, TargetView, Views};
 
 /// An inner corner of the target, and where a picture shows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,6 +47,20 @@ pub enum CalibrateError {
         size_px: [u32; 2],
         /// Width and height of the first one.
         expected_px: [u32; 2],
+    },
+    /// The target is there with its columns for rows.
+    #[error(
+        "{seen} of {looked} pictures show a ChArUco board of {0} x {1} squares, not of {1} x {0}: its columns come first \
+         (--charuco {0}x{1})",
+        squares[0], squares[1]
+    )]
+    Swapped {
+        /// Number of pictures.
+        looked: u32,
+        /// How many show the other board.
+        seen: u32,
+        /// Its columns and rows.
+        squares: [u32; 2],
     },
     /// The target is in none of them.
     #[error(

@@ -1,5 +1,5 @@
 //! The calibration itself: OpenCV's bundle adjustment (Zhang, "A flexible new technique for camera calibration", 2000),
-//! without the views that do not fit, with no more of the lens model than the views tell.
+//! without the views that spoil it, with no more of the lens model than the views tell: both by cross-validation.
 
 use glam::{DAffine3, DVec2, DVec3};
 use opencv::calib3d;
@@ -8,11 +8,13 @@ use opencv::core::{
 };
 use opencv::prelude::*;
 
-use super::deviations::{Parameters, deviations, parameters_of, polynomial_of};
-use super::views::{FEWEST_VIEWS, TILTED_RAD, TargetView, Views, coverage_of, lacks_of};
-use super::{CalibrateError, Coverage, Lack};
+use super::cross_validation::{is_no_worse, left_out_errors};
+use super::deviations::{Parameters, deviations, polynomial_of};
+use super::views::{FEWEST_VIEWS, Placing, TILTED_RAD, TargetView, Views, coverage_of, lacks_of};
+use super::{CalibrateError, Coverage, Lack, TargetCorner};
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::pose::pose_from_rodrigues;
+use crate::geometry::quarter_turns::QuarterTurns;
 
 /// A camera, and how it is known.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,10 +71,31 @@ const BAD_TIMES: f64 = 3.0;
 const BAD_BY_PX: f64 = 0.15;
 /// The largest part of the views that is dropped: where more do not fit, it is not the views.
 const MOST_DROPPED: f64 = 0.25;
-/// Fewer standard deviations from 0 a coefficient is noise: a few views are poor judges of their own scatter.
-const SIGNIFICANT: f64 = 4.0;
+/// An upright picture is turned the other way round where that leaves this part of its error or less.
+const TURNED_BETTER: f64 = 0.9;
+/// Times that all of them are asked where no others tell the camera first.
+const TURNING_ROUNDS: usize = 3;
 
 impl LensTerms {
+    /// The last radial term would bend to bad views.
+    const ROBUST: Self = Self {
+        radial: 2,
+        tangential: true,
+    };
+
+    /// The lenses with a term less, in the order in which they are tried. k1 always stays: most lenses have some.
+    fn fewer(self) -> impl Iterator<Item = Self> {
+        let less_radial = (self.radial > 1).then(|| Self {
+            radial: self.radial - 1,
+            ..self
+        });
+        let less_tangential = self.tangential.then_some(Self {
+            tangential: false,
+            ..self
+        });
+        less_radial.into_iter().chain(less_tangential)
+    }
+
     /// Which of fx, fy, cx, cy, k1, k2, p1, p2, k3 the views decide.
     fn free(self) -> [bool; 9] {
         let (k2, k3) = (self.radial > 1, self.radial > 2);
@@ -108,22 +131,34 @@ impl FittedView {
 /// # Errors
 /// Too few views, views that are all alike, views that do not tell the focal length.
 pub fn solve(views: &Views) -> Result<Calibration, CalibrateError> {
-    let mut chosen = views.chosen()?;
+    let chosen = views.chosen()?;
     // `chosen` made sure that there is a picture.
     let size_px = views.size_px().unwrap_or_default();
+    let upright = upright(&chosen, size_px)?;
+    let mut chosen: Vec<&TargetView> = upright.iter().collect();
     let most_dropped = (MOST_DROPPED * chosen.len() as f64) as usize;
     let mut dropped = Vec::new();
-    // The last radial term would bend to bad views.
-    let robust = LensTerms {
-        radial: 2,
-        tangential: true,
-    };
-    let mut fit = CameraFit::of(&chosen, size_px, robust)?;
+    let mut fit = CameraFit::of(&chosen, size_px, LensTerms::ROBUST)?;
     while dropped.len() < most_dropped && chosen.len() > FEWEST_VIEWS {
         let Some(worst) = fit.bad_view() else { break };
-        let view = chosen.remove(worst);
+        let mut others = chosen.clone();
+        let view = others.remove(worst);
+        let without = CameraFit::of(&others, size_px, LensTerms::ROBUST)?;
+        // A view that is merely blurred tells the same camera: it stays.
+        let mut errors = fit.left_out_errors(&chosen, LensTerms::ROBUST);
+        if let Some(errors) = &mut errors {
+            errors.remove(worst);
+        }
+        let errors_without = without.left_out_errors(&others, LensTerms::ROBUST);
+        let spoils = match (errors, errors_without) {
+            (Some(with), Some(without)) => without.iter().sum::<f64>() < with.iter().sum(),
+            _ => false,
+        };
+        if !spoils {
+            break;
+        }
         dropped.push((view.picture, fit.view_rms_px[worst]));
-        fit = CameraFit::of(&chosen, size_px, robust)?;
+        (fit, chosen) = (without, others);
     }
     let (fit, lens, deviations) = simplest(&chosen, size_px)?;
     let focal_deviation_px = DVec2::new(deviations[0], deviations[1]);
@@ -156,7 +191,75 @@ pub fn solve(views: &Views) -> Result<Calibration, CalibrateError> {
     })
 }
 
-/// The lens with no more terms than the views tell, and the parameters' standard deviations.
+/// The views, each upright picture of which nobody knows how it was turned on that side on which it fits the others better.
+fn upright(views: &[&TargetView], size_px: [u32; 2]) -> Result<Vec<TargetView>, CalibrateError> {
+    let mut settled: Vec<TargetView> = views.iter().map(|&view| view.clone()).collect();
+    let is_open = |view: &TargetView| matches!(view.placing, Placing::UpOrDown(_));
+    if !settled.iter().any(is_open) {
+        return Ok(settled);
+    }
+    let known = settled.iter().filter(|view| !is_open(view)).count();
+    let rounds = match known >= FEWEST_VIEWS {
+        true => 1,
+        false => TURNING_ROUNDS,
+    };
+    for _ in 0..rounds {
+        let base: Vec<&TargetView> = (settled.iter())
+            .filter(|view| known < FEWEST_VIEWS || !is_open(view))
+            .collect();
+        let camera = CameraFit::of(&base, size_px, LensTerms::ROBUST)?.intrinsics;
+        for view in settled.iter_mut().filter(|view| is_open(view)) {
+            let over = view.turned(QuarterTurns::HALF, size_px);
+            if error_px(&camera, &over)? < TURNED_BETTER * error_px(&camera, view)? {
+                *view = over;
+            }
+        }
+    }
+    Ok(settled)
+}
+
+/// Root mean square distance of a view's corners from where a camera puts them, the target wherever it fits best; pixels.
+fn error_px(camera: &Intrinsics, view: &TargetView) -> Result<f64, CalibrateError> {
+    let object_points: Vector<Point3f> = (view.corners.iter())
+        .map(|corner| {
+            let [x, y] = corner.target_m.as_vec2().to_array();
+            Point3f::new(x, y, 0.0)
+        })
+        .collect();
+    let pixels = view.pixels().map(|pixel| pixel.as_vec2());
+    let image_points: Vector<Point2f> =
+        pixels.map(|pixel| Point2f::new(pixel.x, pixel.y)).collect();
+    let (focal, center) = (camera.focal_px, camera.center_px);
+    let rows = [
+        [focal.x, 0.0, center.x],
+        [0.0, focal.y, center.y],
+        [0.0, 0.0, 1.0],
+    ];
+    let matrix = Mat::from_slice_2d(&rows)?;
+    let coefficients = polynomial_of(camera);
+    let coefficients = Mat::from_slice(&coefficients)?;
+    let (mut turn, mut shift) = (Vec3d::default(), Vec3d::default());
+    let found = calib3d::solve_pnp_def(
+        &object_points,
+        &image_points,
+        &matrix,
+        &coefficients,
+        &mut turn,
+        &mut shift,
+    )?;
+    if !found {
+        return Ok(f64::INFINITY);
+    }
+    let pose = pose_from_rodrigues(DVec3::from_array(shift.0), DVec3::from_array(turn.0));
+    let squares = view.corners.iter().map(|corner| {
+        let expected_px = camera.pixel_of(pose.transform_point3(corner.target_m.extend(0.0)));
+        expected_px.map_or(f64::INFINITY, |pixel| pixel.distance_squared(corner.pixel))
+    });
+    Ok((squares.sum::<f64>() / view.corners.len() as f64).sqrt())
+}
+
+/// The lens with no more terms than the views tell, and the parameters' standard deviations: a term is left out where
+/// cross-validation does not miss it, or where the lens would fold with it.
 fn simplest(
     views: &[&TargetView],
     size_px: [u32; 2],
@@ -165,35 +268,40 @@ fn simplest(
         radial: 3,
         tangential: true,
     };
+    let mut fit = match CameraFit::of(views, size_px, lens) {
+        Ok(fit) => fit,
+        Err(_) => {
+            lens.radial = 2;
+            CameraFit::of(views, size_px, lens)?
+        }
+    };
     loop {
-        let fit = match CameraFit::of(views, size_px, lens) {
-            Ok(fit) => fit,
-            Err(_) if lens.radial == 3 => {
-                lens.radial = 2;
-                continue;
-            }
-            Err(error) => return Err(error),
-        };
-        let seen = views.iter().map(|view| view.corners.as_slice());
-        let poses = fit.camera_from_target.iter().copied();
-        let deviations = deviations(&fit.intrinsics, seen.zip(poses), lens.free());
-        let parameters = parameters_of(&fit.intrinsics);
-        let is_noise = |k: usize| parameters[k].abs() < SIGNIFICANT * deviations[k];
-        // k1 always stays: most lenses have some.
-        let last_is_noise = match lens.radial {
-            3 => is_noise(8),
-            2 => is_noise(5),
-            _ => false,
-        };
+        let errors = fit.left_out_errors(views, lens);
         let folds = folds(&fit.intrinsics);
-        if lens.radial > 1 && (folds || last_is_noise) {
-            lens.radial -= 1;
-        } else if lens.tangential && is_noise(6) && is_noise(7) {
-            lens.tangential = false;
-        } else if folds {
-            return Err(CalibrateError::Folds);
-        } else {
-            return Ok((fit, lens, deviations));
+        let mut simpler = None;
+        for fewer in lens.fewer() {
+            let Ok(other) = CameraFit::of(views, size_px, fewer) else {
+                continue;
+            };
+            let is_radial = fewer.radial < lens.radial;
+            let is_as_good = match (&errors, other.left_out_errors(views, fewer)) {
+                (Some(errors), Some(others)) => is_no_worse(&others, errors),
+                // What the views do not determine they do not tell.
+                (None, _) => true,
+                (Some(_), None) => false,
+            };
+            if is_as_good || (folds && is_radial) {
+                simpler = Some((other, fewer));
+                break;
+            }
+        }
+        match simpler {
+            Some(found) => (fit, lens) = found,
+            None if folds => return Err(CalibrateError::Folds),
+            None => {
+                let deviations = deviations(&fit.intrinsics, fit.posed(views), lens.free());
+                return Ok((fit, lens, deviations));
+            }
         }
     }
 }
@@ -280,6 +388,20 @@ impl CameraFit {
             view_rms_px: view_rms_px.data_typed::<f64>()?.to_vec(),
             rms_px,
         })
+    }
+
+    /// The views, each with where the target lies.
+    fn posed<'a>(
+        &self,
+        views: &'a [&TargetView],
+    ) -> impl Iterator<Item = (&'a [TargetCorner], DAffine3)> {
+        let seen = views.iter().map(|view| view.corners.as_slice());
+        seen.zip(self.camera_from_target.iter().copied())
+    }
+
+    /// How far each view would be off for a camera that is known from the others.
+    fn left_out_errors(&self, views: &[&TargetView], lens: LensTerms) -> Option<Vec<f64>> {
+        left_out_errors(&self.intrinsics, self.posed(views), lens.free())
     }
 
     /// The view that fits worst, if it is a bad one.

@@ -128,6 +128,16 @@ impl Target {
         Ok(target)
     }
 
+    /// A board with its columns for rows.
+    #[must_use]
+    pub fn swapped(&self) -> Self {
+        let [across, down] = self.squares;
+        Self {
+            squares: [down, across],
+            ..*self
+        }
+    }
+
     /// Inner corners across and down.
     pub fn corners(&self) -> [u32; 2] {
         self.squares.map(|squares| squares - 1)

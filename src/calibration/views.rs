@@ -4,6 +4,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::{CalibrateError, Coverage, Target, TargetCorner, TargetFinder};
 use crate::geometry::homography::{best_homography, mapped};
+use crate::geometry::quarter_turns::QuarterTurns;
 
 /// Fewer different views are no calibration.
 pub const FEWEST_VIEWS: usize = 4;
@@ -37,10 +38,29 @@ pub struct TargetView {
     pub picture: u32,
     /// What it shows.
     pub corners: Vec<TargetCorner>,
+    /// How it was turned to the others.
+    pub(super) placing: Placing,
     /// Where a plain homography puts the corners of the whole target.
     outline_px: [DVec2; 4],
     /// Root mean square distance of the corners from that homography: the lens, and how sharp the picture is.
     misfit_px: f64,
+}
+
+/// How a picture lies to those of its camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Placing {
+    /// After these turns, as the camera's sensor does.
+    Known(QuarterTurns),
+    /// After these turns as the camera's sensor does, or upside down: nobody has noted how an upright picture was turned.
+    UpOrDown(QuarterTurns),
+}
+
+impl Placing {
+    fn turns(self) -> QuarterTurns {
+        match self {
+            Self::Known(turns) | Self::UpOrDown(turns) => turns,
+        }
+    }
 }
 
 /// What became of a picture.
@@ -108,7 +128,21 @@ impl Views {
         grey: &[u8],
         size_px: [u32; 2],
     ) -> Result<TargetLook, CalibrateError> {
-        let view = self.see(picture, grey, size_px)?;
+        self.look_placed(picture, grey, size_px, Placing::Known(QuarterTurns::NONE))
+    }
+
+    /// The same of a picture that is turned against the others.
+    ///
+    /// # Errors
+    /// As there; the size is that after the turn.
+    pub fn look_placed(
+        &mut self,
+        picture: u32,
+        grey: &[u8],
+        size_px: [u32; 2],
+        placing: Placing,
+    ) -> Result<TargetLook, CalibrateError> {
+        let view = self.see_placed(picture, grey, size_px, placing)?;
         Ok(view.map_or(TargetLook::NoTarget, |view| self.take(view)))
     }
 
@@ -122,16 +156,31 @@ impl Views {
         grey: &[u8],
         size_px: [u32; 2],
     ) -> Result<Option<TargetView>, CalibrateError> {
-        let expected_px = *self.size_px.get_or_insert(size_px);
-        if size_px != expected_px {
+        self.see_placed(picture, grey, size_px, Placing::Known(QuarterTurns::NONE))
+    }
+
+    fn see_placed(
+        &mut self,
+        picture: u32,
+        grey: &[u8],
+        size_px: [u32; 2],
+        placing: Placing,
+    ) -> Result<Option<TargetView>, CalibrateError> {
+        let turned_px = placing.turns().size_px(size_px);
+        let expected_px = *self.size_px.get_or_insert(turned_px);
+        if turned_px != expected_px {
             return Err(CalibrateError::OtherSize {
-                size_px,
+                size_px: turned_px,
                 expected_px,
             });
         }
         self.looked += 1;
         let corners = self.finder.find(grey, size_px)?;
         let view = TargetView::new(picture, corners, self.finder.target())?;
+        let view = view.map(|view| TargetView {
+            placing,
+            ..view.turned(placing.turns(), size_px)
+        });
         self.found += u32::from(view.is_some());
         Ok(view)
     }
@@ -153,6 +202,18 @@ impl Views {
             *kept = view;
         }
         TargetLook::Alike
+    }
+
+    /// The same views in pictures that are all turned: so that the calibration holds for how they are shown.
+    #[must_use]
+    pub fn turned(mut self, turns: QuarterTurns) -> Self {
+        if let Some(size_px) = self.size_px {
+            self.size_px = Some(turns.size_px(size_px));
+            for view in &mut self.kept {
+                *view = view.turned(turns, size_px);
+            }
+        }
+        self
     }
 
     /// Forgets the view that was taken last; false where there is none.
@@ -228,6 +289,13 @@ impl Views {
 
     /// The views that a calibration is made of: all, or those that cover most and differ most.
     pub(super) fn chosen(&self) -> Result<Vec<&TargetView>, CalibrateError> {
+        if self.finder.swapped() > self.found {
+            return Err(CalibrateError::Swapped {
+                looked: self.looked,
+                seen: self.finder.swapped(),
+                squares: self.target().swapped().squares,
+            });
+        }
         let Some(size_px) = self.size_px.filter(|_| self.found > 0) else {
             return Err(CalibrateError::NoTarget {
                 looked: self.looked,
@@ -328,10 +396,25 @@ impl TargetView {
             .all(|corner| corner.is_finite())
             .then(|| Self {
                 picture,
+                placing: Placing::Known(QuarterTurns::NONE),
                 misfit_px: (squared / pairs.len() as f64).sqrt(),
                 corners,
                 outline_px,
             }))
+    }
+
+    /// The view in the picture of this size, turned.
+    #[must_use]
+    pub(super) fn turned(&self, turns: QuarterTurns, size_px: [u32; 2]) -> Self {
+        let corners = self.corners.iter().map(|corner| TargetCorner {
+            pixel: turns.pixel(corner.pixel, size_px),
+            ..*corner
+        });
+        Self {
+            corners: corners.collect(),
+            outline_px: self.outline_px.map(|pixel| turns.pixel(pixel, size_px)),
+            ..self.clone()
+        }
     }
 
     /// Where its corners are in the picture.

@@ -4,8 +4,9 @@ use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
 use super::error::{CaptureError, Notice};
-use super::pixels::{self, read_picture};
+use super::pixels::{self, read_picture, read_picture_as_taken, turn_when_shown};
 use super::video::Place;
+use crate::geometry::quarter_turns::QuarterTurns;
 
 /// Images carry no time of their own.
 pub(super) const ASSUMED_FPS: f64 = 30.0;
@@ -31,6 +32,17 @@ pub(super) struct ImageFrames {
     next_index: u32,
     good_frames: u32,
     size_px: [u32; 2],
+    /// Whether pictures come of any size and as the sensor has them.
+    as_taken: bool,
+    /// The turn by which the last one is shown.
+    shown_turn: QuarterTurns,
+}
+
+/// A picture of a folder.
+pub(super) struct Image {
+    pub(super) index: u32,
+    pub(super) size_px: [u32; 2],
+    pub(super) rgba: Vec<u8>,
 }
 
 impl ImageFrames {
@@ -53,7 +65,19 @@ impl ImageFrames {
             next_index: 0,
             good_frames: 0,
             size_px,
+            as_taken: false,
+            shown_turn: QuarterTurns::NONE,
         })
+    }
+
+    /// From now on pictures come of any size, and as the camera's sensor has them.
+    pub(super) fn take_as_taken(&mut self) {
+        self.as_taken = true;
+    }
+
+    /// By which turn the last picture is shown, where pictures come as the sensor has them.
+    pub(super) fn shown_turn(&self) -> QuarterTurns {
+        self.shown_turn
     }
 
     pub(super) fn frame_count(&self) -> u32 {
@@ -67,18 +91,22 @@ impl ImageFrames {
     pub(super) fn next_picture(
         &mut self,
         notices: &mut Vec<Notice>,
-    ) -> Result<Option<(u32, Vec<u8>)>, CaptureError> {
+    ) -> Result<Option<Image>, CaptureError> {
         while let Some(path) = self.paths.get(self.next_index as usize) {
             let index = self.next_index;
             self.next_index += 1;
-            match read_picture(path) {
+            let read = match self.as_taken {
+                true => read_picture_as_taken(path),
+                false => read_picture(path),
+            };
+            match read {
                 None => notices.push(Notice::Broken {
                     path: path.clone(),
                     first: index,
                     count: 1,
                     good_before: self.good_frames,
                 }),
-                Some(picture) if pixels::size_of(&picture) != self.size_px => {
+                Some(picture) if !self.as_taken && pixels::size_of(&picture) != self.size_px => {
                     notices.push(Notice::OtherSize {
                         path: path.clone(),
                         frame: index,
@@ -88,13 +116,20 @@ impl ImageFrames {
                 }
                 Some(picture) => {
                     self.good_frames += 1;
+                    if self.as_taken {
+                        self.shown_turn = turn_when_shown(path);
+                    }
                     let rgba =
                         pixels::rgba_from_bgr(&picture).map_err(|error| CaptureError::OpenCv {
                             path: path.clone(),
                             frame: index,
                             message: error.message,
                         })?;
-                    return Ok(Some((index, rgba)));
+                    return Ok(Some(Image {
+                        index,
+                        size_px: pixels::size_of(&picture),
+                        rgba,
+                    }));
                 }
             }
         }

@@ -16,13 +16,14 @@ mod video;
 use std::path::{Path, PathBuf};
 
 use crate::geometry::camera::Intrinsics;
+use crate::geometry::quarter_turns::QuarterTurns;
 
 pub use calibration::{
     CalibrationError, calibration_text, check_frame_size, load_calibration, load_calibration_for,
 };
 pub use error::{CaptureError, Notice};
 
-use images::ImageFrames;
+use images::{Image, ImageFrames};
 use times::FrameTimes;
 use video::{Place, VideoFrames};
 
@@ -183,6 +184,24 @@ impl FrameSource {
         Self { mirrored, ..self }
     }
 
+    /// The same with each picture of a folder of its own size and as the camera's sensor has it, whatever its EXIF says of
+    /// how the camera was held. (Frames of a video are all of one size, and shown as it says.)
+    #[must_use]
+    pub fn as_taken(mut self) -> Self {
+        if let PictureSource::Images(images) = &mut self.pictures {
+            images.take_as_taken();
+        }
+        self
+    }
+
+    /// The turn by which the last frame is shown, where frames come [as taken](Self::as_taken).
+    pub fn shown_turn(&self) -> QuarterTurns {
+        match &self.pictures {
+            PictureSource::Video(_) => QuarterTurns::NONE,
+            PictureSource::Images(images) => images.shown_turn(),
+        }
+    }
+
     /// Where the recording lies.
     pub fn path(&self) -> &Path {
         &self.path
@@ -218,12 +237,23 @@ impl FrameSource {
     /// The next good frame; `None` at the end.
     pub fn next_frame(&mut self) -> Result<Option<Frame>, CaptureError> {
         let picture = match &mut self.pictures {
-            PictureSource::Video(video) => video.next_picture(&mut self.notices)?,
-            PictureSource::Images(images) => images
-                .next_picture(&mut self.notices)?
-                .map(|(index, rgba)| (images::place_of(index), rgba)),
+            PictureSource::Video(video) => {
+                let size_px = video.size_px();
+                let picture = video.next_picture(&mut self.notices)?;
+                picture.map(|(place, rgba)| (place, size_px, rgba))
+            }
+            PictureSource::Images(images) => {
+                let picture = images.next_picture(&mut self.notices)?;
+                picture.map(
+                    |Image {
+                         index,
+                         size_px,
+                         rgba,
+                     }| { (images::place_of(index), size_px, rgba) },
+                )
+            }
         };
-        let Some((Place { index, time_secs }, rgba)) = picture else {
+        let Some((Place { index, time_secs }, size_px, rgba)) = picture else {
             return Ok(None);
         };
         self.good_frames += 1;
@@ -231,7 +261,7 @@ impl FrameSource {
         let mut frame = Frame {
             index,
             time_secs,
-            size_px: self.size_px(),
+            size_px,
             rgba,
         };
         if self.mirrored {

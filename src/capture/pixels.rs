@@ -1,9 +1,13 @@
 //! Picture files by OpenCV, and from its pictures to plain pixels.
 
+use std::fs::File;
+use std::io::BufReader;
 use std::path::Path;
 
 use opencv::core::{Mat, MatTraitConst, Vec4b};
 use opencv::{imgcodecs, imgproc};
+
+use crate::geometry::quarter_turns::QuarterTurns;
 
 /// No file is too small for a picture of so many pixels.
 const SMALL_PIXELS: u64 = 32 << 20;
@@ -13,6 +17,37 @@ const MOST_PIXELS_PER_BYTE: u64 = 64;
 /// The colours of a picture file, 8-bit BGR; `None` where OpenCV cannot decode it (it has no better word for it), or its
 /// header asks for more pixels than a file of its size has.
 pub(super) fn read_picture(path: &Path) -> Option<Mat> {
+    read(path, imgcodecs::IMREAD_COLOR)
+}
+
+/// The same as the camera's sensor has it: what EXIF says of how it was held is not looked at.
+pub(super) fn read_picture_as_taken(path: &Path) -> Option<Mat> {
+    read(
+        path,
+        imgcodecs::IMREAD_COLOR | imgcodecs::IMREAD_IGNORE_ORIENTATION,
+    )
+}
+
+/// The turn by which a picture as the sensor has it is shown, from its EXIF; a mirrored one counts as not turned.
+pub(super) fn turn_when_shown(path: &Path) -> QuarterTurns {
+    let orientation = || {
+        let file = File::open(path).ok()?;
+        let exif = exif::Reader::new()
+            .read_from_container(&mut BufReader::new(file))
+            .ok()?;
+        exif.get_field(exif::Tag::Orientation, exif::In::PRIMARY)?
+            .value
+            .get_uint(0)
+    };
+    match orientation() {
+        Some(3) => QuarterTurns::HALF,
+        Some(6) => QuarterTurns::ONE,
+        Some(8) => QuarterTurns::BACK,
+        _ => QuarterTurns::NONE,
+    }
+}
+
+fn read(path: &Path, flags: i32) -> Option<Mat> {
     let file = std::fs::metadata(path)
         .ok()
         .filter(std::fs::Metadata::is_file)?;
@@ -22,7 +57,7 @@ pub(super) fn read_picture(path: &Path) -> Option<Mat> {
             return None;
         }
     }
-    imgcodecs::imread(path, imgcodecs::IMREAD_COLOR)
+    imgcodecs::imread(path, flags)
         .ok()
         .filter(|picture| !picture.empty())
 }

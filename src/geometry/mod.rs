@@ -26,6 +26,7 @@ pub mod outline_scale;
 pub mod penumbra;
 pub mod polygon;
 pub mod pose;
+pub mod quarter_turns;
 pub mod ray_caster;
 pub mod reach;
 pub mod robust;

@@ -46,7 +46,7 @@ keys! {
             => "a session, a video, a folder of images, \"webcam:0\" or an address is expected";
     }
     /// File with the camera's matrix and lens distortion.
-    calibration: Option<PathBuf>, FileKind::Calibration => Means(None, "what the recording itself carries");
+    calibration: Option<PathBuf>, FileKind::Calibration => Means(None, "what the recording itself carries, else what its markers tell of the camera");
     /// The camera mirrors its pictures: turn them back first.
     mirror: bool => Is(false);
     /// Ask a webcam for pictures of this size.

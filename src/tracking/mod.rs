@@ -18,6 +18,7 @@ mod edge_fit;
 mod expected_picture;
 mod filter;
 mod flipped_pose;
+pub mod focal;
 mod layout;
 mod light;
 pub mod mapping;

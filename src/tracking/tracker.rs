@@ -124,6 +124,13 @@ impl Tracker {
         })
     }
 
+    /// From now on frames are by another camera, or by one that is known better: anchors are searched for anew.
+    pub fn set_camera(&mut self, intrinsics: Intrinsics) {
+        self.intrinsics = intrinsics;
+        self.anchors.iter_mut().for_each(TrackedAnchor::lose);
+        self.searched_secs = f64::NEG_INFINITY;
+    }
+
     /// The poses of all anchors in the order in which they were given, or came. A marker that is not seen is no error.
     /// Frames are expected in the order of their times; one from before the last one starts the tracker anew.
     pub fn track(&mut self, frame: &Frame) -> Result<Vec<AnchorPose>, TrackingError> {

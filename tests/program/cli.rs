@@ -803,7 +803,6 @@ fn check_and_replay_agree_on_what_cannot_be_played() {
         .unwrap();
     assert!(!checked(folder.path(), &scene).contains("warning"));
     for (line, says) in [
-        ("", "carries no calibration: give one (calibration ="),
         ("calibration = \"smaller.toml\"", "320"),
         ("calibration = \"none.toml\"", "none.toml"),
     ] {

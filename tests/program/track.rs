@@ -289,18 +289,6 @@ fn mistakes_are_told_and_leave_nothing() {
         ],
         &["no/such/place"],
     );
-    let video = project_file("recordings/lamp/video.mp4");
-    refused(
-        &[
-            "track",
-            plain(&video),
-            "--size-mm",
-            "45",
-            "--poses",
-            "p.csv",
-        ],
-        &["carries no calibration"],
-    );
     let inside = project_file("recordings/lamp/poses.csv");
     refused(
         &[
@@ -552,4 +540,120 @@ fn a_mirrored_recording_is_told_and_turned_back() {
     };
     assert!(without_scene(&[]).contains("--mirror"));
     assert!(without_scene(&["--mirror"]).contains("markers found"));
+}
+
+/// The focal length and its deviation that a job tells of a recording without a calibration.
+fn told_focal_px(said: &str) -> (f64, f64) {
+    let (_, rest) = said
+        .split_once("carries no calibration: focal length ")
+        .unwrap_or_else(|| panic!("no focal length in {said}"));
+    let mut words = rest.split_whitespace();
+    let mut number = || words.next().and_then(|word| word.parse().ok());
+    let focal_px = number();
+    let deviation_px = rest.split_whitespace().nth(2);
+    (
+        focal_px.expect("a number"),
+        deviation_px
+            .and_then(|word| word.parse().ok())
+            .expect("a number"),
+    )
+}
+
+#[test]
+fn a_camera_without_a_calibration_is_learnt_and_all_jobs_say_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["lamp", "hand", "room"] {
+        let path = |file: &str| folder.path().join(format!("{name}_{file}"));
+        let video = project_file(&format!("recordings/{name}/video.mp4"));
+        let text = std::fs::read_to_string(project_file(&format!("config/{name}.toml"))).unwrap();
+        let root = project_file("");
+        let text = text
+            .replace(
+                &format!("source = \"recordings/{name}\""),
+                &format!("source = \"{}\"", plain(&video)),
+            )
+            .replace("\"models/", &format!("\"{}models/", plain(&root)))
+            .replace("\"recordings/", &format!("\"{}recordings/", plain(&root)));
+        let scene = path("scene.toml");
+        std::fs::write(&scene, text).unwrap();
+        let scene = plain(&scene).to_owned();
+        let poses = plain(&path("poses.csv")).to_owned();
+        let again = plain(&path("again.csv")).to_owned();
+        let known = plain(&path("known.csv")).to_owned();
+        let replayed = done(folder.path(), &["replay", &scene, "--poses", &poses]);
+        let tracked = done(folder.path(), &["track", &scene, "--poses", &again]);
+        let checked = gnomon(folder.path(), &["check", &scene]);
+        assert!(checked.status.success());
+        let checked = String::from_utf8_lossy(&checked.stdout).into_owned();
+        let calibration = project_file(&format!("recordings/{name}/camera.toml"));
+        let (anchors, source) = (scene.as_str(), plain(&video));
+        done(
+            folder.path(),
+            &[
+                "track",
+                source,
+                "--anchors",
+                anchors,
+                "--calibration",
+                plain(&calibration),
+                "--poses",
+                &known,
+            ],
+        );
+        let (focal_px, deviation_px) = told_focal_px(&replayed);
+        eprintln!("{name}: {focal_px} ± {deviation_px} px");
+        for said in [&tracked, &checked] {
+            assert_eq!(told_focal_px(said), (focal_px, deviation_px), "{said}");
+        }
+        let truth = gnomon::capture::load_calibration(&calibration).unwrap();
+        let truth_px = (truth.focal_px.x + truth.focal_px.y) / 2.0;
+        let off_px = (focal_px - truth_px).abs();
+        assert!(
+            off_px < 0.03 * truth_px,
+            "{name}: {focal_px} for {truth_px}"
+        );
+        assert!(
+            off_px < 3.0 * deviation_px,
+            "{name}: {focal_px} ± {deviation_px}"
+        );
+        let learnt = rows(Path::new(&poses));
+        // The second run repeats the first bit for bit, in another job.
+        assert_eq!(
+            without_costs(learnt.clone()),
+            without_costs(rows(Path::new(&again))),
+            "{name}"
+        );
+        // Distances follow the focal length, directions do not.
+        let mut apart = Vec::new();
+        for (learnt, known) in learnt.iter().zip(rows(Path::new(&known))) {
+            assert_eq!(learnt[..3], known[..3]);
+            let place = |row: &[String]| -> Option<DVec3> {
+                let numbers: Option<Vec<f64>> =
+                    row[5..8].iter().map(|field| field.parse().ok()).collect();
+                numbers.map(|numbers| DVec3::from_slice(&numbers))
+            };
+            if let (Some(learnt), Some(known)) = (place(learnt), place(&known)) {
+                apart.push((learnt - known).length() / known.length());
+            }
+        }
+        apart.sort_by(f64::total_cmp);
+        let median = apart[apart.len() / 2];
+        eprintln!("{name}: places {median:.4} apart");
+        assert!(apart.len() > 30 && median < 0.03, "{name}: {median}");
+    }
+}
+
+#[test]
+fn lone_markers_tell_a_camera_as_far_as_they_can() {
+    let folder = tempfile::tempdir().unwrap();
+    let video = project_file("recordings/lamp/video.mp4");
+    let poses = plain(&folder.path().join("poses.csv")).to_owned();
+    let said = done(
+        folder.path(),
+        &["track", plain(&video), "--size-mm", "44", "--poses", &poses],
+    );
+    let (focal_px, deviation_px) = told_focal_px(&said);
+    eprintln!("{focal_px} ± {deviation_px} px by lone markers");
+    assert!((focal_px - 614.0).abs() < 3.0 * deviation_px, "{said}");
+    assert!(rows(Path::new(&poses)).len() > 300);
 }

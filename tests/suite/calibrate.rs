@@ -9,7 +9,7 @@ use crate::common::prints::{
 };
 use crate::common::sheets::CAMERA;
 use assert_cmd::Command;
-use glam::{DAffine3, DMat3, DVec2};
+use glam::{DAffine3, DMat3, DVec2, Vec2Swizzles as _};
 use gnomon::app::files::picture_files::{grey_png, write_bytes};
 use gnomon::calibration::{
     CalibrateError, Calibration, Lack, Target, TargetFinder, TargetLook, TargetMarkers, Views,
@@ -339,6 +339,22 @@ fn the_command_writes_what_scenes_read() {
         let path = folder.path().join(format!("views/{k}.png"));
         write_grey_png(&path, CAMERA.size_px, &grey);
     }
+    // One by one, with a broken one among them: all that can be read is used, and the broken one named.
+    write_bytes(&folder.path().join("broken.png"), b"no picture").expect("a file");
+    let one_by_one: Vec<String> = (0..15).map(|k| format!("views/{k}.png")).collect();
+    let output = gnomon(
+        folder.path(),
+        &format!(
+            "calibrate {} broken.png {CHESSBOARD} --out one.toml",
+            one_by_one.join(" ")
+        ),
+    );
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        !output.status.success() && said.contains("broken.png"),
+        "{said}"
+    );
+    assert!(String::from_utf8_lossy(&output.stdout).contains("15 used"));
     let output = gnomon(
         folder.path(),
         &format!("calibrate views {CHESSBOARD} --out camera.toml --coverage coverage.png"),
@@ -356,6 +372,134 @@ fn the_command_writes_what_scenes_read() {
         .expect("a picture")
         .into_rgb8();
     assert!(coverage.width() >= 640 && coverage.height() > 480);
+}
+
+/// A camera whose axis is far from the middle: it tells which way up a picture is.
+const LOPSIDED: Intrinsics = Intrinsics {
+    center_px: DVec2::new(350.0, 222.0),
+    ..BENT_CAMERA
+};
+
+/// A JPEG that says in its EXIF how the camera was held.
+fn write_jpeg(path: &Path, grey: &[u8], orientation: u16) {
+    let mut jpeg = Vec::new();
+    let [width, height] = CAMERA.size_px;
+    image::codecs::jpeg::JpegEncoder::new_with_quality(&mut jpeg, 98)
+        .encode(grey, width, height, image::ExtendedColorType::L8)
+        .expect("a picture");
+    // One entry, tag 0x0112, a short: TIFF 6.0, section 2.
+    let mut segment = b"Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0".to_vec();
+    segment.extend(orientation.to_le_bytes());
+    segment.extend([0; 6]);
+    let length = (segment.len() as u16 + 2).to_be_bytes();
+    let mut bytes = vec![0xff, 0xd8, 0xff, 0xe1, length[0], length[1]];
+    bytes.extend(segment);
+    bytes.extend(&jpeg[2..]);
+    write_bytes(path, &bytes).expect("a picture");
+}
+
+#[test]
+fn pictures_that_were_taken_upright_are_of_the_same_camera() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let print = Print::chessboard();
+    let photographer = Photographer::new(LOPSIDED);
+    let [width, height] = CAMERA.size_px;
+    for (k, pose) in good_poses(print).iter().enumerate() {
+        let grey = photographer.photograph(print, pose, 1.0);
+        match k % 5 {
+            // Held upright, upside down, the other way: the file says so.
+            0 => write_jpeg(&folder.path().join(format!("views/{k}.jpg")), &grey, 6),
+            1 => write_jpeg(&folder.path().join(format!("views/{k}.jpg")), &grey, 3),
+            2 => write_jpeg(&folder.path().join(format!("views/{k}.jpg")), &grey, 1),
+            3 => write_grey_png(
+                &folder.path().join(format!("views/{k}.png")),
+                [width, height],
+                &grey,
+            ),
+            // Turned by a program that has left no word of which way.
+            _ => {
+                let picture = image::GrayImage::from_raw(width, height, grey).expect("a picture");
+                let turned = match k % 2 {
+                    0 => image::imageops::rotate90(&picture),
+                    _ => image::imageops::rotate270(&picture),
+                };
+                let path = folder.path().join(format!("views/{k}.png"));
+                write_grey_png(&path, [height, width], turned.as_raw());
+            }
+        }
+    }
+    // A thumbnail among them.
+    write_grey_png(
+        &folder.path().join("views/small.png"),
+        [64, 48],
+        &[90; 64 * 48],
+    );
+    let output = gnomon(
+        folder.path(),
+        &format!("calibrate views {CHESSBOARD} --out camera.toml"),
+    );
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let printed = String::from_utf8_lossy(&output.stdout);
+    for part in [
+        "frame 15: 64 x 48 pixels, most have 640 x 480; left out",
+        "15 used",
+    ] {
+        assert!(printed.contains(part), "{part:?} is not in {printed}");
+    }
+    let found = load_calibration(&folder.path().join("camera.toml")).expect("a calibration");
+    let off_px = (found.center_px - LOPSIDED.center_px).abs();
+    assert!(off_px.max_element() < 2.0, "{found:?}");
+    assert!(farthest_px(&found, &LOPSIDED) < 0.5, "{found:?}");
+}
+
+#[test]
+fn pictures_that_are_all_upright_are_calibrated_as_they_are_shown() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let print = Print::chessboard();
+    let photographer = Photographer::new(LOPSIDED);
+    for (k, pose) in good_poses(print).iter().enumerate() {
+        let grey = photographer.photograph(print, pose, 1.0);
+        write_jpeg(&folder.path().join(format!("views/{k}.jpg")), &grey, 6);
+    }
+    let output = gnomon(
+        folder.path(),
+        &format!("calibrate views {CHESSBOARD} --out camera.toml"),
+    );
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let found = load_calibration(&folder.path().join("camera.toml")).expect("a calibration");
+    // Turned clockwise: what was up is right.
+    assert_eq!(found.size_px, [480, 640]);
+    let center_px = DVec2::new(479.0 - LOPSIDED.center_px.y, LOPSIDED.center_px.x);
+    assert!(
+        (found.center_px - center_px).abs().max_element() < 2.0,
+        "{found:?}"
+    );
+    let off = (found.focal_px.yx() / LOPSIDED.focal_px - 1.0).abs();
+    assert!(off.max_element() < 2e-3, "{found:?}");
+}
+
+#[test]
+fn columns_for_rows_are_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let print = Print::charuco();
+    for (k, pose) in good_poses(print).iter().take(6).enumerate() {
+        let grey = Photographer::straight().photograph(print, pose, 1.0);
+        let path = folder.path().join(format!("views/{k}.png"));
+        write_grey_png(&path, CAMERA.size_px, &grey);
+    }
+    let swapped = CHARUCO.replace("9x6", "6x9");
+    let output = gnomon(
+        folder.path(),
+        &format!("calibrate views {swapped} --out camera.toml"),
+    );
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success(), "{said}");
+    let part = "6 of 6 pictures show a ChArUco board of 9 x 6 squares, not of 6 x 9: its columns come first (--charuco \
+                9x6)";
+    assert!(said.contains(part), "{said}");
+    assert!(!folder.path().join("camera.toml").exists());
 }
 
 #[test]
@@ -376,11 +520,7 @@ fn mistakes_are_told_and_leave_nothing() {
         ),
         (
             format!("sizes {chessboard}"),
-            vec!["1.png", "600 x 480", "one size"],
-        ),
-        (
-            format!("sizes/0.png sizes/1.png {chessboard}"),
-            vec!["1.png", "600 x 480", "640 x 480"],
+            vec!["none of 1 pictures", "8 x 5 inner corners"],
         ),
         (
             format!("empty {chessboard}"),

@@ -9,7 +9,8 @@ use glam::{DAffine3, DQuat, DVec2, DVec3};
 use gnomon::capture::Frame;
 use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::scene::{Anchor, ArucoRefinement, DetectorKind, Family, Marker, TrackingSettings};
-use gnomon::tracking::{Detector, Status, Tracker};
+use gnomon::tracking::focal::CameraLearner;
+use gnomon::tracking::{Detector, Status, Tracker, TrackingError};
 
 use crate::common::photographs::{photographs, pictures_in, read_photograph};
 use crate::common::sheets::{
@@ -378,6 +379,52 @@ fn solved(rows: &mut [Vec<f64>]) -> [f64; 12] {
         }
     }
     std::array::from_fn(|k| rows[k][12] / rows[k][k])
+}
+
+/// A grid whose own corners gave fx 606.57 and fy 609.98 by another program's calibration, and a room with lone tags whose
+/// camera was calibrated by a chessboard.
+#[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
+fn photographs_of_tags_tell_the_focal_length() {
+    let grid = [Anchor {
+        name: "grid".to_owned(),
+        markers: april_grid(),
+    }];
+    let usual = TrackingSettings::default();
+    let in_room = TrackingSettings {
+        decimation: 1.0,
+        ..TrackingSettings::default()
+    };
+    let by_grid = |size_px| CameraLearner::of_anchors(&usual, &grid, size_px);
+    let by_tags = |size_px| CameraLearner::of_every_marker(&in_room, Family::TAG36H11, size_px);
+    let learnt =
+        |folder: &str, learner: &dyn Fn([u32; 2]) -> Result<CameraLearner, TrackingError>| {
+            let mut learning = None;
+            for path in pictures_in(&photographs(folder)) {
+                let frame = read_photograph(&path);
+                let learner = learning.get_or_insert_with(|| learner(frame.size_px).unwrap());
+                learner.look(&frame).unwrap();
+            }
+            learning.expect("pictures").finish()
+        };
+    for (folder, learnt, focal_px) in [
+        ("grid", learnt("yac_mocap/cam0/data", &by_grid), 608.3),
+        (
+            "room",
+            learnt("swatbotics/mapping_feb_2014", &by_tags),
+            764.6,
+        ),
+    ] {
+        let off = (learnt.intrinsics.focal_px.x / focal_px).ln();
+        eprintln!("{folder}: {}, off by {off:.4}", learnt.in_words());
+        assert!(off.abs() < 0.02, "{folder}: {learnt:?}");
+        assert!(
+            off.abs() < 3.0 * learnt.focal_deviation,
+            "{folder}: {learnt:?}"
+        );
+        // Lone tags leave it less sure, and that is said.
+        assert_eq!(learnt.is_sure(), folder == "grid", "{learnt:?}");
+    }
 }
 
 #[test]

@@ -6,7 +6,7 @@ use anyhow::Result;
 use glam::DAffine3;
 
 use super::lab::{Lab, Recording};
-use crate::app::input::source;
+use crate::app::stages::source::{self, CalibrationNamed};
 use crate::app::truth::{Drawn, Errors, Truth, compare, draw, key_frames};
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
@@ -59,7 +59,7 @@ impl Shots {
     }
 
     fn read(recording: &Recording, scene: &Scene, frames: Vec<PosedFrame>) -> Result<Self> {
-        let (_, intrinsics) = source::open(&scene.camera)?;
+        let (_, intrinsics) = source::open_calibrated(&scene.camera, CalibrationNamed::ByKey)?;
         let shots = frames.into_iter().map(|(frame, camera_from_anchor)| {
             Ok(Shot {
                 truth: Truth::open(&recording.folder, frame.index)?,

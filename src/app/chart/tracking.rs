@@ -10,7 +10,7 @@ use super::family::Chart;
 use super::figure::{Axis, Figure, FigurePanel, Point, Series, pareto_front};
 use super::lab::Lab;
 use super::measured::rounded;
-use crate::app::input::source;
+use crate::app::stages::source::{self, CalibrationNamed};
 use crate::app::stages::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
 use crate::app::truth::{PoseErrors, TruePoses, shifts_px};
@@ -134,7 +134,8 @@ impl Chart for Tracking {
             .map(|_| WayTally::new(scene.anchors.len()))
             .collect();
         for round in 0..lab.rounds().min(3) {
-            let (mut source, intrinsics) = source::open(&scene.camera)?;
+            let (mut source, intrinsics) =
+                source::open_calibrated(&scene.camera, CalibrationNamed::ByKey)?;
             let trackers = ways
                 .iter()
                 .map(|way| Tracker::new(&way.settings, &scene.anchors, intrinsics));

@@ -6,5 +6,4 @@ pub mod live_input;
 pub mod mailbox;
 pub(crate) mod mirror_watch;
 pub(crate) mod sightings;
-pub(crate) mod source;
 pub(crate) mod usual_tracking;

@@ -10,9 +10,9 @@ use crate::app::files::anchor_block;
 use crate::app::files::job_files::{JobFiles, Replacing};
 use crate::app::files::picture_files::write_text;
 use crate::app::files::result_kind::ResultKind;
-use crate::app::input::source::{self, CalibrationNamed};
 use crate::app::input::usual_tracking::usual_tracking;
 use crate::app::stages::progress::Progress;
+use crate::app::stages::source::{self, CalibrationNamed};
 use crate::app::talk;
 use crate::capture::{FrameSource, Notice};
 use crate::scene::{CameraSettings, Family, Marker, TrackingSettings};
@@ -89,7 +89,7 @@ pub fn board(request: &BoardRequest, stop: &AtomicBool) -> Result<()> {
         BoardInput::Scene(_) => CalibrationNamed::ByKey,
         BoardInput::Recording { .. } => CalibrationNamed::ByOption,
     };
-    let (source, intrinsics) = source::open_named(&camera, named)?;
+    let (source, intrinsics) = source::open_calibrated(&camera, named)?;
     let (pictures, notices) = detections(source, &settings, request.family, stop)?;
     let learnt = learn_board(&intrinsics, request.family, &pictures, &request.map)
         .with_context(|| format!("{} pictures of {}", pictures.len(), camera.source))?;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use anyhow::{Result, bail};
 
@@ -12,20 +13,25 @@ use crate::app::files::job_files::{JobFiles, Replacing};
 use crate::app::files::picture_files::write_text;
 use crate::app::files::poses_file::PosesText;
 use crate::app::files::result_kind::ResultKind;
-use crate::app::input::live_capture::LiveCapture;
+use crate::app::input::capture_talk;
+use crate::app::input::live_capture::{CaptureEvent, LiveCapture};
 use crate::app::input::live_input::LiveInput;
+use crate::app::input::mailbox::Taken;
 use crate::app::input::mirror_watch::MirrorWatch;
 use crate::app::input::sightings::Sightings;
-use crate::app::input::source::{self, CalibrationNamed};
 use crate::app::input::usual_tracking::usual_tracking;
+use crate::app::stages::known_camera::{KeptCamera, KnownCamera, LearntFrom, LiveCamera};
 use crate::app::stages::report::Report;
+use crate::app::stages::source::{self, CalibrationNamed};
 use crate::app::stages::stats::{Stats, detector_in_words, peak_memory_mib};
 use crate::app::stages::tally::Tally;
 use crate::app::stages::tracked::{Ended, Frames, Poser, TrackedFrame, each_tracked_frame};
 use crate::app::stopwatch::Stopwatch;
+use crate::app::talk;
 use crate::capture::live::is_live;
 use crate::geometry::camera::Intrinsics;
 use crate::scene::{Anchor, CameraSettings, Family, TrackingSettings};
+use crate::tracking::focal::LearntCamera;
 use crate::tracking::{AnchorPose, Detector, Tracker, grey_from_rgba};
 
 /// A request to track a recording or a camera.
@@ -79,8 +85,12 @@ pub fn track(request: &TrackRequest, stop: &AtomicBool) -> Result<Report> {
     let plan = TrackPlan::of(&request.input, &mut files)?;
     request.name_results(&mut files);
     files.check()?;
-    let (frames_in, intrinsics) = open(&plan.camera, request.input.calibration_named())?;
-    let poser = plan.poser(intrinsics)?;
+    let (frames_in, camera) = plan.open(request.input.calibration_named(), stop)?;
+    let intrinsics = camera.intrinsics();
+    let mut poser = plan.poser(intrinsics)?;
+    if let (Frames::Live(..), KnownCamera::Learnt(_)) = (&frames_in, &camera) {
+        poser = poser.of_live_camera(plan.live_camera(intrinsics.size_px)?);
+    }
     let raw = request
         .markers
         .as_ref()
@@ -203,10 +213,13 @@ impl TrackRun<'_> {
     fn report(mut self, ended: &Ended, interrupted: bool) -> Report {
         let listed = self.listed();
         let lost = listed.iter().map(|&anchor| self.lost(anchor));
-        let remarks = lost
+        let mut remarks: Vec<String> = lost
             .filter(|&(_, lost)| lost > 0)
             .map(|(name, lost)| format!("\"{name}\" was not found in {lost} of them"))
             .collect();
+        let place = self.request.input.calibration_named().place();
+        let learnt = ended.camera.map(KnownCamera::Learnt);
+        remarks.extend(learnt.and_then(|camera| camera.remark(&self.plan.camera.source, place)));
         let frames = self.tally.frames;
         let done = match self.plan.every_marker.is_some() {
             true => format!("{frames} frames, {} markers found", listed.len()),
@@ -221,21 +234,6 @@ impl TrackRun<'_> {
             interrupted,
         )
     }
-}
-
-/// Opens a recording or begins to open a camera, with its calibration.
-fn open(camera: &CameraSettings, named: CalibrationNamed) -> Result<(Frames, Intrinsics)> {
-    if !is_live(&camera.source) {
-        let (source, intrinsics) = source::open_named(camera, named)?;
-        return Ok((Frames::Recorded(Box::new(source)), intrinsics));
-    }
-    let input = LiveInput::of(camera)?;
-    let Some(intrinsics) = input.calibration else {
-        bail!(named.missing(&camera.source));
-    };
-    let now = Arc::new(Stopwatch::clock());
-    let capture = LiveCapture::start(&camera.source, &input.options(false), now, None);
-    Ok((Frames::Live(Box::new(capture), intrinsics), intrinsics))
 }
 
 /// What an [`TrackInput`] comes to.
@@ -298,6 +296,49 @@ impl TrackPlan {
             .collect()
     }
 
+    /// Opens a recording or begins to open a camera.
+    fn open(&self, named: CalibrationNamed, stop: &AtomicBool) -> Result<(Frames, KnownCamera)> {
+        let source = &self.camera.source;
+        if !is_live(source) {
+            let from = self.learnt_from();
+            let (frames, camera) =
+                source::open_and_learn(&self.camera, &self.settings, from, stop)?;
+            if let Some(remark) = camera.remark(source, named.place()) {
+                talk::say(remark);
+            }
+            return Ok((Frames::Recorded(Box::new(frames)), camera));
+        }
+        let input = LiveInput::of(&self.camera)?;
+        let now = Arc::new(Stopwatch::clock());
+        let capture = Box::new(LiveCapture::start(source, &input.options(false), now, None));
+        let camera = match input.calibration {
+            Some(intrinsics) => KnownCamera::Calibrated(intrinsics),
+            None => KnownCamera::Learnt(LearntCamera::guess(first_size_px(&capture, stop)?)),
+        };
+        Ok((Frames::Live(capture, camera.intrinsics()), camera))
+    }
+
+    /// What a camera that is not calibrated is learnt from.
+    fn learnt_from(&self) -> LearntFrom<'_> {
+        match self.every_marker {
+            Some((family, _)) => LearntFrom::EveryMarker(family),
+            None => LearntFrom::Anchors(&self.anchors),
+        }
+    }
+
+    /// A live camera that is learnt while frames come.
+    fn live_camera(&self, size_px: [u32; 2]) -> Result<LiveCamera> {
+        let kept = KeptCamera::of(&self.camera.source);
+        let from = self.learnt_from();
+        Ok(LiveCamera::begin(
+            &self.settings,
+            from,
+            size_px,
+            kept,
+            None,
+        )?)
+    }
+
     fn poser(&self, intrinsics: Intrinsics) -> Result<Poser> {
         let mirror_watch = MirrorWatch::new(&self.settings, self.families());
         Ok(match self.every_marker {
@@ -312,6 +353,27 @@ impl TrackPlan {
                 Sightings::of_anchors(&self.anchors),
             ),
         })
+    }
+}
+
+/// The size of a camera's pictures, which its first one tells.
+fn first_size_px(capture: &LiveCapture, stop: &AtomicBool) -> Result<[u32; 2]> {
+    const PATIENCE: Duration = Duration::from_millis(50);
+    let frames = capture.frames();
+    loop {
+        let taken = frames.take_within(PATIENCE);
+        while let Some(event) = capture.next_event() {
+            capture_talk::say(&event);
+            if let CaptureEvent::Failed(error) = event {
+                return Err(error.into());
+            }
+        }
+        match taken {
+            Taken::New(arrived) => return Ok(arrived.frame.size_px),
+            Taken::Closed => bail!("no frame came"),
+            Taken::Nothing if stop.load(Ordering::Relaxed) => bail!("interrupted; no frame came"),
+            Taken::Nothing => {}
+        }
     }
 }
 

@@ -2,19 +2,18 @@
 
 use std::sync::Arc;
 
-use glam::{DAffine3, DVec2};
+use glam::DAffine3;
 
 use crate::app::input::live_capture::Arrived;
+use crate::app::stages::known_camera::{KeptCamera, LearntFrom, LiveCamera};
 use crate::app::stopwatch::Stopwatch;
 use crate::capture::{Frame, check_frame_size};
-use crate::geometry::camera::{Distortion, Intrinsics};
+use crate::geometry::camera::Intrinsics;
 use crate::scene::{Anchor, Family, Scene, TrackingSettings};
+use crate::tracking::focal::{LearntCamera, guessed_intrinsics};
 use crate::tracking::{
     AnchorPose, Detection, Detector, Quad, Tracker, TrackingError, grey_from_rgba, rejected_quads,
 };
-
-/// Tangent of half the angle that a camera nobody has calibrated is taken to see across: most webcams see about 60°.
-const GUESSED_HALF_WIDTH: f64 = 0.577;
 
 /// The markers that are looked for in frames.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,8 +36,10 @@ pub struct TrackedPicture {
     pub frame: Arc<Frame>,
     /// When it came, by the program's clock, seconds.
     pub arrived_secs: f64,
-    /// The camera that took it: calibrated, or a guess.
+    /// The camera that took it.
     pub intrinsics: Intrinsics,
+    /// How that is known; `None` where it is calibrated.
+    pub learnt: Option<LearntCamera>,
     /// What the poses are of.
     pub anchors: Arc<[Anchor]>,
     /// Of each anchor; all lost where there is [`TrackedPicture::trouble`].
@@ -78,22 +79,28 @@ impl TrackedPicture {
 /// The tracker of live frames, made anew where their size or the plan changes.
 pub struct FrameTracker {
     calibration: Option<Intrinsics>,
+    kept: KeptCamera,
     plan: TrackingPlan,
+    /// The camera that was in use last, where it is learnt.
+    learnt: Option<LearntCamera>,
     /// Made for the frames' size.
     worker: Option<([u32; 2], Worker)>,
 }
 
 enum Worker {
-    Follows(Box<Tracker>),
+    /// With what learns the camera, where that is not calibrated.
+    Follows(Box<Tracker>, Option<Box<LiveCamera>>),
     Looks(Box<Detector>),
 }
 
 impl FrameTracker {
-    /// `calibration`: `None` where the camera has none, and a guess must do.
-    pub fn new(calibration: Option<Intrinsics>, plan: TrackingPlan) -> Self {
+    /// `calibration`: `None` where the camera has none; it is then learnt, and kept there.
+    pub fn new(calibration: Option<Intrinsics>, kept: KeptCamera, plan: TrackingPlan) -> Self {
         Self {
             calibration,
+            kept,
             plan,
+            learnt: None,
             worker: None,
         }
     }
@@ -117,16 +124,23 @@ impl FrameTracker {
             let checked = check_frame_size(calibration, frame.size_px, "the camera");
             checked.err().map(|error| error.to_string())
         });
-        let intrinsics = match &self.calibration {
-            Some(calibration) if unfit.is_none() => *calibration,
-            _ => guessed_intrinsics(frame.size_px),
-        };
         let (tracked, track_ms) = Stopwatch::time(|| match unfit {
             Some(trouble) => Err(trouble),
-            None => self
-                .track(&frame, intrinsics)
-                .map_err(|error| error.to_string()),
+            None => self.track(&frame).map_err(|error| error.to_string()),
         });
+        let of_size = |camera: &LearntCamera| camera.intrinsics.size_px == frame.size_px;
+        let learnt = match self.calibration {
+            Some(_) => None,
+            None => {
+                Some((self.learnt.filter(of_size)).unwrap_or(LearntCamera::guess(frame.size_px)))
+            }
+        };
+        let calibration = self
+            .calibration
+            .filter(|known| known.size_px == frame.size_px);
+        let intrinsics = calibration
+            .or(learnt.map(|camera| camera.intrinsics))
+            .unwrap_or_else(|| guessed_intrinsics(frame.size_px));
         let lost = || vec![AnchorPose::LOST; anchors.len()];
         let ((poses, detections), trouble) = match tracked {
             Ok(tracked) => (tracked, None),
@@ -140,6 +154,7 @@ impl FrameTracker {
             frame,
             arrived_secs: at_secs,
             intrinsics,
+            learnt,
             anchors,
             poses,
             detections,
@@ -149,20 +164,22 @@ impl FrameTracker {
         }
     }
 
-    fn track(
-        &mut self,
-        frame: &Frame,
-        intrinsics: Intrinsics,
-    ) -> Result<(Vec<AnchorPose>, Vec<Detection>), TrackingError> {
-        let worker = match &mut self.worker {
-            Some((size_px, worker)) if *size_px == frame.size_px => worker,
-            other => {
-                let worker = Worker::new(&self.plan, intrinsics)?;
-                &mut other.insert((frame.size_px, worker)).1
-            }
+    fn track(&mut self, frame: &Frame) -> Result<(Vec<AnchorPose>, Vec<Detection>), TrackingError> {
+        let is_of_size = |(size_px, _): &(_, _)| *size_px == frame.size_px;
+        if !self.worker.as_ref().is_some_and(is_of_size) {
+            self.worker = Some((frame.size_px, self.worker(frame.size_px)?));
+        }
+        let Some((_, worker)) = &mut self.worker else {
+            return Ok((Vec::new(), Vec::new()));
         };
         match worker {
-            Worker::Follows(tracker) => {
+            Worker::Follows(tracker, camera) => {
+                if let Some(camera) = camera {
+                    if camera.look(frame)? {
+                        tracker.set_camera(camera.in_use().intrinsics);
+                    }
+                    self.learnt = Some(camera.in_use());
+                }
                 let poses = tracker.track(frame)?;
                 Ok((poses, tracker.detections().to_vec()))
             }
@@ -173,13 +190,25 @@ impl FrameTracker {
             }
         }
     }
-}
 
-impl Worker {
-    fn new(plan: &TrackingPlan, intrinsics: Intrinsics) -> Result<Self, TrackingError> {
-        Ok(match plan {
+    fn worker(&self, size_px: [u32; 2]) -> Result<Worker, TrackingError> {
+        match &self.plan {
             TrackingPlan::Follow { settings, anchors } => {
-                Self::Follows(Box::new(Tracker::new(settings, anchors, intrinsics)?))
+                let learning = match self.calibration {
+                    Some(_) => None,
+                    None => Some(Box::new(LiveCamera::begin(
+                        settings,
+                        LearntFrom::Anchors(anchors),
+                        size_px,
+                        self.kept.clone(),
+                        self.learnt,
+                    )?)),
+                };
+                let learnt = learning.as_ref().map(|camera| camera.in_use().intrinsics);
+                let intrinsics = self.calibration.or(learnt);
+                let intrinsics = intrinsics.unwrap_or_else(|| guessed_intrinsics(size_px));
+                let tracker = Tracker::new(settings, anchors, intrinsics)?;
+                Ok(Worker::Follows(Box::new(tracker), learning))
             }
             TrackingPlan::Look => {
                 // No tracker chases what a quick search misses.
@@ -187,20 +216,10 @@ impl Worker {
                     library_edges: true,
                     ..TrackingSettings::default()
                 };
-                Self::Looks(Box::new(Detector::new(&settings, &[Family::TAG36H11])?))
+                let detector = Detector::new(&settings, &[Family::TAG36H11])?;
+                Ok(Worker::Looks(Box::new(detector)))
             }
-        })
-    }
-}
-
-/// A camera that nobody has calibrated, by its pictures' size.
-pub fn guessed_intrinsics(size_px: [u32; 2]) -> Intrinsics {
-    let [width, height] = size_px.map(f64::from);
-    Intrinsics {
-        size_px,
-        focal_px: DVec2::splat(width.max(height) / 2.0 / GUESSED_HALF_WIDTH),
-        center_px: (DVec2::new(width, height) - 1.0) / 2.0,
-        distortion: Distortion::NONE,
+        }
     }
 }
 
@@ -224,6 +243,10 @@ mod tests {
         (scene, arrived, intrinsics)
     }
 
+    fn tracker_of(calibration: Option<Intrinsics>, plan: TrackingPlan) -> FrameTracker {
+        FrameTracker::new(calibration, KeptCamera::default(), plan)
+    }
+
     #[test]
     fn a_frame_that_does_not_fit_the_calibration_is_still_shown() {
         let (scene, arrived, intrinsics) = lamp();
@@ -235,21 +258,62 @@ mod tests {
             size_px: [320, 240],
             ..intrinsics
         };
-        let picture =
-            FrameTracker::new(Some(other), plan.clone()).look(arrived.clone(), 2.01, false);
+        let picture = tracker_of(Some(other), plan.clone()).look(arrived.clone(), 2.01, false);
         assert!(picture.trouble.unwrap().contains("320"));
         assert_eq!(picture.poses, [AnchorPose::LOST]);
         assert_eq!(picture.intrinsics.size_px, picture.frame.size_px);
-        let picture = FrameTracker::new(Some(intrinsics), plan).look(arrived, 2.01, false);
+        let picture = tracker_of(Some(intrinsics), plan).look(arrived, 2.01, false);
         assert_eq!(picture.trouble, None);
         assert!(picture.poses[0].camera_from_anchor.is_some());
         assert!((picture.wait_ms - 10.0).abs() < 1e-9);
     }
 
     #[test]
+    fn a_camera_that_nobody_has_calibrated_is_learnt_while_frames_come() {
+        let (scene, _, truth) = lamp();
+        let plan = TrackingPlan::Follow {
+            settings: scene.tracking.clone(),
+            anchors: scene.anchors.into(),
+        };
+        let mut tracker = tracker_of(None, plan.clone());
+        let mut source = FrameSource::open(&scene.camera.source).unwrap();
+        let (mut cameras, mut lost) = (Vec::new(), 0);
+        while let Some(frame) = source.next_frame().unwrap() {
+            let at_secs = frame.time_secs;
+            let frame = Arc::new(frame);
+            let picture = tracker.look(Arrived { frame, at_secs }, at_secs, false);
+            assert_eq!(picture.trouble, None);
+            let camera = picture.learnt.unwrap();
+            assert_eq!(camera.intrinsics, picture.intrinsics);
+            lost += usize::from(picture.poses[0].camera_from_anchor.is_none());
+            cameras.push(camera);
+        }
+        // What is shown jumps a few times, and never for a worse camera.
+        let last = cameras[cameras.len() - 1];
+        cameras.dedup();
+        assert!(cameras.len() <= 8 && lost <= 3, "{cameras:?}");
+        let fall = |pair: &[LearntCamera]| pair[1].focal_deviation < pair[0].focal_deviation;
+        assert!(cameras.windows(2).all(fall), "{cameras:?}");
+        assert!(last.is_sure(), "{last:?}");
+        let off = (last.intrinsics.focal_px.x / truth.focal_px.x).ln().abs();
+        assert!(
+            off < 0.02 && off < 3.0 * last.focal_deviation,
+            "{off} {last:?}"
+        );
+        // Another plan begins with what is known.
+        tracker.set_plan(TrackingPlan::Look);
+        tracker.set_plan(plan);
+        let mut source = FrameSource::open(&scene.camera.source).unwrap();
+        let frame = Arc::new(source.next_frame().unwrap().unwrap());
+        let at_secs = 0.0;
+        let picture = tracker.look(Arrived { frame, at_secs }, at_secs, false);
+        assert_eq!(picture.learnt, Some(last));
+    }
+
+    #[test]
     fn without_a_scene_every_marker_is_seen() {
         let (_, arrived, _) = lamp();
-        let mut tracker = FrameTracker::new(None, TrackingPlan::Look);
+        let mut tracker = tracker_of(None, TrackingPlan::Look);
         let picture = tracker.look(arrived, 2.0, false);
         let ids: Vec<u32> = picture.detections.iter().map(|seen| seen.id).collect();
         // Shadows lie across two of the six.

@@ -9,6 +9,7 @@ use std::thread::{self, JoinHandle};
 use super::frame_tracker::{FrameTracker, TrackedPicture, TrackingPlan};
 use crate::app::input::live_capture::{Arrived, CaptureEvent, LiveCapture, Tap};
 use crate::app::input::mailbox::Mailbox;
+use crate::app::stages::known_camera::KeptCamera;
 use crate::app::window::Wake;
 use crate::capture::live::{LiveOptions, Now};
 use crate::geometry::camera::Intrinsics;
@@ -19,7 +20,7 @@ pub struct PipelineInput {
     pub source: String,
     /// How it is opened.
     pub options: LiveOptions,
-    /// `None`: the camera is not calibrated.
+    /// `None`: the camera is not calibrated, and learnt.
     pub calibration: Option<Intrinsics>,
 }
 
@@ -45,7 +46,7 @@ impl Pipeline {
         let thread = {
             let (captured, tracked) = (Arc::clone(&captured), Arc::clone(&tracked));
             let stage = TrackingStage {
-                tracker: FrameTracker::new(input.calibration, plan),
+                tracker: FrameTracker::new(input.calibration, KeptCamera::of(&input.source), plan),
                 new_plans,
                 wants_rejected: Arc::clone(&wants_rejected),
                 now: Arc::clone(now),

@@ -97,7 +97,7 @@ pub struct LiveSession {
     now: Now,
     wake: Wake,
     camera: CameraSettings,
-    /// `None` where a guess must do.
+    /// `None` where it is learnt.
     calibration: Option<Intrinsics>,
     /// The source's rate, where it says it.
     fps: Option<f64>,
@@ -255,8 +255,8 @@ impl LiveSession {
         if session.calibration.is_none() {
             session.tell(
                 Weight::Trouble,
-                "The camera is not calibrated: a usual one is assumed, and things will not stand quite still. See gnomon \
-                 calibrate --help.",
+                "The camera is not calibrated: its focal length is learnt from the markers. Show several of a board from \
+                 several sides.",
             );
         }
         session
@@ -292,6 +292,7 @@ impl LiveSession {
         ) {
             self.recorders.add_poses(&tracked);
             self.notices.tracking.clone_from(&tracked.trouble);
+            self.tell_of_camera(&tracked);
             self.picture = PictureState::Following(Box::new(DrawnPicture {
                 tracked,
                 drawn: None,
@@ -373,6 +374,21 @@ impl LiveSession {
             ..pending.sample
         });
         Ok(())
+    }
+
+    /// Tells once when a camera that is not calibrated is known surely.
+    fn tell_of_camera(&mut self, tracked: &TrackedPicture) {
+        let was_sure = self.picture().and_then(|picture| picture.learnt);
+        let was_sure = was_sure.is_some_and(|camera| camera.is_sure());
+        if let Some(camera) = tracked
+            .learnt
+            .filter(|camera| camera.is_sure() && !was_sure)
+        {
+            self.tell(
+                Weight::Done,
+                format!("The camera is known: {}.", camera.in_words()),
+            );
+        }
     }
 
     /// What the program's clock shows, seconds.

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use anyhow::{Context as _, Result};
 
+use super::known_camera::LiveCamera;
 use super::progress::Progress;
 use crate::app::files::poses_file::GivenPoses;
 use crate::app::input::capture_talk::say;
@@ -20,6 +21,7 @@ use crate::app::stopwatch::Stopwatch;
 use crate::capture::{Frame, FrameSource, Notice, check_frame_size};
 use crate::geometry::camera::Intrinsics;
 use crate::scene::Anchor;
+use crate::tracking::focal::LearntCamera;
 use crate::tracking::{AnchorPose, Detection, Tracker};
 
 /// Frames that may wait between two stages: enough to even out their times, few enough to stay small.
@@ -31,7 +33,7 @@ const LIVE_PATIENCE: Duration = Duration::from_millis(50);
 pub(crate) enum Frames {
     /// A recording: all of them.
     Recorded(Box<FrameSource>),
-    /// A camera, calibrated: as they come.
+    /// A camera: as they come, of one size.
     Live(Box<LiveCapture>, Intrinsics),
 }
 
@@ -46,6 +48,8 @@ pub(crate) enum Poser {
 /// A tracker, and what is watched beside it.
 pub(crate) struct PicturePoser {
     tracker: Tracker,
+    /// `None` where the camera is known before.
+    camera: Option<LiveCamera>,
     mirror_watch: MirrorWatch,
     sightings: Sightings,
     /// Anchors that came by themselves so far.
@@ -74,6 +78,8 @@ pub(crate) struct Ended {
     pub notices: Vec<Notice>,
     /// Frames that were not tracked: broken ones, and those of a live source that came too fast.
     pub dropped: u32,
+    /// The camera that was learnt while frames came; `None` where it was known before.
+    pub camera: Option<LearntCamera>,
     /// Tells whether it is mirrored; `None` where poses were given.
     pub mirror_watch: Option<MirrorWatch>,
     /// Tells what was never found; `None` where poses were given.
@@ -242,6 +248,7 @@ fn track_stage(
             quarter_turns: poser.tracker.quarter_turns().collect(),
             doubled_frames: poser.tracker.doubled_frames().collect(),
             size_errors: poser.tracker.size_errors().collect(),
+            camera: poser.camera.map(|camera| camera.in_use()),
             mirror_watch: Some(poser.mirror_watch),
             sightings: Some(poser.sightings),
             ..Ended::default()
@@ -259,16 +266,33 @@ impl Poser {
     ) -> Self {
         Self::Tracker(Box::new(PicturePoser {
             tracker,
+            camera: None,
             mirror_watch,
             sightings,
             came: 0,
         }))
     }
 
+    /// The same of a camera that is learnt while frames come.
+    pub(crate) fn of_live_camera(self, learnt: LiveCamera) -> Self {
+        match self {
+            Self::Tracker(mut poser) => {
+                poser.camera = Some(learnt);
+                Self::Tracker(poser)
+            }
+            Self::Given(given) => Self::Given(given),
+        }
+    }
+
     /// The poses, and what a tracker took for them.
     fn poses(&mut self, frame: &Frame) -> Result<(Vec<AnchorPose>, Option<f64>)> {
         match self {
             Self::Tracker(poser) => {
+                if let Some(camera) = &mut poser.camera
+                    && camera.look(frame)?
+                {
+                    poser.tracker.set_camera(camera.in_use().intrinsics);
+                }
                 let (poses, ms) = Stopwatch::time(|| poser.tracker.track(frame));
                 let poses = poses?;
                 let shows_marker = !poser.tracker.detections().is_empty();

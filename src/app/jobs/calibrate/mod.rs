@@ -2,6 +2,8 @@
 
 mod watched;
 
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -14,16 +16,19 @@ use crate::app::files::new_file::is_stdout;
 use crate::app::files::picture_files::{write_rgb_png, write_text};
 use crate::app::files::result_kind::ResultKind;
 use crate::app::stages::progress::Progress;
-use crate::calibration::{Calibration, Lack, Target, Views, coverage_picture, solve};
+use crate::calibration::{
+    CalibrateError, Calibration, Lack, Placing, Target, TargetLook, Views, coverage_picture, solve,
+};
 use crate::capture::live::LiveOptions;
-use crate::capture::{FrameSource, Notice, calibration_text};
+use crate::capture::{CaptureError, FrameSource, calibration_text};
+use crate::geometry::quarter_turns::QuarterTurns;
 use crate::scene::WantedFormat;
 use crate::tracking::grey_from_rgba;
 
 /// A request to calibrate a camera.
 #[derive(Debug, Clone)]
 pub struct CalibrateRequest {
-    /// Videos, folders of pictures, single pictures; all of one camera at one size.
+    /// Videos, folders of pictures, single pictures; all of one camera at one size, held however.
     pub sources: Vec<String>,
     /// What they show.
     pub target: Target,
@@ -130,6 +135,7 @@ fn watched(
             .iter()
             .map(|at_secs| format!("at {at_secs:.1} s"))
             .collect(),
+        others: Vec::new(),
         notices: Vec::new(),
     })
 }
@@ -156,25 +162,58 @@ struct TargetPictures {
     views: Views,
     /// By number.
     names: Vec<String>,
+    /// Pictures of other sizes, by name, with their width and height.
+    others: Vec<(String, [u32; 2])>,
     notices: Vec<String>,
+}
+
+/// The pictures of all sources, sorted by their size.
+#[derive(Default)]
+struct SortedPictures {
+    sizes: Vec<OfOneSize>,
+    /// By number.
+    names: Vec<String>,
+    notices: Vec<String>,
+}
+
+/// The pictures of one size, upright ones among them.
+struct OfOneSize {
+    /// The longer side first.
+    size_px: [u32; 2],
+    views: Views,
+    /// Numbers of the pictures.
+    pictures: Vec<usize>,
+    /// How many of those that show the target are shown after which turn.
+    shown: BTreeMap<QuarterTurns, u32>,
 }
 
 impl TargetPictures {
     fn of_recordings(request: &CalibrateRequest, stop: &AtomicBool) -> Result<Self> {
-        let mut pictures = Self {
-            views: Views::new(request.target)?,
-            names: Vec::new(),
-            notices: Vec::new(),
-        };
+        let mut sorted = SortedPictures::default();
         for name in &request.sources {
-            let source = FrameSource::open(name)?.mirrored(request.mirror);
             let is_only_source = request.sources.len() == 1;
-            pictures.look_at(source, is_only_source, stop)?;
+            let source = match FrameSource::open(name) {
+                // One of several pictures: the others are used all the same.
+                Err(error @ CaptureError::NoGoodFrame { .. }) if !is_only_source => {
+                    sorted.notices.push(error.to_string());
+                    continue;
+                }
+                opened => opened?.mirrored(request.mirror).as_taken(),
+            };
+            sorted.look_at(source, is_only_source, request.target, stop)?;
         }
-        Ok(pictures)
+        sorted.conclude(request.target)
     }
+}
 
-    fn look_at(&mut self, mut source: FrameSource, is_only: bool, stop: &AtomicBool) -> Result<()> {
+impl SortedPictures {
+    fn look_at(
+        &mut self,
+        mut source: FrameSource,
+        is_only: bool,
+        target: Target,
+        stop: &AtomicBool,
+    ) -> Result<()> {
         let path = source.path().to_owned();
         let count = source.frame_count();
         let step = count.map_or(1, |count| count.div_ceil(MOST_FRAMES).max(1));
@@ -191,22 +230,93 @@ impl TargetPictures {
             }
             let name = name_of(&path, (count == Some(1), is_only), frame.index);
             grey_from_rgba(&frame, &mut grey)?;
-            let number = self.names.len() as u32;
-            self.views
-                .look(number, &grey, frame.size_px)
-                .with_context(|| name.clone())?;
-            self.names.push(name);
+            let number = self.names.len();
+            self.names.push(name.clone());
+            self.of_size(frame.size_px, target)?
+                .look(number, &grey, frame.size_px, source.shown_turn())
+                .context(name)?;
         }
         progress.finish();
-        let odd = |notice: &&Notice| matches!(notice, Notice::OtherSize { .. });
-        if let Some(notice) = source.notices().iter().find(odd) {
-            bail!("{notice}: a calibration needs one camera at one size");
-        }
         self.notices
             .extend(source.notices().iter().map(ToString::to_string));
         Ok(())
     }
 
+    /// Those of a size, the camera held however.
+    fn of_size(&mut self, [width, height]: [u32; 2], target: Target) -> Result<&mut OfOneSize> {
+        let size_px = [width.max(height), width.min(height)];
+        let known = self.sizes.iter().position(|of| of.size_px == size_px);
+        let at = known.unwrap_or(self.sizes.len());
+        if known.is_none() {
+            self.sizes.push(OfOneSize {
+                size_px,
+                views: Views::new(target)?,
+                pictures: Vec::new(),
+                shown: BTreeMap::new(),
+            });
+        }
+        Ok(&mut self.sizes[at])
+    }
+
+    /// The pictures of that size in which the target was seen most; the others are left out.
+    fn conclude(mut self, target: Target) -> Result<TargetPictures> {
+        // Of those that are alike the first one.
+        let worth = |of: &OfOneSize| (of.views.found(), of.views.looked());
+        let best = (0..self.sizes.len())
+            .rev()
+            .max_by_key(|&at| worth(&self.sizes[at]));
+        let chosen = match best {
+            Some(best) => self.sizes.remove(best),
+            None => bail!("no picture of {target} was read"),
+        };
+        let mut left_out: Vec<(usize, [u32; 2])> = (self.sizes.iter())
+            .flat_map(|of| of.pictures.iter().map(|&number| (number, of.size_px)))
+            .collect();
+        left_out.sort_unstable();
+        // The calibration holds for how most of them are shown.
+        let shown = chosen
+            .shown
+            .iter()
+            .max_by_key(|&(turn, count)| (count, Reverse(turn)));
+        let turn = shown.map_or(QuarterTurns::NONE, |(turn, _)| *turn);
+        Ok(TargetPictures {
+            views: chosen.views.turned(turn),
+            others: (left_out.into_iter())
+                .map(|(number, size_px)| (self.names[number].clone(), size_px))
+                .collect(),
+            names: self.names,
+            notices: self.notices,
+        })
+    }
+}
+
+impl OfOneSize {
+    fn look(
+        &mut self,
+        number: usize,
+        grey: &[u8],
+        size_px: [u32; 2],
+        shown_turn: QuarterTurns,
+    ) -> Result<(), CalibrateError> {
+        // An upright picture that no EXIF explains was turned by a program, or is one of a video that is shown so.
+        let (placing, shown_turn) = match size_px == self.size_px {
+            true => (Placing::Known(QuarterTurns::NONE), shown_turn),
+            false => (
+                Placing::UpOrDown(QuarterTurns::ONE),
+                QuarterTurns::ONE.inverse(),
+            ),
+        };
+        self.pictures.push(number);
+        let number = u32::try_from(number).unwrap_or(u32::MAX);
+        let look = self.views.look_placed(number, grey, size_px, placing)?;
+        if look != TargetLook::NoTarget {
+            *self.shown.entry(shown_turn).or_default() += 1;
+        }
+        Ok(())
+    }
+}
+
+impl TargetPictures {
     /// A row for each view, then the camera.
     fn summary(&self, calibration: &Calibration) -> String {
         let name = |picture: u32| self.names.get(picture as usize).map_or("", String::as_str);
@@ -234,6 +344,14 @@ impl TargetPictures {
                 "",
                 "",
                 name(picture)
+            );
+        }
+        let used_px = self.views.size_px().unwrap_or_default();
+        for (name, size_px) in &self.others {
+            let _ = writeln!(
+                text,
+                "{:>8} {:>8} {:>8}  {name}: {} x {} pixels, most have {} x {}; left out",
+                "", "", "", size_px[0], size_px[1], used_px[0], used_px[1]
             );
         }
         let _ = writeln!(

@@ -1,11 +1,12 @@
 //! What a scene's frame budget comes to on this machine: one frame of its recording is drawn until the settings settle.
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use anyhow::{Result, bail, ensure};
 
-use crate::app::input::source;
 use crate::app::stages::budget_words::setting_words;
+use crate::app::stages::source;
 use crate::app::stages::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
 use crate::capture::live::is_live;
@@ -33,7 +34,8 @@ fn measured(scene: &Scene) -> Result<String> {
     if is_live(&scene.camera.source) {
         bail!("that takes a recording");
     }
-    let (mut source, intrinsics) = source::open(&scene.camera)?;
+    let (mut source, camera) = source::open(scene, &AtomicBool::new(false))?;
+    let intrinsics = camera.intrinsics();
     let mut tracker = Tracker::new(&scene.tracking, &scene.anchors, intrinsics)?;
     let mut found = None;
     for _ in 0..FIRST_FRAMES {

@@ -1,11 +1,14 @@
 //! What the first frames of a scene's recording tell before it is played.
 
+use std::sync::atomic::AtomicBool;
+
 use anyhow::{Result, bail};
 use glam::{DAffine3, DVec2, DVec3};
 
 use crate::app::input::mirror_watch::MirrorWatch;
 use crate::app::input::sightings::Sightings;
-use crate::app::input::source;
+use crate::app::stages::known_camera::KnownCamera;
+use crate::app::stages::source::{self, CalibrationNamed};
 use crate::capture::live::is_live;
 use crate::capture::{Frame, FrameSource, load_calibration};
 use crate::geometry::camera::Intrinsics;
@@ -20,26 +23,34 @@ const STRIDE: u32 = 10;
 const FIRST_FRAMES: u32 = 16;
 
 /// The warnings that the first frames of a scene's recording give: mirrored pictures, anchors that are not seen, things that
-/// are out of view. A camera is not asked, but its calibration is read.
+/// are out of view; and what is learnt of a camera that is not calibrated. A live camera is not asked, but its calibration
+/// is read.
 ///
 /// # Errors
 /// What keeps the scene from being replayed: a recording that cannot be opened, is damaged where it was read, or has a
-/// calibration that is missing or of another size.
+/// calibration of another size.
 pub fn first_look(scene: &Scene) -> Result<Vec<String>> {
     if is_live(&scene.camera.source) {
-        if let Some(path) = &scene.camera.calibration {
-            load_calibration(path)?;
-        }
-        return Ok(Vec::new());
+        return Ok(match &scene.camera.calibration {
+            Some(path) => load_calibration(path).map(|_| Vec::new())?,
+            None => vec![format!(
+                "{} has no calibration: its focal length is guessed, and learnt from the markers while pictures come \
+                 ({} is better)",
+                scene.camera.source,
+                CalibrationNamed::ByKey.place()
+            )],
+        });
     }
-    let (mut source, intrinsics) = source::open(&scene.camera)?;
-    let mut look = Look::new(scene, intrinsics)?;
+    let (mut source, camera) = source::open(scene, &AtomicBool::new(false))?;
+    let mut look = Look::new(scene, &camera)?;
     let ended = look.watch(&mut source)?;
     if !source.notices().is_empty() {
         let notices: Vec<String> = source.notices().iter().map(ToString::to_string).collect();
         bail!("the recording is damaged: {}", notices.join("; "));
     }
-    Ok(look.warnings(ended, source.good_frames()))
+    let of_camera = camera.remark(&scene.camera.source, CalibrationNamed::ByKey.place());
+    let of_frames = look.warnings(ended, source.good_frames());
+    Ok(of_camera.into_iter().chain(of_frames).collect())
 }
 
 /// What was seen so far.
@@ -57,7 +68,8 @@ struct Look<'a> {
 }
 
 impl<'a> Look<'a> {
-    fn new(scene: &'a Scene, intrinsics: Intrinsics) -> Result<Self> {
+    fn new(scene: &'a Scene, camera: &KnownCamera) -> Result<Self> {
+        let intrinsics = camera.intrinsics();
         Ok(Self {
             scene,
             intrinsics,

@@ -28,10 +28,10 @@ use crate::app::files::result_kind::ResultKind;
 use crate::app::files::video_writer::Codec;
 use crate::app::input::mirror_watch::MirrorWatch;
 use crate::app::input::sightings::Sightings;
-use crate::app::input::source;
 use crate::app::scene_warnings;
 use crate::app::stages::budget_words::budget_words;
 use crate::app::stages::report::Report;
+use crate::app::stages::source::{self, CalibrationNamed};
 use crate::app::stages::stats::{Stats, detector_in_words, peak_memory_mib};
 use crate::app::stages::tally::Tally;
 use crate::app::stages::tracked::{
@@ -84,8 +84,13 @@ pub fn replay(request: &ReplayRequest, stop: &AtomicBool) -> Result<Report> {
     }
     request.name_files(&mut files)?;
     files.check()?;
-    let (source, intrinsics) = source::open(&scene.camera)?;
     request.check_layers()?;
+    let (source, camera) = source::open(&scene, stop)?;
+    let place = CalibrationNamed::ByKey.place();
+    if let Some(remark) = camera.remark(&scene.camera.source, place) {
+        talk::say(remark);
+    }
+    let intrinsics = camera.intrinsics();
     let poser = match &request.poses_from {
         Some(path) => Poser::Given(GivenPoses::read(path, &scene.anchors)?),
         None => Poser::tracker(

@@ -51,6 +51,9 @@ pub fn show(ui: &mut Ui, facts: &Facts<'_>, editing: &mut Editing, commands: &mu
                 ui.end_row();
             }
         });
+    if let Some(camera) = picture.learnt {
+        ui.label(camera.in_words());
+    }
     let worst_px = picture.poses.iter().map(|pose| pose.reprojection_px);
     if worst_px.fold(0.0, f64::max) > MOST_REPROJECTION_PX {
         ui.colored_label(
