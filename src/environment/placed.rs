@@ -62,7 +62,11 @@ impl PlacedThing<'_> {
     /// A box around it, in the world.
     pub fn bounds(&self) -> Bounds {
         let corners = self.thing.bounds.corners();
-        let placed = corners.map(|corner| self.world_from_anchor.transform_point3(corner.as_vec3()).as_dvec3());
+        let placed = corners.map(|corner| {
+            self.world_from_anchor
+                .transform_point3(corner.as_vec3())
+                .as_dvec3()
+        });
         Bounds {
             low: placed.into_iter().fold(DVec3::MAX, DVec3::min),
             high: placed.into_iter().fold(DVec3::MIN, DVec3::max),
@@ -103,14 +107,15 @@ impl PlacedScene<'_> {
         let mut open = vec![true; count * regions.len()];
         for (index, &number) in numbers.iter().enumerate() {
             let own = &self.things[index];
-            let middle = own.world_from_anchor.transform_point3(own.thing.ball.center);
+            let middle = own
+                .world_from_anchor
+                .transform_point3(own.thing.ball.center);
             let row = &mut open[number * regions.len()..(number + 1) * regions.len()];
             for (open, region) in row.iter_mut().zip(regions) {
                 let toward = region.toward.as_vec3();
                 // (A sheet of paper on it does not hide the sky from all of a table.)
-                let counts = |thing: &Thing| {
-                    !thing.casts && thing.ball.radius > own.thing.ball.radius
-                };
+                let counts =
+                    |thing: &Thing| !thing.casts && thing.ball.radius > own.thing.ball.radius;
                 *open = self.seen(middle, toward, counts).is_none();
             }
         }
@@ -154,9 +159,10 @@ impl PlacedScene<'_> {
 
     /// Whether a thing that casts shadows hides what lies `reach` along a direction.
     fn is_hidden(&self, among: Among, origin: Vec3, direction: Vec3, reach: f32) -> bool {
-        let mut casting = self.things.iter().filter(|placed| {
-            placed.thing.casts && (among == Among::All || placed.thing.is_real)
-        });
+        let mut casting = self
+            .things
+            .iter()
+            .filter(|placed| placed.thing.casts && (among == Among::All || placed.thing.is_real));
         casting.any(|placed| placed.hides(origin, direction, reach))
     }
 
@@ -187,13 +193,7 @@ impl PlacedScene<'_> {
         seen.albedo * arriving * FRAC_1_PI
     }
 
-    fn of_region(
-        &self,
-        among: Among,
-        start: Vec3,
-        normal: Vec3,
-        region: &Region,
-    ) -> Vec3 {
+    fn of_region(&self, among: Among, start: Vec3, normal: Vec3, region: &Region) -> Vec3 {
         let toward = region.toward.as_vec3();
         let cosine = toward.dot(normal);
         match cosine > 0.0 && !self.is_hidden(among, start, toward, f32::INFINITY) {

@@ -22,14 +22,8 @@ const RAYS: usize = 512;
 
 /// What harmonics of even surroundings with radiance 1 a diffuse surface turns into irradiance, degree by degree (Ramamoorthi &
 /// Hanrahan 2001, equation 8).
-const COSINE_LOBE: [f64; TRANSFER_DEGREE + 1] = [
-    PI,
-    2.0 * PI / 3.0,
-    PI / 4.0,
-    0.0,
-    -PI / 24.0,
-    0.0,
-];
+const COSINE_LOBE: [f64; TRANSFER_DEGREE + 1] =
+    [PI, 2.0 * PI / 3.0, PI / 4.0, 0.0, -PI / 24.0, 0.0];
 
 /// A corner's self-occlusion, in its thing's anchor's space.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,7 +100,9 @@ impl SelfOcclusion {
     /// negative, which a sum of few harmonics may be.
     pub fn irradiance(&self, radiance: &[DVec3; TRANSFERS]) -> Vec3 {
         let parts = self.transfer.iter().zip(radiance);
-        let sum: DVec3 = parts.map(|(&part, &radiance)| radiance * f64::from(part)).sum();
+        let sum: DVec3 = parts
+            .map(|(&part, &radiance)| radiance * f64::from(part))
+            .sum();
         sum.max(DVec3::ZERO).as_vec3()
     }
 }

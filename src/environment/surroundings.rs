@@ -41,11 +41,14 @@ impl LocalLight {
         let size = bounds.high - bounds.low;
         let (low, size) = (bounds.low + size * INSET, size * (1.0 - 2.0 * INSET));
         let mut corners = [[DVec3::ZERO; TRANSFERS]; 8];
-        corners.par_iter_mut().enumerate().for_each(|(index, corner)| {
-            let part = |bit: usize| (index >> bit & 1) as f64;
-            let place = low + size * DVec3::new(part(0), part(1), part(2));
-            *corner = radiance_at(scene, place.as_vec3(), own);
-        });
+        corners
+            .par_iter_mut()
+            .enumerate()
+            .for_each(|(index, corner)| {
+                let part = |bit: usize| (index >> bit & 1) as f64;
+                let place = low + size * DVec3::new(part(0), part(1), part(2));
+                *corner = radiance_at(scene, place.as_vec3(), own);
+            });
         Self { low, size, corners }
     }
 
@@ -90,8 +93,7 @@ fn radiance_at(scene: &PlacedScene<'_>, place: Vec3, own: usize) -> Radiance {
     let weight = 4.0 * PI / RAYS as f64;
     for (number, direction) in sphere(RAYS).enumerate() {
         // What casters reflect on to real things is added by the pixel.
-        let counts =
-            |thing: &Thing| !std::ptr::eq(thing, own) && !(thing.casts && own.is_real);
+        let counts = |thing: &Thing| !(std::ptr::eq(thing, own) || thing.casts && own.is_real);
         let Some(seen) = scene.seen(place, direction.as_vec3(), counts) else {
             continue;
         };

@@ -69,7 +69,9 @@ impl Turn {
     pub fn new(there_from_here: glam::DMat3, degree: usize) -> Self {
         // A quadrature of products of two harmonics: exact up to rounding with Gauss' places in z and even ones around.
         let quadrature = quadrature(degree);
-        let mut degrees: Vec<Vec<f64>> = (0..=degree).map(|l| vec![0.0; (2 * l + 1).pow(2)]).collect();
+        let mut degrees: Vec<Vec<f64>> = (0..=degree)
+            .map(|l| vec![0.0; (2 * l + 1).pow(2)])
+            .collect();
         for (direction, weight) in quadrature {
             let here = basis(direction, degree);
             let there = basis(there_from_here * direction, degree);
@@ -113,7 +115,10 @@ fn quadrature(degree: usize) -> Vec<(DVec3, f64)> {
             let (mut before, mut value) = (1.0, z);
             for l in 1..rings {
                 let l = l as f64;
-                (before, value) = (value, ((2.0 * l + 1.0) * z * value - l * before) / (l + 1.0));
+                (before, value) = (
+                    value,
+                    ((2.0 * l + 1.0) * z * value - l * before) / (l + 1.0),
+                );
             }
             slope = rings as f64 * (z * value - before) / (z * z - 1.0);
             let step = value / slope;
@@ -196,13 +201,19 @@ mod tests {
         };
         let turned = Turn::new(turn(), DEGREE).turned(&coefficients);
         for direction in sphere(50) {
-            let (before, after) = (at(&coefficients, direction), at(&turned, turn() * direction));
+            let (before, after) = (
+                at(&coefficients, direction),
+                at(&turned, turn() * direction),
+            );
             assert!(before.distance(after) < 1e-10, "{before} {after}");
         }
         for degree in 0..=DEGREE {
             let band = degree * degree..(degree + 1) * (degree + 1);
             let power = |all: &[DVec3]| -> f64 {
-                all[band.clone()].iter().map(|part| part.length_squared()).sum()
+                all[band.clone()]
+                    .iter()
+                    .map(|part| part.length_squared())
+                    .sum()
             };
             assert!((power(&turned) / power(&coefficients) - 1.0).abs() < 1e-10);
         }
@@ -228,7 +239,10 @@ mod tests {
                     0.0
                 };
                 let found = sums[l * l + m];
-                assert!((found - expected).abs() < 1e-4, "{l} {m}: {found} {expected}");
+                assert!(
+                    (found - expected).abs() < 1e-4,
+                    "{l} {m}: {found} {expected}"
+                );
             }
         }
     }

@@ -138,7 +138,9 @@ impl Sum {
     fn spread(&self, toward: DVec3) -> f64 {
         let along = toward.dot(self.squares * toward);
         let trace = self.squares.x_axis.x + self.squares.y_axis.y + self.squares.z_axis.z;
-        ((trace - along) / (2.0 * along.max(f64::MIN_POSITIVE))).max(0.0).sqrt()
+        ((trace - along) / (2.0 * along.max(f64::MIN_POSITIVE)))
+            .max(0.0)
+            .sqrt()
     }
 
     fn region(&self) -> Option<Region> {
@@ -264,7 +266,10 @@ mod tests {
             let regions = regions(&probe, count);
             assert_eq!(regions.len(), count);
             let solid_angle: f64 = regions.iter().map(|region| region.solid_angle_sr).sum();
-            assert!((solid_angle / (4.0 * PI) - 1.0).abs() < 1e-9, "{solid_angle}");
+            assert!(
+                (solid_angle / (4.0 * PI) - 1.0).abs() < 1e-9,
+                "{solid_angle}"
+            );
             // A colour's vector may lie a little beside that of the whole light; along it nothing is lost.
             let summed: DVec3 = regions
                 .iter()
@@ -272,7 +277,10 @@ mod tests {
                 .sum();
             let [red, green, blue] = irradiance_vector(&probe);
             let exact = DMat3::from_cols(red, green, blue) * REC_709;
-            assert!(summed.distance(exact) < 1e-9 * exact.length(), "{summed} {exact}");
+            assert!(
+                summed.distance(exact) < 1e-9 * exact.length(),
+                "{summed} {exact}"
+            );
         }
     }
 
@@ -301,7 +309,10 @@ mod tests {
                 .fold(0.0, f64::max)
         };
         let [few, more, many] = [16, 64, 256].map(error);
-        assert!(few < 0.1 && more < 0.03 && many < 0.01, "{few} {more} {many}");
+        assert!(
+            few < 0.1 && more < 0.03 && many < 0.01,
+            "{few} {more} {many}"
+        );
     }
 
     #[test]
@@ -334,7 +345,11 @@ mod tests {
         let found = regions(&probe, 8);
         assert!(!found.is_empty() && found.len() <= 8);
         let middle = probe.direction(22.0, 10.0);
-        assert!(found.iter().all(|region| region.toward.angle_between(middle) < 0.4));
+        assert!(
+            found
+                .iter()
+                .all(|region| region.toward.angle_between(middle) < 0.4)
+        );
         assert!(regions(&Probe::new(size_px, vec![Vec3::ZERO; 2048]).unwrap(), 8).is_empty());
     }
 }

@@ -166,11 +166,6 @@ fn textures(device: &wgpu::Device, tiling: &Tiling) -> (wgpu::Texture, wgpu::Tex
         tiling.levels(),
         wgpu::TextureUsages::TEXTURE_BINDING,
     );
-    let depth = texture(
-        "maps' depth",
-        DEPTH_FORMAT,
-        1,
-        wgpu::TextureUsages::empty(),
-    );
+    let depth = texture("maps' depth", DEPTH_FORMAT, 1, wgpu::TextureUsages::empty());
     (atlas, depth.create_view(&Default::default()))
 }

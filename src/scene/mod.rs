@@ -67,8 +67,8 @@ pub use quality::Quality;
 pub use ranges::{Digits, Numbers, Whole};
 pub use reference::reference;
 pub use shadows::{
-    EnvironmentMethod, EnvironmentSettings,
-    ShadowChange, ShadowSettings, ShadowTechnique, ShaftSettings, Technique, VolumeCounting,
+    EnvironmentMethod, EnvironmentSettings, ShadowChange, ShadowSettings, ShadowTechnique,
+    ShaftSettings, Technique, VolumeCounting,
 };
 pub use shapes::ShapeKind;
 pub use shortcuts::{Shortcut, Shortcuts};

@@ -315,9 +315,8 @@ fn check_technique(table: &Table, probe: Option<&ProbeScene>) -> Result<(), Scen
         return Ok(());
     };
     match (value.text()?, probe) {
-        ("environment", None) => Err(value.error(
-            "the scene has no [probe], which is the environment; allowed: auto, volumes",
-        )),
+        ("environment", None) => Err(value
+            .error("the scene has no [probe], which is the environment; allowed: auto, volumes")),
         ("shafts", None) => Err(value.error(
             "the scene has no [probe], which shafts take their light from; allowed: auto, volumes",
         )),

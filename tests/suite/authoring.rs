@@ -453,6 +453,7 @@ mod edits {
                 from: scene.shadows,
                 to: ShadowSettings {
                     compact_penumbra_px: (random.between(0.0, 40.0) * 100.0).round() / 100.0,
+                    environment: Default::default(),
                     without: Shortcuts::NONE,
                     light_samples: [16, 64, 100][random.below(3)],
                     ambient_samples: [0, 32, 50][random.below(3)],

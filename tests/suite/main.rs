@@ -14,6 +14,7 @@ mod board;
 mod calibrate;
 mod counting;
 mod detail;
+mod environment;
 mod figures;
 mod gltf;
 mod lenses;

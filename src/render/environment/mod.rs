@@ -113,9 +113,8 @@ impl Environment {
             .corners()
             .zip(&occlusions)
             .map(|((_, _, corners), batch)| {
-                let visibility = |corner: usize| {
-                    batch.occlusions[batch.point_of_corner[corner]].visibility
-                };
+                let visibility =
+                    |corner: usize| batch.occlusions[batch.point_of_corner[corner]].visibility;
                 let contents = occlusion_corners(&corners.thing_of, visibility);
                 gpu.buffer("self-occlusion", &contents, wgpu::BufferUsages::VERTEX)
             })
@@ -125,9 +124,7 @@ impl Environment {
         let largest_px = gpu.device.limits().max_texture_dimension_2d;
         let tiling = Tiling::new(count, settings.map_px, largest_px);
         let kinds = gpu_scene.kinds;
-        let glossy = kinds
-            .glossy
-            .then(|| (rest.as_ref(), probe.exposure as f32));
+        let glossy = kinds.glossy.then(|| (rest.as_ref(), probe.exposure as f32));
         Self {
             pipelines: Pipelines::new(gpu, scene.shadows.samples, kinds, settings.method),
             atlas: MapAtlas::new(gpu, tiling, "occlusion_maps.wgsl"),
@@ -280,22 +277,27 @@ impl Environment {
             };
             let lights: Vec<LocalLight> =
                 lights.iter().map(|light| light.seen_from(pose)).collect();
-            let points = batch.points.iter().zip(&batch.occlusions).zip(&batch.thing_of_point);
-            let of_point = |((point, occlusion), thing): ((&(DVec3, DVec3), &SelfOcclusion), &usize)| {
-                let Some(index) = numbers.iter().position(|number| number == thing) else {
-                    return Vec3::ZERO;
+            let points = batch
+                .points
+                .iter()
+                .zip(&batch.occlusions)
+                .zip(&batch.thing_of_point);
+            let of_point =
+                |((point, occlusion), thing): ((&(DVec3, DVec3), &SelfOcclusion), &usize)| {
+                    let Some(index) = numbers.iter().position(|number| number == thing) else {
+                        return Vec3::ZERO;
+                    };
+                    let place = pose.transform_point3(point.0);
+                    let around = occlusion.irradiance(&lights[index].at(place));
+                    let of_itself = match scene.things[index].thing.is_real {
+                        true => Vec3::ZERO,
+                        false => {
+                            let normal = pose.transform_vector3(point.1).as_vec3();
+                            discs.irradiance_from_itself(index, place.as_vec3(), normal)
+                        }
+                    };
+                    around + of_itself
                 };
-                let place = pose.transform_point3(point.0);
-                let around = occlusion.irradiance(&lights[index].at(place));
-                let of_itself = match scene.things[index].thing.is_real {
-                    true => Vec3::ZERO,
-                    false => {
-                        let normal = pose.transform_vector3(point.1).as_vec3();
-                        discs.irradiance_from_itself(index, place.as_vec3(), normal)
-                    }
-                };
-                around + of_itself
-            };
             let at_points: Vec<Vec3> = points.map(of_point).collect();
             let corners = batch.point_of_corner.iter();
             corners.map(|&point| at_points[point]).collect()
@@ -364,7 +366,9 @@ impl BroadLight for Environment {
         }
         let placed = self.placed.as_ref()?;
         let is_real = |&&number: &&usize| {
-            self.things[number].as_ref().is_some_and(|thing| thing.is_real)
+            self.things[number]
+                .as_ref()
+                .is_some_and(|thing| thing.is_real)
         };
         let frame = EnvironmentFrame {
             world_from_camera: glam::DMat4::from(world_from_camera).as_mat4(),
@@ -377,7 +381,11 @@ impl BroadLight for Environment {
             .write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
         let has_virtual = self.things.iter().flatten().any(|thing| !thing.is_real);
         let covered = |bounds: &Bounds| {
-            reach::covered(&bounds.corners(), &camera_from_world, gpu_scene.intrinsics())
+            reach::covered(
+                &bounds.corners(),
+                &camera_from_world,
+                gpu_scene.intrinsics(),
+            )
         };
         let pixels = placed.bounds.iter().map(covered);
         let pixels = pixels.fold(PixelRect::NONE, PixelRect::union);

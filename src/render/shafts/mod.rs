@@ -316,7 +316,6 @@ impl Shafts {
         pass.set_vertex_buffer(0, self.places.slice(..));
         pass.draw(self.first_of_room..self.place_count, 0..1);
     }
-
 }
 
 impl BroadLight for Shafts {

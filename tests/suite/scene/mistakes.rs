@@ -154,7 +154,7 @@ const MISTAKES: &[Mistake] = &[
     added("[tracking]\ndecimation = 0.5\n", 7, 14, &["allowed: 1 to 8"]),
     // Shadows
     added("[shadows]\ntechnique = \"shafts\"\n", 7, 13, &["the scene has no [probe]", "allowed: auto, volumes"]),
-    added("[shadows]\ntechnique = \"environment\"\n", 7, 13, &["this version does not render it", "auto, volumes, shafts"]),
+    added("[shadows]\ntechnique = \"environment\"\n", 7, 13, &["the scene has no [probe]", "auto, volumes"]),
     added("[shadows]\nsources = 0\n", 7, 11, &["1 to 4096"]),
     added("[shadows]\nsources = \"most\"\n", 7, 11, &["a number of sources", "\"all\""]),
     added("[shadows]\nmap_px = 100\n", 7, 10, &["a side of maps", "64, 128"]),

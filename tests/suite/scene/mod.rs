@@ -130,6 +130,7 @@ fn a_small_scene_has_the_defaults() {
     assert_eq!(
         scene.shadows,
         ShadowSettings {
+            environment: Default::default(),
             without: Shortcuts::NONE,
             quality: None,
             technique: Technique::Auto,
@@ -297,6 +298,7 @@ frame_budget_ms = 16
     assert_eq!(
         scene.shadows,
         ShadowSettings {
+            environment: Default::default(),
             without: Shortcuts::NONE,
             quality: Some(Quality::Accurate),
             technique: Technique::Volumes,

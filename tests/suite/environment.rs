@@ -1,0 +1,311 @@
+//! An environment's light on things that move and turn, held against sums over all of the probe's pixels by rays.
+
+use glam::{DAffine3, DMat3, DVec2, DVec3, Vec3};
+use gnomon::geometry::camera::{Distortion, Intrinsics};
+use gnomon::geometry::ray_caster::RayCaster;
+use gnomon::light::probe::Probe;
+use gnomon::render::{REAL, Shown, VIRTUAL};
+use gnomon::scene::{EnvironmentMethod, Object, ProbeScene, Scene, Technique};
+
+use crate::common::shapes::{cuboid, rectangle, sphere};
+use crate::common::{Picture, Stage, flat_mesh, look_at, object, scene};
+
+const CAMERA: Intrinsics = Intrinsics {
+    size_px: [120, 90],
+    focal_px: DVec2::splat(130.0),
+    center_px: DVec2::new(59.5, 44.5),
+    distortion: Distortion::NONE,
+};
+const PROBE_PX: [usize; 2] = [96, 48];
+
+/// A sky that is bright to one side, with a broad glow, over dark ground; turned to the left by so many columns.
+fn sky(turned: usize) -> Probe {
+    let [width, height] = PROBE_PX;
+    let grid = Probe::new(PROBE_PX, vec![Vec3::ONE; width * height]).expect("pixels");
+    let glow = DVec3::new(0.6, 0.2, 0.7).normalize();
+    let pixels = (0..width * height).map(|index| {
+        let (row, column) = (index / width, (index % width + width - turned) % width);
+        let direction = grid.direction(column as f64 + 0.5, row as f64 + 0.5);
+        let glow = 6.0 * (direction.dot(glow).max(0.0)).powi(12);
+        let sky = 0.6 + 0.4 * direction.y;
+        let bright = match direction.z > 0.0 {
+            true => sky + glow,
+            false => 0.2,
+        };
+        Vec3::new(1.0, 0.9, 0.8) * bright as f32
+    });
+    Probe::new(PROBE_PX, pixels.collect()).expect("pixels")
+}
+
+fn probe_scene(probe: Probe) -> ProbeScene {
+    ProbeScene {
+        image: "sky.hdr".into(),
+        probe,
+        notes: Vec::new(),
+        position_m: DVec3::new(0.0, 0.0, 0.05),
+        exposure: 0.3,
+        room: Vec::new(),
+        is_far: true,
+    }
+}
+
+/// A table, and what stands on it, under the sky.
+fn under_sky(turned: usize, phantoms: Vec<Object>, virtuals: Vec<Object>) -> Scene {
+    let table = rectangle([-1.0, -1.0], [1.0, 1.0]);
+    let table = flat_mesh(table.positions, table.triangles);
+    let mut table = object("table", table, DVec3::splat(0.0), DAffine3::IDENTITY);
+    table.casts = false;
+    let phantoms = std::iter::once(table).chain(phantoms).collect();
+    let mut scene = scene(phantoms, virtuals, Vec::new(), 0.0);
+    scene.probe = Some(probe_scene(sky(turned)));
+    scene.shadows.technique = Technique::Environment;
+    scene.shadows.samples = 1;
+    // All of it is broad.
+    scene.shadows.compact_penumbra_px = 0.0;
+    scene
+}
+
+fn black_box(name: &str, low: [f32; 3], high: [f32; 3], place: DAffine3) -> Object {
+    let soup = cuboid(low, high);
+    object(
+        name,
+        flat_mesh(soup.positions, soup.triangles),
+        DVec3::ZERO,
+        place,
+    )
+}
+
+/// The gain of each pixel, and what is there.
+fn gains(scene: &Scene, camera_from_world: DAffine3) -> (Vec<[f32; 3]>, Vec<u8>, Picture) {
+    let mut renderer = Stage::of_scene(scene.clone()).renderer(CAMERA);
+    renderer.draw(&[Some(camera_from_world)], Shown::Composite);
+    let picture = Picture::new(renderer.read_picture().expect("a picture"));
+    let layers = renderer.layers().expect("layers");
+    (layers.gain, layers.role, picture)
+}
+
+fn triangles(object: &Object) -> Vec<[Vec3; 3]> {
+    let positions = object.positions_in_anchor(&object.mesh);
+    let corners = object.mesh.triangles.iter();
+    corners
+        .map(|triangle| triangle.map(|index| positions[index as usize]))
+        .collect()
+}
+
+/// Green irradiance of a place from all pixels that nothing of `casters` hides.
+fn exact(probe: &Probe, place: DVec3, normal: DVec3, casters: &[&RayCaster]) -> f64 {
+    let [width, _] = probe.size_px();
+    let start = (place + normal * 1e-5).as_vec3();
+    let pixels = probe.pixels().iter().enumerate();
+    let arriving = pixels.map(|(index, pixel)| {
+        let (row, column) = (index / width, index % width);
+        let direction = probe.direction(column as f64 + 0.5, row as f64 + 0.5);
+        let cosine = direction.dot(normal);
+        let way = direction.as_vec3();
+        let is_lost = cosine <= 0.0
+            || direction.z < 0.0
+            || casters
+                .iter()
+                .any(|it| it.is_hidden(start, way, f32::INFINITY));
+        match is_lost {
+            true => 0.0,
+            false => f64::from(pixel.y) * cosine * probe.pixel_solid_angle(row),
+        }
+    });
+    arriving.sum()
+}
+
+/// The place on the table that a pixel shows.
+fn on_table(index: usize, camera_from_world: &DAffine3) -> DVec3 {
+    let pixel = DVec2::new((index % 120) as f64, (index / 120) as f64);
+    let world_from_camera = camera_from_world.inverse();
+    let way = ((pixel - CAMERA.center_px) / CAMERA.focal_px).extend(1.0);
+    let (eye, way) = (
+        world_from_camera.translation,
+        world_from_camera.transform_vector3(way),
+    );
+    eye - way * (eye.z / way.z)
+}
+
+fn camera() -> DAffine3 {
+    look_at(DVec3::new(0.1, -0.5, 0.45), DVec3::new(0.0, 0.02, 0.0))
+}
+
+/// Root mean square and largest difference of a scene's gains on the table from the exact ones.
+fn off_exact(scene: &Scene) -> [f64; 2] {
+    let camera_from_world = camera();
+    let (gain, role, _) = gains(scene, camera_from_world);
+    let probe = &scene.probe.as_ref().expect("a probe").probe;
+    let caster = |objects: &[Object]| {
+        let casting = objects.iter().filter(|object| object.casts);
+        RayCaster::new(&casting.flat_map(triangles).collect::<Vec<_>>())
+    };
+    let (real, virtuals) = (caster(&scene.phantoms), caster(&scene.virtuals));
+    let hidden_by_real = scene.phantoms.len() > 1;
+    let (mut squares, mut largest, mut count) = (0.0, 0.0, 0);
+    for index in (0..gain.len()).step_by(7) {
+        let place = on_table(index, &camera_from_world);
+        let world_from_camera = camera_from_world.inverse();
+        let eye = world_from_camera.translation.as_vec3();
+        let way = place.as_vec3() - eye;
+        // (Of phantoms the table alone is looked at.)
+        let shows_phantom = hidden_by_real && real.is_hidden(eye, way, 0.999);
+        if role[index] != REAL || place.truncate().length() > 0.6 || shows_phantom {
+            continue;
+        }
+        let before = exact(probe, place, DVec3::Z, &[&real]);
+        let after = exact(probe, place, DVec3::Z, &[&real, &virtuals]);
+        let difference = f64::from(gain[index][1]) - after / before;
+        squares += difference * difference;
+        largest = f64::max(largest, difference.abs());
+        count += 1;
+    }
+    assert!(count > 500, "{count}");
+    [(squares / f64::from(count)).sqrt(), largest]
+}
+
+/// A box that floats, one that stands, and a real one.
+fn three_boxes() -> Scene {
+    let turned = DAffine3::from_rotation_z(0.5);
+    let at = |x: f64, y: f64, z: f64| DAffine3::from_translation(DVec3::new(x, y, z)) * turned;
+    let real = black_box(
+        "crate",
+        [-0.04, -0.03, 0.0],
+        [0.04, 0.03, 0.07],
+        at(-0.12, 0.05, 0.0),
+    );
+    let floats = black_box(
+        "slab",
+        [-0.06, -0.06, 0.0],
+        [0.06, 0.06, 0.01],
+        at(0.1, 0.02, 0.06),
+    );
+    let stands = black_box(
+        "post",
+        [-0.02, -0.02, 0.0],
+        [0.02, 0.02, 0.1],
+        at(-0.02, -0.05, 0.0),
+    );
+    under_sky(0, vec![real], vec![floats, stands])
+}
+
+#[test]
+fn black_boxes_take_of_a_table_what_the_sum_over_the_probe_says() {
+    let mut scene = three_boxes();
+    let [rms, largest] = off_exact(&scene);
+    assert!(rms < 0.02 && largest < 0.1, "{rms} {largest}");
+    scene.shadows.environment.method = EnvironmentMethod::Maps;
+    let [rms_of_maps, _] = off_exact(&scene);
+    assert!(
+        rms < rms_of_maps && rms_of_maps < 0.08,
+        "the paper's way {rms_of_maps}, ours {rms}"
+    );
+}
+
+#[test]
+fn more_regions_are_nearer_to_the_sum() {
+    let off = |regions: u32| {
+        let mut scene = three_boxes();
+        scene.shadows.environment.regions = regions;
+        off_exact(&scene)[0]
+    };
+    let [one, eight, many] = [1, 8, 64].map(off);
+    assert!(many < eight && eight < one, "{one} {eight} {many}");
+}
+
+#[test]
+fn a_turned_probe_is_a_turned_scene() {
+    let columns = 17;
+    let turn = DAffine3::from_mat3(DMat3::from_rotation_z(
+        std::f64::consts::TAU * columns as f64 / PROBE_PX[0] as f64,
+    ));
+    let before = three_boxes();
+    let mut after = three_boxes();
+    after.probe = Some(probe_scene(sky(columns)));
+    for thing in after.phantoms.iter_mut().chain(&mut after.virtuals) {
+        thing.anchor_from_object = turn * thing.anchor_from_object;
+    }
+    let (gain, role, _) = gains(&before, camera());
+    let (turned, turned_role, _) = gains(&after, camera() * turn.inverse());
+    let mut compared = 0;
+    for index in 0..gain.len() {
+        // (The table's own outline is a square, and turns.)
+        let place = on_table(index, &camera());
+        if role[index] != REAL || turned_role[index] != REAL || place.truncate().length() > 0.5 {
+            continue;
+        }
+        let off = (gain[index][1] - turned[index][1]).abs();
+        assert!(
+            off < 0.02,
+            "{index}: {} {}",
+            gain[index][1],
+            turned[index][1]
+        );
+        compared += 1;
+    }
+    assert!(compared > 3000, "{compared}");
+}
+
+#[test]
+fn a_real_desk_darkens_what_is_virtual_below_it_as_much_as_it_hides() {
+    let plate = rectangle([-0.03, -0.03], [0.03, 0.03]);
+    let plate = flat_mesh(plate.positions, plate.triangles);
+    let at = DVec3::new(0.0, 0.0, 0.02);
+    let plate = object(
+        "plate",
+        plate,
+        DVec3::splat(0.8),
+        DAffine3::from_translation(at),
+    );
+    let desk_at = DAffine3::from_translation(DVec3::new(0.12, 0.08, 0.12));
+    let desk = black_box("desk", [-0.12, -0.12, 0.0], [0.12, 0.12, 0.01], desk_at);
+    let caster = RayCaster::new(&triangles(&desk));
+    let scene = under_sky(0, vec![desk], vec![plate]);
+    let (_, role, picture) = gains(&scene, camera());
+    let probe = scene.probe.as_ref().expect("a probe");
+    let irradiance = exact(&probe.probe, at, DVec3::Z, &[&caster]) * probe.exposure;
+    let expected = 0.8 / std::f64::consts::PI * irradiance;
+    let world_at = camera().transform_point3(at);
+    let pixel = CAMERA.focal_px * world_at.truncate() / world_at.z + CAMERA.center_px;
+    let index = pixel.y.round() as usize * 120 + pixel.x.round() as usize;
+    assert_eq!(role[index], VIRTUAL);
+    let found = picture.linear(index).y;
+    assert!(
+        (found / expected - 1.0).abs() < 0.06,
+        "{found}, not {expected}"
+    );
+}
+
+#[test]
+fn things_that_move_past_each_other_change_the_light_smoothly() {
+    let scene_at = |x: f64| {
+        let soup = sphere(0.03, 16, 24);
+        let ball = flat_mesh(soup.positions, soup.triangles);
+        let at = DAffine3::from_translation(DVec3::new(x, -0.03, 0.04));
+        let ball = object("ball", ball, DVec3::splat(0.5), at);
+        let mut scene = three_boxes();
+        scene.virtuals.push(ball);
+        scene.shadows.environment.regions = 32;
+        scene
+    };
+    let steps: Vec<(Vec<[f32; 3]>, Vec<u8>)> = (0..8)
+        .map(|step| {
+            let (gain, role, _) = gains(&scene_at(0.03 + 0.001 * f64::from(step)), camera());
+            (gain, role)
+        })
+        .collect();
+    let mut largest = 0.0_f32;
+    for around in steps.windows(3) {
+        let [before, now, after] = [0, 1, 2].map(|step| &around[step]);
+        for index in 0..now.0.len() {
+            if [before, now, after]
+                .iter()
+                .all(|(_, role)| role[index] == REAL)
+            {
+                let bend = before.0[index][1] - 2.0 * now.0[index][1] + after.0[index][1];
+                largest = largest.max(bend.abs());
+            }
+        }
+    }
+    assert!(largest < 0.02, "{largest}");
+}
