@@ -2,7 +2,7 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use glam::{Affine3, DVec3, Vec3};
+use glam::{Affine3, DAffine3, DVec3, Vec3};
 
 use crate::geometry::bounds::Bounds;
 use crate::light::regions::Region;
@@ -56,6 +56,17 @@ pub struct PlacedScene<'a> {
     pub distant: &'a DistantLight,
     /// Compact lights, in the world.
     pub compact: &'a [Light],
+}
+
+impl<'a> PlacedThing<'a> {
+    /// A thing whose anchor is there.
+    pub fn new(thing: &'a Thing, world_from_anchor: &DAffine3) -> Self {
+        Self {
+            thing,
+            world_from_anchor: world_from_anchor.as_affine3(),
+            anchor_from_world: world_from_anchor.inverse().as_affine3(),
+        }
+    }
 }
 
 impl PlacedThing<'_> {

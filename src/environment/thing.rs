@@ -1,6 +1,6 @@
 //! A thing as light from afar meets it: simplified, in its anchor's space.
 
-use glam::{DAffine3, Vec3};
+use glam::Vec3;
 
 use crate::geometry::bounds::Bounds;
 use crate::geometry::levels::levels;
@@ -88,14 +88,5 @@ impl Thing {
             triangles,
             albedos,
         })
-    }
-
-    /// Where it is, given where its anchor is.
-    pub fn placed(&self, world_from_anchor: &DAffine3) -> super::placed::PlacedThing<'_> {
-        super::placed::PlacedThing {
-            thing: self,
-            world_from_anchor: world_from_anchor.as_affine3(),
-            anchor_from_world: world_from_anchor.inverse().as_affine3(),
-        }
     }
 }

@@ -10,7 +10,7 @@ use glam::{DAffine3, DVec3, Vec3};
 
 use crate::environment::distant_light::DistantLight;
 use crate::environment::occlusion_map::OcclusionMap;
-use crate::environment::placed::PlacedScene;
+use crate::environment::placed::{PlacedScene, PlacedThing};
 use crate::environment::reflected::DiscTree;
 use crate::environment::self_occlusion::{SelfOcclusion, self_occlusions};
 use crate::environment::surroundings::LocalLight;
@@ -176,7 +176,7 @@ impl Environment {
             let Some(thing) = thing else { continue };
             if let Some(pose) = &world_from_anchor[thing.anchor] {
                 numbers.push(number);
-                scene.things.push(thing.placed(pose));
+                scene.things.push(PlacedThing::new(thing, pose));
             }
         }
         let bounds: Vec<Bounds> = scene.things.iter().map(|placed| placed.bounds()).collect();
