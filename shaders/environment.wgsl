@@ -151,10 +151,13 @@ fn map_at(tile: MapTile, spread_m: f32) -> vec3f {
 // Part of a region's light that a thing itself leaves to a place of it.
 fn self_visibility(sampled: SampledSurface, index: u32) -> f32 {
     let row = sampled.thing * (1u + 4u * frame.region_count) + 1u + 4u * index;
-    let sum = dot(sampled.visibility_0, receiver_row(row))
-        + dot(sampled.visibility_1, receiver_row(row + 1u))
-        + dot(sampled.visibility_2, receiver_row(row + 2u))
-        + dot(sampled.visibility_3, receiver_row(row + 3u));
+    var sum = dot(sampled.visibility_0, receiver_row(row));
+    // (Of what hides nothing from itself only the first harmonic is there.)
+    if any(sampled.visibility_0.yzw != vec3f(0.0)) {
+        sum += dot(sampled.visibility_1, receiver_row(row + 1u))
+            + dot(sampled.visibility_2, receiver_row(row + 2u))
+            + dot(sampled.visibility_3, receiver_row(row + 3u));
+    }
     return clamp(recovered(vec3f(sum), vec3f(1.0), sampled.one).x, 0.0, 1.0);
 }
 

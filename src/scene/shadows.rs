@@ -368,6 +368,11 @@ fn difference_keys(difference: Difference) -> [KeyChange; 2] {
 }
 
 impl Scene {
+    fn has_moving_phantoms(&self) -> bool {
+        let mut phantoms = self.phantoms.iter();
+        phantoms.any(|phantom| phantom.visible && phantom.anchor != 0)
+    }
+
     /// The technique that makes this scene's shadows, and why.
     pub fn chosen_technique(&self) -> (ShadowTechnique, &'static str) {
         match self.shadows.technique {
@@ -377,6 +382,11 @@ impl Scene {
                     ShadowTechnique::Shafts,
                     "the scene has a probe; only a ratio is taken of several lights' sum",
                 ),
+                // (What shafts know of a room they work out once.)
+                Some(probe) if probe.is_far && self.has_moving_phantoms() => {
+                    let reason = "the scene has a probe whose light comes from afar, and phantoms that move";
+                    (ShadowTechnique::Environment, reason)
+                }
                 Some(probe) if probe.is_far => {
                     let reason = "the scene has a probe; without a room its light comes from afar";
                     (ShadowTechnique::Both, reason)
