@@ -384,7 +384,8 @@ impl Scene {
                 ),
                 // (What shafts know of a room they work out once.)
                 Some(probe) if probe.is_far && self.has_moving_phantoms() => {
-                    let reason = "the scene has a probe whose light comes from afar, and phantoms that move";
+                    let reason =
+                        "the scene has a probe whose light comes from afar, and phantoms that move";
                     (ShadowTechnique::Environment, reason)
                 }
                 Some(probe) if probe.is_far => {
