@@ -28,6 +28,13 @@ choices! {
     }
 }
 
+impl Technique {
+    /// Whether a scene without a probe cannot have it.
+    pub fn needs_probe(self) -> bool {
+        matches!(self, Self::Shafts | Self::Environment)
+    }
+}
+
 choices! {
     /// How the environment's shadows are made of what its regions see.
     pub enum EnvironmentMethod, "method" {

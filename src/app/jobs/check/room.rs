@@ -3,7 +3,9 @@
 use crate::app::room_transport_cache;
 use crate::app::scene_warnings::counted;
 use crate::app::stopwatch::Stopwatch;
-use crate::scene::{ProbeLight, ProbeLightKind, ProbeScene, Scene};
+use crate::scene::{
+    EnvironmentMethod, ProbeLight, ProbeLightKind, ProbeScene, Scene, ShadowTechnique,
+};
 
 /// What stands out of the probe, and what it is taken for.
 fn compact_lines(scene: &Scene, probe: &ProbeScene) -> Vec<(&'static str, String)> {
@@ -68,10 +70,24 @@ pub fn room_lines(scene: &Scene, probe: &ProbeScene) -> Vec<(&'static str, Strin
             ),
         ),
     ];
-    if !scene.chosen_technique().0.has_shafts() {
+    let technique = scene.chosen_technique().0;
+    lines.extend(compact_lines(scene, probe));
+    if technique == ShadowTechnique::Environment {
+        let settings = scene.shadows.environment;
+        let method = match settings.method {
+            EnvironmentMethod::Penumbrae => "as soft at each place as things are far from it",
+            EnvironmentMethod::Maps => "as soft over a whole thing as its middle is far",
+        };
+        let told = format!(
+            "{}, maps of {} px: shadows {method}",
+            counted(settings.regions as usize, "region"),
+            settings.map_px
+        );
+        lines.push(("environment", told));
+    }
+    if !technique.has_shafts() {
         return lines;
     }
-    lines.extend(compact_lines(scene, probe));
     let folder = room_transport_cache::folder();
     let (ready, took_ms) =
         Stopwatch::time(|| room_transport_cache::ready(&room, folder.as_deref()));

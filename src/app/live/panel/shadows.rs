@@ -25,11 +25,15 @@ pub fn show(ui: &mut Ui, scene: &Scene, editing: &mut Editing, commands: &mut Co
         }
         ui.label("quality").on_hover_text(SHADOWS.quality.says());
     });
+    let techniques: Vec<(&str, Technique)> = Technique::BY_NAME
+        .into_iter()
+        .filter(|(_, technique)| scene.probe.is_some() || !technique.needs_probe())
+        .collect();
     choice(
         ui,
         ("technique", &SHADOWS.technique),
         &mut shadows.technique,
-        &Technique::BY_NAME,
+        &techniques,
     );
     let (technique, why) = scene.chosen_technique();
     ui.weak(format!("{}: {why}", technique.name()));
