@@ -1,5 +1,5 @@
-// An environment's broad light on real and virtual things that move and turn (Tamura et al. 2005): region by region what a thing
-// hides of it from itself and what others hide.
+// An environment's broad light on real and virtual things that move and turn (Tamura et al. 2005): region by region what a
+// thing hides of it from itself and what others hide.
 //!include "sampled_surface.wgsl"
 //!include "light_sums.wgsl"
 //!include "mirrored.wgsl"

@@ -1,4 +1,5 @@
-//! A probe's light as it comes from afar: as regions, whose shadows are drawn, and as harmonics, for what a thing hides from itself.
+//! A probe's light as it comes from afar: as regions, whose shadows are drawn, and as harmonics, for what a thing hides from
+//! itself.
 
 use glam::DVec3;
 

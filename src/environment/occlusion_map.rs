@@ -1,5 +1,5 @@
-//! Maps of what a thing hides of the light of a region (Tamura et al. 2005, section 4.2.2), as values: which tile of an atlas each
-//! has, and how the region looks at the thing.
+//! Maps of what a thing hides of the light of a region (Tamura et al. 2005, section 4.2.2), as values: which tile of an atlas
+//! each has, and how the region looks at the thing.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec2, Vec3, Vec4};

@@ -111,8 +111,8 @@ impl PlacedScene<'_> {
         around.map_or(0.0, |around| (around.high - around.low).length() as f32)
     }
 
-    /// For each of `count` things, numbered by `numbers`, and region whether what throws no shadow, as the table, leaves it open from the
-    /// thing's middle.
+    /// For each of `count` things, numbered by `numbers`, and each region whether what throws no shadow, as the table, leaves
+    /// it open from the thing's middle.
     pub fn open_regions(&self, numbers: &[usize], count: usize) -> Vec<bool> {
         let regions = &self.distant.regions;
         let mut open = vec![true; count * regions.len()];

@@ -1,5 +1,5 @@
-//! What things reflect on to others (one bounce), as discs on their surfaces and groups of these: virtual things on to real ones,
-//! and real ones on to each other, with and without virtual things in the way of the light.
+//! What things reflect on to others (one bounce), as discs on their surfaces and groups of these: virtual things on to real
+//! ones, and real ones on to each other, with and without virtual things in the way of the light.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 

@@ -31,8 +31,8 @@ pub struct LocalLight {
 }
 
 impl LocalLight {
-    /// In world space, around a box in which thing `own` is (its place among `scene.things`): that hides nothing here, for what it hides from itself is
-    /// known corner by corner.
+    /// In world space, around a box in which thing `own` is (its place among `scene.things`): that hides nothing here, for
+    /// what it hides from itself is known corner by corner.
     ///
     /// What casts no shadow, as the table, stands in place of the light behind it. What casts some adds what it reflects;
     /// what it hides is drawn in maps, by the pixel. Around a phantom there is only what others reflect, for all the rest of

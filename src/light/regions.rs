@@ -42,9 +42,9 @@ struct Pixel {
 
 /// Cuts a probe into `count` regions of pixels, fewer where fewer pixels have light; each pixel is in exactly one.
 ///
-/// A region is all that is nearer to its middle than to any other. The one is cut next whose light lies farthest around its middle, along the
-/// line on which it lies widest, and all middles move to where their light comes from, so that the same light is cut alike
-/// however the probe is turned.
+/// A region is all that is nearer to its middle than to any other. The one is cut next whose light lies farthest around its
+/// middle, along the line on which it lies widest, and all middles move to where their light comes from, so that the same light
+/// is cut alike however the probe is turned.
 pub fn regions(probe: &Probe, count: usize) -> Vec<Region> {
     let [width, _] = probe.size_px();
     let pixels: Vec<Pixel> = probe

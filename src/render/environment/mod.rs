@@ -1,4 +1,4 @@
-//! An environment's broad light on things that move and turn (Tamura et al. 2005): what regions of it each thing hides, from maps.
+//! An environment's broad light on things that move and turn (Tamura et al. 2005): what each thing hides of its regions, by maps.
 //! Reads the probe and poses. Writes the things' maps, and light sums.
 //!
 //! What depends on where things are in the world is worked out when they move, not when the camera does.
@@ -258,8 +258,8 @@ impl Environment {
         maps
     }
 
-    /// For each batch the irradiance of its corners: on virtual things of all broad light that they do not hide from themselves,
-    /// on real ones of what others reflect.
+    /// For each batch the irradiance of its corners: on virtual things of all broad light that they do not hide from
+    /// themselves, on real ones of what others reflect.
     fn light_of_corners(
         &self,
         scene: &PlacedScene<'_>,
