@@ -220,7 +220,7 @@ fn widest(spread: &DMat3) -> DVec3 {
     let mut power = *spread;
     for _ in 0..16 {
         let scale = power.x_axis.length() + power.y_axis.length() + power.z_axis.length();
-        power = power * (1.0 / scale.max(f64::MIN_POSITIVE));
+        power *= 1.0 / scale.max(f64::MIN_POSITIVE);
         power = power * power;
     }
     let columns = [power.x_axis, power.y_axis, power.z_axis];
