@@ -2,6 +2,7 @@
 // thing hides of it from itself and what others hide.
 //!include "sampled_surface.wgsl"
 //!include "light_sums.wgsl"
+//!include "depth_moments.wgsl"
 //!include "mirrored.wgsl"
 
 struct EnvironmentFrame {
@@ -66,8 +67,6 @@ fn disc_words(index: u32, part: u32) -> vec4u {
 
 // Set when the shader is built: whether a thing's shadow on another is as wide as at the other's middle, as in the paper.
 override BY_PLANES: bool = false;
-// Least variance of depths in a map: a thing shades what touches it.
-const LEAST_SPREAD: f32 = 0.0004;
 // A group is seen as one disc from so many of its radii (reflected.rs).
 const SEEN_AS_ONE: f32 = 4.0;
 // Part of a pixel's light below which what is taken from it is left.
@@ -116,18 +115,9 @@ fn hidden(number: u32, region: Region, point: vec4f, receiver: u32) -> f32 {
     if behind <= 0.0 {
         return 0.0;
     }
-    // What lies before the place, as if all else lay at its depth (Yang et al. 2010).
-    let blocker = max(mean - spread_of(around) / behind, 0.0);
+    let blocker = blocker_depth(around, mean, behind);
     let seen = map_at(tile, region.spread * (depth - range_m * blocker));
-    let behind_seen = max(depth / range_m - seen.y / max(seen.x, 1e-3), 0.0);
-    let squared = behind_seen * behind_seen;
-    return seen.x * squared / (squared + spread_of(seen));
-}
-
-// Variance of the depths in a map.
-fn spread_of(seen: vec3f) -> f32 {
-    let mean = seen.y / max(seen.x, 1e-3);
-    return max(seen.z / max(seen.x, 1e-3) - mean * mean, LEAST_SPREAD);
+    return part_before(seen, depth / range_m);
 }
 
 struct MapTile {

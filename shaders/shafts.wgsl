@@ -2,6 +2,7 @@
 // they reflect, and the light on them.
 //!include "sampled_surface.wgsl"
 //!include "light_sums.wgsl"
+//!include "depth_moments.wgsl"
 //!include "mapped_source.wgsl"
 //!include "mirrored.wgsl"
 
@@ -22,9 +23,6 @@ struct ShaftFrame {
 @group(2) @binding(4) var<storage, read> lists: array<u32>;
 @group(2) @binding(5) var maps: texture_2d<f32>;
 @group(2) @binding(6) var map_sampler: sampler;
-
-// Least variance of depths in a map: a surface hides itself by no more than its own slope.
-const LEAST_SPREAD: f32 = 0.0004;
 
 struct PatchCorner {
     @location(0) position: vec3f,
@@ -114,18 +112,9 @@ fn hidden(index: u32, point_in_world: vec3f, is_caster: bool) -> f32 {
     if !is_caster {
         return map_at(source, in_tile, source.near_m + source.range_m * mean, depth).x;
     }
-    // What lies before the place, as if all else lay at its depth (Yang et al. 2010).
-    let blocker = max(mean - spread_of(around) / behind, 0.0);
+    let blocker = blocker_depth(around, mean, behind);
     let seen = map_at(source, in_tile, source.near_m + source.range_m * blocker, depth);
-    let behind_seen = max((depth - source.near_m) / source.range_m - seen.y / max(seen.x, 1e-3), 0.0);
-    let squared = behind_seen * behind_seen;
-    return seen.x * squared / (squared + spread_of(seen));
-}
-
-// Variance of the depths in a map.
-fn spread_of(seen: vec3f) -> f32 {
-    let mean = seen.y / max(seen.x, 1e-3);
-    return max(seen.z / max(seen.x, 1e-3) - mean * mean, LEAST_SPREAD);
+    return part_before(seen, (depth - source.near_m) / source.range_m);
 }
 
 // The map around a place, averaged over what the source's extent sees through a caster at a depth.

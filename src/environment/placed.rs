@@ -18,6 +18,8 @@ const ASKED_REGIONS: usize = 4;
 
 /// A thing in the world.
 pub struct PlacedThing<'a> {
+    /// Its number in the scene.
+    pub number: usize,
     /// It.
     pub thing: &'a Thing,
     /// Its pose.
@@ -60,8 +62,9 @@ pub struct PlacedScene<'a> {
 
 impl<'a> PlacedThing<'a> {
     /// A thing whose anchor is there.
-    pub fn new(thing: &'a Thing, world_from_anchor: &DAffine3) -> Self {
+    pub fn new(number: usize, thing: &'a Thing, world_from_anchor: &DAffine3) -> Self {
         Self {
+            number,
             thing,
             world_from_anchor: world_from_anchor.as_affine3(),
             anchor_from_world: world_from_anchor.inverse().as_affine3(),
@@ -111,13 +114,20 @@ impl PlacedScene<'_> {
         around.map_or(0.0, |around| (around.high - around.low).length() as f32)
     }
 
-    /// For each of `count` things, numbered by `numbers`, and each region whether what throws no shadow, as the table, leaves
+    /// Where among `things` that of a number is, if it has a pose.
+    pub fn position(&self, number: usize) -> Option<usize> {
+        self.things
+            .iter()
+            .position(|placed| placed.number == number)
+    }
+
+    /// For each of `count` things, by their numbers, and each region whether what throws no shadow, as the table, leaves
     /// it open from the thing's middle.
-    pub fn open_regions(&self, numbers: &[usize], count: usize) -> Vec<bool> {
+    pub fn open_regions(&self, count: usize) -> Vec<bool> {
         let regions = &self.distant.regions;
         let mut open = vec![true; count * regions.len()];
-        for (index, &number) in numbers.iter().enumerate() {
-            let own = &self.things[index];
+        for own in &self.things {
+            let number = own.number;
             let middle = own
                 .world_from_anchor
                 .transform_point3(own.thing.ball.center);
@@ -125,8 +135,10 @@ impl PlacedScene<'_> {
             for (open, region) in row.iter_mut().zip(regions) {
                 let toward = region.toward.as_vec3();
                 // (A sheet of paper on it does not hide the sky from all of a table.)
-                let counts =
-                    |thing: &Thing| !thing.casts && thing.ball.radius > own.thing.ball.radius;
+                let counts = |placed: &PlacedThing<'_>| {
+                    let thing = placed.thing;
+                    !thing.casts && thing.ball.radius > own.thing.ball.radius
+                };
                 *open = self.seen(middle, toward, counts).is_none();
             }
         }
@@ -138,11 +150,11 @@ impl PlacedScene<'_> {
         &self,
         origin: Vec3,
         direction: Vec3,
-        counts: impl Fn(&Thing) -> bool,
+        counts: impl Fn(&PlacedThing<'_>) -> bool,
     ) -> Option<SeenSurface> {
         let mut nearest: Option<(usize, usize, f32)> = None;
         for (index, placed) in self.things.iter().enumerate() {
-            if !counts(placed.thing) {
+            if !counts(placed) {
                 continue;
             }
             let reach = nearest.map_or(f32::INFINITY, |(_, _, distance)| distance);

@@ -7,7 +7,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::shafts::light_of_room::hemisphere;
-use crate::shafts::surfels::{Surfel, from_disc, open_directions};
+use crate::shafts::surfels::{Surfel, as_one, from_disc, mean_by_area, open_directions};
 
 use super::placed::{Among, OFFSET_M, PlacedScene, PlacedThing};
 
@@ -72,7 +72,7 @@ impl PlacedScene<'_> {
         let start = surfel.position + surfel.normal * OFFSET_M;
         let radiance = |among: Among| {
             let thrown_back = |(number, direction): (usize, Vec3)| {
-                let counts = |thing: &super::thing::Thing| among == Among::All || thing.is_real;
+                let counts = |placed: &PlacedThing<'_>| among == Among::All || placed.thing.is_real;
                 let seen = self.seen(start, direction, counts)?;
                 Some(self.radiance(among, &seen, number))
             };
@@ -147,31 +147,17 @@ impl DiscTree {
 
 impl DiscNode {
     fn around(discs: &[ReflectingDisc]) -> Self {
-        let area: f32 = discs.iter().map(|disc| disc.surfel.area).sum();
-        let mean = |of: &dyn Fn(&ReflectingDisc) -> Vec3| {
-            let sum: Vec3 = discs.iter().map(|disc| of(disc) * disc.surfel.area).sum();
-            sum / area.max(f32::MIN_POSITIVE)
-        };
-        let position = mean(&|disc| disc.surfel.position);
-        let normal = mean(&|disc| disc.surfel.normal);
-        let farthest = discs
-            .iter()
-            .map(|disc| disc.surfel.position.distance(position))
-            .fold(0.0, f32::max);
+        let (surfel, radius) = as_one(discs, |disc| &disc.surfel);
+        let mean =
+            |of: &dyn Fn(&ReflectingDisc) -> Vec3| mean_by_area(discs, |disc| disc.surfel.area, of);
         Self {
             whole: ReflectingDisc {
-                surfel: Surfel {
-                    position,
-                    normal: normal.normalize_or_zero(),
-                    // Discs that look apart show less of themselves.
-                    area: area * normal.length(),
-                    albedo: mean(&|disc| disc.surfel.albedo),
-                },
+                surfel,
                 open: discs.iter().fold(0, |open, disc| open | disc.open),
                 without: mean(&|disc| disc.without),
                 with: mean(&|disc| disc.with),
             },
-            radius: farthest + (area / discs.len().max(1) as f32 / PI).sqrt(),
+            radius,
             next: 0,
             thing: 0,
         }

@@ -3,15 +3,14 @@
 
 use std::f64::consts::PI;
 
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::geometry::bounds::Bounds;
 use crate::light::harmonics::{Turn, basis, sphere};
 
-use super::placed::{Among, PlacedScene};
+use super::placed::{Among, PlacedScene, PlacedThing};
 use super::self_occlusion::{TRANSFER_DEGREE, TRANSFERS};
-use super::thing::Thing;
 
 /// Rays from each corner of the box.
 const RAYS: usize = 256;
@@ -52,9 +51,8 @@ impl LocalLight {
         Self { low, size, corners }
     }
 
-    /// The same as an anchor meets it; places stay those of the world.
-    pub fn seen_from(&self, world_from_anchor: &DAffine3) -> Self {
-        let turn = Turn::new(world_from_anchor.matrix3.transpose(), TRANSFER_DEGREE);
+    /// The same in directions of an anchor, which `turn` makes of the world's; places stay those of the world.
+    pub fn turned(&self, turn: &Turn) -> Self {
         Self {
             corners: self.corners.map(|corner| turn.turned(&corner)),
             ..*self
@@ -81,6 +79,7 @@ impl LocalLight {
 }
 
 fn radiance_at(scene: &PlacedScene<'_>, place: Vec3, own: usize) -> Radiance {
+    let number_of_own = scene.things[own].number;
     let own = scene.things[own].thing;
     let mut sums = [DVec3::ZERO; TRANSFERS];
     if !own.is_real {
@@ -93,7 +92,9 @@ fn radiance_at(scene: &PlacedScene<'_>, place: Vec3, own: usize) -> Radiance {
     let weight = 4.0 * PI / RAYS as f64;
     for (number, direction) in sphere(RAYS).enumerate() {
         // What casters reflect on to real things is added by the pixel.
-        let counts = |thing: &Thing| !(std::ptr::eq(thing, own) || thing.casts && own.is_real);
+        let counts = |placed: &PlacedThing<'_>| {
+            placed.number != number_of_own && !(placed.thing.casts && own.is_real)
+        };
         let Some(seen) = scene.seen(place, direction.as_vec3(), counts) else {
             continue;
         };

@@ -3,14 +3,11 @@
 use glam::Vec3;
 
 use crate::geometry::bounds::Bounds;
-use crate::geometry::levels::levels;
 use crate::geometry::ray_caster::RayCaster;
 use crate::shafts::bounding::Ball;
 use crate::shafts::casters::Occluder;
 use crate::shafts::surfels::{Surfel, surfels};
 
-/// The limit to how far outlines may move for fewer triangles, in parts of a thing's size.
-const COARSE_PART: f64 = 0.004;
 /// Discs that a thing's surface reflects light from.
 const SURFELS: usize = 256;
 
@@ -42,38 +39,14 @@ impl Thing {
         if !thing.visible {
             return None;
         }
-        let shape = thing.mesh.without_looks();
-        let around = Bounds::around(shape.positions.iter().map(|place| place.as_dvec3()))?;
-        let error_m = COARSE_PART * (around.high - around.low).length();
-        let coarse_enough = levels(&shape)
-            .into_iter()
-            .rfind(|level| level.max_error_m <= error_m);
-        let mesh = coarse_enough.map_or(shape, |level| level.mesh);
-        let placed = |index: u32| {
-            let place = mesh.positions[index as usize].as_dvec3();
-            thing.anchor_from_object.transform_point3(place).as_vec3()
-        };
-        let triangles: Vec<[Vec3; 3]> = mesh
-            .triangles
-            .iter()
-            .map(|triangle| triangle.map(placed))
-            .collect();
-        let albedos: Vec<Vec3> = mesh
-            .triangle_materials
-            .iter()
-            .map(|&material| thing.albedos[material as usize])
-            .collect();
+        let with_albedo = thing.simplified_in_anchor();
+        let (triangles, albedos): (Vec<[Vec3; 3]>, Vec<Vec3>) = with_albedo.iter().copied().unzip();
         let corners = || triangles.iter().flatten();
         let bounds = Bounds::around(corners().map(|corner| corner.as_dvec3()))?;
         let center = ((bounds.low + bounds.high) / 2.0).as_vec3();
         let radius = corners()
             .map(|corner| corner.distance(center))
             .fold(0.0, f32::max);
-        let with_albedo: Vec<([Vec3; 3], Vec3)> = triangles
-            .iter()
-            .copied()
-            .zip(albedos.iter().copied())
-            .collect();
         Some(Self {
             is_real,
             casts: thing.casts,

@@ -336,6 +336,17 @@ impl GpuScene {
         &self.camera_from_anchor
     }
 
+    /// Where the anchors are in the world, which stands still to itself; `None` where the world has no pose.
+    pub fn world_from_anchor(&self) -> Option<Vec<Option<DAffine3>>> {
+        let world_from_camera = (*self.camera_from_anchor.first()?)?.inverse();
+        let anchors = self.camera_from_anchor.iter();
+        let mut placed: Vec<Option<DAffine3>> = anchors
+            .map(|pose| pose.map(|camera_from_anchor| world_from_camera * camera_from_anchor))
+            .collect();
+        placed[0] = Some(DAffine3::IDENTITY);
+        Some(placed)
+    }
+
     /// Makes the shadow volumes that the picture shows. Returns where the placed things and their shadows can be; `None`
     /// where nothing is placed; what changes `besides` is among them.
     pub fn cast_shadows(

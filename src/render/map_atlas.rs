@@ -7,7 +7,7 @@ use glam::Vec3;
 
 use crate::shafts::shadow_atlas::Tiling;
 
-use super::attachments::cleared;
+use super::attachments::{cleared, target};
 use super::gpu::Gpu;
 use super::passes::Passes;
 use super::pipelines::{GroupLayout, PipelineDescription, overwritten, storage, texels};
@@ -144,28 +144,22 @@ impl MapAtlas {
 
 fn textures(device: &wgpu::Device, tiling: &Tiling) -> (wgpu::Texture, wgpu::TextureView) {
     let [width, height] = tiling.size_px();
-    let texture = |label, format, levels, usage| {
-        device.create_texture(&wgpu::TextureDescriptor {
-            label: Some(label),
-            size: wgpu::Extent3d {
-                width,
-                height,
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: levels,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
-            view_formats: &[],
-        })
-    };
-    let atlas = texture(
-        "maps",
-        MAP_FORMAT,
-        tiling.levels(),
-        wgpu::TextureUsages::TEXTURE_BINDING,
-    );
-    let depth = texture("maps' depth", DEPTH_FORMAT, 1, wgpu::TextureUsages::empty());
-    (atlas, depth.create_view(&Default::default()))
+    let atlas = device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("maps"),
+        size: wgpu::Extent3d {
+            width,
+            height,
+            depth_or_array_layers: 1,
+        },
+        mip_level_count: tiling.levels(),
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: MAP_FORMAT,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    });
+    let unread = wgpu::TextureUsages::empty();
+    let size_px = [width, height];
+    let depth = target(device, "maps' depth", size_px, DEPTH_FORMAT, 1, unread);
+    (atlas, depth)
 }

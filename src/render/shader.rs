@@ -11,11 +11,12 @@ macro_rules! files {
 }
 
 /// All files under `shaders/`.
-const FILES: [(&str, &str); 25] = files![
+const FILES: [(&str, &str); 26] = files![
     "area_lights.wgsl",
     "background.wgsl",
     "common.wgsl",
     "composite.wgsl",
+    "depth_moments.wgsl",
     "difference.wgsl",
     "direct.wgsl",
     "environment.wgsl",

@@ -109,23 +109,16 @@ pub static TABLE_SECTION: Section = Section {
     is_aside: false,
 };
 
-/// `[[phantom]]`.
-pub static PHANTOM_SECTION: Section = Section {
-    name: "phantom",
-    says: "Coarse models of real things. Never drawn; they hide virtual things, catch their shadows and cast their own on \
-           them.",
-    times: Times::Any,
-    groups: &[
-        ThingNameKeys::ALL,
-        ShapeKeys::ALL,
-        StandingKeys::ALL,
-        PlacementKeys::ALL,
-        MotionKeys::ALL,
-        ThingKeys::ALL,
-    ],
-    shown: &[
-        ("name", Example::Live("\"house\"")),
-        ("mesh", Example::Live("\"models/house.obj\"")),
+/// What the reference shows for a thing's keys: its name, its file, its place, rotation and scale, and its material.
+const fn shown_of_thing(
+    name: &'static str,
+    mesh: &'static str,
+    [position_m, rotation_deg, scale]: [&'static str; 3],
+    material: &'static str,
+) -> [(&'static str, Example); 18] {
+    [
+        ("name", Example::Live(name)),
+        ("mesh", Example::Live(mesh)),
         ("up", Example::Aside("\"y\"")),
         ("fit_m", Example::Aside("0.1")),
         ("box_m", Example::Aside("[0.15, 0.21, 0.03]")),
@@ -142,16 +135,38 @@ pub static PHANTOM_SECTION: Section = Section {
             Example::Aside("{ profile_m = [[0, 0], [0.03, 0], [0.035, 0.1], [0.015, 0.14]] }"),
         ),
         ("on", Example::Live("\"table\"")),
-        ("position_m", Example::Live("[-0.055, 0.035, 0.0]")),
-        ("rotation_deg", Example::Live("[0, 0, 20]")),
-        ("scale", Example::Live("1")),
+        ("position_m", Example::Live(position_m)),
+        ("rotation_deg", Example::Live(rotation_deg)),
+        ("scale", Example::Live(scale)),
         ("turn_deg_per_s", Example::Aside("30")),
         (
             "path",
             Example::Aside("[{ time_s = 0 }, { time_s = 2, position_m = [0.1, 0, 0] }]"),
         ),
-        ("material", Example::Live("{ albedo = [0.62, 0.55, 0.42] }")),
+        ("material", Example::Live(material)),
+    ]
+}
+
+/// `[[phantom]]`.
+pub static PHANTOM_SECTION: Section = Section {
+    name: "phantom",
+    says: "Coarse models of real things. Never drawn; they hide virtual things, catch their shadows and cast their own on \
+           them.",
+    times: Times::Any,
+    groups: &[
+        ThingNameKeys::ALL,
+        ShapeKeys::ALL,
+        StandingKeys::ALL,
+        PlacementKeys::ALL,
+        MotionKeys::ALL,
+        ThingKeys::ALL,
     ],
+    shown: &shown_of_thing(
+        "\"house\"",
+        "\"models/house.obj\"",
+        ["[-0.055, 0.035, 0.0]", "[0, 0, 20]", "1"],
+        "{ albedo = [0.62, 0.55, 0.42] }",
+    ),
     is_aside: false,
 };
 
@@ -169,38 +184,12 @@ pub static VIRTUAL_SECTION: Section = Section {
         ThingKeys::ALL,
         VirtualKeys::ALL,
     ],
-    shown: &[
-        ("name", Example::Live("\"torus\"")),
-        ("mesh", Example::Live("\"models/torus.obj\"")),
-        ("up", Example::Aside("\"y\"")),
-        ("fit_m", Example::Aside("0.1")),
-        ("box_m", Example::Aside("[0.15, 0.21, 0.03]")),
-        ("cylinder_m", Example::Aside("[0.04, 0.1]")),
-        ("cone_m", Example::Aside("[0.03, 0.08]")),
-        ("sphere_m", Example::Aside("0.025")),
-        ("rect_m", Example::Aside("[0.297, 0.21]")),
-        (
-            "prism",
-            Example::Aside("{ outline_m = [[0, 0], [0.08, 0], [0, 0.05]], height_m = 0.02 }"),
-        ),
-        (
-            "revolved",
-            Example::Aside("{ profile_m = [[0, 0], [0.03, 0], [0.035, 0.1], [0.015, 0.14]] }"),
-        ),
-        ("on", Example::Live("\"table\"")),
-        ("position_m", Example::Live("[0.022, 0.0, 0.036]")),
-        ("rotation_deg", Example::Live("[70, 0, 35]")),
-        ("scale", Example::Live("[1, 1, 1]")),
-        ("turn_deg_per_s", Example::Aside("30")),
-        (
-            "path",
-            Example::Aside("[{ time_s = 0 }, { time_s = 2, position_m = [0.1, 0, 0] }]"),
-        ),
-        (
-            "material",
-            Example::Live("{ albedo = [0.75, 0.16, 0.12], roughness = 0.4 }"),
-        ),
-    ],
+    shown: &shown_of_thing(
+        "\"torus\"",
+        "\"models/torus.obj\"",
+        ["[0.022, 0.0, 0.036]", "[70, 0, 35]", "[1, 1, 1]"],
+        "{ albedo = [0.75, 0.16, 0.12], roughness = 0.4 }",
+    ),
     is_aside: false,
 };
 

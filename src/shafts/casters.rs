@@ -45,6 +45,41 @@ pub struct Occluder<'a> {
     pub visible: bool,
 }
 
+impl Occluder<'_> {
+    /// Its triangles in its own space, simplified as far as nobody sees it in soft shadows, with their albedos.
+    pub fn simplified(&self) -> Vec<([Vec3; 3], Vec3)> {
+        let size = Aabb::around(self.mesh.positions.iter().copied()).diagonal();
+        let shape = self.mesh.without_looks();
+        let coarser = levels(&shape);
+        let coarse_enough = coarser
+            .into_iter()
+            .rfind(|level| level.max_error_m <= COARSE_PART * f64::from(size));
+        let mesh = coarse_enough.map_or(shape, |level| level.mesh);
+        let corners = mesh
+            .triangles
+            .iter()
+            .map(|triangle| triangle.map(|index| mesh.positions[index as usize]));
+        let albedos = mesh
+            .triangle_materials
+            .iter()
+            .map(|&material| self.albedos[material as usize]);
+        corners.zip(albedos).collect()
+    }
+
+    /// The same in its anchor's space.
+    pub fn simplified_in_anchor(&self) -> Vec<([Vec3; 3], Vec3)> {
+        let simplified = self.simplified().into_iter();
+        simplified
+            .map(|(corners, albedo)| (corners.map(|corner| self.in_anchor(corner)), albedo))
+            .collect()
+    }
+
+    fn in_anchor(&self, corner: Vec3) -> Vec3 {
+        let placed = self.anchor_from_object.transform_point3(corner.as_dvec3());
+        placed.as_vec3()
+    }
+}
+
 /// A virtual thing, simplified, which hides light if it casts.
 struct SimplifiedCaster {
     casts: bool,
@@ -150,24 +185,9 @@ impl ShaftCasters {
 
 impl SimplifiedCaster {
     fn new(thing: &Occluder<'_>) -> Self {
-        let size = Aabb::around(thing.mesh.positions.iter().copied()).diagonal();
-        let shape = thing.mesh.without_looks();
-        let coarser = levels(&shape);
-        let coarse_enough = coarser
-            .into_iter()
-            .rfind(|level| level.max_error_m <= COARSE_PART * f64::from(size));
-        let mesh = coarse_enough.map_or(shape, |level| level.mesh);
-        let corners = mesh
-            .triangles
-            .iter()
-            .map(|triangle| triangle.map(|index| mesh.positions[index as usize]));
-        let albedos = mesh
-            .triangle_materials
-            .iter()
-            .map(|&material| thing.albedos[material as usize]);
         Self {
             casts: thing.casts,
-            coarse: corners.zip(albedos).collect(),
+            coarse: thing.simplified(),
             anchor: thing.anchor,
             triangles: Vec::new(),
             surfels: Vec::new(),
@@ -180,10 +200,7 @@ impl SimplifiedCaster {
             self.surfels.clear();
             return;
         }
-        let place = |corner: Vec3| {
-            let placed = thing.anchor_from_object.transform_point3(corner.as_dvec3());
-            placed.as_vec3()
-        };
+        let place = |corner: Vec3| thing.in_anchor(corner);
         let placed = |(corners, albedo): &([Vec3; 3], Vec3)| (corners.map(place), *albedo);
         let with_albedo: Vec<([Vec3; 3], Vec3)> = self.coarse.iter().map(placed).collect();
         self.surfels = match self.casts {

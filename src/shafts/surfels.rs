@@ -121,32 +121,46 @@ impl GroupedSurfels {
     }
 }
 
+/// The mean over discs by their areas.
+pub fn mean_by_area<T>(discs: &[T], area: impl Fn(&T) -> f32, of: impl Fn(&T) -> Vec3) -> Vec3 {
+    let whole: f32 = discs.iter().map(&area).sum();
+    let sum: Vec3 = discs.iter().map(|disc| of(disc) * area(disc)).sum();
+    sum / whole.max(f32::MIN_POSITIVE)
+}
+
+/// One disc for several, and the radius around its middle that holds them; `surfel` says what disc each is.
+pub fn as_one<T>(discs: &[T], surfel: impl Fn(&T) -> &Surfel) -> (Surfel, f32) {
+    let mean = |of: &dyn Fn(&Surfel) -> Vec3| {
+        mean_by_area(discs, |disc| surfel(disc).area, |disc| of(surfel(disc)))
+    };
+    let area: f32 = discs.iter().map(|disc| surfel(disc).area).sum();
+    let position = mean(&|surfel| surfel.position);
+    let normal = mean(&|surfel| surfel.normal);
+    let farthest = discs
+        .iter()
+        .map(|disc| surfel(disc).position.distance(position))
+        .fold(0.0, f32::max);
+    let whole = Surfel {
+        position,
+        normal: normal.normalize_or_zero(),
+        // Discs that look apart show less of themselves.
+        area: area * normal.length(),
+        albedo: mean(&|surfel| surfel.albedo),
+    };
+    let radius = farthest + (area / discs.len().max(1) as f32 / PI).sqrt();
+    (whole, radius)
+}
+
 impl Group {
     fn new(surfels: &[LitSurfel]) -> Self {
-        let area: f32 = surfels.iter().map(|lit| lit.surfel.area).sum();
-        let mean = |of: &dyn Fn(&LitSurfel) -> Vec3| {
-            let sum: Vec3 = surfels.iter().map(|lit| of(lit) * lit.surfel.area).sum();
-            sum / area.max(f32::MIN_POSITIVE)
-        };
-        let position = mean(&|lit| lit.surfel.position);
-        let normal = mean(&|lit| lit.surfel.normal);
-        let farthest = surfels
-            .iter()
-            .map(|lit| lit.surfel.position.distance(position))
-            .fold(0.0, f32::max);
+        let (surfel, radius) = as_one(surfels, |lit| &lit.surfel);
         Self {
             whole: LitSurfel {
-                surfel: Surfel {
-                    position,
-                    normal: normal.normalize_or_zero(),
-                    // Discs that look apart show less of themselves.
-                    area: area * normal.length(),
-                    albedo: mean(&|lit| lit.surfel.albedo),
-                },
+                surfel,
                 open: surfels.iter().fold(0, |open, lit| open | lit.open),
-                radiance: mean(&|lit| lit.radiance),
+                radiance: mean_by_area(surfels, |lit| lit.surfel.area, |lit| lit.radiance),
             },
-            radius: farthest + (area / surfels.len() as f32 / PI).sqrt(),
+            radius,
         }
     }
 }

@@ -59,6 +59,22 @@ impl Project {
     }
 }
 
+/// An edit puts `new` in the place of `old` in the file, and nothing else; its undoing brings the file back.
+fn assert_changed_to(
+    project: &Project,
+    document: &mut SceneDocument,
+    edit: &Edit,
+    old: &str,
+    new: &str,
+) {
+    let before = project.text();
+    document.commit(edit).unwrap();
+    assert!(before.contains(old), "{old}");
+    assert_eq!(project.text(), before.replace(old, new), "{edit:?}");
+    document.undo().unwrap();
+    assert_eq!(project.text(), before);
+}
+
 fn torus_at(position_m: DVec3, old: Placement) -> Edit {
     Edit::Place {
         thing: "torus".to_owned(),
@@ -101,11 +117,7 @@ mod edits {
         let before = project.text();
         let mut document = project.open();
         let mut changed_to = |edit: &Edit, old: &str, new: &str| {
-            document.commit(edit).unwrap();
-            assert!(before.contains(old), "{old}");
-            assert_eq!(project.text(), before.replace(old, new), "{edit:?}");
-            document.undo().unwrap();
-            assert_eq!(project.text(), before);
+            assert_changed_to(&project, &mut document, edit, old, new);
         };
         let placed = |thing: &str, x_m: f64, scale: f64| Edit::Place {
             thing: thing.to_owned(),
@@ -158,14 +170,9 @@ mod edits {
     #[test]
     fn each_kind_of_edit_is_written_as_a_person_would() {
         let project = Project::new();
-        let before = project.text();
         let mut document = project.open();
         let mut changed_to = |edit: &Edit, old: &str, new: &str| {
-            document.commit(edit).unwrap();
-            assert!(before.contains(old), "{old}");
-            assert_eq!(project.text(), before.replace(old, new), "{edit:?}");
-            document.undo().unwrap();
-            assert_eq!(project.text(), before);
+            assert_changed_to(&project, &mut document, edit, old, new);
         };
         let hidden = Edit::Show {
             thing: "tin".to_owned(),

@@ -12,13 +12,14 @@ use crate::environment::distant_light::DistantLight;
 use crate::environment::occlusion_map::OcclusionMap;
 use crate::environment::placed::{PlacedScene, PlacedThing};
 use crate::environment::reflected::DiscTree;
-use crate::environment::self_occlusion::{SelfOcclusion, self_occlusions};
+use crate::environment::self_occlusion::{SelfOcclusion, TRANSFER_DEGREE, self_occlusions};
 use crate::environment::surroundings::LocalLight;
 use crate::environment::thing::Thing;
 use crate::geometry::bounds::Bounds;
 use crate::geometry::ray_caster::RayCaster;
 use crate::geometry::reach::{self, PixelRect};
 use crate::light::Light;
+use crate::light::harmonics::Turn;
 use crate::scene::{Object, ProbeScene, Scene};
 use crate::shafts::shadow_atlas::Tiling;
 
@@ -166,7 +167,6 @@ impl Environment {
         world_from_anchor: &[Option<DAffine3>],
         compact: &[Light],
     ) -> Placed {
-        let mut numbers = Vec::new();
         let mut scene = PlacedScene {
             things: Vec::new(),
             distant: &self.distant,
@@ -175,19 +175,18 @@ impl Environment {
         for (number, thing) in self.things.iter().enumerate() {
             let Some(thing) = thing else { continue };
             if let Some(pose) = &world_from_anchor[thing.anchor] {
-                numbers.push(number);
-                scene.things.push(PlacedThing::new(thing, pose));
+                scene.things.push(PlacedThing::new(number, thing, pose));
             }
         }
         let bounds: Vec<Bounds> = scene.things.iter().map(|placed| placed.bounds()).collect();
         let discs = scene.reflecting();
-        let lit = self.light_of_corners(&scene, &numbers, &bounds, &discs, world_from_anchor);
+        let lit = self.light_of_corners(&scene, &bounds, &discs, world_from_anchor);
         for (number, irradiances) in lit.iter().enumerate() {
             gpu_scene.write_indirect(&gpu.queue, number, irradiances);
         }
-        let maps = self.maps(&scene, &numbers);
+        let maps = self.maps(&scene);
         let regions = &self.distant.regions;
-        let open = scene.open_regions(&numbers, self.things.len());
+        let open = scene.open_regions(self.things.len());
         let receivers = self.things.iter().zip(open.chunks(regions.len().max(1)));
         let receivers: Vec<[u32; 4]> = receivers
             .flat_map(|(thing, open)| {
@@ -236,11 +235,11 @@ impl Environment {
     }
 
     /// For each caster and region its map.
-    fn maps(&self, scene: &PlacedScene<'_>, numbers: &[usize]) -> Vec<OcclusionMap> {
+    fn maps(&self, scene: &PlacedScene<'_>) -> Vec<OcclusionMap> {
         let reach_m = scene.reach_m();
         let mut maps = Vec::new();
         for &caster in &self.casters {
-            let placed = numbers.iter().position(|&number| number == caster);
+            let placed = scene.position(caster);
             for region in &self.distant.regions {
                 let index = maps.len() as u32;
                 maps.push(match placed {
@@ -263,20 +262,19 @@ impl Environment {
     fn light_of_corners(
         &self,
         scene: &PlacedScene<'_>,
-        numbers: &[usize],
         bounds: &[Bounds],
         discs: &DiscTree,
         world_from_anchor: &[Option<DAffine3>],
     ) -> Vec<Vec<Vec3>> {
-        let lights: Vec<LocalLight> = (0..numbers.len())
+        let lights: Vec<LocalLight> = (0..scene.things.len())
             .map(|index| LocalLight::new(scene, bounds[index], index))
             .collect();
         let of_batch = |batch: &BatchOcclusion| {
             let Some(pose) = &world_from_anchor[batch.anchor] else {
                 return vec![Vec3::ZERO; batch.point_of_corner.len()];
             };
-            let lights: Vec<LocalLight> =
-                lights.iter().map(|light| light.seen_from(pose)).collect();
+            let turn = Turn::new(pose.matrix3.transpose(), TRANSFER_DEGREE);
+            let lights: Vec<LocalLight> = lights.iter().map(|light| light.turned(&turn)).collect();
             let points = batch
                 .points
                 .iter()
@@ -284,7 +282,7 @@ impl Environment {
                 .zip(&batch.thing_of_point);
             let of_point =
                 |((point, occlusion), thing): ((&(DVec3, DVec3), &SelfOcclusion), &usize)| {
-                    let Some(index) = numbers.iter().position(|number| number == thing) else {
+                    let Some(index) = scene.position(*thing) else {
                         return Vec3::ZERO;
                     };
                     let place = pose.transform_point3(point.0);
@@ -350,14 +348,9 @@ impl BroadLight for Environment {
     }
 
     fn update(&mut self, gpu: &Gpu, gpu_scene: &GpuScene) -> Option<PixelRect> {
-        let camera_from_anchor = gpu_scene.camera_from_anchor();
-        let camera_from_world = (*camera_from_anchor.first()?)?;
+        let camera_from_world = (*gpu_scene.camera_from_anchor().first()?)?;
         let world_from_camera = camera_from_world.inverse();
-        let mut world_from_anchor: Vec<Option<DAffine3>> = camera_from_anchor
-            .iter()
-            .map(|pose| pose.map(|camera_from_anchor| world_from_camera * camera_from_anchor))
-            .collect();
-        world_from_anchor[0] = Some(DAffine3::IDENTITY);
+        let world_from_anchor = gpu_scene.world_from_anchor()?;
         let placed_for = (world_from_anchor, gpu_scene.shining());
         if self.placed_for.as_ref() != Some(&placed_for) {
             let (anchors, compact) = &placed_for;

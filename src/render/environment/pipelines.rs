@@ -1,12 +1,11 @@
 //! How the environment's passes are built.
 
-use super::super::anchor_geometry::{CORNER_LAYOUT, INDIRECT_LAYOUT, OCCLUSION_LAYOUT};
+use super::super::anchor_geometry::OCCLUSION_LAYOUT;
 use super::super::gpu::Gpu;
 use super::super::pipelines::{
     GroupLayout, PipelineDescription, filtered, overwritten, sampler, uniform, words,
 };
-use super::super::stencil::depth_stencil_state;
-use super::super::surfaces::{Sided, SurfaceKinds};
+use super::super::surfaces::{Sided, SurfaceKinds, surface_description};
 use super::super::uniforms::GEOMETRY_GROUPS;
 use crate::scene::EnvironmentMethod;
 
@@ -50,16 +49,9 @@ impl Pipelines {
             groups: [GEOMETRY_GROUPS[0], GEOMETRY_GROUPS[1], ENVIRONMENT_GROUP]
                 .map(Some)
                 .to_vec(),
-            vertex_buffers: vec![CORNER_LAYOUT, INDIRECT_LAYOUT],
             targets: vec![overwritten(format), overwritten(format)],
-            depth_stencil: Some(depth_stencil_state(
-                gpu.depth_format,
-                true,
-                wgpu::CompareFunction::Greater,
-                wgpu::StencilState::default(),
-            )),
             samples,
-            ..Default::default()
+            ..surface_description(gpu, None)
         };
         let with_occlusion = |mut description: PipelineDescription| {
             description.vertex_buffers.push(OCCLUSION_LAYOUT);

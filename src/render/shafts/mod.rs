@@ -159,14 +159,9 @@ impl Shafts {
 
     /// Works out what is hidden where things are now. Returns the pixels that it can change, `None` if none.
     pub fn update(&mut self, gpu: &Gpu, gpu_scene: &GpuScene) -> Option<PixelRect> {
-        let camera_from_anchor = gpu_scene.camera_from_anchor();
-        let camera_from_world = (*camera_from_anchor.first()?)?;
+        let camera_from_world = (*gpu_scene.camera_from_anchor().first()?)?;
         let world_from_camera = camera_from_world.inverse();
-        let mut world_from_anchor: Vec<Option<DAffine3>> = camera_from_anchor
-            .iter()
-            .map(|pose| pose.map(|camera_from_anchor| world_from_camera * camera_from_anchor))
-            .collect();
-        world_from_anchor[0] = Some(DAffine3::IDENTITY);
+        let world_from_anchor = gpu_scene.world_from_anchor()?;
         if self.world_from_anchor != world_from_anchor {
             self.hidden = self
                 .casters
