@@ -35,7 +35,7 @@ pub fn summary(scene: &Scene) -> String {
         "calibration",
         calibration
             .as_deref()
-            .unwrap_or("what the recording carries"),
+            .unwrap_or("what the recording carries, else what its markers tell"),
     );
     let detector = match scene.tracking.detector {
         DetectorKind::ByFamily => {
