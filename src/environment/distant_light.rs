@@ -10,7 +10,7 @@ use crate::light::regions::{Region, regions};
 use super::self_occlusion::TRANSFER_DEGREE;
 
 /// Light from all directions, the same everywhere.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct DistantLight {
     /// Its parts, each as a light from one direction (the W of Tamura et al. 2005, section 4.2.1), linear radiance up to the
     /// camera's exposure.

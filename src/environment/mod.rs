@@ -2,6 +2,7 @@
 //! itself is worked out once, what others hide of it wherever they are.
 
 pub mod distant_light;
+pub mod final_gather;
 pub mod occlusion_map;
 pub mod placed;
 pub mod reflected;

@@ -48,6 +48,10 @@ pub struct SeenSurface {
     pub normal: Vec3,
     /// Diffuse reflectance.
     pub albedo: Vec3,
+    /// Along the ray, in units of its direction.
+    pub distance: f32,
+    /// Whether the ray came from inside of a solid.
+    pub is_inside: bool,
 }
 
 /// All things where they are, and what shines on them.
@@ -87,6 +91,7 @@ impl PlacedThing<'_> {
         }
     }
 
+    /// Number of the first triangle along a ray, and how far off it is.
     fn first_hit(&self, origin: Vec3, direction: Vec3, reach: f32) -> Option<(usize, f32)> {
         let origin = self.anchor_from_world.transform_point3(origin);
         let direction = self.anchor_from_world.transform_vector3(direction);
@@ -152,12 +157,23 @@ impl PlacedScene<'_> {
         direction: Vec3,
         counts: impl Fn(&PlacedThing<'_>) -> bool,
     ) -> Option<SeenSurface> {
+        self.seen_within(origin, direction, f32::INFINITY, counts)
+    }
+
+    /// The same, no farther than `reach`.
+    pub fn seen_within(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        reach: f32,
+        counts: impl Fn(&PlacedThing<'_>) -> bool,
+    ) -> Option<SeenSurface> {
         let mut nearest: Option<(usize, usize, f32)> = None;
         for (index, placed) in self.things.iter().enumerate() {
             if !counts(placed) {
                 continue;
             }
-            let reach = nearest.map_or(f32::INFINITY, |(_, _, distance)| distance);
+            let reach = nearest.map_or(reach, |(_, _, distance)| distance);
             if let Some((triangle, distance)) = placed.first_hit(origin, direction, reach) {
                 nearest = Some((index, triangle, distance));
             }
@@ -169,23 +185,36 @@ impl PlacedScene<'_> {
             .world_from_anchor
             .transform_vector3((b - a).cross(c - a));
         let normal = outward.normalize_or_zero();
+        let is_averted = outward.dot(direction) > 0.0;
         Some(SeenSurface {
             thing: index,
             place: origin + direction * distance,
-            normal: match outward.dot(direction) > 0.0 {
+            normal: match is_averted {
                 true => -normal,
                 false => normal,
             },
             albedo: placed.thing.albedos[triangle],
+            distance,
+            is_inside: is_averted && placed.thing.is_solid,
         })
     }
 
     /// Whether a thing that casts shadows hides what lies `reach` along a direction.
     fn is_hidden(&self, among: Among, origin: Vec3, direction: Vec3, reach: f32) -> bool {
-        let mut casting = self
-            .things
-            .iter()
-            .filter(|placed| placed.thing.casts && (among == Among::All || placed.thing.is_real));
+        let counts = |placed: &PlacedThing<'_>| among == Among::All || placed.thing.is_real;
+        self.is_hidden_by(counts, origin, direction, reach)
+    }
+
+    /// Whether one of the things that cast shadows and that `counts` says yes of hides what lies `reach` along a direction.
+    pub fn is_hidden_by(
+        &self,
+        counts: impl Fn(&PlacedThing<'_>) -> bool,
+        origin: Vec3,
+        direction: Vec3,
+        reach: f32,
+    ) -> bool {
+        let things = self.things.iter();
+        let mut casting = things.filter(|placed| placed.thing.casts && counts(placed));
         casting.any(|placed| placed.hides(origin, direction, reach))
     }
 
@@ -227,10 +256,7 @@ impl PlacedScene<'_> {
 
     fn of_compact(&self, among: Among, start: Vec3, normal: Vec3) -> Vec3 {
         let of_light = |light: &Light| {
-            let (way, reach) = match *light {
-                Light::Point { position_m, .. } => (position_m.as_vec3() - start, 1.0),
-                Light::Directional { direction, .. } => (-direction.as_vec3(), f32::INFINITY),
-            };
+            let (way, reach) = way_to(light, start);
             let arriving = irradiance(light, start.as_dvec3(), normal.as_dvec3());
             match arriving == DVec3::ZERO || self.is_hidden(among, start, way, reach) {
                 true => Vec3::ZERO,
@@ -238,5 +264,13 @@ impl PlacedScene<'_> {
             }
         };
         self.compact.iter().map(of_light).sum()
+    }
+}
+
+/// The way from a place to a light's middle, and how far along it that is.
+pub fn way_to(light: &Light, start: Vec3) -> (Vec3, f32) {
+    match *light {
+        Light::Point { position_m, .. } => (position_m.as_vec3() - start, 1.0),
+        Light::Directional { direction, .. } => (-direction.as_vec3(), f32::INFINITY),
     }
 }

@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use crate::geometry::bounds::Bounds;
 use crate::geometry::ray_caster::RayCaster;
+use crate::geometry::solid::holes;
 use crate::shafts::bounding::Ball;
 use crate::shafts::casters::Occluder;
 use crate::shafts::surfels::{Surfel, surfels};
@@ -17,6 +18,8 @@ pub struct Thing {
     pub is_real: bool,
     /// Whether it takes light away from others.
     pub casts: bool,
+    /// Whether it has an inside.
+    pub is_solid: bool,
     /// Number of its anchor.
     pub anchor: usize,
     /// Its triangles, in the anchor's space, metres.
@@ -34,12 +37,35 @@ pub struct Thing {
 }
 
 impl Thing {
-    /// `None` where nothing of it is there.
+    /// Simplified; `None` where nothing of it is there.
     pub fn new(thing: &Occluder<'_>, is_real: bool) -> Option<Self> {
         if !thing.visible {
             return None;
         }
         let with_albedo = thing.simplified_in_anchor();
+        let own = Self::of_triangles(thing, is_real, &with_albedo)?;
+        Some(Self {
+            surfels: match thing.casts {
+                true => surfels(&with_albedo, SURFELS),
+                false => Vec::new(),
+            },
+            ..own
+        })
+    }
+
+    /// With all its triangles and without discs; `None` where nothing of it is there.
+    pub fn whole(thing: &Occluder<'_>, is_real: bool) -> Option<Self> {
+        match thing.visible {
+            true => Self::of_triangles(thing, is_real, &thing.whole_in_anchor()),
+            false => None,
+        }
+    }
+
+    fn of_triangles(
+        thing: &Occluder<'_>,
+        is_real: bool,
+        with_albedo: &[([Vec3; 3], Vec3)],
+    ) -> Option<Self> {
         let (triangles, albedos): (Vec<[Vec3; 3]>, Vec<Vec3>) = with_albedo.iter().copied().unzip();
         let corners = || triangles.iter().flatten();
         let bounds = Bounds::around(corners().map(|corner| corner.as_dvec3()))?;
@@ -50,14 +76,12 @@ impl Thing {
         Some(Self {
             is_real,
             casts: thing.casts,
+            is_solid: holes(thing.mesh).is_some_and(|holes| holes.is_empty()),
             anchor: thing.anchor,
             caster: RayCaster::new(&triangles),
             ball: Ball { center, radius },
             bounds,
-            surfels: match thing.casts {
-                true => surfels(&with_albedo, SURFELS),
-                false => Vec::new(),
-            },
+            surfels: Vec::new(),
             triangles,
             albedos,
         })

@@ -46,6 +46,11 @@ impl Bounds {
         point.cmpge(self.low).all() && point.cmple(self.high).all()
     }
 
+    /// How far off a point is; 0 inside.
+    pub fn distance(&self, point: DVec3) -> f64 {
+        point.distance(point.clamp(self.low, self.high))
+    }
+
     /// The box's eight corners.
     pub fn corners(&self) -> [DVec3; 8] {
         let pick = |bit: usize, low: f64, high: f64| if bit == 0 { low } else { high };

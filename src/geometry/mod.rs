@@ -35,5 +35,6 @@ pub mod shadow_volume;
 pub mod shapes;
 pub mod solid;
 mod soup;
+pub mod subdivide;
 pub mod surface_distance;
 pub mod winding;

@@ -1,6 +1,6 @@
 //! A light of some size cut into small ones: from each a shadow has a sharp edge, and all together have the soft one.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use glam::DVec3;
 
@@ -71,23 +71,6 @@ impl Light {
             }
         }
     }
-}
-
-/// Light of one radiance from the half of all directions about a unit vector, as `count` lights from one direction each: a plane
-/// across it gets the same of each, and of all together exactly what it gets from all around. (Malley's spiral over the disc.)
-pub fn surroundings(up: DVec3, radiance: DVec3, count: usize) -> Vec<Light> {
-    let (x, y) = up.any_orthonormal_pair();
-    let from = |index: usize| {
-        let radius_squared = (index as f64 + 0.5) / count as f64;
-        let (sine, cosine) = (TAU * 0.618_033_988_749_895 * index as f64).sin_cos();
-        let height = (1.0 - radius_squared).sqrt();
-        let aside = (x * cosine + y * sine) * radius_squared.sqrt();
-        Light::directional(
-            -(aside + up * height),
-            radiance * (PI / (count as f64 * height)),
-        )
-    };
-    (0..count).map(from).collect()
 }
 
 /// Three numbers from 0 to 1, of any number of such evenly spread (Roberts 2018, "The unreasonable effectiveness of quasirandom
@@ -221,24 +204,5 @@ mod tests {
                 assert!((part - counted).abs() < 0.03, "{way}: {part} {counted}");
             }
         }
-    }
-
-    #[test]
-    fn surroundings_give_a_plane_what_all_around_gives() {
-        let sky = surroundings(DVec3::Z, DVec3::ONE, 32);
-        let on = |normal: DVec3| -> f64 {
-            let given = sky
-                .iter()
-                .map(|light| irradiance(light, DVec3::ZERO, normal).x);
-            given.sum()
-        };
-        assert!((on(DVec3::Z) - PI).abs() < 1e-12);
-        // A wall sees half of them.
-        let walls = (0..16).map(|step| {
-            let (y, x) = (TAU * f64::from(step) / 16.0).sin_cos();
-            on(DVec3::new(x, y, 0.0))
-        });
-        let mean = walls.sum::<f64>() / 16.0;
-        assert!((mean - PI / 2.0).abs() < 0.15, "{mean}");
     }
 }

@@ -7,6 +7,7 @@ use crate::geometry::reach::PixelRect;
 use super::anchor_geometry::Role;
 use super::attachments::{depth_stencil, loaded};
 use super::background::Background;
+use super::final_gather::FinalGather;
 use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
 use super::gpu_scene::{DrawnLight, GpuScene};
@@ -24,6 +25,8 @@ pub(super) struct Accumulated {
     surfaces: Surfaces,
     volumes: Volumes,
     first: First,
+    /// What real surfaces get beside the lights, where it is gathered.
+    final_gather: Option<Box<FinalGather>>,
     /// Where all is added up.
     pub sums: LightSums,
 }
@@ -39,9 +42,18 @@ impl Accumulated {
     ) -> Self {
         Self {
             first,
+            final_gather: None,
             surfaces: Surfaces::new(gpu, samples, kinds, first),
             volumes: Volumes::new(gpu, &GEOMETRY_GROUPS, samples, &[gpu.light_format; 2]),
             sums: LightSums::new(gpu, background, samples, BY_GAIN),
+        }
+    }
+
+    /// The same with what real surfaces get beside the lights.
+    pub fn with_final_gather(self, final_gather: Option<FinalGather>) -> Self {
+        Self {
+            final_gather: final_gather.map(Box::new),
+            ..self
         }
     }
 
@@ -54,13 +66,12 @@ impl Accumulated {
     ) {
         let sums = &self.sums;
         let count = frame.gpu_scene.light_count().max(1);
-        let surroundings = frame.gpu_scene.pieces_of_surroundings();
         let fresh = match self.first {
             First::Ambient => wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
             First::DepthAlone => wgpu::LoadOp::Load,
         };
         for light in 0..count {
-            let (first, last) = (light == 0, light + 1 == count && surroundings.is_empty());
+            let (first, last) = (light == 0, light + 1 == count);
             let begins = first && self.first == First::Ambient;
             let load = match first {
                 true => fresh,
@@ -76,16 +87,6 @@ impl Accumulated {
                 before(&mut pass);
             }
             self.draw_light(&mut pass, frame, light, first);
-        }
-        if !surroundings.is_empty() {
-            let load = wgpu::LoadOp::Load;
-            let mut pass = passes.begin(
-                "surroundings",
-                Some(GpuSpan::Light.part(false, true)),
-                &[loaded(&sums.reaching, load), loaded(&sums.change, load)],
-                Some(depth_stencil(&sums.depth_stencil, false, true)),
-            );
-            self.draw_surroundings(&mut pass, frame);
         }
     }
 
@@ -108,6 +109,9 @@ impl Accumulated {
             ];
             for (pipelines, role) in ambient {
                 gpu_scene.draw_surfaces(pass, pipelines, role, whole, pixels);
+                if let (Some(final_gather), Role::Real) = (&self.final_gather, role) {
+                    final_gather.draw(pass, gpu_scene);
+                }
             }
         }
         let pieces = gpu_scene.pieces_of(light);
@@ -169,15 +173,6 @@ impl Accumulated {
         self.draw_taken(pass, frame, piece);
     }
 
-    /// Draws what real and virtual things hide of the ambient light from real surfaces, all of which has reached them. (What of
-    /// it reaches virtual ones is gathered: indirect.rs.)
-    fn draw_surroundings(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>) {
-        set_scissor(pass, frame.bounds.pixels);
-        for piece in frame.gpu_scene.pieces_of_surroundings() {
-            self.draw_hidden(pass, frame, piece);
-        }
-    }
-
     /// Draws what virtual things take of a piece from real surfaces; what real ones hide of it is known.
     fn draw_taken(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>, piece: usize) {
         let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
@@ -188,7 +183,7 @@ impl Accumulated {
                 pass,
                 &lit.hidden_from_real,
                 Role::Real,
-                DrawnLight::Taken(piece),
+                DrawnLight::Piece(piece),
                 pixels,
             );
         }
@@ -202,7 +197,11 @@ impl TechniquePasses for Accumulated {
         gpu_scene: &mut GpuScene,
         shown: Shown,
     ) -> Option<ScreenBounds> {
-        gpu_scene.cast_shadows(gpu, shown, PixelRect::NONE)
+        let gathered = match (shown, &mut self.final_gather) {
+            (Shown::Composite, Some(final_gather)) => final_gather.update(gpu, gpu_scene),
+            _ => PixelRect::NONE,
+        };
+        gpu_scene.cast_shadows(gpu, shown, gathered)
     }
 
     fn draw(&mut self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) {

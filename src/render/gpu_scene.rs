@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
+use crate::geometry::subdivide::Corner;
 use crate::light::Light;
 use crate::scene::{Scene, SceneLight, ShadowSettings, Shortcut};
 
@@ -26,7 +27,6 @@ use super::screen_bounds::{ScreenBounds, screen_bounds};
 use super::shown::Shown;
 use super::stencil::REAL_HIDES;
 use super::surfaces::{Sided, SurfaceKinds};
-use super::surroundings::hidden_surroundings;
 use super::uniforms::{AnchorView, UniformRow, VIEW_GROUP};
 use super::volumes::{Among, Volumes, set_scissor};
 
@@ -37,15 +37,24 @@ pub(super) enum DrawnLight {
     Whole(usize),
     /// A piece of one.
     Piece(usize),
-    /// What virtual things take where they hide a piece.
-    Taken(usize),
     /// A piece where real things hide it: the stencil's reference says that.
     HiddenPiece(usize),
 }
 
+/// A thing in its level of detail.
+pub(super) struct DrawnModel {
+    /// Number of the thing, and of its level.
+    pub number: usize,
+    pub level: usize,
+    pub anchor: usize,
+    /// How far its surface may lie off the finest level's, metres.
+    pub error_m: f32,
+    /// In the anchor's space.
+    pub triangles: Vec<[Corner; 3]>,
+}
+
 /// The scene as the present frame has it.
 pub(super) struct GpuScene {
-    lit_by: LitBy,
     intrinsics: Intrinsics,
     /// Those that cast shadow volumes.
     lights: Lights,
@@ -86,7 +95,6 @@ impl GpuScene {
         let light_kinds = lights.iter().map(|light| LightKind::of(&light.light));
         let light_kinds = light_kinds.collect();
         Self {
-            lit_by,
             standing: standing(scene),
             known_levels,
             casters: Casters::new(gpu, things.len(), &scene.shadows),
@@ -104,7 +112,7 @@ impl GpuScene {
             things,
             view_group: gpu.bind_group(&VIEW_GROUP, [views.binding()]),
             camera_from_anchor: vec![None; scene.node_count()],
-            lights: Lights::new(gpu, lights, hidden_surroundings(scene, lit_by)),
+            lights: Lights::new(gpu, lights),
             kinds: SurfaceKinds {
                 glossy: scene.virtuals.iter().any(|object| {
                     let mut materials = object.materials.iter();
@@ -122,8 +130,7 @@ impl GpuScene {
     /// Takes another state of the same scene: lights otherwise, things elsewhere, shown or hidden. What surroundings
     /// reflect stays as it was gathered, where the same corners are there to get it. `lights` are those that cast shadow volumes.
     pub fn follow(&mut self, gpu: &Gpu, scene: &Scene, lights: Vec<SceneLight>) {
-        let surroundings = hidden_surroundings(scene, self.lit_by);
-        self.lights.follow(lights, surroundings);
+        self.lights.follow(lights);
         let standing = standing(scene);
         if self.standing == standing {
             return;
@@ -156,16 +163,6 @@ impl GpuScene {
     /// The pieces of a light, of which each casts its shadows.
     pub fn pieces_of(&self, light: usize) -> Range<usize> {
         self.lights.pieces_of(light)
-    }
-
-    /// From how many directions light from all around may be hidden.
-    pub fn surroundings_count(&self) -> usize {
-        self.lights.surroundings_count()
-    }
-
-    /// The pieces of the light from all around that virtual things hide.
-    pub fn pieces_of_surroundings(&self) -> Range<usize> {
-        self.lights.pieces_of_surroundings()
     }
 
     /// Triangles of the levels that the present frame's things are drawn in.
@@ -303,9 +300,37 @@ impl GpuScene {
         self.lights.shining()
     }
 
+    /// The real things as the frame has them.
+    pub fn drawn_real(&self) -> impl Iterator<Item = DrawnModel> {
+        let batches = self.placed(Role::Real);
+        batches.flat_map(|batch| {
+            let things = self.of_batch(batch);
+            things.map(|(number, thing)| {
+                let level = self.levels[number];
+                let drawn = &thing.levels[level];
+                let (corners, triangles) = &batch.places.corners;
+                let (first, last) = (drawn.range.start / 3, drawn.range.end / 3);
+                let triangles = &triangles[first as usize..last as usize];
+                let corner = |index: u32| corners[index as usize];
+                DrawnModel {
+                    number,
+                    level,
+                    anchor: thing.anchor,
+                    error_m: drawn.max_error_m as f32,
+                    triangles: triangles.iter().map(|it| it.map(corner)).collect(),
+                }
+            })
+        })
+    }
+
+    /// What passes draw from here on stands on an anchor.
+    pub fn set_anchor(&self, pass: &mut wgpu::RenderPass<'_>, anchor: usize) {
+        pass.set_bind_group(0, &self.view_group, &[self.views.offset(anchor)]);
+    }
+
     /// What passes draw from here on stands in the world.
     pub fn set_world(&self, pass: &mut wgpu::RenderPass<'_>) {
-        pass.set_bind_group(0, &self.view_group, &[self.views.offset(0)]);
+        self.set_anchor(pass, 0);
         self.lights.set_whole(pass, 0);
     }
 
@@ -396,7 +421,6 @@ impl GpuScene {
         match light {
             DrawnLight::Whole(light) => self.lights.set_whole(pass, light),
             DrawnLight::Piece(piece) => self.lights.set_piece(pass, piece),
-            DrawnLight::Taken(piece) => self.lights.set_taken(pass, piece),
             DrawnLight::HiddenPiece(piece) => {
                 self.lights.set_piece(pass, piece);
                 pass.set_stencil_reference(REAL_HIDES);
@@ -414,9 +438,9 @@ impl GpuScene {
     pub fn light_kind(&self, light: DrawnLight) -> LightKind {
         match light {
             DrawnLight::Whole(light) => self.lights.kind_of_whole(light),
-            DrawnLight::Piece(piece)
-            | DrawnLight::HiddenPiece(piece)
-            | DrawnLight::Taken(piece) => self.lights.kind_of_piece(piece),
+            DrawnLight::Piece(piece) | DrawnLight::HiddenPiece(piece) => {
+                self.lights.kind_of_piece(piece)
+            }
         }
     }
 

@@ -24,8 +24,6 @@ pub(super) struct Piece {
     pub kind: LightKind,
     /// Its number, which stays the same from frame to frame.
     pub slot: usize,
-    /// What a real surface loses where a virtual thing hides the piece, if that is something else, and the slot of that.
-    pub taken: Option<(Light, usize)>,
 }
 
 /// A light as its shadow volumes see it from an anchor.

@@ -21,9 +21,7 @@ use super::uniforms::{CameraLight, LIGHT_GROUP, UniformRow};
 pub(super) struct Lights {
     scene: Vec<SceneLight>,
     placed: Vec<PlacedLight>,
-    /// What shines from all around, a light for each direction; they have slots like the rest.
-    surroundings: Vec<Piece>,
-    /// All pieces of the lights, then the surroundings.
+    /// All pieces of the lights.
     pieces: Vec<Piece>,
     /// For each light the slots of its pieces, as many as it ever had.
     slots: Vec<Vec<usize>>,
@@ -41,17 +39,15 @@ struct PlacedLight {
 }
 
 impl Lights {
-    /// `surroundings`: what of light from all around things may hide, and what a surface loses where virtual ones do.
-    pub fn new(gpu: &Gpu, scene: Vec<SceneLight>, surroundings: Vec<[Light; 2]>) -> Self {
+    /// Of a scene's lights.
+    pub fn new(gpu: &Gpu, scene: Vec<SceneLight>) -> Self {
         let capacity = 2 * scene.len();
-        let count = surroundings.len();
         let (uniforms, group) = uniforms(gpu, capacity);
         Self {
             slots: vec![Vec::new(); scene.len()],
             placed: Vec::new(),
             pieces: Vec::new(),
-            slot_count: 2 * count,
-            surroundings: surrounding_pieces(surroundings),
+            slot_count: 0,
             scene,
             uniforms,
             capacity,
@@ -60,9 +56,8 @@ impl Lights {
     }
 
     /// Takes as many lights that shine otherwise.
-    pub fn follow(&mut self, scene: Vec<SceneLight>, surroundings: Vec<[Light; 2]>) {
+    pub fn follow(&mut self, scene: Vec<SceneLight>) {
         self.scene = scene;
-        self.surroundings = surrounding_pieces(surroundings);
     }
 
     /// Places the lights; those on anchors without a pose do not shine.
@@ -110,12 +105,10 @@ impl Lights {
                     light,
                     kind: LightKind::of(&light),
                     slot,
-                    taken: None,
                 });
             }
             placed.pieces = first..self.pieces.len();
         }
-        self.pieces.extend(&self.surroundings);
         let needed = self.scene.len() + self.slot_count;
         if needed > self.capacity {
             self.capacity = needed.next_power_of_two();
@@ -132,9 +125,6 @@ impl Lights {
         }
         for piece in &self.pieces {
             write(self.scene.len() + piece.slot, &piece.light);
-            if let Some((light, slot)) = &piece.taken {
-                write(self.scene.len() + slot, light);
-            }
         }
     }
 
@@ -168,16 +158,6 @@ impl Lights {
             .map_or(0..0, |placed| placed.pieces.clone())
     }
 
-    /// How many directions of the surroundings there are.
-    pub fn surroundings_count(&self) -> usize {
-        self.surroundings.len()
-    }
-
-    /// Which of them are the surroundings.
-    pub fn pieces_of_surroundings(&self) -> Range<usize> {
-        self.pieces.len().saturating_sub(self.surroundings.len())..self.pieces.len()
-    }
-
     /// What a whole light is.
     pub fn kind_of_whole(&self, light: usize) -> LightKind {
         let light = self.scene.get(light);
@@ -195,31 +175,12 @@ impl Lights {
         pass.set_bind_group(1, &self.group, &[self.uniforms.offset(light)]);
     }
 
-    /// Puts what a piece loses to virtual things into group 1.
-    pub fn set_taken(&self, pass: &mut wgpu::RenderPass<'_>, piece: usize) {
-        let piece = self.pieces.get(piece);
-        let slot = piece.map_or(0, |piece| piece.taken.map_or(piece.slot, |(_, slot)| slot));
-        let offset = self.uniforms.offset(self.scene.len() + slot);
-        pass.set_bind_group(1, &self.group, &[offset]);
-    }
-
     /// Puts a piece into group 1.
     pub fn set_piece(&self, pass: &mut wgpu::RenderPass<'_>, piece: usize) {
         let slot = self.pieces.get(piece).map_or(0, |piece| piece.slot);
         let offset = self.uniforms.offset(self.scene.len() + slot);
         pass.set_bind_group(1, &self.group, &[offset]);
     }
-}
-
-fn surrounding_pieces(surroundings: Vec<[Light; 2]>) -> Vec<Piece> {
-    let count = surroundings.len();
-    let piece = |(slot, [light, taken]): (usize, [Light; 2])| Piece {
-        light,
-        kind: LightKind::Plain,
-        slot,
-        taken: Some((taken, count + slot)),
-    };
-    surroundings.into_iter().enumerate().map(piece).collect()
 }
 
 fn uniforms(gpu: &Gpu, count: usize) -> (UniformRow, wgpu::BindGroup) {

@@ -11,7 +11,7 @@ macro_rules! files {
 }
 
 /// All files under `shaders/`.
-const FILES: [(&str, &str); 26] = files![
+const FILES: [(&str, &str); 27] = files![
     "area_lights.wgsl",
     "background.wgsl",
     "common.wgsl",
@@ -21,6 +21,7 @@ const FILES: [(&str, &str); 26] = files![
     "direct.wgsl",
     "environment.wgsl",
     "fade.wgsl",
+    "final_gather.wgsl",
     "fullscreen.wgsl",
     "layers.wgsl",
     "light_sums.wgsl",

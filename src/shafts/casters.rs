@@ -54,27 +54,36 @@ impl Occluder<'_> {
         let coarse_enough = coarser
             .into_iter()
             .rfind(|level| level.max_error_m <= COARSE_PART * f64::from(size));
-        let mesh = coarse_enough.map_or(shape, |level| level.mesh);
-        let corners = mesh
-            .triangles
-            .iter()
-            .map(|triangle| triangle.map(|index| mesh.positions[index as usize]));
-        let albedos = mesh
-            .triangle_materials
-            .iter()
-            .map(|&material| self.albedos[material as usize]);
-        corners.zip(albedos).collect()
+        self.with_albedos(&coarse_enough.map_or(shape, |level| level.mesh))
     }
 
     /// The same in its anchor's space.
     pub fn simplified_in_anchor(&self) -> Vec<([Vec3; 3], Vec3)> {
-        let simplified = self.simplified().into_iter();
-        simplified
-            .map(|(corners, albedo)| (corners.map(|corner| self.in_anchor(corner)), albedo))
-            .collect()
+        self.in_anchor(self.simplified())
     }
 
-    fn in_anchor(&self, corner: Vec3) -> Vec3 {
+    /// All its triangles in its anchor's space, with their albedos.
+    pub fn whole_in_anchor(&self) -> Vec<([Vec3; 3], Vec3)> {
+        self.in_anchor(self.with_albedos(self.mesh))
+    }
+
+    fn with_albedos(&self, mesh: &Mesh) -> Vec<([Vec3; 3], Vec3)> {
+        let triangles = mesh.triangles.iter();
+        let corners =
+            triangles.map(|triangle| triangle.map(|index| mesh.positions[index as usize]));
+        let materials = mesh.triangle_materials.iter();
+        let albedos = materials.map(|&material| self.albedos[material as usize]);
+        corners.zip(albedos).collect()
+    }
+
+    fn in_anchor(&self, triangles: Vec<([Vec3; 3], Vec3)>) -> Vec<([Vec3; 3], Vec3)> {
+        let triangles = triangles.into_iter();
+        let placed = |corner: Vec3| self.corner_in_anchor(corner);
+        let placed = triangles.map(|(corners, albedo)| (corners.map(placed), albedo));
+        placed.collect()
+    }
+
+    fn corner_in_anchor(&self, corner: Vec3) -> Vec3 {
         let placed = self.anchor_from_object.transform_point3(corner.as_dvec3());
         placed.as_vec3()
     }
@@ -200,9 +209,7 @@ impl SimplifiedCaster {
             self.surfels.clear();
             return;
         }
-        let place = |corner: Vec3| thing.in_anchor(corner);
-        let placed = |(corners, albedo): &([Vec3; 3], Vec3)| (corners.map(place), *albedo);
-        let with_albedo: Vec<([Vec3; 3], Vec3)> = self.coarse.iter().map(placed).collect();
+        let with_albedo = thing.in_anchor(self.coarse.clone());
         self.surfels = match self.casts {
             true => surfels(&with_albedo, surfel_count),
             false => Vec::new(),

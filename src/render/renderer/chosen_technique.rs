@@ -5,6 +5,7 @@ use super::super::background::Background;
 use super::super::combined::Combined;
 use super::super::direct::Direct;
 use super::super::environment::Environment;
+use super::super::final_gather::FinalGather;
 use super::super::gpu::Gpu;
 use super::super::gpu_scene::GpuScene;
 use super::super::light_kind::LightKind;
@@ -70,8 +71,9 @@ impl ChosenTechnique {
                 let (samples, kinds) = (scene.shadows.samples, gpu_scene.kinds);
                 // (A lamp that moves along may be lost, and one of some size has soft shadows.)
                 let is_plain = |light: &SceneLight| light.anchor == 0 && !light.light.has_size();
+                let final_gather = FinalGather::new(gpu, scene, samples);
                 let is_direct = samples == 1
-                    && gpu_scene.surroundings_count() == 0
+                    && final_gather.is_none()
                     && !scene.shadows.without.has(Shortcut::Direct);
                 let technique = match &scene.lights[..] {
                     [one] if is_direct && is_plain(one) => {
@@ -80,7 +82,8 @@ impl ChosenTechnique {
                     }
                     _ => {
                         let first = First::Ambient;
-                        Self::Accumulated(Accumulated::new(gpu, background, samples, kinds, first))
+                        let lights = Accumulated::new(gpu, background, samples, kinds, first);
+                        Self::Accumulated(lights.with_final_gather(final_gather))
                     }
                 };
                 (technique, gpu_scene)

@@ -6,7 +6,7 @@ use super::super::pipelines::{
     GroupLayout, PipelineDescription, added, filtered, overwritten, sampler, storage, uniform,
     untouched,
 };
-use super::super::stencil::depth_stencil_state;
+use super::super::stencil::{IN_A_SURFACE, depth_stencil_state};
 use super::super::surfaces::{Sided, SurfaceKinds};
 use super::super::uniforms::GEOMETRY_GROUPS;
 use super::data::{PATCH_CORNER_LAYOUT, REFLECTED_CORNER_LAYOUT};
@@ -29,19 +29,6 @@ pub(super) const SHAFT_GROUP: GroupLayout = GroupLayout {
 
 /// All groups of the pass.
 const SHAFT_GROUPS: [GroupLayout; 3] = [GEOMETRY_GROUPS[0], GEOMETRY_GROUPS[1], SHAFT_GROUP];
-
-/// The depth bias of patches, and of the parts that they are cut into, over the depth of the whole patch. A part lies in its
-/// patch but for rounding: of its corners' depths, by some units in the last place, and of their places on screen to a 256th
-/// of a pixel, which moves either plane by up to a 512th of its slope along both axes, both planes by less than a hundredth.
-/// At one metre 16 units are 2 µm, less than the 15 µm by which a virtual thing that touches a patch is nearer
-/// ([`AnchorView::winning_ties`]), so it stays in front. No volume is ever drawn with it.
-///
-/// [`AnchorView::winning_ties`]: super::super::uniforms::AnchorView::winning_ties
-const ON_THE_PATCH: wgpu::DepthBiasState = wgpu::DepthBiasState {
-    constant: 16,
-    slope_scale: 0.01,
-    clamp: 0.0,
-};
 
 /// The pipelines.
 pub(super) struct Pipelines {
@@ -94,7 +81,7 @@ impl Pipelines {
         );
         let on_patch = PipelineDescription {
             depth_stencil: Some(wgpu::DepthStencilState {
-                bias: ON_THE_PATCH,
+                bias: IN_A_SURFACE,
                 ..depth_of_patch
             }),
             ..into_depth.clone()
