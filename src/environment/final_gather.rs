@@ -14,6 +14,7 @@ use crate::light::irradiance_records::IrradianceRecords;
 use crate::shafts::light_of_room::hemisphere;
 
 use super::placed::{OFFSET_M, PlacedScene, PlacedThing, SeenSurface, way_to};
+use super::sky::Sky;
 
 /// Edges of real surfaces are at most this part of a virtual thing's size where they touch it, ...
 const NEAR_PART: f32 = 1.0 / 20.0;
@@ -36,10 +37,10 @@ pub struct Gathered {
 }
 
 /// How light is gathered.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Gathering {
-    /// Radiance from all around.
-    pub ambient: Vec3,
+    /// What comes from where rays meet nothing.
+    pub sky: Sky,
     /// From each point.
     pub rays: usize,
     /// At hardly more points than this; those between have the light of their neighbours.
@@ -83,7 +84,7 @@ struct Sample {
 
 impl PlacedScene<'_> {
     /// The light at points of real surfaces.
-    pub fn gathered(&self, on: Points<'_>, how: Gathering) -> Vec<Gathered> {
+    pub fn gathered(&self, on: Points<'_>, how: &Gathering) -> Vec<Gathered> {
         let records = IrradianceRecords::new(on.points, how.most_records);
         let offset_m = OFFSET_M + on.error_m;
         let samples: Vec<Sample> = records
@@ -114,7 +115,7 @@ impl PlacedScene<'_> {
         .collect()
     }
 
-    fn sample(&self, start: Vec3, normal: Vec3, how: Gathering) -> Sample {
+    fn sample(&self, start: Vec3, normal: Vec3, how: &Gathering) -> Sample {
         let mut sample = Sample::default();
         let (mut inside_real, mut inside) = (0, 0);
         for direction in hemisphere(normal, how.rays) {
@@ -122,12 +123,13 @@ impl PlacedScene<'_> {
             let reach = real.map_or(f32::INFINITY, |seen| seen.distance);
             let is_virtual = |placed: &PlacedThing<'_>| !placed.thing.is_real && placed.thing.casts;
             let before = self.seen_within(start, direction, reach, is_virtual);
-            let [without, behind] = real.map_or([how.ambient; 2], |seen| {
-                self.reflected_by(&seen, how.ambient)
-            });
+            let [without, behind] = match &real {
+                Some(seen) => self.reflected_by(seen, &how.sky),
+                None => [how.sky.radiance(direction); 2],
+            };
             sample.without += without;
             sample.with += match &before {
-                Some(seen) => self.reflected_by(seen, how.ambient)[1],
+                Some(seen) => self.reflected_by(seen, &how.sky)[1],
                 None => behind,
             };
             inside_real += usize::from(real.is_some_and(|seen| seen.is_inside));
@@ -143,10 +145,11 @@ impl PlacedScene<'_> {
         }
     }
 
-    /// Radiance that a surface reflects of the lights and of the ambient light: without virtual things, and with them.
-    fn reflected_by(&self, seen: &SeenSurface, ambient: Vec3) -> [Vec3; 2] {
+    /// Radiance that a surface reflects of the lights and of the sky, which it sees all of: without virtual things, and with
+    /// them.
+    fn reflected_by(&self, seen: &SeenSurface, sky: &Sky) -> [Vec3; 2] {
         let start = seen.place + seen.normal * OFFSET_M;
-        let mut arriving = [Vec3::ZERO; 2];
+        let mut arriving = [sky.irradiance(seen.normal); 2];
         for light in self.compact {
             let given = irradiance(light, start.as_dvec3(), seen.normal.as_dvec3()).as_vec3();
             let (way, reach) = way_to(light, start);
@@ -162,7 +165,7 @@ impl PlacedScene<'_> {
                 arriving[1] += given;
             }
         }
-        arriving.map(|arriving| seen.albedo * (ambient + arriving * FRAC_1_PI))
+        arriving.map(|arriving| seen.albedo * arriving * FRAC_1_PI)
     }
 }
 

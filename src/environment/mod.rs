@@ -7,5 +7,6 @@ pub mod occlusion_map;
 pub mod placed;
 pub mod reflected;
 pub mod self_occlusion;
+pub mod sky;
 pub mod surroundings;
 pub mod thing;

@@ -104,6 +104,7 @@ mod tests {
     use super::*;
     use crate::light::irradiance;
     use glam::DVec2;
+    use std::f64::consts::PI;
 
     fn lamp(shape: Shape) -> Light {
         Light::Point {

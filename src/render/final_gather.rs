@@ -11,6 +11,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use crate::environment::distant_light::DistantLight;
 use crate::environment::final_gather::{Gathered, Gathering, Points, longest_edge_m};
 use crate::environment::placed::{PlacedScene, PlacedThing};
+use crate::environment::sky::Sky;
 use crate::environment::thing::Thing;
 use crate::geometry::bounds::Bounds;
 use crate::geometry::reach::{self, PixelRect};
@@ -78,9 +79,20 @@ struct OnModel {
 }
 
 impl FinalGather {
-    /// Of a scene in which light is to be gathered; `None` of others.
-    pub fn new(gpu: &Gpu, scene: &Scene, samples: u32) -> Option<Self> {
-        let rays = scene.shadows.ambient_samples as usize;
+    /// The ambient light of a scene and what its lights have things reflect; `None` where it is not to be gathered.
+    pub fn of_ambient(gpu: &Gpu, scene: &Scene) -> Option<Self> {
+        let sky = |_| Sky::constant(scene.ambient_radiance);
+        Self::new(gpu, scene, scene.shadows.ambient_samples as usize, sky)
+    }
+
+    /// By so many rays from each point, where nothing moves; `sky` is made for as many. `None` where there is nothing real or
+    /// nothing virtual.
+    pub fn new(
+        gpu: &Gpu,
+        scene: &Scene,
+        rays: usize,
+        sky: impl FnOnce(usize) -> Sky,
+    ) -> Option<Self> {
         let (real, virtuals) = (scene.real_occluders(), scene.occluders());
         let real = real.iter().filter_map(|thing| Thing::whole(thing, true));
         let virtuals = virtuals
@@ -106,7 +118,7 @@ impl FinalGather {
             things,
             distant: DistantLight::default(),
             how: Gathering {
-                ambient: scene.ambient_radiance.as_vec3(),
+                sky: sky(rays),
                 rays,
                 most_records,
             },
@@ -115,7 +127,7 @@ impl FinalGather {
                 shader: "final_gather.wgsl",
                 vertex: "place_gathered",
                 fragment: "gathered_on_real",
-                constants: vec![("MULTISAMPLED", f64::from(samples > 1))],
+                constants: vec![("MULTISAMPLED", f64::from(scene.shadows.samples > 1))],
                 groups: vec![Some(VIEW_GROUP)],
                 vertex_buffers: vec![GATHERED_LAYOUT],
                 depth_stencil: Some(wgpu::DepthStencilState {
@@ -123,7 +135,7 @@ impl FinalGather {
                     ..on_surface
                 }),
                 targets: vec![overwritten(format), overwritten(format)],
-                samples,
+                samples: scene.shadows.samples,
                 ..Default::default()
             }),
             gathered_for: None,
@@ -161,10 +173,16 @@ impl FinalGather {
                 continue;
             };
             let key = (model.number, model.level);
-            let on_model = self
-                .on_models
-                .entry(key)
-                .or_insert_with(|| on_model(gpu, &scene, &virtuals, &model, &pose, (self.how, self.coarser)));
+            let on_model = self.on_models.entry(key).or_insert_with(|| {
+                on_model(
+                    gpu,
+                    &scene,
+                    &virtuals,
+                    &model,
+                    &pose,
+                    (&self.how, self.coarser),
+                )
+            });
             self.drawn.push(key);
             let camera_from_anchor = gpu_scene.camera_from_anchor()[model.anchor];
             let changed = on_model.changed.zip(camera_from_anchor);
@@ -195,10 +213,11 @@ fn on_model(
     virtuals: &[Bounds],
     model: &DrawnModel,
     world_from_anchor: &DAffine3,
-    (how, coarser): (Gathering, f32),
+    (how, coarser): (&Gathering, f32),
 ) -> OnModel {
     let in_world = |place: Vec3| world_from_anchor.transform_point3(place.as_dvec3());
-    let longest_m = |from: Vec3, to: Vec3| longest_edge_m(virtuals, coarser, in_world(from), in_world(to));
+    let longest_m =
+        |from: Vec3, to: Vec3| longest_edge_m(virtuals, coarser, in_world(from), in_world(to));
     let parts = subdivided(model.triangles.clone(), longest_m, MOST_PARTS);
     let corners: Vec<Corner> = parts.into_flattened();
     let triangles: Vec<[u32; 3]> = (0..corners.len() as u32 / 3)

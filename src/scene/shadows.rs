@@ -38,6 +38,8 @@ impl Technique {
 choices! {
     /// How the environment's shadows are made of what its regions see.
     pub enum EnvironmentMethod, "method" {
+        /// On real surfaces by rays from points of them (final gathering), on virtual ones as penumbrae.
+        Rays = "rays",
         /// As soft at each place as things are far from it.
         Penumbrae = "penumbrae",
         /// As in the paper: as soft over a whole thing as its middle is far, and taken off.
@@ -123,9 +125,9 @@ settings! {
     samples: u32, Whole::one_of("number of samples", &[1, 4]) => ByQuality { fast: 1, balanced: 4, accurate: 4 };
     /// A light of some size casts its soft shadows from as many places as they are wide in pixels, up to this many.
     light_samples: u32, Whole::between(1, 1024) => ByQuality { fast: 16, balanced: 64, accurate: 256 };
-    /// From so many directions virtual things hide the ambient light of real ones; 0: they hide none of it. Takes no part in
-    /// shafts, whose probe is the ambient light.
-    ambient_samples: u32, Whole::between(0, 1024) => Is(0);
+    /// By so many rays from each point real surfaces get the ambient light, an environment's too, and what things reflect on to
+    /// them; 0: virtual things hide and reflect none of that. Where things move there are fewer. Takes no part in shafts.
+    ambient_samples: u32, Whole::between(0, 1024) => ByQuality { fast: 0, balanced: 256, accurate: 1024 };
     /// How volumes are counted.
     counting: VolumeCounting => Is(VolumeCounting::Auto);
     /// By less than this many pixels a coarser version of a thing may move its silhouette, as the camera and the lights
@@ -178,7 +180,7 @@ settings! {
     pub struct EnvironmentSettings, ENVIRONMENT: EnvironmentKeys;
 
     /// How shadows are made of what the regions see.
-    method: EnvironmentMethod => Is(EnvironmentMethod::Penumbrae);
+    method: EnvironmentMethod => Is(EnvironmentMethod::Rays);
     /// Regions that the probe's broad light is cut into, each with a shadow of its own (q of Tamura et al. 2005).
     regions: u32, Whole::between(1, 256) => Is(64);
     /// Side of the map of a thing as a region sees it, pixels.

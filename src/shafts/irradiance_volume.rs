@@ -12,8 +12,8 @@ use crate::geometry::ray_caster::RayCaster;
 
 use super::bounding::Aabb;
 use super::bright_patches::BrightPatches;
-use super::harmonics::{Radiance9, sphere};
 use super::patches::RoomPatches;
+use crate::light::radiance9::{Radiance9, sphere};
 
 /// Rays from each point of the grid.
 const RAYS: usize = 1024;

@@ -7,7 +7,6 @@ mod carried_light;
 pub mod casters;
 pub mod difference;
 mod form_factor;
-mod harmonics;
 pub mod hidden_light;
 pub mod hierarchy;
 pub mod intensity_transfers;

@@ -247,7 +247,7 @@ pub fn from_disc(place: Vec3, normal: Vec3, surfel: &Surfel) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shafts::harmonics::sphere;
+    use crate::light::radiance9::sphere;
     use std::f32::consts::TAU;
 
     #[test]

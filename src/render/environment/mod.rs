@@ -13,6 +13,7 @@ use crate::environment::occlusion_map::OcclusionMap;
 use crate::environment::placed::{PlacedScene, PlacedThing};
 use crate::environment::reflected::DiscTree;
 use crate::environment::self_occlusion::{SelfOcclusion, TRANSFER_DEGREE, self_occlusions};
+use crate::environment::sky::Sky;
 use crate::environment::surroundings::LocalLight;
 use crate::environment::thing::Thing;
 use crate::geometry::bounds::Bounds;
@@ -20,11 +21,12 @@ use crate::geometry::ray_caster::RayCaster;
 use crate::geometry::reach::{self, PixelRect};
 use crate::light::Light;
 use crate::light::harmonics::Turn;
-use crate::scene::{Object, ProbeScene, Scene};
+use crate::scene::{EnvironmentMethod, Object, ProbeScene, Scene};
 use crate::shafts::shadow_atlas::Tiling;
 
 use super::anchor_geometry::Role;
 use super::combined::BroadLight;
+use super::final_gather::FinalGather;
 use super::gpu::Gpu;
 use super::gpu_scene::{DrawnLight, GpuScene};
 use super::indirect::points;
@@ -40,6 +42,9 @@ use pipelines::{ENVIRONMENT_GROUP, Pipelines};
 /// Rays start this part of a thing's size off its surface.
 const START_OFFSET: f64 = 1e-4;
 
+/// Rays from each point of real surfaces, whatever the ambient light of lamps gets.
+const FEWEST_RAYS: usize = 64;
+
 /// The broad light of a probe.
 pub(super) struct Environment {
     distant: DistantLight,
@@ -53,6 +58,8 @@ pub(super) struct Environment {
     /// For each batch what its corners hide from themselves.
     occlusions: Vec<BatchOcclusion>,
     pipelines: Pipelines,
+    /// What real surfaces get, where rays tell that.
+    final_gather: Option<FinalGather>,
     tiling: Tiling,
     atlas: MapAtlas,
     frame: wgpu::Buffer,
@@ -125,9 +132,16 @@ impl Environment {
         let largest_px = gpu.device.limits().max_texture_dimension_2d;
         let tiling = Tiling::new(count, settings.map_px, largest_px);
         let kinds = gpu_scene.kinds;
+        let rays = (scene.shadows.ambient_samples as usize).max(FEWEST_RAYS);
         let glossy = kinds.glossy.then(|| (rest.as_ref(), probe.exposure as f32));
         Self {
             pipelines: Pipelines::new(gpu, scene.shadows.samples, kinds, settings.method),
+            final_gather: match settings.method {
+                EnvironmentMethod::Rays => FinalGather::new(gpu, scene, rays, |rays| {
+                    Sky::new(&rest, probe.exposure, rays)
+                }),
+                EnvironmentMethod::Penumbrae | EnvironmentMethod::Maps => None,
+            },
             atlas: MapAtlas::new(gpu, tiling, "occlusion_maps.wgsl"),
             tiling,
             triangles: gpu.buffer(
@@ -357,6 +371,8 @@ impl BroadLight for Environment {
             self.placed = Some(self.place(gpu, gpu_scene, anchors, compact));
             self.placed_for = Some(placed_for);
         }
+        let gathered = self.final_gather.as_mut();
+        let gathered = gathered.map(|gathered| gathered.update(gpu, gpu_scene));
         let placed = self.placed.as_ref()?;
         let is_real = |&&number: &&usize| {
             self.things[number]
@@ -380,8 +396,10 @@ impl BroadLight for Environment {
                 gpu_scene.intrinsics(),
             )
         };
-        let pixels = placed.bounds.iter().map(covered);
-        let pixels = pixels.fold(PixelRect::NONE, PixelRect::union);
+        let pixels = gathered.unwrap_or_else(|| {
+            let pixels = placed.bounds.iter().map(covered);
+            pixels.fold(PixelRect::NONE, PixelRect::union)
+        });
         (has_virtual && !pixels.is_empty()).then_some(pixels)
     }
 
@@ -411,12 +429,18 @@ impl BroadLight for Environment {
             return;
         };
         pass.set_bind_group(2, &placed.group, &[]);
-        let drawn = [
-            (&self.pipelines.light_on_real, Role::Real),
-            (&self.pipelines.light_on_virtual, Role::Virtual),
-        ];
-        for (pipelines, role) in drawn {
-            gpu_scene.draw_surfaces(pass, pipelines, role, DrawnLight::Whole(0), within);
+        let pipelines = &self.pipelines;
+        let on_real = match &self.final_gather {
+            Some(_) => &pipelines.depth_of_real,
+            None => &pipelines.light_on_real,
+        };
+        let whole = DrawnLight::Whole(0);
+        gpu_scene.draw_surfaces(pass, on_real, Role::Real, whole, within);
+        if let Some(final_gather) = &self.final_gather {
+            final_gather.draw(pass, gpu_scene);
         }
+        pass.set_bind_group(2, &placed.group, &[]);
+        let on_virtual = &pipelines.light_on_virtual;
+        gpu_scene.draw_surfaces(pass, on_virtual, Role::Virtual, whole, within);
     }
 }

@@ -3,7 +3,7 @@
 use super::super::anchor_geometry::OCCLUSION_LAYOUT;
 use super::super::gpu::Gpu;
 use super::super::pipelines::{
-    GroupLayout, PipelineDescription, filtered, overwritten, sampler, uniform, words,
+    GroupLayout, PipelineDescription, filtered, overwritten, sampler, uniform, untouched, words,
 };
 use super::super::surfaces::{Sided, SurfaceKinds, surface_description};
 use super::super::uniforms::GEOMETRY_GROUPS;
@@ -27,6 +27,8 @@ pub(super) const ENVIRONMENT_GROUP: GroupLayout = GroupLayout {
 
 /// The pipelines.
 pub(super) struct Pipelines {
+    /// Depth of real surfaces, on which the light is known otherwise.
+    pub depth_of_real: Sided,
     /// Depth of real surfaces, the light that reaches them and what virtual things take of it.
     pub light_on_real: Sided,
     /// Depth of virtual surfaces, and their light.
@@ -57,7 +59,13 @@ impl Pipelines {
             description.vertex_buffers.push(OCCLUSION_LAYOUT);
             Sided::new(gpu, &description)
         };
+        let format = gpu.light_format;
+        let depth_alone = PipelineDescription {
+            targets: vec![untouched(format), untouched(format)],
+            ..described("nothing")
+        };
         Self {
+            depth_of_real: with_occlusion(depth_alone),
             light_on_real: with_occlusion(described("light_on_real")),
             light_on_virtual: with_occlusion(kinds.of_virtual(described("light_on_virtual"))),
         }

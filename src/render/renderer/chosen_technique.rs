@@ -71,7 +71,7 @@ impl ChosenTechnique {
                 let (samples, kinds) = (scene.shadows.samples, gpu_scene.kinds);
                 // (A lamp that moves along may be lost, and one of some size has soft shadows.)
                 let is_plain = |light: &SceneLight| light.anchor == 0 && !light.light.has_size();
-                let final_gather = FinalGather::new(gpu, scene, samples);
+                let final_gather = FinalGather::of_ambient(gpu, scene);
                 let is_direct = samples == 1
                     && final_gather.is_none()
                     && !scene.shadows.without.has(Shortcut::Direct);

@@ -75,6 +75,9 @@ pub fn room_lines(scene: &Scene, probe: &ProbeScene) -> Vec<(&'static str, Strin
     if technique == ShadowTechnique::Environment {
         let settings = scene.shadows.environment;
         let method = match settings.method {
+            EnvironmentMethod::Rays => {
+                "on real surfaces by rays, on virtual ones as soft as things are far"
+            }
             EnvironmentMethod::Penumbrae => "as soft at each place as things are far from it",
             EnvironmentMethod::Maps => "as soft over a whole thing as its middle is far",
         };
