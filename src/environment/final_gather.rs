@@ -5,7 +5,7 @@
 use std::collections::HashMap;
 use std::f32::consts::{FRAC_1_PI, PI};
 
-use glam::{DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::geometry::bounds::Bounds;
@@ -24,7 +24,7 @@ const AWAY_PART: f32 = 0.35;
 const INSIDE_PART: f32 = 0.5;
 /// Points inside of a solid have the light of those outside for so many edges.
 const EDGES_INWARDS: usize = 2;
-/// Changes below this part of what is gathered are none, so that what nothing touches stays as it is.
+/// Changes below this part of all light at a point are none, so that what nothing touches stays as it is.
 const LEAST_CHANGE: f32 = 0.002;
 
 /// Light on a point of a real surface, linear irradiance.
@@ -41,21 +41,40 @@ pub struct Gathered {
 pub struct Gathering {
     /// What comes from where rays meet nothing.
     pub sky: Sky,
-    /// From each point.
+    /// From each record.
     pub rays: usize,
-    /// At hardly more points than this; those between have the light of their neighbours.
-    pub most_records: usize,
 }
 
-/// Points of surfaces, in the world.
-#[derive(Debug, Clone, Copy)]
-pub struct Points<'a> {
-    /// A place and a unit normal each.
-    pub points: &'a [(DVec3, DVec3)],
-    /// Triangles that join them.
-    pub triangles: &'a [[u32; 3]],
-    /// How far the surface may lie off the one that rays meet, metres.
-    pub error_m: f32,
+/// Points of a surface that get light, and where it is gathered for them.
+#[derive(Debug, Clone)]
+pub struct GatherPoints {
+    records: IrradianceRecords,
+    /// For each point those that share an edge with it; none where several share a record.
+    neighbors: Vec<Vec<u32>>,
+    /// How far off the surface rays start, metres.
+    offset_m: f32,
+}
+
+impl GatherPoints {
+    /// Points (a place and a unit normal each, in a space of their own) that `triangles` join, on a surface that may lie
+    /// `error_m` off the one that rays meet; with hardly more records than `most_records`.
+    pub fn new(
+        points: &[(DVec3, DVec3)],
+        triangles: &[[u32; 3]],
+        error_m: f32,
+        most_records: usize,
+    ) -> Self {
+        let records = IrradianceRecords::new(points, most_records);
+        let neighbors = match records.places.len() == points.len() {
+            true => neighbors(points.len(), triangles),
+            false => Vec::new(),
+        };
+        Self {
+            records,
+            neighbors,
+            offset_m: OFFSET_M + error_m,
+        }
+    }
 }
 
 /// The longest edge of a real surface's parts between two places in the world; `virtuals` are the virtual things' boxes.
@@ -77,81 +96,116 @@ pub fn longest_edge_m(virtuals: &[Bounds], coarser: f32, from: DVec3, to: DVec3)
 struct Sample {
     without: Vec3,
     with: Vec3,
+    /// Of the lights themselves, without virtual things.
+    direct: Vec3,
     /// Whether it lies inside of a real solid, and inside of any.
     is_inside_real: bool,
     is_inside: bool,
 }
 
 impl PlacedScene<'_> {
-    /// The light at points of real surfaces.
-    pub fn gathered(&self, on: Points<'_>, how: &Gathering) -> Vec<Gathered> {
-        let records = IrradianceRecords::new(on.points, how.most_records);
-        let offset_m = OFFSET_M + on.error_m;
-        let samples: Vec<Sample> = records
-            .places
-            .par_iter()
+    /// The light at points of real surfaces, whose space has the pose `world_from_points`.
+    pub fn gathered(
+        &self,
+        on: &GatherPoints,
+        world_from_points: &DAffine3,
+        how: &Gathering,
+    ) -> Vec<Gathered> {
+        let records = &on.records;
+        let places = records.places.par_iter();
+        let samples: Vec<Sample> = places
             .map(|&(place, normal)| {
-                let normal = normal.as_vec3();
-                self.sample(place.as_vec3() + normal * offset_m, normal, how)
+                let place = world_from_points.transform_point3(place).as_vec3();
+                let normal = world_from_points.transform_vector3(normal).as_vec3();
+                self.sample(place + normal * on.offset_m, normal, how)
             })
             .collect();
-        let is_own = records.places.len() == on.points.len();
         let at_points = |of: &dyn Fn(&Sample) -> Vec3| {
             records.at_points(&samples.iter().map(of).collect::<Vec<_>>())
         };
         let mut reaching = at_points(&|sample| sample.without);
         let mut with = at_points(&|sample| sample.with);
-        if is_own {
-            let neighbors = neighbors(on);
-            let inside = |of: &dyn Fn(&Sample) -> bool| samples.iter().map(of).collect();
-            fill(&mut reaching, inside(&|it| it.is_inside_real), &neighbors);
-            fill(&mut with, inside(&|it| it.is_inside), &neighbors);
-        }
-        let both = reaching.into_iter().zip(with);
-        both.map(|(reaching, with)| Gathered {
+        let direct = at_points(&|sample| sample.direct);
+        let inside = |of: &dyn Fn(&Sample) -> bool| samples.iter().map(of).collect();
+        let neighbors = &on.neighbors;
+        fill(&mut reaching, inside(&|it| it.is_inside_real), neighbors);
+        fill(&mut with, inside(&|it| it.is_inside), neighbors);
+        let all = reaching.into_iter().zip(with).zip(direct);
+        all.map(|((reaching, with), direct)| Gathered {
             reaching,
-            taken: seen_change(reaching - with, reaching),
+            taken: seen_change(reaching - with, reaching + direct),
         })
         .collect()
     }
 
     fn sample(&self, start: Vec3, normal: Vec3, how: &Gathering) -> Sample {
-        let mut sample = Sample::default();
+        let rays = how.sky.rays(how.rays);
+        let [mut without, mut with] = [Vec3::ZERO; 2];
         let (mut inside_real, mut inside) = (0, 0);
-        for direction in hemisphere(normal, how.rays) {
-            let real = self.seen(start, direction, |placed| placed.thing.is_real);
+        for direction in hemisphere(normal, rays) {
+            let real = self.seen(start, direction, is_real);
             let reach = real.map_or(f32::INFINITY, |seen| seen.distance);
-            let is_virtual = |placed: &PlacedThing<'_>| !placed.thing.is_real && placed.thing.casts;
-            let before = self.seen_within(start, direction, reach, is_virtual);
-            let [without, behind] = match &real {
+            let before = self.seen_within(start, direction, reach, is_virtual_caster);
+            let [of_real, behind] = match &real {
                 Some(seen) => self.reflected_by(seen, &how.sky),
-                None => [how.sky.radiance(direction); 2],
+                None => [how.sky.radiance; 2],
             };
-            sample.without += without;
-            sample.with += match &before {
+            without += of_real;
+            with += match &before {
                 Some(seen) => self.reflected_by(seen, &how.sky)[1],
                 None => behind,
             };
             inside_real += usize::from(real.is_some_and(|seen| seen.is_inside));
             inside += usize::from(before.or(real).is_some_and(|seen| seen.is_inside));
         }
-        let weight = PI / how.rays.max(1) as f32;
-        let most_inside = (INSIDE_PART * how.rays as f32) as usize;
+        let weight = PI / rays.max(1) as f32;
+        let [of_sky, left_of_sky] = self.of_sources(start, normal, &how.sky);
+        let most_inside = (INSIDE_PART * rays as f32) as usize;
         Sample {
-            without: sample.without * weight,
-            with: sample.with * weight,
+            without: without * weight + of_sky,
+            with: with * weight + left_of_sky,
+            direct: self.direct(start, normal)[0],
             is_inside_real: inside_real > most_inside,
             is_inside: inside > most_inside,
         }
+    }
+
+    /// Irradiance of a place of the sky's single directions: without virtual things, and with them.
+    fn of_sources(&self, start: Vec3, normal: Vec3, sky: &Sky) -> [Vec3; 2] {
+        let mut sums = [Vec3::ZERO; 2];
+        for source in &sky.sources {
+            let toward = source.toward.as_vec3();
+            let cosine = toward.dot(normal);
+            let is_hidden = |counts: fn(&PlacedThing<'_>) -> bool| {
+                let mut things = self.things.iter().filter(|placed| counts(placed));
+                things.any(|placed| placed.hides(start, toward, f32::INFINITY))
+            };
+            if cosine <= 0.0 || is_hidden(is_real) {
+                continue;
+            }
+            let given = source.irradiance.as_vec3() * cosine;
+            sums[0] += given;
+            if !is_hidden(is_virtual_caster) {
+                sums[1] += given;
+            }
+        }
+        sums
     }
 
     /// Radiance that a surface reflects of the lights and of the sky, which it sees all of: without virtual things, and with
     /// them.
     fn reflected_by(&self, seen: &SeenSurface, sky: &Sky) -> [Vec3; 2] {
         let start = seen.place + seen.normal * OFFSET_M;
-        let mut arriving = [sky.irradiance(seen.normal); 2];
+        let of_sky = sky.irradiance(seen.normal);
+        let direct = self.direct(start, seen.normal);
+        direct.map(|direct| seen.albedo * (of_sky + direct) * FRAC_1_PI)
+    }
+
+    /// Irradiance of a place of the lights themselves: without virtual things, and with them.
+    fn direct(&self, start: Vec3, normal: Vec3) -> [Vec3; 2] {
+        let mut arriving = [Vec3::ZERO; 2];
         for light in self.compact {
-            let given = irradiance(light, start.as_dvec3(), seen.normal.as_dvec3()).as_vec3();
+            let given = irradiance(light, start.as_dvec3(), normal.as_dvec3()).as_vec3();
             let (way, reach) = way_to(light, start);
             let is_hidden = |is_real: bool| {
                 let counts = |placed: &PlacedThing<'_>| placed.thing.is_real == is_real;
@@ -165,8 +219,16 @@ impl PlacedScene<'_> {
                 arriving[1] += given;
             }
         }
-        arriving.map(|arriving| seen.albedo * arriving * FRAC_1_PI)
+        arriving
     }
+}
+
+fn is_real(placed: &PlacedThing<'_>) -> bool {
+    placed.thing.is_real
+}
+
+fn is_virtual_caster(placed: &PlacedThing<'_>) -> bool {
+    !placed.thing.is_real && placed.thing.casts
 }
 
 /// A change without what is too little to be seen.
@@ -175,11 +237,10 @@ fn seen_change(change: Vec3, of: Vec3) -> Vec3 {
     change.signum() * (change.abs() - least).max(Vec3::ZERO)
 }
 
-/// For each point those that share an edge with it.
-fn neighbors(on: Points<'_>) -> Vec<Vec<u32>> {
-    let mut neighbors = vec![Vec::new(); on.points.len()];
-    // (Points of one place with several normals are each other's border, not their neighbours.)
-    for &[a, b, c] in on.triangles {
+/// For each point those that share an edge with it. (Points of one place with several normals are each other's border.)
+fn neighbors(count: usize, triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
+    let mut neighbors = vec![Vec::new(); count];
+    for &[a, b, c] in triangles {
         for (from, to) in [(a, b), (b, c), (c, a)] {
             neighbors[from as usize].push(to);
             neighbors[to as usize].push(from);

@@ -1,66 +1,64 @@
-//! Light from all around as rays meet it: what comes from a direction, and what a surface gets that nothing hides it from.
+//! Light from all around as it is gathered: what comes from everywhere alike, and what comes from single directions.
 
 use glam::{DVec3, Vec3};
 
 use crate::light::probe::Probe;
 use crate::light::radiance9::Radiance9;
+use crate::light::regions::{Region, regions};
 
-/// Rows for each root of the rays of a hemisphere: a pixel is about as wide as the rays are apart.
-const ROWS_PER_ROOT: f64 = 2.0;
-/// Rows at least, and at most.
-const ROWS: [usize; 2] = [8, 128];
+/// Of so many rays that a scene asks for one looks for what things reflect, where the sky's light has directions of its own.
+const RAYS_FOR_ONE: usize = 4;
 
-/// Radiance by direction, as fine as rays can tell.
+/// Light from afar.
 #[derive(Debug, Clone)]
 pub struct Sky {
-    /// Means of the probe's pixels, each weighted by its solid angle.
-    means: Probe,
+    /// From everywhere.
+    pub radiance: Vec3,
+    /// Of regions of like power, each from one direction: a bright part of the sky gets many of them.
+    pub sources: Vec<Region>,
     harmonics: Radiance9,
 }
 
 impl Sky {
-    /// A probe's radiance times `exposure`, for so many rays over each hemisphere.
+    /// A probe's radiance times `exposure`, from about so many directions over each hemisphere.
     pub fn new(probe: &Probe, exposure: f64, rays: usize) -> Self {
-        let [width, height] = probe.size_px();
-        let [fewest, most] = ROWS;
-        let rows = (ROWS_PER_ROOT * (rays as f64).sqrt()) as usize;
-        let rows = rows.clamp(fewest, most).min(height);
-        let columns = (2 * rows).min(width);
-        let mut sums = vec![(DVec3::ZERO, 0.0); rows * columns];
+        let mut sources = regions(probe, 2 * rays);
         let mut harmonics = Radiance9::default();
-        for (index, pixel) in probe.pixels().iter().enumerate() {
-            let (column, row) = (index % width, index / width);
-            let solid_angle = probe.pixel_solid_angle(row);
-            let radiance = pixel.as_dvec3() * exposure;
-            let direction = probe.direction(column as f64 + 0.5, row as f64 + 0.5);
-            harmonics.add(direction.as_vec3(), (radiance * solid_angle).as_vec3());
-            let (sum, weight) = &mut sums[row * rows / height * columns + column * columns / width];
-            *sum += radiance * solid_angle;
-            *weight += solid_angle;
+        for source in &mut sources {
+            source.irradiance *= exposure;
         }
-        let means = sums.iter();
-        let means = means.map(|(sum, weight)| (*sum / weight.max(1e-300)).as_vec3());
+        let [width, _] = probe.size_px();
+        for (index, pixel) in probe.pixels().iter().enumerate() {
+            let (column, row) = ((index % width) as f64 + 0.5, index / width);
+            let light = pixel.as_dvec3() * (exposure * probe.pixel_solid_angle(row));
+            let direction = probe.direction(column, row as f64 + 0.5);
+            harmonics.add(direction.as_vec3(), light.as_vec3());
+        }
         Self {
-            means: Probe::new([columns, rows], means.collect()).unwrap_or_default(),
+            radiance: Vec3::ZERO,
+            sources,
             harmonics,
         }
     }
 
     /// The same radiance from everywhere.
     pub fn constant(radiance: DVec3) -> Self {
-        let pixels = vec![radiance.as_vec3(); 2];
         let mut harmonics = Radiance9::default();
         // (The harmonic of degree 0 over the sphere.)
         harmonics.0[0] = (radiance * (4.0 * std::f64::consts::PI).sqrt()).as_vec3();
         Self {
-            means: Probe::new([2, 1], pixels).unwrap_or_default(),
+            radiance: radiance.as_vec3(),
+            sources: Vec::new(),
             harmonics,
         }
     }
 
-    /// What comes from a direction of unit length.
-    pub fn radiance(&self, direction: Vec3) -> Vec3 {
-        self.means.radiance(direction.as_dvec3())
+    /// Rays over a hemisphere, of so many that are asked for.
+    pub fn rays(&self, asked_for: usize) -> usize {
+        match self.sources.is_empty() {
+            true => asked_for,
+            false => asked_for.div_ceil(RAYS_FOR_ONE),
+        }
     }
 
     /// Irradiance of a surface with a unit normal that sees all of it.
@@ -74,47 +72,22 @@ mod tests {
     use super::*;
     use std::f32::consts::PI;
 
-    /// A gradient with a bright spot.
-    fn probe() -> Probe {
-        let size_px = [96, 48];
-        let black = Probe::new(size_px, vec![Vec3::ZERO; 96 * 48]).expect("pixels");
-        let spot = DVec3::new(0.3, -0.5, 0.8).normalize();
-        let pixel = |index: usize| {
-            let direction = black.direction((index % 96) as f64 + 0.5, (index / 96) as f64 + 0.5);
-            let bright = direction.dot(spot).max(0.0).powi(40) * 20.0;
-            DVec3::new(1.0 + direction.z, 1.0 - 0.5 * direction.x, bright).as_vec3()
-        };
-        Probe::new(size_px, (0..96 * 48).map(pixel).collect()).expect("pixels")
-    }
-
-    fn power(probe: &Probe) -> DVec3 {
-        let [width, _] = probe.size_px();
-        let pixels = probe.pixels().iter().enumerate();
-        pixels
-            .map(|(index, pixel)| pixel.as_dvec3() * probe.pixel_solid_angle(index / width))
-            .sum()
-    }
-
-    #[test]
-    fn means_keep_the_power() {
-        for rays in [16, 64, 100, 1024] {
-            let sky = Sky::new(&probe(), 2.0, rays);
-            let (means, whole) = (power(&sky.means), 2.0 * power(&probe()));
-            // (Where rows are no multiple of rows, a mean's weight is not just its pixel's solid angle.)
-            assert!(
-                means.distance(whole) < 0.03 * whole.length(),
-                "{rays}: {means} {whole}"
-            );
-        }
-    }
-
     #[test]
     fn one_radiance_gives_all_surfaces_pi_times_it() {
-        let sky = Sky::constant(DVec3::new(0.5, 1.0, 2.0));
+        let radiance = Vec3::new(0.5, 1.0, 2.0);
+        let constant = Sky::constant(radiance.as_dvec3());
+        let probe = Probe::new([64, 32], vec![0.25 * radiance; 64 * 32]).expect("pixels");
+        let sky = Sky::new(&probe, 4.0, 256);
         for way in [Vec3::X, Vec3::NEG_Z, Vec3::new(0.6, 0.0, 0.8)] {
-            assert_eq!(sky.radiance(way), Vec3::new(0.5, 1.0, 2.0));
-            let found = sky.irradiance(way) / PI;
-            assert!(found.distance(Vec3::new(0.5, 1.0, 2.0)) < 1e-5, "{found}");
+            for found in [constant.irradiance(way), sky.irradiance(way)] {
+                assert!((found / PI).distance(radiance) < 0.01, "{found}");
+            }
+            let of_sources = sky.sources.iter().map(|source| {
+                let cosine = source.toward.as_vec3().dot(way).max(0.0);
+                source.irradiance.as_vec3() * cosine
+            });
+            let found = of_sources.sum::<Vec3>() / PI;
+            assert!(found.distance(radiance) < 0.03, "{way}: {found}");
         }
     }
 }

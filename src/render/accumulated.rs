@@ -3,6 +3,7 @@
 //! Writes depth, stencil and light sums; then the picture.
 
 use crate::geometry::reach::PixelRect;
+use crate::scene::Scene;
 
 use super::anchor_geometry::Role;
 use super::attachments::{depth_stencil, loaded};
@@ -191,6 +192,13 @@ impl Accumulated {
 }
 
 impl TechniquePasses for Accumulated {
+    fn follow(&mut self, scene: &Scene) -> bool {
+        if let Some(final_gather) = &mut self.final_gather {
+            final_gather.follow(scene);
+        }
+        true
+    }
+
     fn prepare(
         &mut self,
         gpu: &Gpu,

@@ -1,7 +1,8 @@
 //! The ambient light and what things reflect on real surfaces, gathered by rays (environment::final_gather) at the corners of small
 //! triangles that lie in them. Reads poses. Writes `reaching` and `change` (light_sums.wgsl) where depth has the surfaces already.
 //!
-//! It is gathered anew when a thing or a light moves in the world, not when the camera does.
+//! It is gathered anew when a thing or a light moves in the world, not when the camera does: more coarsely then, and finely
+//! again as soon as all stands still.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +10,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DVec3, Vec3};
 
 use crate::environment::distant_light::DistantLight;
-use crate::environment::final_gather::{Gathered, Gathering, Points, longest_edge_m};
+use crate::environment::final_gather::{GatherPoints, Gathered, Gathering, longest_edge_m};
 use crate::environment::placed::{PlacedScene, PlacedThing};
 use crate::environment::sky::Sky;
 use crate::environment::thing::Thing;
@@ -26,15 +27,31 @@ use super::pipelines::{PipelineDescription, overwritten};
 use super::stencil::{IN_A_SURFACE, depth_stencil_state};
 use super::uniforms::VIEW_GROUP;
 
-/// Points on a surface where nothing moves: gathered once.
-const STANDING_RECORDS: usize = 8192;
-/// Points where things move, how much longer the edges between them are, and the part of all rays that each sends: gathered in
-/// every frame.
-const MOVING_RECORDS: usize = 2048;
-const MOVING_COARSER: f32 = 2.0;
-const MOVING_PART: usize = 4;
 /// A real surface has hardly more parts.
 const MOST_PARTS: usize = 20_000;
+
+/// How finely light is gathered.
+struct Fineness {
+    /// At so many points of a surface, hardly more.
+    records: usize,
+    /// So many times as long edges of parts (see [`longest_edge_m`]).
+    coarser: f32,
+    /// One ray for so many that the scene asks for.
+    rays_for_one: usize,
+}
+
+/// Where all stands still: gathered once.
+const FINE: Fineness = Fineness {
+    records: 8192,
+    coarser: 1.0,
+    rays_for_one: 1,
+};
+/// Where something moves: gathered in every frame.
+const COARSE: Fineness = Fineness {
+    records: 2048,
+    coarser: 2.0,
+    rays_for_one: 3,
+};
 
 /// A corner of a part, as `GatheredCorner` in final_gather.wgsl reads it.
 #[repr(C)]
@@ -55,18 +72,30 @@ const GATHERED_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLay
 /// The gathered light of a scene's real surfaces.
 pub(super) struct FinalGather {
     things: Vec<Thing>,
-    /// None: the ambient light is gathered by the same rays.
+    /// None: light from afar is gathered by the same rays.
     distant: DistantLight,
-    how: Gathering,
-    /// See [`longest_edge_m`].
-    coarser: f32,
+    sky: Sky,
+    /// That the scene asks for.
+    rays: usize,
     pipeline: wgpu::RenderPipeline,
-    /// What `on_models` was gathered for: where anchors are in the world, and the lights.
-    gathered_for: Option<(Vec<Option<DAffine3>>, Vec<Light>)>,
-    /// By the numbers of a thing and of its level of detail.
-    on_models: BTreeMap<(usize, usize), OnModel>,
+    /// Whether things can move to each other without an edit.
+    moves: bool,
+    gathered: Option<GatheredFor>,
+    /// Surfaces that are in small parts as they are, by the numbers of a thing and of its level of detail, and whether
+    /// light was gathered finely.
+    known: BTreeMap<(usize, usize, bool), Parts>,
     /// Those of the present frame.
     drawn: Vec<(usize, usize)>,
+}
+
+/// What was gathered where things are.
+struct GatheredFor {
+    /// Where anchors are in the world.
+    world_from_anchor: Vec<Option<DAffine3>>,
+    lights: Vec<Light>,
+    is_fine: bool,
+    /// By the numbers of a thing and of its level of detail.
+    on_models: BTreeMap<(usize, usize), OnModel>,
 }
 
 /// What was gathered on a real thing in one level of detail.
@@ -78,35 +107,32 @@ struct OnModel {
     changed: Option<Bounds>,
 }
 
+/// A surface in small parts, in its anchor's space.
+struct Parts {
+    /// Three for each part.
+    corners: Vec<Corner>,
+    point_of_corner: Vec<usize>,
+    points: GatherPoints,
+}
+
 impl FinalGather {
     /// The ambient light of a scene and what its lights have things reflect; `None` where it is not to be gathered.
     pub fn of_ambient(gpu: &Gpu, scene: &Scene) -> Option<Self> {
+        let rays = scene.shadows.ambient_samples as usize;
         let sky = |_| Sky::constant(scene.ambient_radiance);
-        Self::new(gpu, scene, scene.shadows.ambient_samples as usize, sky)
+        (rays > 0).then(|| Self::new(gpu, scene, rays, sky))?
     }
 
-    /// By so many rays from each point, where nothing moves; `sky` is made for as many. `None` where there is nothing real or
-    /// nothing virtual.
+    /// By so many rays from each point, where nothing moves; `sky` makes one for so many rays. `None` where there is nothing real or nothing virtual.
     pub fn new(
         gpu: &Gpu,
         scene: &Scene,
         rays: usize,
         sky: impl FnOnce(usize) -> Sky,
     ) -> Option<Self> {
-        let (real, virtuals) = (scene.real_occluders(), scene.occluders());
-        let real = real.iter().filter_map(|thing| Thing::whole(thing, true));
-        let virtuals = virtuals
-            .iter()
-            .filter_map(|thing| Thing::whole(thing, false));
-        let things: Vec<Thing> = real.chain(virtuals).collect();
-        let is_seen = |is_real: bool| things.iter().any(|thing| thing.is_real == is_real);
-        if rays == 0 || !is_seen(true) || !is_seen(false) {
+        if scene.phantoms.is_empty() || scene.virtuals.is_empty() {
             return None;
         }
-        let (rays, most_records, coarser) = match scene.node_count() {
-            1 => (rays, STANDING_RECORDS, 1.0),
-            _ => (rays.div_ceil(MOVING_PART), MOVING_RECORDS, MOVING_COARSER),
-        };
         let format = gpu.light_format;
         let on_surface = depth_stencil_state(
             gpu.depth_format,
@@ -114,20 +140,21 @@ impl FinalGather {
             wgpu::CompareFunction::GreaterEqual,
             wgpu::StencilState::default(),
         );
+        let samples = scene.shadows.samples;
+        let moves = scene.node_count() > 1;
         Some(Self {
-            things,
+            things: things(scene),
             distant: DistantLight::default(),
-            how: Gathering {
-                sky: sky(rays),
-                rays,
-                most_records,
-            },
-            coarser,
+            sky: sky(match moves {
+                true => rays.div_ceil(COARSE.rays_for_one),
+                false => rays,
+            }),
+            rays,
             pipeline: gpu.pipeline(&PipelineDescription {
                 shader: "final_gather.wgsl",
                 vertex: "place_gathered",
                 fragment: "gathered_on_real",
-                constants: vec![("MULTISAMPLED", f64::from(scene.shadows.samples > 1))],
+                constants: vec![("MULTISAMPLED", f64::from(samples > 1))],
                 groups: vec![Some(VIEW_GROUP)],
                 vertex_buffers: vec![GATHERED_LAYOUT],
                 depth_stencil: Some(wgpu::DepthStencilState {
@@ -135,13 +162,24 @@ impl FinalGather {
                     ..on_surface
                 }),
                 targets: vec![overwritten(format), overwritten(format)],
-                samples: scene.shadows.samples,
+                samples,
                 ..Default::default()
             }),
-            gathered_for: None,
-            on_models: BTreeMap::new(),
+            moves,
+            gathered: None,
+            known: BTreeMap::new(),
             drawn: Vec::new(),
         })
+    }
+
+    /// Takes another state of its scene: things elsewhere, shown or hidden.
+    pub fn follow(&mut self, scene: &Scene) {
+        self.things = things(scene);
+        self.known.clear();
+        if let Some(gathered) = &mut self.gathered {
+            // As for another scene, which moves.
+            gathered.world_from_anchor.clear();
+        }
     }
 
     /// Gathers what the frame needs and is not known. Returns the pixels that virtual things can change.
@@ -150,38 +188,43 @@ impl FinalGather {
         let Some(world_from_anchor) = gpu_scene.world_from_anchor() else {
             return PixelRect::NONE;
         };
-        let gathered_for = (world_from_anchor, gpu_scene.shining());
-        if self.gathered_for.as_ref() != Some(&gathered_for) {
-            self.on_models.clear();
-        }
-        let (world_from_anchor, lights) = &gathered_for;
+        let mut gathered = self.gathered_for(world_from_anchor, gpu_scene.shining());
         let mut scene = PlacedScene {
             things: Vec::new(),
             distant: &self.distant,
-            compact: lights,
+            compact: &gathered.lights,
         };
         for (number, thing) in self.things.iter().enumerate() {
-            if let Some(pose) = &world_from_anchor[thing.anchor] {
+            if let Some(pose) = &gathered.world_from_anchor[thing.anchor] {
                 scene.things.push(PlacedThing::new(number, thing, pose));
             }
         }
         let virtuals = scene.things.iter().filter(|placed| !placed.thing.is_real);
         let virtuals: Vec<Bounds> = virtuals.map(PlacedThing::bounds).collect();
+        let fineness = match gathered.is_fine {
+            true => FINE,
+            false => COARSE,
+        };
+        let how = Gathering {
+            sky: self.sky.clone(),
+            rays: self.rays.div_ceil(fineness.rays_for_one),
+        };
         let mut pixels = PixelRect::NONE;
         for model in gpu_scene.drawn_real() {
-            let Some(pose) = world_from_anchor[model.anchor] else {
+            let Some(pose) = gathered.world_from_anchor[model.anchor] else {
                 continue;
             };
             let key = (model.number, model.level);
-            let on_model = self.on_models.entry(key).or_insert_with(|| {
-                on_model(
-                    gpu,
-                    &scene,
-                    &virtuals,
-                    &model,
-                    &pose,
-                    (&self.how, self.coarser),
-                )
+            let on_model = gathered.on_models.entry(key).or_insert_with(|| {
+                let known = (model.number, model.level, gathered.is_fine);
+                let parts = self.known.remove(&known);
+                let parts =
+                    parts.unwrap_or_else(|| Parts::new(&model, &virtuals, &pose, &fineness));
+                let on_model = OnModel::new(gpu, &scene, &parts, &model, &pose, &how);
+                if parts.corners.len() == model.corner_count() {
+                    self.known.insert(known, parts);
+                }
+                on_model
             });
             self.drawn.push(key);
             let camera_from_anchor = gpu_scene.camera_from_anchor()[model.anchor];
@@ -192,14 +235,46 @@ impl FinalGather {
             });
             pixels = pixels.union(changed.unwrap_or(PixelRect::NONE));
         }
-        self.gathered_for = Some(gathered_for);
+        self.gathered = Some(gathered);
         pixels
+    }
+
+    /// What is known of things at these places under these lights.
+    fn gathered_for(
+        &mut self,
+        world_from_anchor: Vec<Option<DAffine3>>,
+        lights: Vec<Light>,
+    ) -> GatheredFor {
+        let last = self.gathered.take();
+        let is_first = last.is_none();
+        let is_same = |last: &GatheredFor| {
+            last.world_from_anchor == world_from_anchor && last.lights == lights
+        };
+        let is_fine = match last.filter(is_same) {
+            Some(last) if last.is_fine => return last,
+            // (Where things move a frame is the same whichever frame was before it.)
+            Some(last) if self.moves => return last,
+            Some(_) => true,
+            None => is_first && !self.moves,
+        };
+        GatheredFor {
+            world_from_anchor,
+            lights,
+            is_fine,
+            on_models: BTreeMap::new(),
+        }
     }
 
     /// Draws what was gathered where the surfaces are.
     pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, gpu_scene: &GpuScene) {
+        let Some(gathered) = &self.gathered else {
+            return;
+        };
         pass.set_pipeline(&self.pipeline);
-        for on_model in self.drawn.iter().filter_map(|key| self.on_models.get(key)) {
+        for key in &self.drawn {
+            let Some(on_model) = gathered.on_models.get(key) else {
+                continue;
+            };
             gpu_scene.set_anchor(pass, on_model.anchor);
             pass.set_vertex_buffer(0, on_model.corners.slice(..));
             pass.draw(0..on_model.count, 0..1);
@@ -207,63 +282,81 @@ impl FinalGather {
     }
 }
 
-fn on_model(
-    gpu: &Gpu,
-    scene: &PlacedScene<'_>,
-    virtuals: &[Bounds],
-    model: &DrawnModel,
-    world_from_anchor: &DAffine3,
-    (how, coarser): (&Gathering, f32),
-) -> OnModel {
-    let in_world = |place: Vec3| world_from_anchor.transform_point3(place.as_dvec3());
-    let longest_m =
-        |from: Vec3, to: Vec3| longest_edge_m(virtuals, coarser, in_world(from), in_world(to));
-    let parts = subdivided(model.triangles.clone(), longest_m, MOST_PARTS);
-    let corners: Vec<Corner> = parts.into_flattened();
-    let triangles: Vec<[u32; 3]> = (0..corners.len() as u32 / 3)
-        .map(|triangle| [0, 1, 2].map(|corner| 3 * triangle + corner))
-        .collect();
-    let (points, point_of_corner) = points(&corners, &triangles);
-    let in_world: Vec<(DVec3, DVec3)> = points
-        .iter()
-        .map(|&(place, normal)| {
-            let normal = world_from_anchor.transform_vector3(normal);
-            (world_from_anchor.transform_point3(place), normal)
-        })
-        .collect();
-    let of_points = |triangle: &[u32; 3]| triangle.map(|it| point_of_corner[it as usize] as u32);
-    let joined: Vec<[u32; 3]> = triangles.iter().map(of_points).collect();
-    let on = Points {
-        points: &in_world,
-        triangles: &joined,
-        error_m: model.error_m,
-    };
-    let at_points = scene.gathered(on, how);
-    let changes = |triangle: &&[u32; 3]| {
-        let mut corners = triangle.iter();
-        corners.any(|&point| at_points[point as usize].taken != Vec3::ZERO)
-    };
-    let changed = joined.iter().filter(changes).flatten();
-    let changed = Bounds::around(changed.map(|&point| points[point as usize].0));
-    let corners = corners.iter().zip(&point_of_corner);
-    let corners: Vec<GatheredCorner> = corners
-        .map(|(&(position, _), &point)| {
-            let Gathered { reaching, taken } = at_points[point];
-            GatheredCorner {
-                position,
-                reaching,
-                taken,
-            }
-        })
-        .collect();
-    OnModel {
-        anchor: model.anchor,
-        count: corners.len() as u32,
-        corners: gpu.buffer(
-            "gathered light",
-            bytemuck::cast_slice(&corners),
-            wgpu::BufferUsages::VERTEX,
-        ),
-        changed,
+/// All things that are there.
+fn things(scene: &Scene) -> Vec<Thing> {
+    let real = scene.real_occluders();
+    let real = real.iter().filter_map(|thing| Thing::whole(thing, true));
+    let virtuals = scene.occluders();
+    let virtuals = virtuals.iter();
+    let virtuals = virtuals.filter_map(|thing| Thing::whole(thing, false));
+    real.chain(virtuals).collect()
+}
+
+impl Parts {
+    fn new(
+        model: &DrawnModel<'_>,
+        virtuals: &[Bounds],
+        world_from_anchor: &DAffine3,
+        fineness: &Fineness,
+    ) -> Self {
+        let in_world = |place: Vec3| world_from_anchor.transform_point3(place.as_dvec3());
+        let longest_m = |from: Vec3, to: Vec3| {
+            longest_edge_m(virtuals, fineness.coarser, in_world(from), in_world(to))
+        };
+        let parts = subdivided(model.triangles(), longest_m, MOST_PARTS);
+        let corners: Vec<Corner> = parts.into_flattened();
+        let triangles: Vec<[u32; 3]> = (0..corners.len() as u32 / 3)
+            .map(|triangle| [0, 1, 2].map(|corner| 3 * triangle + corner))
+            .collect();
+        let (points, point_of_corner): (Vec<(DVec3, DVec3)>, Vec<usize>) =
+            points(&corners, &triangles);
+        let of_points =
+            |triangle: &[u32; 3]| triangle.map(|it| point_of_corner[it as usize] as u32);
+        let joined: Vec<[u32; 3]> = triangles.iter().map(of_points).collect();
+        Self {
+            corners,
+            points: GatherPoints::new(&points, &joined, model.error_m(), fineness.records),
+            point_of_corner,
+        }
+    }
+}
+
+impl OnModel {
+    fn new(
+        gpu: &Gpu,
+        scene: &PlacedScene<'_>,
+        parts: &Parts,
+        model: &DrawnModel<'_>,
+        world_from_anchor: &DAffine3,
+        how: &Gathering,
+    ) -> Self {
+        let at_points = scene.gathered(&parts.points, world_from_anchor, how);
+        let corners = parts.corners.iter().zip(&parts.point_of_corner);
+        let corners: Vec<GatheredCorner> = corners
+            .map(|(&(position, _), &point)| {
+                let Gathered { reaching, taken } = at_points[point];
+                GatheredCorner {
+                    position,
+                    reaching,
+                    taken,
+                }
+            })
+            .collect();
+        let (triangles, _) = corners.as_chunks::<3>();
+        let changes = |triangle: &&[GatheredCorner; 3]| {
+            let mut corners = triangle.iter();
+            corners.any(|corner| corner.taken != Vec3::ZERO)
+        };
+        let changed = triangles.iter().filter(changes).flatten();
+        Self {
+            anchor: model.anchor,
+            count: corners.len() as u32,
+            changed: Bounds::around(changed.map(|corner| corner.position.as_dvec3())),
+            corners: gpu.buffer(
+                "gathered light",
+                bytemuck::cast_slice(&corners),
+                wgpu::BufferUsages::VERTEX,
+            ),
+        }
     }
 }

@@ -12,7 +12,8 @@ use crate::light::Light;
 use crate::scene::{Scene, SceneLight, ShadowSettings, Shortcut};
 
 use super::anchor_geometry::{
-    AnchorGeometry, AnchoredModel, BatchCorners, Corners, KnownLevels, Role, SurfaceBatch,
+    AnchorGeometry, AnchoredModel, BatchCorners, Corners, KnownLevels, ModelLevel, Role,
+    SurfaceBatch,
 };
 use super::casters::{Casters, LitSides};
 use super::detail::{chosen_levels, widest_penumbra_px};
@@ -42,15 +43,34 @@ pub(super) enum DrawnLight {
 }
 
 /// A thing in its level of detail.
-pub(super) struct DrawnModel {
+pub(super) struct DrawnModel<'a> {
     /// Number of the thing, and of its level.
     pub number: usize,
     pub level: usize,
     pub anchor: usize,
+    drawn: &'a ModelLevel,
+    batch: &'a Corners,
+}
+
+impl DrawnModel<'_> {
     /// How far its surface may lie off the finest level's, metres.
-    pub error_m: f32,
-    /// In the anchor's space.
-    pub triangles: Vec<[Corner; 3]>,
+    pub fn error_m(&self) -> f32 {
+        self.drawn.max_error_m as f32
+    }
+
+    /// Three for each triangle.
+    pub fn corner_count(&self) -> usize {
+        self.drawn.range.len()
+    }
+
+    /// Its triangles, in the anchor's space.
+    pub fn triangles(&self) -> Vec<[Corner; 3]> {
+        let (corners, triangles) = self.batch;
+        let (first, last) = (self.drawn.range.start / 3, self.drawn.range.end / 3);
+        let triangles = triangles[first as usize..last as usize].iter();
+        let corner = |index: u32| corners[index as usize];
+        triangles.map(|triangle| triangle.map(corner)).collect()
+    }
 }
 
 /// The scene as the present frame has it.
@@ -301,23 +321,18 @@ impl GpuScene {
     }
 
     /// The real things as the frame has them.
-    pub fn drawn_real(&self) -> impl Iterator<Item = DrawnModel> {
+    pub fn drawn_real(&self) -> impl Iterator<Item = DrawnModel<'_>> {
         let batches = self.placed(Role::Real);
         batches.flat_map(|batch| {
             let things = self.of_batch(batch);
             things.map(|(number, thing)| {
                 let level = self.levels[number];
-                let drawn = &thing.levels[level];
-                let (corners, triangles) = &batch.places.corners;
-                let (first, last) = (drawn.range.start / 3, drawn.range.end / 3);
-                let triangles = &triangles[first as usize..last as usize];
-                let corner = |index: u32| corners[index as usize];
                 DrawnModel {
                     number,
                     level,
                     anchor: thing.anchor,
-                    error_m: drawn.max_error_m as f32,
-                    triangles: triangles.iter().map(|it| it.map(corner)).collect(),
+                    drawn: &thing.levels[level],
+                    batch: &batch.places.corners,
                 }
             })
         })

@@ -127,7 +127,7 @@ settings! {
     light_samples: u32, Whole::between(1, 1024) => ByQuality { fast: 16, balanced: 64, accurate: 256 };
     /// By so many rays from each point real surfaces get the ambient light, an environment's too, and what things reflect on to
     /// them; 0: virtual things hide and reflect none of that. Where things move there are fewer. Takes no part in shafts.
-    ambient_samples: u32, Whole::between(0, 1024) => ByQuality { fast: 0, balanced: 256, accurate: 1024 };
+    ambient_samples: u32, Whole::between(0, 1024) => ByQuality { fast: 0, balanced: 256, accurate: 512 };
     /// How volumes are counted.
     counting: VolumeCounting => Is(VolumeCounting::Auto);
     /// By less than this many pixels a coarser version of a thing may move its silhouette, as the camera and the lights

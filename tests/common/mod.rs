@@ -107,7 +107,7 @@ pub fn object(name: &str, mesh: Mesh, albedo: DVec3, world_from_object: DAffine3
     }
 }
 
-/// A scene of four samples whose world is the only anchor.
+/// A scene of four samples whose world is the only anchor; real surfaces get no light but of the lights, and all of the ambient.
 pub fn scene(
     phantoms: Vec<Object>,
     virtuals: Vec<Object>,
@@ -126,6 +126,7 @@ pub fn scene(
         shadows: ShadowSettings {
             technique: Technique::Auto,
             samples: 4,
+            ambient_samples: 0,
             ..ShadowSettings::default()
         },
         ..Scene::default()
@@ -302,6 +303,7 @@ impl Stage {
         let mut scene = Scene::load(&path).unwrap_or_else(|error| panic!("{error}"));
         scene.lights = lights.into_iter().map(Into::into).collect();
         scene.ambient_radiance = ambient_radiance;
+        scene.shadows.ambient_samples = 0;
         let objects = scene.phantoms.iter().chain(&scene.virtuals);
         let scales = objects.map(|object| object.anchor_from_object).collect();
         let mut stage = Self {

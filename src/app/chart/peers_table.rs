@@ -94,6 +94,7 @@ impl PeersStage {
             ambient_radiance: DVec3::splat(0.05),
             shadows: ShadowSettings {
                 samples,
+                ambient_samples: 0,
                 ..ShadowSettings::default()
             },
             ..Scene::default()

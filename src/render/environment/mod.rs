@@ -137,9 +137,9 @@ impl Environment {
         Self {
             pipelines: Pipelines::new(gpu, scene.shadows.samples, kinds, settings.method),
             final_gather: match settings.method {
-                EnvironmentMethod::Rays => FinalGather::new(gpu, scene, rays, |rays| {
-                    Sky::new(&rest, probe.exposure, rays)
-                }),
+                EnvironmentMethod::Rays => {
+                    FinalGather::new(gpu, scene, rays, || Sky::new(&rest, probe.exposure, rays))
+                }
                 EnvironmentMethod::Penumbrae | EnvironmentMethod::Maps => None,
             },
             atlas: MapAtlas::new(gpu, tiling, "occlusion_maps.wgsl"),
