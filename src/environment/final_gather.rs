@@ -19,13 +19,13 @@ use super::sky::Sky;
 /// Edges of real surfaces are at most this part of a virtual thing's size where they touch it, ...
 const NEAR_PART: f32 = 1.0 / 20.0;
 /// ... and elsewhere this part of the way to it: what it hides varies over such lengths.
-const AWAY_PART: f32 = 0.35;
+const AWAY_PART: f32 = 0.25;
 /// A point of which more of its rays than this part start in a solid is inside of it.
 const INSIDE_PART: f32 = 0.5;
 /// Points inside of a solid have the light of those outside for so many edges.
 const EDGES_INWARDS: usize = 2;
 /// Changes below this part of all light at a point are none, so that what nothing touches stays as it is.
-const LEAST_CHANGE: f32 = 0.002;
+const LEAST_CHANGE: f32 = 0.001;
 
 /// Light on a point of a real surface, linear irradiance.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -60,7 +60,7 @@ fn under_sky(turned: usize, phantoms: Vec<Object>, virtuals: Vec<Object>) -> Sce
     scene.probe = Some(probe_scene(sky(turned)));
     scene.shadows.technique = Technique::Environment;
     scene.shadows.samples = 1;
-    scene.shadows.ambient_samples = std::env::var("RAYS").map_or(256, |v| v.parse().unwrap());
+    scene.shadows.ambient_samples = 256;
     // All of it is broad.
     scene.shadows.compact_penumbra_px = 0.0;
     scene
@@ -198,15 +198,25 @@ fn three_boxes() -> Scene {
 
 #[test]
 fn black_boxes_take_of_a_table_what_the_sum_over_the_probe_says() {
-    let mut scene = three_boxes();
-    let [rms, largest] = off_exact(&scene);
-    eprintln!("OFF {rms} {largest}");
-    assert!(rms < 0.01 && largest < 0.15, "{rms} {largest}");
-    scene.shadows.environment.method = EnvironmentMethod::Maps;
-    let [rms_of_maps, _] = off_exact(&scene);
+    let off = |method: EnvironmentMethod| {
+        let mut scene = three_boxes();
+        scene.shadows.environment.method = method;
+        off_exact(&scene)
+    };
+    let [by_rays, largest_by_rays] = off(EnvironmentMethod::Rays);
     assert!(
-        rms < rms_of_maps && rms_of_maps < 0.08,
-        "the paper's way {rms_of_maps}, ours {rms}"
+        by_rays < 0.005 && largest_by_rays < 0.05,
+        "{by_rays} {largest_by_rays}"
+    );
+    let [by_penumbrae, largest] = off(EnvironmentMethod::Penumbrae);
+    assert!(
+        by_penumbrae < 0.01 && largest < 0.15,
+        "{by_penumbrae} {largest}"
+    );
+    let [by_maps, _] = off(EnvironmentMethod::Maps);
+    assert!(
+        by_penumbrae < by_maps && by_maps < 0.08,
+        "the paper's way {by_maps}, ours {by_penumbrae}"
     );
 }
 
@@ -214,6 +224,7 @@ fn black_boxes_take_of_a_table_what_the_sum_over_the_probe_says() {
 fn more_regions_are_nearer_to_the_sum() {
     let off = |regions: u32| {
         let mut scene = three_boxes();
+        scene.shadows.environment.method = EnvironmentMethod::Penumbrae;
         scene.shadows.environment.regions = regions;
         off_exact(&scene)[0]
     };
@@ -311,10 +322,6 @@ fn things_that_move_past_each_other_change_the_light_smoothly() {
             }
         }
     }
-    eprintln!(
-        "WORST {largest} {worst:?} {:?}",
-        on_table(worst.1, &camera())
-    );
     // The light itself bends where a thing passes close by.
     let (first, index) = worst;
     let exact_gain = |step: i32| {

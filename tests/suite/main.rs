@@ -16,6 +16,7 @@ mod counting;
 mod detail;
 mod environment;
 mod figures;
+mod final_gather;
 mod gltf;
 mod lenses;
 mod light_from_picture;

@@ -42,8 +42,10 @@ use pipelines::{ENVIRONMENT_GROUP, Pipelines};
 /// Rays start this part of a thing's size off its surface.
 const START_OFFSET: f64 = 1e-4;
 
-/// Rays from each point of real surfaces, whatever the ambient light of lamps gets.
-const FEWEST_RAYS: usize = 64;
+/// Rays from each point of real surfaces for one that the ambient light of lamps gets: here it is all light.
+const RAYS_FOR_ONE: usize = 2;
+/// Rays at least.
+const FEWEST_RAYS: usize = 128;
 
 /// The broad light of a probe.
 pub(super) struct Environment {
@@ -132,14 +134,14 @@ impl Environment {
         let largest_px = gpu.device.limits().max_texture_dimension_2d;
         let tiling = Tiling::new(count, settings.map_px, largest_px);
         let kinds = gpu_scene.kinds;
-        let rays = (scene.shadows.ambient_samples as usize).max(FEWEST_RAYS);
+        let rays = (RAYS_FOR_ONE * scene.shadows.ambient_samples as usize).max(FEWEST_RAYS);
         let glossy = kinds.glossy.then(|| (rest.as_ref(), probe.exposure as f32));
         Self {
             pipelines: Pipelines::new(gpu, scene.shadows.samples, kinds, settings.method),
             final_gather: match settings.method {
-                EnvironmentMethod::Rays => {
-                    FinalGather::new(gpu, scene, rays, || Sky::new(&rest, probe.exposure, rays))
-                }
+                EnvironmentMethod::Rays => FinalGather::new(gpu, scene, rays, |rays| {
+                    Sky::new(&rest, probe.exposure, rays)
+                }),
                 EnvironmentMethod::Penumbrae | EnvironmentMethod::Maps => None,
             },
             atlas: MapAtlas::new(gpu, tiling, "occlusion_maps.wgsl"),
