@@ -223,7 +223,7 @@ fn what_stands_on_the_table_darkens_it_up_to_where_they_touch() {
 }
 
 #[test]
-fn nothing_changes_where_nothing_virtual_is_near() {
+fn nothing_changes_by_a_level_where_nothing_virtual_is_near() {
     let drawn = Drawn::new(&beside(), DVec3::new(-0.7, -0.9, 1.1));
     let places = (-9..=9).flat_map(|x| (-9..=9).map(move |y| (x, y)));
     let places = places.map(|(x, y)| DVec3::new(0.1 * f64::from(x), 0.1 * f64::from(y), 0.0));
@@ -232,7 +232,7 @@ fn nothing_changes_where_nothing_virtual_is_near() {
         .filter_map(|place| Some(drawn.gain_at(place)?.1))
         .collect();
     assert!(
-        gains.len() > 20 && gains.iter().all(|&gain| gain == 1.0),
+        gains.len() > 20 && gains.iter().all(|&gain| gain > 0.998 && gain <= 1.0),
         "{gains:?}"
     );
 }
