@@ -246,6 +246,9 @@ pub struct BoardArgs {
     /// Distance measured between two markers' centres: a better scale than a marker's size
     #[arg(long, value_name = "ID:ID:MM", value_parser = distance_of)]
     pub distance: Option<Distance>,
+    /// What the markers lie in
+    #[arg(long, value_enum, default_value = "seen")]
+    pub shape: Shape,
     /// What a marker may lie off the plane of the others
     #[arg(long, value_name = "MM", default_value = "2")]
     pub plane_tolerance_mm: f64,
@@ -360,6 +363,17 @@ pub enum PageSize {
     A3,
     /// 8.5 x 11 inches
     Letter,
+}
+
+/// What a board's markers lie in.
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+pub enum Shape {
+    /// A plane where the pictures bear that out, otherwise space: a cube, a corner of a room
+    Seen,
+    /// A plane; a marker off it is an error
+    Flat,
+    /// Space
+    Space,
 }
 
 /// Where markers' sizes come from.

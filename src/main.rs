@@ -29,11 +29,11 @@ use gnomon::app::talk;
 use gnomon::capture::live::is_live;
 use gnomon::scene::format::MARKER;
 use gnomon::scene::{CameraSettings, Scene};
-use gnomon::tracking::mapping::MapSettings;
+use gnomon::tracking::mapping::{MapSettings, ShapeWanted};
 
 use command_line::{
     BoardArgs, CalibrateArgs, ChartArgs, Cli, Command, LiveArgs, MarkersArgs, PageSize, ProbeArgs,
-    ProbeKindArg, RecordArgs, RecordingArgs, ReplayArgs, Sizes, TrackArgs,
+    ProbeKindArg, RecordArgs, RecordingArgs, ReplayArgs, Shape, Sizes, TrackArgs,
 };
 
 /// As shells have it for Ctrl-C.
@@ -294,6 +294,11 @@ fn run_board(args: BoardArgs) -> Result<()> {
             gauge: args.gauge,
             learns_sizes: args.sizes == Sizes::Estimate,
             plane_tolerance_m: args.plane_tolerance_mm * 1e-3,
+            shape: match args.shape {
+                Shape::Seen => ShapeWanted::AsSeen,
+                Shape::Flat => ShapeWanted::Flat,
+                Shape::Space => ShapeWanted::Space,
+            },
         },
         distance: args.distance,
         name: args.name,

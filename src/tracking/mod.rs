@@ -13,6 +13,7 @@ mod aruco_dictionary;
 mod belief;
 mod condition;
 mod conventions;
+mod cover;
 mod detector;
 mod edge_fit;
 mod expected_picture;

@@ -1,8 +1,8 @@
-//! The pose of a planar anchor from its corners: a homography, its two decompositions (IPPE), both refined by
-//! Levenberg-Marquardt on the pixel error.
+//! The pose of an anchor from the corners of its markers: a homography, its two decompositions (IPPE), both refined by
+//! Levenberg-Marquardt on the pixel error. Of markers in several planes each says where the others may be.
 //!
 //! T. Collins and A. Bartoli, "Infinitesimal plane-based pose estimation", IJCV 2014. A plane seen from afar has two
-//! poses that explain the picture about equally well; both are kept, and how sure the better one is.
+//! poses that explain the picture about equally well; both are kept, and how sure the better one is. Two planes have one.
 
 use glam::{DAffine3, DMat2, DMat3, DVec2, DVec3};
 
@@ -15,7 +15,7 @@ use crate::geometry::pose::{PoseStep, by_step, moved, rotation_between};
 /// A point of an anchor and where it was seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct CornerObservation {
-    /// The point in the anchor's space, metres; z = 0 in its plane.
+    /// The point in the anchor's space, metres.
     pub(super) point_m: DVec3,
     /// Undistorted pixel.
     pub(super) pixel: DVec2,
@@ -52,22 +52,29 @@ const CORNER_NOISE_PX: f64 = 0.2;
 /// variance σ² the odds of two poses are exp(difference of their squared errors / 2σ²).
 const DECISIVE: f64 = 9.2;
 
-/// The two poses of a plane. `None` when no pose in front of the camera, facing it, explains the observations.
+/// Points that lie off a plane by less than this part of the first marker's side lie in it.
+const FLAT: f64 = 1e-3;
+
+/// So many markers, the largest ones, say where others in other planes may be.
+const SAYING: usize = 4;
+
+/// The two poses of a plane, or the best two of what is not flat. The observations are markers' corners, four by four, as
+/// printed from the top left clockwise. `None` when no pose in front of the camera, to which all of them face, explains them.
 pub(super) fn solve(
     intrinsics: &Intrinsics,
     observations: &[CornerObservation],
 ) -> Option<Solutions> {
-    let starts = ippe_starts(intrinsics, observations)?;
-    let mut solutions = starts
+    let mut solutions = starts(intrinsics, observations)
         .into_iter()
         .filter_map(|start| refine(intrinsics, observations, start))
         .filter(|solution| is_seen_from_the_front(&solution.camera_from_anchor, observations))
         .collect::<Vec<_>>();
     solutions.sort_by(|a, b| a.squared_error_px.total_cmp(&b.squared_error_px));
     let best = *solutions.first()?;
-    let alternative = solutions.get(1).copied().filter(|other| {
+    let is_other = |other: &&Solution| {
         rotation_between(&best.camera_from_anchor, &other.camera_from_anchor) > 1e-4
-    });
+    };
+    let alternative = solutions[1..].iter().find(is_other).copied();
     let degrees_of_freedom = (2 * observations.len()).saturating_sub(6).max(1) as f64;
     let variance =
         (best.squared_error_px / degrees_of_freedom).max(CORNER_NOISE_PX * CORNER_NOISE_PX);
@@ -84,16 +91,92 @@ fn is_seen_from_the_front(
     camera_from_anchor: &DAffine3,
     observations: &[CornerObservation],
 ) -> bool {
-    let toward_viewer = camera_from_anchor.matrix3.z_axis;
-    observations.iter().all(|observation| {
-        let in_camera = camera_from_anchor.transform_point3(observation.point_m);
-        in_camera.z > 0.0 && toward_viewer.dot(in_camera) < 0.0
+    observations.chunks(4).all(|corners| {
+        let Some(normal) = normal_of(corners) else {
+            return false;
+        };
+        let toward_viewer = camera_from_anchor.matrix3 * normal;
+        corners.iter().all(|observation| {
+            let in_camera = camera_from_anchor.transform_point3(observation.point_m);
+            in_camera.z > 0.0 && toward_viewer.dot(in_camera) < 0.0
+        })
     })
 }
 
+/// The way out of a marker's printed side, from its corners as printed; of any length.
+fn normal_of(corners: &[CornerObservation]) -> Option<DVec3> {
+    let [top_left, top_right, _, bottom_left] = corners else {
+        return None;
+    };
+    let up_m = top_left.point_m - bottom_left.point_m;
+    Some((top_right.point_m - top_left.point_m).cross(up_m))
+}
+
+/// The frame whose plane z = 0 has all points: the anchor's own where that has them, else the first marker's. `None` where
+/// they are in several planes.
+fn anchor_from_plane(observations: &[CornerObservation]) -> Option<DAffine3> {
+    if observations.iter().all(|seen| seen.point_m.z == 0.0) {
+        return Some(DAffine3::IDENTITY);
+    }
+    let first = observations.get(..4)?;
+    let z = normal_of(first)?.try_normalize()?;
+    let along_m = first[1].point_m - first[0].point_m;
+    let x = along_m.try_normalize()?;
+    let frame =
+        DAffine3::from_mat3_translation(DMat3::from_cols(x, z.cross(x), z), first[0].point_m);
+    let within_m = FLAT * along_m.length();
+    let is_in_plane = |seen: &CornerObservation| z.dot(seen.point_m - first[0].point_m).abs();
+    let mut heights_m = observations.iter().map(is_in_plane);
+    heights_m
+        .all(|height_m| height_m < within_m)
+        .then_some(frame)
+}
+
+/// Poses near which those that explain the observations lie: of a plane the two that its homography allows, else those of
+/// the markers that are seen largest.
+pub(super) fn starts(intrinsics: &Intrinsics, observations: &[CornerObservation]) -> Vec<DAffine3> {
+    if let Some(anchor_from_plane) = anchor_from_plane(observations) {
+        return starts_in(intrinsics, observations, &anchor_from_plane);
+    }
+    let mut markers: Vec<&[CornerObservation]> = observations.chunks_exact(4).collect();
+    let area_px = |corners: &[CornerObservation]| {
+        let across_px = corners[2].pixel - corners[0].pixel;
+        across_px.perp_dot(corners[3].pixel - corners[1].pixel)
+    };
+    markers.sort_by(|a, b| area_px(b).total_cmp(&area_px(a)));
+    let largest = markers.into_iter().take(SAYING);
+    largest
+        .filter_map(|corners| Some((corners, anchor_from_plane(corners)?)))
+        .flat_map(|(corners, frame)| starts_in(intrinsics, corners, &frame))
+        .collect()
+}
+
+/// The two poses of observations in a plane.
+fn starts_in(
+    intrinsics: &Intrinsics,
+    observations: &[CornerObservation],
+    anchor_from_plane: &DAffine3,
+) -> Vec<DAffine3> {
+    if *anchor_from_plane == DAffine3::IDENTITY {
+        return ippe_starts(intrinsics, observations).map_or(Vec::new(), Vec::from);
+    }
+    let plane_from_anchor = anchor_from_plane.inverse();
+    let in_plane: Vec<CornerObservation> = observations
+        .iter()
+        .map(|seen| CornerObservation {
+            point_m: plane_from_anchor.transform_point3(seen.point_m),
+            ..*seen
+        })
+        .collect();
+    let starts = ippe_starts(intrinsics, &in_plane).into_iter().flatten();
+    starts
+        .map(|camera_from_plane| camera_from_plane * plane_from_anchor)
+        .collect()
+}
+
 /// The two poses that the homography's derivative at the points' centre allows (IPPE, section 4); the points must lie in
-/// the anchor's plane.
-pub(super) fn ippe_starts(
+/// the plane z = 0.
+fn ippe_starts(
     intrinsics: &Intrinsics,
     observations: &[CornerObservation],
 ) -> Option<[DAffine3; 2]> {

@@ -229,7 +229,7 @@ fn a_recording_is_shown_in_time_with_the_poses_of_its_own_images() {
             let markers = picture.anchors[0]
                 .markers
                 .iter()
-                .map(|m| m.center_m.extend(0.0));
+                .map(|marker| marker.center_m());
             let off = markers.map(|at_m| {
                 let at_px =
                     |pose: DAffine3| picture.intrinsics.pixel_of(pose.transform_point3(at_m));

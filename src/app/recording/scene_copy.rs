@@ -31,6 +31,7 @@ pub fn copy_folder(kind: FileKind) -> Option<&'static str> {
         FileKind::RoomMesh => Some("room"),
         FileKind::Probe => Some("probe"),
         FileKind::Dictionary => Some("markers"),
+        FileKind::Bundles => Some("bundles"),
     }
 }
 
@@ -157,6 +158,7 @@ impl Copies<'_> {
                 self.put(format!("{own_name}.{extension}"), &bytes)?
             }
             FileKind::Dictionary => self.put(format!("{own_name}.yml"), &read(&named.path)?)?,
+            FileKind::Bundles => self.put(format!("{own_name}.yaml"), &read(&named.path)?)?,
             FileKind::Recording | FileKind::Calibration => return Ok(None),
         };
         self.known.insert(key, name.clone());

@@ -7,12 +7,14 @@ use glam::{DAffine3, DQuat, DVec2, DVec3};
 
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
-use crate::scene::{Codes, Family, Marker};
+use crate::scene::{Codes, Face, Family, Marker};
 
 /// Linear light of paper, of ink, and of what lies around.
 const PAPER: f64 = 0.8;
 const INK: f64 = 0.02;
 const SURROUNDINGS: f64 = 0.25;
+/// Sheets nearer to each other than this part of their distance lie on one another.
+const SAME_PLACE: f64 = 1e-9;
 
 /// The cells of a marker as printed, without its black border; `#` is white. `None` for those not written down.
 pub fn printed(family: Family, id: u32) -> Option<&'static [&'static str]> {
@@ -45,11 +47,11 @@ pub fn camera_above(tilt_deg: f64, turn_deg: f64, at_m: DVec3) -> DAffine3 {
 
 /// Whether a marker prints white or black at a point of its anchor's plane, metres; `None` beside it.
 pub fn is_white(marker: &Marker, point_m: DVec2) -> Option<bool> {
-    let offset_m = point_m - marker.center_m;
+    let offset_m = point_m - marker.center_m().truncate();
     if offset_m.abs().max_element() > marker.size_m {
         return None;
     }
-    let local = DVec2::from_angle(-marker.rotation_rad).rotate(offset_m);
+    let local = DVec2::from_angle(-marker.rotation_rad()).rotate(offset_m);
     let cells = printed(marker.family, marker.id)?;
     let border = marker.family.border_cells() as i32;
     let across = cells.len() as i32 + 2 * border;
@@ -68,12 +70,23 @@ pub fn is_white(marker: &Marker, point_m: DVec2) -> Option<bool> {
 /// The rectangle of white paper around the markers of a sheet, half a marker beyond them, metres.
 fn paper_m(markers: &[Marker]) -> [DVec2; 2] {
     let beyond = |marker: &Marker| DVec2::splat(marker.size_m);
-    let low = markers.iter().map(|m| m.center_m - beyond(m));
-    let high = markers.iter().map(|m| m.center_m + beyond(m));
+    let low = markers.iter().map(|m| m.center_m().truncate() - beyond(m));
+    let high = markers.iter().map(|m| m.center_m().truncate() + beyond(m));
     [
         low.fold(DVec2::MAX, DVec2::min),
         high.fold(DVec2::MIN, DVec2::max),
     ]
+}
+
+/// The sheets of a board in space, each on its plane, for [`Light::of`].
+pub fn sheets_of(
+    markers: &[Marker],
+    camera_from_anchor: &DAffine3,
+) -> Vec<(Vec<Marker>, DAffine3)> {
+    let faces = Face::all_of(markers).into_iter();
+    faces
+        .map(|face| (face.markers, *camera_from_anchor * face.anchor_from_face))
+        .collect()
 }
 
 /// A sheet as the camera sees it.
@@ -123,8 +136,8 @@ impl<'a> SheetView<'a> {
         (self.from[0]..self.to[0]).contains(&x) && (self.from[1]..self.to[1]).contains(&y)
     }
 
-    /// Light along the ray through a point of the plane z = 1; `None` beside the paper.
-    fn light(&self, point: DVec2) -> Option<f64> {
+    /// How far along the ray through a point of the plane z = 1 the paper is, and its light there; `None` beside it.
+    fn light(&self, point: DVec2) -> Option<(f64, f64)> {
         let eye = self.anchor_from_camera.translation;
         let ray = self.anchor_from_camera.transform_vector3(point.extend(1.0));
         let along = -eye.z / ray.z;
@@ -138,11 +151,14 @@ impl<'a> SheetView<'a> {
             .find_map(|marker| is_white(marker, point_m));
         let [low, high] = self.paper_m;
         let on_paper = point_m.cmpge(low).all() && point_m.cmple(high).all();
-        match print {
-            Some(true) => Some(PAPER),
-            Some(false) => Some(INK),
-            None => on_paper.then_some(PAPER),
-        }
+        let light = match (print, eye.z > 0.0) {
+            // The back of a sheet is white.
+            (Some(false), true) => INK,
+            (Some(_), true) => PAPER,
+            _ if on_paper => PAPER,
+            _ => return None,
+        };
+        Some((along, light))
     }
 }
 
@@ -156,7 +172,7 @@ pub struct Light {
 }
 
 impl Light {
-    /// Of sheets of markers, the first one on top; 16 samples a pixel, no two of them in one row or column, since an edge
+    /// Of sheets of markers, of those in one place the first one on top; 16 samples a pixel, no two of them in one row or column, since an edge
     /// that runs along the rows of a grid lies where a row is, not where it is.
     pub fn of(camera: &Intrinsics, sheets: &[(&[Marker], DAffine3)]) -> Self {
         const SAMPLES: usize = 16;
@@ -183,8 +199,10 @@ impl Light {
                         point += target - camera.distort(point);
                     }
                 }
-                let seen = views.iter().find_map(|view| view.light(point));
-                seen.unwrap_or(SURROUNDINGS)
+                let seen = views.iter().filter_map(|view| view.light(point));
+                let nearest =
+                    seen.reduce(|a, b| if b.0 < (1.0 - SAME_PLACE) * a.0 { b } else { a });
+                nearest.map_or(SURROUNDINGS, |(_, light)| light)
             });
             samples.iter().sum::<f64>() / SAMPLES as f64
         });

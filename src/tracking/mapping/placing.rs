@@ -148,11 +148,11 @@ impl Placing<'_> {
             .step_by(1 + showing.len() / VOTING)
             .copied()
             .collect();
-        let size_m = match sizes_are_free {
-            true => self.size_in_plane(&voting)?,
-            false => self.size_m,
-        };
-        let grown = size_m / self.size_m;
+        let mut sizes_m = vec![self.size_m];
+        if sizes_are_free {
+            // Upright to the gauge it has no size in the gauge's plane that means anything.
+            sizes_m.extend(self.size_in_plane(&voting));
+        }
         let voters: Vec<Voter> = voting
             .iter()
             .map(|&(picture, at)| {
@@ -172,33 +172,39 @@ impl Placing<'_> {
             .collect();
         let mut best: Option<(f64, PlacedMarker)> = None;
         for (picture, at) in showing.iter().take(SAYING) {
-            let Some((camera_from_world, _)) = self.camera(picture, None) else {
-                continue;
-            };
-            for lone in &picture.lone[*at] {
-                let camera_from_marker =
-                    DAffine3::from_mat3_translation(lone.matrix3, lone.translation * grown);
-                let candidates = self
-                    .starts(picture)
-                    .into_iter()
-                    .chain([camera_from_world])
-                    .map(|camera_from_world| camera_from_world.inverse() * camera_from_marker);
-                for world_from_marker in candidates {
-                    let hypothesis = PlacedMarker {
-                        world_from_marker,
-                        size_m,
-                    };
-                    let against: f64 = voters
-                        .iter()
-                        .map(|voter| self.against(voter, marker, &hypothesis).powi(2))
-                        .sum();
-                    if best.as_ref().is_none_or(|(least, _)| against < *least) {
-                        best = Some((against, hypothesis));
-                    }
+            for hypothesis in self.hypotheses(picture, *at, &sizes_m) {
+                let against: f64 = voters
+                    .iter()
+                    .map(|voter| self.against(voter, marker, &hypothesis).powi(2))
+                    .sum();
+                if best.as_ref().is_none_or(|(least, _)| against < *least) {
+                    best = Some((against, hypothesis));
                 }
             }
         }
         best.map(|(_, placed)| placed)
+    }
+
+    /// Where a marker may be by one picture that shows it, if it is of one of the sizes.
+    fn hypotheses(&self, picture: &BoardPicture, at: usize, sizes_m: &[f64]) -> Vec<PlacedMarker> {
+        let Some((camera_from_world, _)) = self.camera(picture, None) else {
+            return Vec::new();
+        };
+        let mut cameras = self.starts(picture);
+        cameras.push(camera_from_world);
+        let mut hypotheses = Vec::new();
+        for &size_m in sizes_m {
+            let grown = size_m / self.size_m;
+            for lone in &picture.lone[at] {
+                let camera_from_marker =
+                    DAffine3::from_mat3_translation(lone.matrix3, lone.translation * grown);
+                hypotheses.extend(cameras.iter().map(|camera_from_world| PlacedMarker {
+                    world_from_marker: camera_from_world.inverse() * camera_from_marker,
+                    size_m,
+                }));
+            }
+        }
+        hypotheses
     }
 
     /// How far a picture shows a marker from where it is thought to be, pixels (root mean square).

@@ -225,14 +225,10 @@ fn board(sheet: &MarkerSheet, size_mm: [f64; 2]) -> Result<(Page, String)> {
             ];
             print_marker(&mut page, at, *marker_mm, (*family, id))?;
             let from_center = [0, 1].map(|k| at[k] + marker_mm / 2.0 - origin[k] - extent[k] / 2.0);
-            placed.push(Marker {
-                family: *family,
-                id,
-                size_m: marker_mm / 1000.0,
-                // y runs up on the board.
-                center_m: DVec2::new(from_center[0], -from_center[1]) / 1000.0,
-                rotation_rad: 0.0,
-            });
+            let marker = Marker::alone(*family, id, marker_mm / 1000.0);
+            // y runs up on the board.
+            let center_m = DVec2::new(from_center[0], -from_center[1]) / 1000.0;
+            placed.push(marker.in_plane(center_m, 0.0));
         }
     }
     Ok((page, anchor_block::board(name, &placed)))
@@ -281,13 +277,7 @@ fn lone(
             print_marker(&mut page, marker_at, marker_mm, (family, id))?;
             let label = format!("{} {id}  {marker_mm} mm", family.name());
             page.write([at[0] + quiet_mm, at[1] + card_mm[1] - 1.2], 2.5, &label);
-            let marker = Marker {
-                family,
-                id,
-                size_m: marker_mm / 1000.0,
-                center_m: DVec2::ZERO,
-                rotation_rad: 0.0,
-            };
+            let marker = Marker::alone(family, id, marker_mm / 1000.0);
             if !block.is_empty() {
                 block.push('\n');
             }
