@@ -314,7 +314,7 @@ pub struct TargetArgs {
 }
 
 #[derive(Args)]
-#[command(group = clap::ArgGroup::new("sheet").required(true).args(["board", "ids", "chessboard", "charuco"]))]
+#[command(group = clap::ArgGroup::new("sheet").required(true).args(["board", "cube", "ids", "chessboard", "charuco"]))]
 pub struct MarkersArgs {
     /// The sheet: .pdf (true size), .svg or .png; what a scene file takes is written beside it as .toml
     #[arg(long, value_name = "FILE")]
@@ -322,6 +322,9 @@ pub struct MarkersArgs {
     /// A board of so many columns and rows of markers, which are one anchor
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = counts_of, requires_all = ["size_mm", "gap_mm"])]
     pub board: Option<[u32; 2]>,
+    /// The faces of a cube with edges of this length, a marker on each, which are one anchor
+    #[arg(long, value_name = "MM", requires = "size_mm")]
+    pub cube: Option<f64>,
     /// Markers to be cut out, each on its own
     #[arg(long, value_name = "ID,…", value_delimiter = ',', requires = "size_mm")]
     pub ids: Option<Vec<u32>>,
@@ -333,10 +336,11 @@ pub struct MarkersArgs {
     /// White between the markers of a board
     #[arg(long, value_name = "MM")]
     pub gap_mm: Option<f64>,
-    /// Id of the board's upper left marker; the others follow row by row
+    /// Id of the board's upper left marker, the others follow row by row; or of a cube's front, then right, back, left, top
+    /// and bottom
     #[arg(long, value_name = "ID", default_value = "0")]
     pub first_id: u32,
-    /// Name of the board
+    /// Name of the board or of the cube
     #[arg(long, value_name = "NAME", default_value = "table", value_parser = |text: &str| ANCHOR_NAME.name.of_option(text))]
     pub name: String,
     #[command(flatten)]

@@ -209,6 +209,13 @@ fn run_markers(args: MarkersArgs) -> Result<()> {
             gap_mm: mm(args.gap_mm),
             name: args.name,
         },
+        _ if args.cube.is_some() => MarkerSheet::Cube {
+            family,
+            first_id: args.first_id,
+            edge_mm: mm(args.cube),
+            size_mm: mm(args.size_mm),
+            name: args.name,
+        },
         (_, Some(ids)) => MarkerSheet::Lone {
             family,
             ids,

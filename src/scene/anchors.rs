@@ -110,6 +110,8 @@ pub static BOARD_SECTION: Section = Section {
                  { id = 3, size_m = 0.045, center_m = [0.175, -0.115] },\n]",
             ),
         ),
+        ("bundle", Example::Aside("\"tags.yaml\"")),
+        ("bundle_name", Example::Aside("\"cube\"")),
     ],
     is_aside: false,
 };
@@ -160,6 +162,9 @@ impl AnchorReader {
     fn board(&mut self, board: &Table) -> Result<Anchor, SceneError> {
         let name = self.name(board)?;
         let family = self.family(board)?;
+        if let (Some(name), None) = (BOARD.bundle_name.value(board), BOARD.bundle.value(board)) {
+            return Err(name.error("no bundle is named; give the file that has it with bundle"));
+        }
         let markers = match (BOARD.markers.value(board), BOARD.bundle.value(board)) {
             (Some(listed), None) => self.listed(&listed, family, &name)?,
             (None, Some(file)) => self.bundle(board, &file, family, &name)?,

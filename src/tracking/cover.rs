@@ -2,7 +2,6 @@
 
 use glam::{DAffine3, DVec3};
 
-use super::marker_template::MarkerTemplate;
 use crate::scene::Marker;
 
 /// What lies in front of a marker's plane by less than this part of the marker's side hides nothing of it.
@@ -62,20 +61,22 @@ pub(super) struct HiddenPart<'a> {
 }
 
 impl<'a> HiddenPart<'a> {
-    /// What a camera does not see of a template's marker.
-    pub fn of(template: &'a MarkerTemplate, camera_from_anchor: &DAffine3) -> Self {
+    /// What a camera does not see within `radius_m` around a marker's middle, metres.
+    pub fn of(
+        covers: &'a [Cover],
+        (middle_m, radius_m): (DVec3, f64),
+        camera_from_anchor: &DAffine3,
+    ) -> Self {
         let mut hidden = Self {
             eye_m: DVec3::ZERO,
             covers: Vec::new(),
         };
-        if !template.covers.is_empty() {
+        if !covers.is_empty() {
             hidden.eye_m = camera_from_anchor.inverse().translation;
-            let middle_m = template.center_m();
-            let radius_m = middle_m.distance(template.corners_m()[0]);
-            let near = template.covers.iter();
-            hidden.covers = near
-                .filter(|cover| cover.is_near(hidden.eye_m, middle_m, radius_m))
-                .collect();
+            let near = covers
+                .iter()
+                .filter(|cover| cover.is_near(hidden.eye_m, middle_m, radius_m));
+            hidden.covers = near.collect();
         }
         hidden
     }
@@ -93,7 +94,6 @@ mod tests {
 
     use super::*;
     use crate::scene::Family;
-    use crate::tracking::printed_marker::PrintedMarker;
 
     fn placed(id: u32, at_m: DVec3, turn: DQuat) -> Marker {
         Marker {
@@ -110,27 +110,24 @@ mod tests {
             placed(
                 1,
                 DVec3::new(0.06, 0.0, 0.06),
-                DQuat::from_rotation_y(-1.5708),
+                DQuat::from_rotation_y(-std::f64::consts::FRAC_PI_2),
             ),
             placed(2, DVec3::new(0.3, 0.0, -0.2), DQuat::IDENTITY),
         ];
         let covers = Cover::of(&markers, 0);
         assert_eq!(covers.len(), 1, "what lies deeper hides nothing");
-        let printed = PrintedMarker::of(Family::TAG36H11, 0).unwrap();
-        let mut template = MarkerTemplate::new(&markers[0], printed);
-        template.covers = covers;
         let right_half = DVec2::new(0.04, 0.0).extend(0.0);
         let left_half = -right_half;
         // Where a camera looks is no matter.
         let looking_from = |eye_m: DVec3| DAffine3::from_translation(-eye_m);
         let from_right = looking_from(DVec3::new(0.5, 0.0, 0.25));
-        let hidden = HiddenPart::of(&template, &from_right);
+        let hidden = HiddenPart::of(&covers, (DVec3::ZERO, 0.08), &from_right);
         assert!(hidden.has(right_half) && hidden.has(left_half));
         let from_above = looking_from(DVec3::new(0.12, 0.0, 0.5));
-        let hidden = HiddenPart::of(&template, &from_above);
+        let hidden = HiddenPart::of(&covers, (DVec3::ZERO, 0.08), &from_above);
         assert!(!hidden.has(left_half));
         let from_left = looking_from(DVec3::new(-0.5, 0.0, 0.3));
-        let hidden = HiddenPart::of(&template, &from_left);
+        let hidden = HiddenPart::of(&covers, (DVec3::ZERO, 0.08), &from_left);
         assert!(!hidden.has(right_half) && !hidden.has(left_half));
     }
 

@@ -8,7 +8,7 @@ use glam::DAffine3;
 
 use super::marker_template::MarkerTemplate;
 use super::pixel_pose::{MeasuredEdge, PixelPose, pixel_of, project};
-use super::pose::{CornerObservation, starts};
+use super::pose_starts::{CornerObservation, starts};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::least_squares::{NormalEquations, Problem, gauss_newton};
 use crate::geometry::pose::{PoseStep, moved, rotation_between};

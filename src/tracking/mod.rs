@@ -26,6 +26,7 @@ pub mod mapping;
 mod marker_template;
 mod pixel_pose;
 mod pose;
+mod pose_starts;
 mod printed_marker;
 mod prints;
 mod reading;

@@ -230,7 +230,9 @@ fn measure(
     if template.facing(pose) < LEAST_FACING {
         return;
     }
-    let hidden = HiddenPart::of(template, pose);
+    let center_m = template.center_m();
+    let radius_m = center_m.distance(template.corners_m()[0]);
+    let hidden = HiddenPart::of(&template.covers, (center_m, radius_m), pose);
     for edge in &template.edges {
         if hidden.has(edge.point_m) {
             continue;

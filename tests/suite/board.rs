@@ -572,6 +572,34 @@ fn the_board_of_a_session_is_learnt_from_its_video() {
 }
 
 #[test]
+fn the_board_of_a_video_is_learnt_with_its_camera_where_nobody_has_calibrated_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let video = project_file("recordings/lamp/video.mp4");
+    let distance = ["--size-mm", "45", "--distance", "0:2:350"];
+    let arguments = [&["board", "--from", plain(&video)], &distance[..]].concat();
+    let output = gnomon(folder.path(), &arguments);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        said.contains("carries no calibration: focal length"),
+        "{said}"
+    );
+    let learnt = board_of(&output);
+    let scene = Scene::load(&project_file("config/lamp.toml")).unwrap();
+    let known: Vec<Marker> = scene.anchors[0]
+        .markers
+        .iter()
+        .copied()
+        .filter(|marker| marker.id != 5)
+        .collect();
+    let (center_mm, turn_deg) = worst(&errors(&learnt, &known));
+    eprintln!("{said}{center_mm:.3} mm, {turn_deg:.3}°");
+    assert!(
+        center_mm < 1.0 && turn_deg < 0.2,
+        "{center_mm} mm, {turn_deg}°"
+    );
+}
+
+#[test]
 #[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
 fn the_grid_of_the_photographs_is_learnt_from_them() {
     let folder = photographs("yac_mocap");

@@ -5,14 +5,16 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use gnomon::geometry::pose::rotation_between;
-use gnomon::scene::{Anchor, Family, Marker, TrackingSettings};
-use gnomon::tracking::{AnchorPose, Status, Tracker};
+use gnomon::scene::{Anchor, DetectorKind, Family, Marker, TrackingSettings};
+use gnomon::tracking::mapping::{
+    BoardShape, LearntBoard, MapError, MapSettings, ShapeWanted, SpaceFrame, learn_board,
+};
+use gnomon::tracking::{AnchorPose, Detection, Status, Tracker};
 
 use crate::common::random::Random;
 use crate::common::sheets::{
-    CAMERA, FRAME_SECS, Light, anchor, settings, sheets_of, tracker, with_noise,
+    CAMERA, FRAME_SECS, Light, anchor, settings, tracker, true_corners_px, with_noise,
 };
-use gnomon::scene::DetectorKind;
 
 /// Side of a cube's markers, half of the cube's, metres.
 const MARKER_M: f64 = 0.04;
@@ -66,12 +68,7 @@ fn room_corner() -> Vec<Marker> {
 }
 
 fn photograph(markers: &[Marker], pose: &DAffine3) -> Light {
-    let sheets = sheets_of(markers, pose);
-    let sheets: Vec<(&[Marker], DAffine3)> = sheets
-        .iter()
-        .map(|(markers, pose)| (markers.as_slice(), *pose))
-        .collect();
-    Light::of(&CAMERA, &sheets)
+    Light::of_boards(&CAMERA, &[(markers, *pose)])
 }
 
 fn random_turn(random: &mut Random) -> DQuat {
@@ -267,4 +264,183 @@ fn a_flat_board_in_another_plane_than_its_frame_s_is_tracked_as_one() {
     let expected = flat.camera_from_anchor.unwrap() * frame_from_sheet.inverse();
     let found = tilted.camera_from_anchor.unwrap();
     assert!(found.abs_diff_eq(expected, 1e-4), "{found} {expected}");
+}
+
+/// What a detector with even errors of so many pixels sees of markers from poses; those that face away are not seen.
+fn seen_from(
+    random: &mut Random,
+    markers: &[Marker],
+    poses: &[DAffine3],
+    noise_px: f64,
+) -> Vec<Vec<Detection>> {
+    let look = |pose: &DAffine3| {
+        let faces = |marker: &&Marker| {
+            let center_m = pose.transform_point3(marker.center_m()).normalize();
+            pose.transform_vector3(marker.normal()).dot(center_m) < -0.2
+        };
+        let seen = markers.iter().filter(faces).map(|marker| Detection {
+            family: marker.family,
+            id: marker.id,
+            corners_px: true_corners_px(&CAMERA, marker, pose).map(|corner_px| {
+                corner_px
+                    + noise_px * DVec2::new(random.between(-1.0, 1.0), random.between(-1.0, 1.0))
+            }),
+            margin: 100.0,
+            corrected_bits: 0,
+        });
+        seen.collect()
+    };
+    poses.iter().map(look).collect()
+}
+
+const MAP: MapSettings = MapSettings {
+    size_m: MARKER_M,
+    gauge: None,
+    learns_sizes: false,
+    plane_tolerance_m: 0.002,
+    shape: ShapeWanted::AsSeen,
+};
+
+fn learn(pictures: &[Vec<Detection>], settings: &MapSettings) -> Result<LearntBoard, MapError> {
+    learn_board(&CAMERA, Family::TAG36H11, pictures, settings)
+}
+
+/// The farthest that a learnt marker's corner is from the truth, metres, once the gauge is laid on the gauge.
+fn worst_m(learnt: &LearntBoard, truth: &[Marker]) -> f64 {
+    let of = |id: u32| truth.iter().find(|marker| marker.id == id).unwrap();
+    let gauge = learnt
+        .markers
+        .iter()
+        .find(|it| it.marker.id == learnt.gauge);
+    let gauge = gauge.unwrap().marker.anchor_from_marker;
+    let truth_from_learnt = of(learnt.gauge).anchor_from_marker * gauge.inverse();
+    let off_m = learnt.markers.iter().flat_map(|learnt| {
+        let corners = learnt.marker.corners_m().into_iter();
+        corners
+            .zip(of(learnt.marker.id).corners_m())
+            .map(move |(found, truth)| truth_from_learnt.transform_point3(found).distance(truth))
+    });
+    off_m.fold(0.0, f64::max)
+}
+
+fn around(random: &mut Random, count: u32) -> Vec<DAffine3> {
+    (0..count)
+        .map(|_| {
+            let at_m = DVec3::new(0.0, 0.0, random.between(0.3, 0.5));
+            DAffine3::from_rotation_translation(random_turn(random), at_m)
+        })
+        .collect()
+}
+
+#[test]
+fn the_layout_of_a_cube_is_learnt_without_a_plane() {
+    let mut random = Random::new(8);
+    let poses = around(&mut random, 60);
+    let exact = seen_from(&mut random, &cube(), &poses, 0.0);
+    let learnt = learn(&exact, &MAP).unwrap();
+    let BoardShape::Space { off, frame } = &learnt.shape else {
+        panic!("{:?}", learnt.shape)
+    };
+    assert!(off.len() >= 4 && *frame == SpaceFrame::Gauge, "{off:?}");
+    assert!(
+        worst_m(&learnt, &cube()) < 1e-6,
+        "{}",
+        worst_m(&learnt, &cube())
+    );
+    assert!(
+        learnt.markers[0]
+            .marker
+            .anchor_from_marker
+            .abs_diff_eq(DAffine3::IDENTITY, 1e-12)
+    );
+
+    let noisy = seen_from(&mut random, &cube(), &poses, 0.3);
+    let learnt = learn(&noisy, &MAP).unwrap();
+    let off_m = worst_m(&learnt, &cube());
+    assert!(off_m < 6e-4, "{off_m} m");
+    let deviation_m = learnt.markers[5].center_deviation_m.length();
+    let opposite = learnt.markers[5].marker.center_m();
+    let error_m = opposite.distance(DVec3::new(0.0, 0.0, -2.0 * MARKER_M));
+    assert!(error_m < 4.0 * deviation_m, "{error_m} m, {deviation_m} m");
+
+    // Sizes as well, which no plane gives.
+    let mut sized = cube();
+    for (k, marker) in sized.iter_mut().enumerate().skip(1) {
+        marker.size_m = 0.025 + 0.003 * k as f64;
+    }
+    let pictures = seen_from(&mut random, &sized, &poses, 0.1);
+    let settings = MapSettings {
+        learns_sizes: true,
+        ..MAP
+    };
+    let learnt = learn(&pictures, &settings).unwrap();
+    for (learnt, truth) in learnt.markers.iter().zip(&sized) {
+        assert!(
+            (learnt.marker.size_m - truth.size_m).abs() < 3e-4,
+            "{learnt:?}"
+        );
+    }
+
+    let flat = MapSettings {
+        shape: ShapeWanted::Flat,
+        ..MAP
+    };
+    let error = learn(&noisy, &flat).unwrap_err();
+    assert!(matches!(error, MapError::NotPlanar { .. }), "{error}");
+}
+
+#[test]
+fn a_table_with_something_upright_on_it_keeps_the_table_s_plane() {
+    let mut markers: Vec<Marker> = (0..6)
+        .map(|id: u32| {
+            let at_m = DVec2::new(0.1 * f64::from(id % 3), 0.12 * f64::from(id / 3));
+            Marker::alone(Family::TAG36H11, id, MARKER_M).in_plane(at_m, 0.3 * f64::from(id))
+        })
+        .collect();
+    markers.push(placed(
+        17,
+        MARKER_M,
+        DVec3::new(0.1, 0.06, 0.03),
+        DQuat::from_rotation_x(FRAC_PI_2),
+    ));
+    let mut random = Random::new(3);
+    let poses: Vec<DAffine3> = (0..40)
+        .map(|k| {
+            let way = DVec2::from_angle(f64::from(k) * PI / 20.0);
+            let eye_m = DVec3::new(
+                0.1 + 0.4 * way.x,
+                0.06 + 0.4 * way.y,
+                random.between(0.25, 0.5),
+            );
+            looking_at(eye_m, DVec3::new(0.1, 0.06, 0.0))
+        })
+        .collect();
+    let pictures = seen_from(&mut random, &markers, &poses, 0.2);
+    let learnt = learn(&pictures, &MAP).unwrap();
+    let BoardShape::Space { off, frame } = &learnt.shape else {
+        panic!("{:?}", learnt.shape)
+    };
+    assert_eq!(
+        (off.len(), off[0].0, *frame),
+        (1, 17, SpaceFrame::PlaneOfMost)
+    );
+    // What lies on the table lies there, more evenly than one marker tells.
+    for on_table in &learnt.markers[..6] {
+        let corners_m = on_table.marker.corners_m();
+        assert!(
+            corners_m.iter().all(|corner_m| corner_m.z.abs() < 4e-4),
+            "{on_table:?}"
+        );
+    }
+    assert!(worst_m(&learnt, &markers) < 1e-3);
+    // The same without it is flat, unless space is asked for.
+    let pictures = seen_from(&mut random, &markers[..6], &poses, 0.2);
+    assert_eq!(learn(&pictures, &MAP).unwrap().shape, BoardShape::Flat);
+    let space = MapSettings {
+        shape: ShapeWanted::Space,
+        ..MAP
+    };
+    let learnt = learn(&pictures, &space).unwrap();
+    assert!(matches!(learnt.shape, BoardShape::Space { .. }));
+    assert!(worst_m(&learnt, &markers) < 1e-3);
 }

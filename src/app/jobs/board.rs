@@ -12,11 +12,13 @@ use crate::app::files::job_files::{JobFiles, Replacing};
 use crate::app::files::picture_files::write_text;
 use crate::app::files::result_kind::ResultKind;
 use crate::app::input::usual_tracking::usual_tracking;
+use crate::app::stages::known_camera::KnownCamera;
 use crate::app::stages::progress::Progress;
 use crate::app::stages::source::{self, CalibrationNamed};
 use crate::app::talk;
 use crate::capture::{FrameSource, Notice};
-use crate::scene::{CameraSettings, Family, Marker, TrackingSettings};
+use crate::scene::{Anchor, CameraSettings, Family, Marker, TrackingSettings};
+use crate::tracking::focal::{CameraLearner, LearntCamera};
 use crate::tracking::mapping::{
     BoardShape, LearntBoard, LearntMarker, MapSettings, SpaceFrame, learn_board, off_in_words,
 };
@@ -92,10 +94,23 @@ pub fn board(request: &BoardRequest, stop: &AtomicBool) -> Result<()> {
         BoardInput::Scene(_) => CalibrationNamed::ByKey,
         BoardInput::Recording { .. } => CalibrationNamed::ByOption,
     };
-    let (source, intrinsics) = source::open_calibrated(&camera, named)?;
+    let (source, calibration) = source::open_as_it_is(&camera)?;
+    let size_px = source.size_px();
     let (pictures, notices) = detections(source, &settings, request.family, stop)?;
-    let learnt = learn_board(&intrinsics, request.family, &pictures, &request.map)
-        .with_context(|| format!("{} pictures of {}", pictures.len(), camera.source))?;
+    let learnt = match calibration {
+        Some(intrinsics) => learn_board(&intrinsics, request.family, &pictures, &request.map)
+            .map_err(anyhow::Error::from),
+        None => learn_with_camera(request, &settings, size_px, &pictures).map(
+            |(learnt, camera_found)| {
+                let remark =
+                    KnownCamera::Learnt(camera_found).remark(&camera.source, named.place());
+                talk::say_lines(&remark.unwrap_or_default());
+                learnt
+            },
+        ),
+    };
+    let learnt =
+        learnt.with_context(|| format!("{} pictures of {}", pictures.len(), camera.source))?;
     let learnt = match &request.distance {
         Some(distance) => to_scale(&learnt, distance)?,
         None => learnt,
@@ -114,6 +129,30 @@ pub fn board(request: &BoardRequest, stop: &AtomicBool) -> Result<()> {
         );
     }
     Ok(())
+}
+
+/// The layout in the pictures of a camera that nobody has calibrated: by what each marker alone tells of the camera, and then
+/// anew by what the layout does.
+fn learn_with_camera(
+    request: &BoardRequest,
+    settings: &TrackingSettings,
+    size_px: [u32; 2],
+    pictures: &[Vec<Detection>],
+) -> Result<(LearntBoard, LearntCamera)> {
+    let camera_by = |mut learner: CameraLearner| {
+        pictures.iter().for_each(|seen| learner.look_at(seen));
+        learner.finish()
+    };
+    let by_each = CameraLearner::of_every_marker(settings, request.family, size_px)?;
+    let camera = camera_by(by_each);
+    let rough = learn_board(&camera.intrinsics, request.family, pictures, &request.map)?;
+    let anchor = Anchor {
+        name: request.name.clone(),
+        markers: rough.markers.iter().map(|learnt| learnt.marker).collect(),
+    };
+    let camera = camera_by(CameraLearner::of_anchors(settings, &[anchor], size_px)?);
+    let learnt = learn_board(&camera.intrinsics, request.family, pictures, &request.map)?;
+    Ok((learnt, camera))
 }
 
 /// What the detector sees in each frame that is looked at.

@@ -13,8 +13,6 @@ use crate::scene::{Codes, Face, Family, Marker};
 const PAPER: f64 = 0.8;
 const INK: f64 = 0.02;
 const SURROUNDINGS: f64 = 0.25;
-/// Sheets nearer to each other than this part of their distance lie on one another.
-const SAME_PLACE: f64 = 1e-9;
 
 /// The cells of a marker as printed, without its black border; `#` is white. `None` for those not written down.
 pub fn printed(family: Family, id: u32) -> Option<&'static [&'static str]> {
@@ -78,15 +76,12 @@ fn paper_m(markers: &[Marker]) -> [DVec2; 2] {
     ]
 }
 
-/// The sheets of a board in space, each on its plane, for [`Light::of`].
-pub fn sheets_of(
-    markers: &[Marker],
-    camera_from_anchor: &DAffine3,
-) -> Vec<(Vec<Marker>, DAffine3)> {
-    let faces = Face::all_of(markers).into_iter();
-    faces
-        .map(|face| (face.markers, *camera_from_anchor * face.anchor_from_face))
-        .collect()
+/// A point of a sheet on a ray.
+struct SheetPoint {
+    /// How far along the ray it is, in the ray's lengths.
+    along: f64,
+    /// Linear.
+    light: f64,
 }
 
 /// A sheet as the camera sees it.
@@ -136,8 +131,8 @@ impl<'a> SheetView<'a> {
         (self.from[0]..self.to[0]).contains(&x) && (self.from[1]..self.to[1]).contains(&y)
     }
 
-    /// How far along the ray through a point of the plane z = 1 the paper is, and its light there; `None` beside it.
-    fn light(&self, point: DVec2) -> Option<(f64, f64)> {
+    /// What is seen along the ray through a point of the plane z = 1; `None` beside the paper.
+    fn light(&self, point: DVec2) -> Option<SheetPoint> {
         let eye = self.anchor_from_camera.translation;
         let ray = self.anchor_from_camera.transform_vector3(point.extend(1.0));
         let along = -eye.z / ray.z;
@@ -158,7 +153,7 @@ impl<'a> SheetView<'a> {
             _ if on_paper => PAPER,
             _ => return None,
         };
-        Some((along, light))
+        Some(SheetPoint { along, light })
     }
 }
 
@@ -172,9 +167,36 @@ pub struct Light {
 }
 
 impl Light {
-    /// Of sheets of markers, of those in one place the first one on top; 16 samples a pixel, no two of them in one row or column, since an edge
-    /// that runs along the rows of a grid lies where a row is, not where it is.
+    /// Of sheets of markers, the first one on top.
     pub fn of(camera: &Intrinsics, sheets: &[(&[Marker], DAffine3)]) -> Self {
+        Self::of_seen(camera, sheets, |seen| seen.next())
+    }
+
+    /// Of boards in space, each with its pose (camera from anchor): of all sheets the nearest is seen.
+    pub fn of_boards(camera: &Intrinsics, boards: &[(&[Marker], DAffine3)]) -> Self {
+        let faces: Vec<(Vec<Marker>, DAffine3)> = boards
+            .iter()
+            .flat_map(|(markers, camera_from_anchor)| {
+                let faces = Face::all_of(markers).into_iter();
+                faces.map(|face| (face.markers, *camera_from_anchor * face.anchor_from_face))
+            })
+            .collect();
+        let sheets: Vec<(&[Marker], DAffine3)> = faces
+            .iter()
+            .map(|(markers, pose)| (markers.as_slice(), *pose))
+            .collect();
+        Self::of_seen(camera, &sheets, |seen| {
+            seen.min_by(|a, b| a.along.total_cmp(&b.along))
+        })
+    }
+
+    /// Of sheets of markers of which `seen` chooses one along each ray; 16 samples a pixel, no two of them in one row or
+    /// column, since an edge that runs along the rows of a grid lies where a row is, not where it is.
+    fn of_seen(
+        camera: &Intrinsics,
+        sheets: &[(&[Marker], DAffine3)],
+        seen: impl Fn(&mut dyn Iterator<Item = SheetPoint>) -> Option<SheetPoint>,
+    ) -> Self {
         const SAMPLES: usize = 16;
         let offsets: [DVec2; SAMPLES] = std::array::from_fn(|k| {
             let mirrored_bits = (k as u8).reverse_bits() >> 4;
@@ -199,10 +221,8 @@ impl Light {
                         point += target - camera.distort(point);
                     }
                 }
-                let seen = views.iter().filter_map(|view| view.light(point));
-                let nearest =
-                    seen.reduce(|a, b| if b.0 < (1.0 - SAME_PLACE) * a.0 { b } else { a });
-                nearest.map_or(SURROUNDINGS, |(_, light)| light)
+                let mut on_ray = views.iter().filter_map(|view| view.light(point));
+                seen(&mut on_ray).map_or(SURROUNDINGS, |seen| seen.light)
             });
             samples.iter().sum::<f64>() / SAMPLES as f64
         });

@@ -220,12 +220,17 @@ impl CameraLearner {
         let detected = grey_from_rgba(frame, &mut grey)
             .and_then(|()| self.detector.detect(&grey, frame.size_px));
         self.grey = grey;
-        self.take(&detected?);
+        self.look_at(&detected?);
+        Ok(())
+    }
+
+    /// Looks at what a detector saw in a picture.
+    pub fn look_at(&mut self, detections: &[Detection]) {
+        self.take(detections);
         let grown = self.views.len() + self.replaced;
         if grown as f64 >= (1.0 + GROWTH) * self.fitted_views as f64 && grown > self.fitted_views {
             self.fit();
         }
-        Ok(())
     }
 
     /// The camera as far as it is learnt.

@@ -3,7 +3,7 @@
 //! A lone square has two poses that explain its picture about equally well; the wrong one of them differs from picture
 //! to picture, the right one does not. So each new marker is put where one picture says, and the other pictures vote.
 
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 
 use super::super::pose::{self, CornerObservation};
 use super::bundle::{BoardView, MarkerObservation, PlacedMarker, UNIT_CORNERS};
@@ -152,6 +152,7 @@ impl Placing<'_> {
         if sizes_are_free {
             // Upright to the gauge it has no size in the gauge's plane that means anything.
             sizes_m.extend(self.size_in_plane(&voting));
+            sizes_m.extend(self.size_by_views(&voting));
         }
         let voters: Vec<Voter> = voting
             .iter()
@@ -227,6 +228,34 @@ impl Placing<'_> {
                 .map(|(_, rms_px)| rms_px),
         };
         rms_px.map_or(DISAGREES_PX, |rms_px| rms_px.min(DISAGREES_PX))
+    }
+
+    /// The side with which all pictures put a marker's middle in one place, by least squares: what it says of the marker's
+    /// distance from a camera, the others' places say of that camera.
+    fn size_by_views(&self, showing: &[(&BoardPicture, usize)]) -> Option<f64> {
+        // Both poses of a lone marker have its middle in about the same place.
+        let ways: Vec<(DVec3, DVec3)> = showing
+            .iter()
+            .filter_map(|(picture, at)| {
+                let (camera_from_world, _) = self.camera(picture, None)?;
+                let world_from_camera = camera_from_world.inverse();
+                let middle_m = picture.lone[*at].first()?.translation;
+                Some((
+                    world_from_camera.translation,
+                    world_from_camera.transform_vector3(middle_m),
+                ))
+            })
+            .collect();
+        let count = ways.len() as f64;
+        let eye_m = ways.iter().map(|way| way.0).sum::<DVec3>() / count;
+        let way_m = ways.iter().map(|way| way.1).sum::<DVec3>() / count;
+        let (mut along, mut squares) = (0.0, 0.0);
+        for (eye, way) in &ways {
+            along += (*way - way_m).dot(*eye - eye_m);
+            squares += (*way - way_m).length_squared();
+        }
+        let grown = -along / squares;
+        (grown.is_finite() && grown > 0.0).then_some(grown * self.size_m)
     }
 
     /// The side that a marker has if it lies in the plane of the gauge: the median over its pictures.

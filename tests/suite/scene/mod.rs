@@ -1,5 +1,6 @@
 //! Scenes: what a good one becomes, and where each mistake is pointed out.
 
+mod bundles;
 mod meshes;
 mod mistakes;
 mod models;
