@@ -65,9 +65,9 @@ impl YamlValue {
     /// The bytes of the text that it was read from where it begins, up to the end of the word there.
     pub fn span_in(&self, text: &str) -> Range<usize> {
         let lines = text.split_inclusive('\n');
-        let line_start: usize = lines.take(self.line - 1).map(str::len).sum();
+        let line_start: usize = lines.take(self.line.saturating_sub(1)).map(str::len).sum();
         let line = text.get(line_start..).unwrap_or_default();
-        let before = line.char_indices().nth(self.column - 1);
+        let before = line.char_indices().nth(self.column.saturating_sub(1));
         let start = line_start + before.map_or(0, |(at, _)| at);
         let word = text.get(start..).unwrap_or_default();
         let length = word.find(|c: char| c.is_whitespace() || ",]}".contains(c));

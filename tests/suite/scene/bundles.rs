@@ -189,3 +189,24 @@ fn markers_of_a_board_stand_in_space_with_three_numbers() {
         assert!(message.contains(part), "{message}");
     }
 }
+
+#[test]
+fn a_damaged_bundle_is_read_or_refused_and_never_worse() {
+    let keys = "bundle_name = \"cube\"";
+    for end in (0..TAGS.len()).step_by(7) {
+        let _ = load(&TAGS[..end], keys);
+    }
+    for (at, _) in TAGS.char_indices().step_by(5) {
+        for odd in [
+            "-", "[", "}", ":", "\u{e9}", "\t", "&a", "*a", "\"", "9e999", "\r",
+        ] {
+            let text = format!("{}{odd}{}", &TAGS[..at], &TAGS[at + 1..]);
+            if let Err(error) = load(&text, keys) {
+                assert!(!error.to_string().is_empty());
+            }
+        }
+    }
+    let deep = format!("tag_bundles: {}{}", "[".repeat(5000), "]".repeat(5000));
+    let message = load(&deep, keys).unwrap_err().to_string();
+    assert!(message.contains("levels"), "{message}");
+}
