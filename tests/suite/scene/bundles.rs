@@ -208,5 +208,5 @@ fn a_damaged_bundle_is_read_or_refused_and_never_worse() {
     }
     let deep = format!("tag_bundles: {}{}", "[".repeat(5000), "]".repeat(5000));
     let message = load(&deep, keys).unwrap_err().to_string();
-    assert!(message.contains("levels"), "{message}");
+    assert!(message.contains("tags.yaml: line 1"), "{message}");
 }
