@@ -246,6 +246,9 @@ pub struct BoardArgs {
     /// Distance measured between two markers' centres: a better scale than a marker's size
     #[arg(long, value_name = "ID:ID:MM", value_parser = distance_of)]
     pub distance: Option<Distance>,
+    /// What the markers lie in
+    #[arg(long, value_enum, default_value = "seen")]
+    pub shape: Shape,
     /// What a marker may lie off the plane of the others
     #[arg(long, value_name = "MM", default_value = "2")]
     pub plane_tolerance_mm: f64,
@@ -311,7 +314,7 @@ pub struct TargetArgs {
 }
 
 #[derive(Args)]
-#[command(group = clap::ArgGroup::new("sheet").required(true).args(["board", "ids", "chessboard", "charuco"]))]
+#[command(group = clap::ArgGroup::new("sheet").required(true).args(["board", "cube", "ids", "chessboard", "charuco"]))]
 pub struct MarkersArgs {
     /// The sheet: .pdf (true size), .svg or .png; what a scene file takes is written beside it as .toml
     #[arg(long, value_name = "FILE")]
@@ -319,6 +322,9 @@ pub struct MarkersArgs {
     /// A board of so many columns and rows of markers, which are one anchor
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = counts_of, requires_all = ["size_mm", "gap_mm"])]
     pub board: Option<[u32; 2]>,
+    /// The faces of a cube with edges of this length, a marker on each, which are one anchor
+    #[arg(long, value_name = "MM", requires = "size_mm")]
+    pub cube: Option<f64>,
     /// Markers to be cut out, each on its own
     #[arg(long, value_name = "ID,…", value_delimiter = ',', requires = "size_mm")]
     pub ids: Option<Vec<u32>>,
@@ -330,10 +336,11 @@ pub struct MarkersArgs {
     /// White between the markers of a board
     #[arg(long, value_name = "MM")]
     pub gap_mm: Option<f64>,
-    /// Id of the board's upper left marker; the others follow row by row
+    /// Id of the board's upper left marker, the others follow row by row; or of a cube's front, then right, back, left, top
+    /// and bottom
     #[arg(long, value_name = "ID", default_value = "0")]
     pub first_id: u32,
-    /// Name of the board
+    /// Name of the board or of the cube
     #[arg(long, value_name = "NAME", default_value = "table", value_parser = |text: &str| ANCHOR_NAME.name.of_option(text))]
     pub name: String,
     #[command(flatten)]
@@ -360,6 +367,17 @@ pub enum PageSize {
     A3,
     /// 8.5 x 11 inches
     Letter,
+}
+
+/// What a board's markers lie in.
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
+pub enum Shape {
+    /// A plane where the pictures bear that out, otherwise space: a cube, a corner of a room
+    Seen,
+    /// A plane; a marker off it is an error
+    Flat,
+    /// Space
+    Space,
 }
 
 /// Where markers' sizes come from.

@@ -29,11 +29,11 @@ use gnomon::app::talk;
 use gnomon::capture::live::is_live;
 use gnomon::scene::format::MARKER;
 use gnomon::scene::{CameraSettings, Scene};
-use gnomon::tracking::mapping::MapSettings;
+use gnomon::tracking::mapping::{MapSettings, ShapeWanted};
 
 use command_line::{
     BoardArgs, CalibrateArgs, ChartArgs, Cli, Command, LiveArgs, MarkersArgs, PageSize, ProbeArgs,
-    ProbeKindArg, RecordArgs, RecordingArgs, ReplayArgs, Sizes, TrackArgs,
+    ProbeKindArg, RecordArgs, RecordingArgs, ReplayArgs, Shape, Sizes, TrackArgs,
 };
 
 /// As shells have it for Ctrl-C.
@@ -209,6 +209,13 @@ fn run_markers(args: MarkersArgs) -> Result<()> {
             gap_mm: mm(args.gap_mm),
             name: args.name,
         },
+        _ if args.cube.is_some() => MarkerSheet::Cube {
+            family,
+            first_id: args.first_id,
+            edge_mm: mm(args.cube),
+            size_mm: mm(args.size_mm),
+            name: args.name,
+        },
         (_, Some(ids)) => MarkerSheet::Lone {
             family,
             ids,
@@ -294,6 +301,11 @@ fn run_board(args: BoardArgs) -> Result<()> {
             gauge: args.gauge,
             learns_sizes: args.sizes == Sizes::Estimate,
             plane_tolerance_m: args.plane_tolerance_mm * 1e-3,
+            shape: match args.shape {
+                Shape::Seen => ShapeWanted::AsSeen,
+                Shape::Flat => ShapeWanted::Flat,
+                Shape::Space => ShapeWanted::Space,
+            },
         },
         distance: args.distance,
         name: args.name,

@@ -2,11 +2,12 @@
 
 use std::collections::HashMap;
 
-use glam::DVec2;
+use glam::{DAffine3, DMat3, DVec2, DVec3};
 
+use super::bundle::{BundleFile, TagRanges};
 use super::error::{SceneError, suggestion};
 use super::named_files::FileKind;
-use super::placement::ANGLE;
+use super::placement::{ANGLE, turn};
 use super::ranges::{Digits, Numbers, Whole};
 use super::reader::{Table, Value};
 use super::schema::key::Missing::{Is, Means};
@@ -18,7 +19,8 @@ use super::{Anchor, DetectorKind, Drawing, Family, Ink, Marker};
 const PRINT: Digits = Digits::Decimals(5);
 /// Side of a marker: below a tenth of a millimetre nothing is seen.
 const SIZE: Numbers = Numbers::between(1e-4, 100.0).unit("m").digits(PRINT);
-const CENTER: Numbers = Numbers::between(-100.0, 100.0).unit("m").digits(PRINT);
+/// Of a marker's centre on its board.
+pub const CENTER: Numbers = Numbers::between(-100.0, 100.0).unit("m").digits(PRINT);
 
 keys! {
     /// The name of a board or a lone marker.
@@ -59,21 +61,25 @@ keys! {
     /// A marker's place on its board.
     pub static ON_BOARD: OnBoardKeys;
     required {
-        /// In the board's frame.
-        center_m: [f64; 2], CENTER => "two numbers in metres are expected";
+        /// In the board's frame. With a third number markers lie in space, on a cube or on walls.
+        center_m: Written, InWords::new("two or three numbers, -100 to 100 m")
+            => "two numbers in metres are expected, or three in space";
     }
-    /// Turn in the board's plane, counter-clockwise.
-    rotation_deg: f64, ANGLE => Is(0.0);
+    /// Turn in the board's plane, counter-clockwise; or turns about x, then y, then z of the board's frame. A marker that is not
+    /// turned has its right along x, its top along y, and is read from z.
+    rotation_deg: Written, InWords::new("a number or three numbers, degrees") => Means(Written, "0");
 }
 
 keys! {
     /// The markers of a board.
     pub static BOARD: BoardKeys;
-    required {
-        /// Its markers, at least one.
-        markers: Written, InWords::parts("a list of tables", &BOARD_MARKER_SECTION)
-            => "a list of { id, size_m, center_m, rotation_deg = 0 } is expected";
-    }
+
+    /// Its markers, at least one; or a bundle has them.
+    markers: Written, InWords::parts("a list of tables", &BOARD_MARKER_SECTION) => Means(Written, "none");
+    /// Its markers as the ROS package apriltag_ros has them: a file with tag_bundles.
+    bundle: Written, InWords::file("bundles of tags (.yaml)", FileKind::Bundles) => Means(Written, "none");
+    /// The bundle's name in that file.
+    bundle_name: Written, InWords::new("a name of the file") => Means(Written, "the only one");
 }
 
 /// An entry of a board's `markers`.
@@ -104,6 +110,8 @@ pub static BOARD_SECTION: Section = Section {
                  { id = 3, size_m = 0.045, center_m = [0.175, -0.115] },\n]",
             ),
         ),
+        ("bundle", Example::Aside("\"tags.yaml\"")),
+        ("bundle_name", Example::Aside("\"cube\"")),
     ],
     is_aside: false,
 };
@@ -146,30 +154,88 @@ pub fn anchors(root: &Table, detector: DetectorKind) -> Result<Vec<Anchor>, Scen
 struct AnchorReader {
     detector: DetectorKind,
     name_lines: HashMap<String, usize>,
-    /// Name of the anchor that has a marker, and the line that says so.
-    owners: HashMap<(Family, u32), (String, usize)>,
+    /// Name of the anchor that has a marker, and where that is said.
+    owners: HashMap<(Family, u32), (String, String)>,
 }
 
 impl AnchorReader {
     fn board(&mut self, board: &Table) -> Result<Anchor, SceneError> {
         let name = self.name(board)?;
         let family = self.family(board)?;
-        let listed = BOARD.markers.require(board)?;
+        if let (Some(name), None) = (BOARD.bundle_name.value(board), BOARD.bundle.value(board)) {
+            return Err(name.error("no bundle is named; give the file that has it with bundle"));
+        }
+        let markers = match (BOARD.markers.value(board), BOARD.bundle.value(board)) {
+            (Some(listed), None) => self.listed(&listed, family, &name)?,
+            (None, Some(file)) => self.bundle(board, &file, family, &name)?,
+            (Some(_), Some(file)) => {
+                return Err(file.error_without_value(
+                    "bundle: the board has markers already; allowed: one of the two",
+                ));
+            }
+            (None, None) => {
+                return Err(board.error(
+                    "missing markers: a list of { id, size_m, center_m, rotation_deg = 0 } is expected, or a bundle",
+                ));
+            }
+        };
+        Ok(Anchor { name, markers })
+    }
+
+    fn listed(
+        &mut self,
+        listed: &Value,
+        family: Family,
+        anchor: &str,
+    ) -> Result<Vec<Marker>, SceneError> {
         let mut markers = Vec::new();
         for entry in listed.array("tables")? {
             let entry = BOARD_MARKER_SECTION.table_of(&entry)?;
+            let id = self.id(&entry, family, anchor)?;
             markers.push(Marker {
-                family,
-                id: self.id(&entry, family, &name)?,
-                size_m: MARKER.size_m.read(&entry)?,
-                center_m: DVec2::from_array(ON_BOARD.center_m.read(&entry)?),
-                rotation_rad: ON_BOARD.rotation_deg.read(&entry)?.to_radians(),
+                anchor_from_marker: place_on_board(&entry)?,
+                ..Marker::alone(family, id, MARKER.size_m.read(&entry)?)
             });
         }
         if markers.is_empty() {
             return Err(listed.error("a board needs at least one marker"));
         }
-        Ok(Anchor { name, markers })
+        Ok(markers)
+    }
+
+    /// The markers of a bundle in a file.
+    fn bundle(
+        &mut self,
+        board: &Table,
+        file: &Value,
+        family: Family,
+        anchor: &str,
+    ) -> Result<Vec<Marker>, SceneError> {
+        let allowed = TagRanges {
+            ids: Whole::between(0, family.id_count() - 1),
+            size: SIZE,
+            center: CENTER,
+        };
+        let bundles = BundleFile::read(&file.existing_path(FileKind::Bundles)?, &allowed)?;
+        let name = BOARD.bundle_name.value(board);
+        let wanted = name.as_ref().map(Value::text).transpose()?;
+        let place = name.as_ref().unwrap_or(file);
+        let bundle = bundles
+            .bundle_of(wanted)
+            .map_err(|message| place.error(message))?;
+        let mut markers = Vec::new();
+        for tag in &bundle.tags {
+            self.own(family, tag.id, anchor, bundles.place_of(tag))
+                .map_err(|message| bundles.error_of(tag, message))?;
+            markers.push(Marker {
+                anchor_from_marker: tag.bundle_from_tag,
+                ..Marker::alone(family, tag.id, tag.size_m)
+            });
+        }
+        if markers.is_empty() {
+            return Err(bundles.error_of_bundle(bundle, "a bundle needs at least one tag"));
+        }
+        Ok(markers)
     }
 
     fn lone_marker(&mut self, marker: &Table) -> Result<Anchor, SceneError> {
@@ -238,15 +304,48 @@ impl AnchorReader {
                 error.message += &format!(" (the ids of {})", family.name());
                 error
             })?;
+        self.own(family, id, anchor, format!("line {}", value.line()))
+            .map_err(|message| value.error(message))?;
+        Ok(id)
+    }
+
+    /// Notes that an anchor has a marker.
+    fn own(&mut self, family: Family, id: u32, anchor: &str, place: String) -> Result<(), String> {
         // However it is drawn, it is one marker to a detector.
         let seen_as = family.drawn_as(Drawing::Own);
-        match self.owners.insert((seen_as, id), (anchor.to_owned(), value.line())) {
-            Some((owner, line)) => Err(value.error(format!(
-                "marker {id} of {family} is taken by \"{owner}\" on line {line}; allowed: each marker once"
-            ))),
-            None => Ok(id),
+        match self
+            .owners
+            .insert((seen_as, id), (anchor.to_owned(), place))
+        {
+            Some((owner, place)) => Err(format!(
+                "marker {id} of {family} is taken by \"{owner}\" on {place}; allowed: each marker once"
+            )),
+            None => Ok(()),
         }
     }
+}
+
+/// A marker's place on its board: in the plane with two numbers and one turn, anywhere with three.
+fn place_on_board(entry: &Table) -> Result<DAffine3, SceneError> {
+    let center = ON_BOARD.center_m.require(entry)?;
+    let in_plane =
+        |value: &Value| !value.is_array() || value.array("numbers").is_ok_and(|all| all.len() == 2);
+    let center_m = match in_plane(&center) {
+        true => DVec2::from_array(center.numbers(&CENTER)?).extend(0.0),
+        false => DVec3::from_array(center.numbers(&CENTER)?),
+    };
+    let rotation = ON_BOARD.rotation_deg.value(entry);
+    Ok(match rotation {
+        Some(value) if value.is_array() => {
+            let rotation_deg = DVec3::from_array(value.numbers(&ANGLE)?);
+            DAffine3::from_rotation_translation(turn(rotation_deg), center_m)
+        }
+        Some(value) => {
+            let rotation_rad = value.number(&ANGLE)?.to_radians();
+            DAffine3::from_mat3_translation(DMat3::from_rotation_z(rotation_rad), center_m)
+        }
+        None => DAffine3::from_translation(center_m),
+    })
 }
 
 /// A name that no other of its kind has.

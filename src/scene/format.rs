@@ -3,8 +3,8 @@
 use super::schema::section::Section;
 
 pub use super::anchors::{
-    ANCHOR_NAME, BOARD, BOARD_MARKER_SECTION, BOARD_SECTION, MARKER, MARKER_SECTION, ON_BOARD,
-    PRINTED,
+    ANCHOR_NAME, BOARD, BOARD_MARKER_SECTION, BOARD_SECTION, CENTER, MARKER, MARKER_SECTION,
+    ON_BOARD, PRINTED,
 };
 pub use super::camera::{CAMERA, CAMERA_SECTION};
 pub use super::lights::{

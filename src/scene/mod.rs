@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::{DAffine3, DVec2, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec2, DVec3, Vec3};
 
 use crate::geometry::mesh::{Mesh, MeshReport};
 use crate::light::probe::Probe;
@@ -16,10 +16,12 @@ pub use crate::shafts::difference::Difference;
 pub mod schema;
 
 mod anchors;
+mod bundle;
 mod camera;
 mod compact;
 mod dictionary;
 mod error;
+mod faces;
 mod family;
 pub mod format;
 pub mod gltf;
@@ -52,11 +54,13 @@ mod texture_file;
 mod tracking;
 mod transport;
 mod vertex_colors;
+pub mod yaml;
 
 pub use camera::{CameraSettings, PixelFormat, WantedFormat};
 pub use compact::{ProbeLight, ProbeLightKind, SplitLight};
 pub use dictionary::Dictionary;
 pub use error::{SceneError, TextPlace};
+pub use faces::Face;
 pub use family::{Codes, Drawing, Family, Ink};
 pub use lights::{SceneLight, unit_direction};
 pub use load::Reading;
@@ -120,10 +124,9 @@ pub struct Marker {
     pub id: u32,
     /// Side of the black square, metres.
     pub size_m: f64,
-    /// Its centre in the anchor's frame, metres.
-    pub center_m: DVec2,
-    /// Counter-clockwise turn in the board's plane, radians.
-    pub rotation_rad: f64,
+    /// A turn and a shift, metres. The marker's own frame: origin at its centre, x right, y up as printed, z towards
+    /// whoever reads it.
+    pub anchor_from_marker: DAffine3,
 }
 
 impl Marker {
@@ -133,13 +136,70 @@ impl Marker {
             family,
             id,
             size_m,
-            center_m: DVec2::ZERO,
-            rotation_rad: 0.0,
+            anchor_from_marker: DAffine3::IDENTITY,
         }
+    }
+
+    /// The marker in its anchor's plane z = 0, its centre at `center_m` (metres), turned counter-clockwise by
+    /// `rotation_rad` (radians).
+    #[must_use]
+    pub fn in_plane(self, center_m: DVec2, rotation_rad: f64) -> Self {
+        Self {
+            anchor_from_marker: DAffine3 {
+                matrix3: DMat3::from_rotation_z(rotation_rad),
+                translation: center_m.extend(0.0),
+            },
+            ..self
+        }
+    }
+
+    /// Its centre in the anchor's frame, metres.
+    pub fn center_m(&self) -> DVec3 {
+        self.anchor_from_marker.translation
+    }
+
+    /// The unit vector of the anchor's frame out of its printed side.
+    pub fn normal(&self) -> DVec3 {
+        self.anchor_from_marker.matrix3.z_axis
+    }
+
+    /// The counter-clockwise turn in the anchor's plane of a marker that faces up, radians.
+    pub fn rotation_rad(&self) -> f64 {
+        let x = self.anchor_from_marker.matrix3.x_axis;
+        x.y.atan2(x.x)
+    }
+
+    /// Its turns about x, then y, then z of the anchor's frame, degrees.
+    pub fn rotation_deg(&self) -> DVec3 {
+        placement::turns_deg(&self.anchor_from_marker.matrix3)
+    }
+
+    /// Whether it lies in its anchor's plane z = 0 and faces up, but for what a file's last decimal leaves.
+    pub fn is_in_plane(&self) -> bool {
+        const EVEN: f64 = 1e-9;
+        self.center_m().z.abs() < EVEN && self.normal().abs_diff_eq(DVec3::Z, EVEN)
+    }
+
+    /// Its corners in the anchor's frame, metres: top left, top right, bottom right, bottom left as printed.
+    pub fn corners_m(&self) -> [DVec3; 4] {
+        let half_m = self.size_m / 2.0;
+        [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)].map(|(x, y)| {
+            let corner_m = DVec3::new(x, y, 0.0) * half_m;
+            self.anchor_from_marker.transform_point3(corner_m)
+        })
+    }
+
+    /// Its size and its distance from the anchor's origin made larger by a factor.
+    #[must_use]
+    pub fn stretched(mut self, factor: f64) -> Self {
+        self.size_m *= factor;
+        self.anchor_from_marker.translation *= factor;
+        self
     }
 }
 
-/// A board of markers or a lone marker, with its own frame (x right, y up as printed, z towards the viewer).
+/// A board of markers or a lone marker, with its own frame. That of what is flat has x right, y up as printed, z towards the
+/// viewer; that of a board in space is whatever its markers are placed in.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Anchor {
     /// Its name, unique in the scene.
@@ -155,6 +215,11 @@ impl Anchor {
             name,
             markers: vec![Marker::alone(family, id, size_m)],
         }
+    }
+
+    /// Whether all of its markers lie in one plane, wherever that is, and face the same way.
+    pub fn is_flat(&self) -> bool {
+        Face::all_of(&self.markers).len() < 2
     }
 }
 

@@ -18,17 +18,20 @@ pub enum FileKind {
     Probe,
     /// A dictionary of markers (YAML).
     Dictionary,
+    /// Bundles of markers (YAML).
+    Bundles,
 }
 
 impl FileKind {
     /// All of them.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Recording,
         Self::Calibration,
         Self::Mesh,
         Self::RoomMesh,
         Self::Probe,
         Self::Dictionary,
+        Self::Bundles,
     ];
 
     /// What is expected, in words.
@@ -39,6 +42,7 @@ impl FileKind {
             Self::Mesh | Self::RoomMesh => "a glTF, OBJ, PLY or STL file",
             Self::Probe => "a picture in linear radiance, .hdr or .exr",
             Self::Dictionary => "a dictionary of markers, .yml",
+            Self::Bundles => "bundles of tags as apriltag_ros has them, .yaml",
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Where things stand: keys that several tables have.
 
-use glam::{DAffine3, DMat3, DQuat, DVec3};
+use glam::{DAffine3, DMat3, DQuat, DVec3, EulerRot};
 
 use super::error::SceneError;
 use super::ranges::{Digits, Numbers};
@@ -65,6 +65,12 @@ impl Placement {
 pub fn turn(rotation_deg: DVec3) -> DQuat {
     let [x, y, z] = rotation_deg.to_array().map(f64::to_radians);
     DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x)
+}
+
+/// The turns about x, then y, then z that come to a rotation, degrees: what [`turn`] is the way back from.
+pub fn turns_deg(rotation: &DMat3) -> DVec3 {
+    let (z, y, x) = DQuat::from_mat3(rotation).to_euler(EulerRot::ZYX);
+    DVec3::new(x, y, z).map(f64::to_degrees)
 }
 
 /// Reads it.

@@ -303,13 +303,7 @@ mod tests {
 
     /// An edge between large cells, which goes from black to white.
     fn edge() -> TemplateEdge {
-        let marker = Marker {
-            family: Family::TAG16H5,
-            id: 0,
-            size_m: 1.0,
-            center_m: DVec2::ZERO,
-            rotation_rad: 0.0,
-        };
+        let marker = Marker::alone(Family::TAG16H5, 0, 1.0);
         // Black, two columns of it, then white.
         let cells = (0..16).map(|k| if k % 4 > 1 { Cell::White } else { Cell::Black });
         let template = MarkerTemplate::new(&marker, PrintedMarker::new(4, cells.collect()));

@@ -1,13 +1,14 @@
 //! The flipped pose of a plane: the other one of its two.
 //!
 //! A plane seen from afar, or a small one, has two poses that put its points in nearly the same places (Collins and
-//! Bartoli, IJCV 2014). The edges of the markers say by how much the picture prefers one of them.
+//! Bartoli, IJCV 2014). The edges of the markers say by how much the picture prefers one of them. Markers in two planes have
+//! one pose, unless hardly anything of one of them is seen.
 
 use glam::DAffine3;
 
 use super::marker_template::MarkerTemplate;
 use super::pixel_pose::{MeasuredEdge, PixelPose, pixel_of, project};
-use super::pose::{CornerObservation, ippe_starts};
+use super::pose_starts::{CornerObservation, starts};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::least_squares::{NormalEquations, Problem, gauss_newton};
 use crate::geometry::pose::{PoseStep, moved, rotation_between};
@@ -36,39 +37,50 @@ pub(super) fn flipped_pose_of(
 ) -> Option<FlippedPose> {
     let here = &pose.camera_from_anchor;
     let seen = templates.iter().zip(&pose.seen).filter(|(_, seen)| **seen);
-    let corners_m = seen.flat_map(|(template, _)| template.corners_m());
+    let seen: Vec<&MarkerTemplate> = seen.map(|(template, _)| template).collect();
+    let corners_m = seen.iter().flat_map(|template| template.corners_m());
     let observations: Option<Vec<CornerObservation>> = corners_m
-        .map(|corner_m| {
-            let point_m = corner_m.extend(0.0);
+        .map(|point_m| {
             let pixel = intrinsics.undistorted_pixel_of(here.transform_point3(point_m))?;
             Some(CornerObservation { point_m, pixel })
         })
         .collect();
-    let start = ippe_starts(intrinsics, &observations?)?
-        .into_iter()
-        .max_by(|a, b| rotation_between(a, here).total_cmp(&rotation_between(b, here)))?;
-    if rotation_between(&start, here) < SAME {
-        return None;
-    }
-    // Both are held against the same edges where they explain them best.
-    let here = refined(pose, intrinsics, *here)?;
-    let is_other = |other: &DAffine3| rotation_between(other, &here) >= SAME;
-    // Where the error has one minimum, the other pose is no worse than the edges say of it.
-    let other = refined(pose, intrinsics, start)
-        .filter(is_other)
-        .unwrap_or(start);
+    let mut starts = starts(intrinsics, &observations?);
+    starts.retain(|start| rotation_between(start, here) >= SAME);
+    // The farthest first.
+    starts.sort_by(|a, b| rotation_between(b, here).total_cmp(&rotation_between(a, here)));
+    let first = *starts.first()?;
+    // All are held against the same edges where they explain them best.
+    let here = refined(pose, intrinsics, &seen, *here)?;
+    let others = starts.into_iter().filter_map(|start| {
+        let other = refined(pose, intrinsics, &seen, start)?;
+        (rotation_between(&other, &here) >= SAME).then_some(other)
+    });
     let edges = &pose.edges;
+    let with_error = |other: DAffine3| {
+        let there = distances(edges, intrinsics, &other)?;
+        Some((other, error(edges, &there), there))
+    };
+    let best = others
+        .filter_map(with_error)
+        .min_by(|a, b| a.1.total_cmp(&b.1));
+    // Where the error has one minimum, the other pose is no worse than the edges say of it.
+    let (other, other_error, there) = best.or_else(|| with_error(first))?;
     let here = distances(edges, intrinsics, &here)?;
-    let there = distances(edges, intrinsics, &other)?;
     Some(FlippedPose {
         camera_from_anchor: other,
-        odds: 0.5 * (error(edges, &there) - error(edges, &here)) / pose.excess,
+        odds: 0.5 * (other_error - error(edges, &here)) / pose.excess,
         rms_px: (there.iter().map(|px| px * px).sum::<f64>() / there.len() as f64).sqrt(),
     })
 }
 
 /// The pose near `start` that fits the edges best, each with the weight that it has.
-fn refined(pose: &PixelPose, intrinsics: &Intrinsics, start: DAffine3) -> Option<DAffine3> {
+fn refined(
+    pose: &PixelPose,
+    intrinsics: &Intrinsics,
+    seen: &[&MarkerTemplate],
+    start: DAffine3,
+) -> Option<DAffine3> {
     const ROUNDS: usize = 8;
     let start = FitToEdges {
         edges: &pose.edges,
@@ -76,7 +88,7 @@ fn refined(pose: &PixelPose, intrinsics: &Intrinsics, start: DAffine3) -> Option
         place: start,
     };
     let FitToEdges { place, .. } = gauss_newton(start, ROUNDS)?;
-    let faces = place.matrix3.z_axis.dot(place.translation) < 0.0;
+    let faces = seen.iter().all(|template| template.facing(&place) > 0.0);
     (place.is_finite() && faces).then_some(place)
 }
 

@@ -1,7 +1,8 @@
 //! An anchor's markers and where a detector saw them: a first pose, from corners.
 
-use glam::{DAffine3, DVec2};
+use glam::{DAffine3, DMat3, DVec2, DVec3};
 
+use super::cover::Cover;
 use super::marker_template::MarkerTemplate;
 use super::pixel_pose::pixel_of;
 use super::pose::{self, CornerObservation, Solutions};
@@ -9,7 +10,7 @@ use super::printed_marker::PrintedMarker;
 use super::{Detection, LossReason, TrackingError};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::matrix::Matrix;
-use crate::scene::{Anchor, Family, Marker};
+use crate::scene::{Anchor, Face, Family, Marker};
 
 /// A board's pose that leaves more than this is looked through for a marker that does not fit, pixels.
 const SUSPICIOUS_RMS_PX: f64 = 1.5;
@@ -24,6 +25,8 @@ const SAME_PART: f64 = 0.25;
 pub(super) struct Layout {
     markers: Vec<Marker>,
     quarter_turns: u32,
+    /// Whether they lie in one plane.
+    is_flat: bool,
     /// The markers' templates, in the same order.
     pub(super) templates: Vec<MarkerTemplate>,
 }
@@ -66,23 +69,28 @@ impl Layout {
     }
 
     fn of(markers: Vec<Marker>, quarter_turns: u32) -> Result<Self, TrackingError> {
-        let templates = markers.iter().map(|marker| {
-            Ok(MarkerTemplate::new(
-                marker,
-                PrintedMarker::of(marker.family, marker.id)?,
-            ))
+        let is_flat = Face::all_of(&markers).len() < 2;
+        let templates = markers.iter().enumerate().map(|(index, marker)| {
+            let printed = PrintedMarker::of(marker.family, marker.id)?;
+            let mut template = MarkerTemplate::new(marker, printed);
+            if !is_flat {
+                template.covers = Cover::of(&markers, index);
+            }
+            Ok(template)
         });
         Ok(Self {
             templates: templates.collect::<Result<_, TrackingError>>()?,
             markers,
             quarter_turns,
+            is_flat,
         })
     }
 
     /// The layout with each of its markers turned once more about its own middle.
     pub(super) fn turned_once_more(&self) -> Result<Self, TrackingError> {
+        let quarter = DAffine3::from_mat3(DMat3::from_cols(DVec3::Y, -DVec3::X, DVec3::Z));
         let turned = self.markers.iter().map(|marker| Marker {
-            rotation_rad: marker.rotation_rad + std::f64::consts::FRAC_PI_2,
+            anchor_from_marker: marker.anchor_from_marker * quarter,
             ..*marker
         });
         Self::of(turned.collect(), (self.quarter_turns + 1) % 4)
@@ -91,6 +99,11 @@ impl Layout {
     /// By how many quarter turns, counter-clockwise, its markers are turned against what the scene says.
     pub(super) fn quarter_turns(&self) -> u32 {
         self.quarter_turns
+    }
+
+    /// Whether its markers lie in one plane, which has two poses.
+    pub(super) fn is_flat(&self) -> bool {
+        self.is_flat
     }
 
     /// The family of a template's marker.
@@ -247,10 +260,10 @@ fn is_near(
 
 impl SeenMarker {
     /// `None` where the lens distortion has no inverse.
-    fn new(intrinsics: &Intrinsics, corners_m: [DVec2; 4], corners_px: [DVec2; 4]) -> Option<Self> {
+    fn new(intrinsics: &Intrinsics, corners_m: [DVec3; 4], corners_px: [DVec2; 4]) -> Option<Self> {
         let [a, b, c, d] = std::array::from_fn(|k| {
             Some(CornerObservation {
-                point_m: corners_m[k].extend(0.0),
+                point_m: corners_m[k],
                 pixel: intrinsics.undistorted_pixel(corners_px[k])?,
             })
         });

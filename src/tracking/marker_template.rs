@@ -1,9 +1,10 @@
-//! What a printed marker looks like: its cells, and the edges between black and white ones, in its anchor's plane.
+//! What a printed marker looks like: its cells, and the edges between black and white ones, in its anchor's space.
 
 use std::cell::OnceCell;
 
-use glam::DVec2;
+use glam::{DAffine3, DVec3};
 
+use super::cover::Cover;
 use super::expected_picture::ExpectedPicture;
 use super::printed_marker::{Cell, PrintedMarker};
 use crate::scene::Marker;
@@ -13,7 +14,7 @@ pub(super) const ROWS: usize = 3;
 /// Columns of cells that an edge knows: two to either side of it.
 pub(super) const COLUMNS: usize = 4;
 
-/// A marker as printed, placed in the plane of its anchor.
+/// A marker as printed, placed in the space of its anchor.
 pub(super) struct MarkerTemplate {
     /// Cells a side of the square whose corners are found.
     pub side: i32,
@@ -22,22 +23,26 @@ pub(super) struct MarkerTemplate {
     /// What a blurred picture of them is, once one was read.
     pub expected: OnceCell<ExpectedPicture>,
     /// Top left corner of that square, metres.
-    corner_m: DVec2,
+    corner_m: DVec3,
     /// A step of one cell to the right, metres.
-    right_m: DVec2,
+    right_m: DVec3,
     /// A step of one cell down, metres.
-    down_m: DVec2,
+    down_m: DVec3,
+    /// A unit vector out of its printed side.
+    pub normal: DVec3,
+    /// Markers of its anchor that may lie between it and a camera that it faces.
+    pub covers: Vec<Cover>,
     pub edges: Vec<TemplateEdge>,
 }
 
 /// One cell's length of the boundary between a black and a white cell.
 pub(super) struct TemplateEdge {
-    /// The edge's middle in the anchor's plane, metres.
-    pub point_m: DVec2,
+    /// The edge's middle in the anchor's space, metres.
+    pub point_m: DVec3,
     /// A step of one cell across it, metres.
-    pub across_m: DVec2,
+    pub across_m: DVec3,
     /// A step of one cell along it, metres.
-    pub along_m: DVec2,
+    pub along_m: DVec3,
     /// Whether a step across goes from black to white.
     pub brightens: bool,
     /// Whiteness (0 or 1) of the cells around, row by row along the edge, columns across it.
@@ -45,19 +50,24 @@ pub(super) struct TemplateEdge {
 }
 
 impl MarkerTemplate {
-    /// A marker's template in its anchor's plane.
+    /// A marker's template in its anchor's space.
     pub fn new(marker: &Marker, printed: PrintedMarker) -> Self {
         let side = printed.side();
-        let turn = DVec2::from_angle(marker.rotation_rad);
+        let DAffine3 {
+            matrix3: turn,
+            translation: center_m,
+        } = marker.anchor_from_marker;
         let half_m = marker.size_m / 2.0;
         let cell_m = marker.size_m / f64::from(side);
         let mut template = Self {
             side,
             printed,
             expected: OnceCell::new(),
-            corner_m: marker.center_m + turn.rotate(DVec2::new(-half_m, half_m)),
-            right_m: turn.rotate(DVec2::new(cell_m, 0.0)),
-            down_m: turn.rotate(DVec2::new(0.0, -cell_m)),
+            corner_m: center_m + turn * DVec3::new(-half_m, half_m, 0.0),
+            right_m: turn * DVec3::new(cell_m, 0.0, 0.0),
+            down_m: turn * DVec3::new(0.0, -cell_m, 0.0),
+            normal: turn.z_axis,
+            covers: Vec::new(),
             edges: Vec::new(),
         };
         let rim = template.printed.rim();
@@ -79,22 +89,30 @@ impl MarkerTemplate {
         }
     }
 
-    /// A place in cells from the square's top left corner, in the anchor's plane, metres.
-    pub fn point_m(&self, column: f64, row: f64) -> DVec2 {
+    /// A place in cells from the square's top left corner, in the anchor's space, metres.
+    pub fn point_m(&self, column: f64, row: f64) -> DVec3 {
         self.corner_m + self.right_m * column + self.down_m * row
     }
 
     /// The middle of the square, metres.
-    pub fn center_m(&self) -> DVec2 {
+    pub fn center_m(&self) -> DVec3 {
         let middle = 0.5 * f64::from(self.side);
         self.point_m(middle, middle)
     }
 
     /// Corners of the square: top left, top right, bottom right, bottom left; metres.
-    pub fn corners_m(&self) -> [DVec2; 4] {
+    pub fn corners_m(&self) -> [DVec3; 4] {
         let side = f64::from(self.side);
         [(0.0, 0.0), (side, 0.0), (side, side), (0.0, side)]
             .map(|(column, row)| self.point_m(column, row))
+    }
+
+    /// The cosine of the angle between the way out of its printed side and the way to the camera; negative where that sees
+    /// its back.
+    pub fn facing(&self, camera_from_anchor: &DAffine3) -> f64 {
+        let center_m = camera_from_anchor.transform_point3(self.center_m());
+        let toward_viewer = camera_from_anchor.matrix3 * self.normal;
+        -toward_viewer.dot(center_m) / center_m.length()
     }
 
     /// The edge left of the cell (line, row), or, `level`, above the cell (row, line); `None` between like cells.
@@ -132,18 +150,15 @@ impl MarkerTemplate {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec2;
+
     use super::*;
     use crate::scene::Family;
 
     /// Three by three cells, the middle one white.
     fn ring(rotation_rad: f64) -> MarkerTemplate {
-        let marker = Marker {
-            family: Family::TAG16H5,
-            id: 0,
-            size_m: 0.3,
-            center_m: DVec2::new(1.0, 2.0),
-            rotation_rad,
-        };
+        let marker = Marker::alone(Family::TAG16H5, 0, 0.3);
+        let marker = marker.in_plane(DVec2::new(1.0, 2.0), rotation_rad);
         let cell = |k| if k == 4 { Cell::White } else { Cell::Black };
         MarkerTemplate::new(&marker, PrintedMarker::new(3, (0..9).map(cell).collect()))
     }
@@ -155,8 +170,9 @@ mod tests {
         assert_eq!(template.edges.len(), 16);
         for edge in &template.edges {
             let step = 0.25 * edge.across_m;
-            let white = |point_m: DVec2| {
-                let cell = ((point_m - template.corner_m) * DVec2::new(10.0, -10.0)).floor();
+            let white = |point_m: DVec3| {
+                let from_corner_m = (point_m - template.corner_m).truncate();
+                let cell = (from_corner_m * DVec2::new(10.0, -10.0)).floor();
                 template.is_white(cell.x as i32, cell.y as i32).unwrap()
             };
             assert_eq!(white(edge.point_m + step), edge.brightens);
@@ -172,10 +188,13 @@ mod tests {
     #[test]
     fn corners_turn_with_the_print() {
         let [top_left, _, bottom_right, _] = ring(0.0).corners_m();
-        assert!(top_left.distance(DVec2::new(0.85, 2.15)) < 1e-12);
-        assert!(bottom_right.distance(DVec2::new(1.15, 1.85)) < 1e-12);
+        assert!(top_left.distance(DVec3::new(0.85, 2.15, 0.0)) < 1e-12);
+        assert!(bottom_right.distance(DVec3::new(1.15, 1.85, 0.0)) < 1e-12);
         let [turned, ..] = ring(std::f64::consts::FRAC_PI_2).corners_m();
-        assert!(turned.distance(DVec2::new(0.85, 1.85)) < 1e-12, "{turned}");
-        assert!(ring(0.3).center_m().distance(DVec2::new(1.0, 2.0)) < 1e-12);
+        assert!(
+            turned.distance(DVec3::new(0.85, 1.85, 0.0)) < 1e-12,
+            "{turned}"
+        );
+        assert!(ring(0.3).center_m().distance(DVec3::new(1.0, 2.0, 0.0)) < 1e-12);
     }
 }

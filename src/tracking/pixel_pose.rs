@@ -9,6 +9,7 @@
 use glam::{DAffine3, DMat2, DVec2, DVec3};
 
 use super::condition::Condition;
+use super::cover::HiddenPart;
 use super::edge_fit::{BlurError, EdgeView, fit_edge};
 use super::light::Grey;
 use super::marker_template::MarkerTemplate;
@@ -43,6 +44,9 @@ const FITTING: f64 = 0.3;
 const SEEN_SHARE: f64 = 0.4;
 /// The number of a marker's edges that must fit for it to be seen.
 const SEEN_EDGES: usize = 10;
+/// The least cosine between the way out of a marker's face and the way to the camera for its edges to be looked for: those
+/// of a face that is seen along itself, or from behind, are not there.
+const LEAST_FACING: f64 = 0.03;
 /// The largest part of a marker's edges that may be the wrong way round: of a marker that is not there, half are.
 const MOST_REVERSED: f64 = 0.15;
 
@@ -71,8 +75,8 @@ impl PixelPose {
 /// An edge of a marker as one picture shows it.
 pub(super) struct MeasuredEdge {
     template: usize,
-    /// The edge's middle in the anchor's plane, metres.
-    pub(super) point_m: DVec2,
+    /// The edge's middle in the anchor's space, metres.
+    pub(super) point_m: DVec3,
     /// Where a point of the edge was seen, distorted pixels; that the ink spills or the marker is of another size is taken out.
     pub(super) seen_px: DVec2,
     /// A unit vector of the picture across the edge.
@@ -114,26 +118,26 @@ impl AnchorPoint {
     }
 }
 
-/// Where a pose puts a point of the anchor's plane; `None` behind the camera.
+/// Where a pose puts a point of the anchor; `None` behind the camera.
 pub(super) fn project(
     intrinsics: &Intrinsics,
     camera_from_anchor: &DAffine3,
-    point_m: DVec2,
+    point_m: DVec3,
 ) -> Option<AnchorPoint> {
-    let turned_m = camera_from_anchor.matrix3 * point_m.extend(0.0);
+    let turned_m = camera_from_anchor.matrix3 * point_m;
     Some(AnchorPoint {
         projection: intrinsics.project(turned_m + camera_from_anchor.translation)?,
         turned_m,
     })
 }
 
-/// The distorted pixel of a point of the anchor's plane; `None` behind the camera.
+/// The distorted pixel of a point of the anchor; `None` behind the camera.
 pub(super) fn pixel_of(
     intrinsics: &Intrinsics,
     camera_from_anchor: &DAffine3,
-    point_m: DVec2,
+    point_m: DVec3,
 ) -> Option<DVec2> {
-    intrinsics.pixel_of(camera_from_anchor.transform_point3(point_m.extend(0.0)))
+    intrinsics.pixel_of(camera_from_anchor.transform_point3(point_m))
 }
 
 /// The pose near `start` that puts the edges of the markers where the picture has them. `None` when too few edges are
@@ -223,15 +227,23 @@ fn measure(
 ) {
     let (known, mut reversed) = (edges.len(), 0);
     let (pose, scale) = (&guess.camera_from_anchor, 1.0 + guess.size_error);
+    if template.facing(pose) < LEAST_FACING {
+        return;
+    }
+    let center_m = template.center_m();
+    let radius_m = center_m.distance(template.corners_m()[0]);
+    let hidden = HiddenPart::of(&template.covers, (center_m, radius_m), pose);
     for edge in &template.edges {
+        if hidden.has(edge.point_m) {
+            continue;
+        }
         let outward_m = edge.point_m - template.center_m();
         let point_m = template.center_m() + scale * outward_m;
         let Some(point) = project(intrinsics, pose, point_m) else {
             continue;
         };
         let expected_px = point.projection.pixel;
-        let in_picture =
-            |step_m: DVec2| point.projection.step_px(pose.matrix3 * step_m.extend(0.0));
+        let in_picture = |step_m: DVec3| point.projection.step_px(pose.matrix3 * step_m);
         let pixels_from_cells =
             scale * DMat2::from_cols(in_picture(edge.across_m), in_picture(edge.along_m));
         // The gradient of the place across.

@@ -1,25 +1,17 @@
-//! The pose of a planar anchor from its corners: a homography, its two decompositions (IPPE), both refined by
+//! The pose of an anchor from the corners of its markers: where it may be (`pose_starts.rs`), refined by
 //! Levenberg-Marquardt on the pixel error.
 //!
-//! T. Collins and A. Bartoli, "Infinitesimal plane-based pose estimation", IJCV 2014. A plane seen from afar has two
-//! poses that explain the picture about equally well; both are kept, and how sure the better one is.
+//! A plane seen from afar has two poses that explain the picture about equally well; both are kept, and how sure the better
+//! one is. Two planes have one.
 
-use glam::{DAffine3, DMat2, DMat3, DVec2, DVec3};
+use glam::{DAffine3, DVec3};
 
+pub(super) use super::pose_starts::CornerObservation;
+use super::pose_starts::{normal_of, starts};
 use crate::geometry::camera::Intrinsics;
-use crate::geometry::homography::{PointScale, linear_homography};
 use crate::geometry::least_squares::{LevenbergMarquardt, Minimum, NormalEquations, Problem};
 use crate::geometry::matrix::Matrix;
 use crate::geometry::pose::{PoseStep, by_step, moved, rotation_between};
-
-/// A point of an anchor and where it was seen.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct CornerObservation {
-    /// The point in the anchor's space, metres; z = 0 in its plane.
-    pub(super) point_m: DVec3,
-    /// Undistorted pixel.
-    pub(super) pixel: DVec2,
-}
 
 /// A pose and how well it explains the observations.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,22 +44,23 @@ const CORNER_NOISE_PX: f64 = 0.2;
 /// variance σ² the odds of two poses are exp(difference of their squared errors / 2σ²).
 const DECISIVE: f64 = 9.2;
 
-/// The two poses of a plane. `None` when no pose in front of the camera, facing it, explains the observations.
+/// The two poses of a plane, or the best two of what is not flat. The observations are markers' corners, four by four, as
+/// printed from the top left clockwise. `None` when no pose in front of the camera, to which all of them face, explains them.
 pub(super) fn solve(
     intrinsics: &Intrinsics,
     observations: &[CornerObservation],
 ) -> Option<Solutions> {
-    let starts = ippe_starts(intrinsics, observations)?;
-    let mut solutions = starts
+    let mut solutions = starts(intrinsics, observations)
         .into_iter()
         .filter_map(|start| refine(intrinsics, observations, start))
         .filter(|solution| is_seen_from_the_front(&solution.camera_from_anchor, observations))
         .collect::<Vec<_>>();
     solutions.sort_by(|a, b| a.squared_error_px.total_cmp(&b.squared_error_px));
     let best = *solutions.first()?;
-    let alternative = solutions.get(1).copied().filter(|other| {
+    let is_other = |other: &&Solution| {
         rotation_between(&best.camera_from_anchor, &other.camera_from_anchor) > 1e-4
-    });
+    };
+    let alternative = solutions[1..].iter().find(is_other).copied();
     let degrees_of_freedom = (2 * observations.len()).saturating_sub(6).max(1) as f64;
     let variance =
         (best.squared_error_px / degrees_of_freedom).max(CORNER_NOISE_PX * CORNER_NOISE_PX);
@@ -84,101 +77,16 @@ fn is_seen_from_the_front(
     camera_from_anchor: &DAffine3,
     observations: &[CornerObservation],
 ) -> bool {
-    let toward_viewer = camera_from_anchor.matrix3.z_axis;
-    observations.iter().all(|observation| {
-        let in_camera = camera_from_anchor.transform_point3(observation.point_m);
-        in_camera.z > 0.0 && toward_viewer.dot(in_camera) < 0.0
-    })
-}
-
-/// The two poses that the homography's derivative at the points' centre allows (IPPE, section 4); the points must lie in
-/// the anchor's plane.
-pub(super) fn ippe_starts(
-    intrinsics: &Intrinsics,
-    observations: &[CornerObservation],
-) -> Option<[DAffine3; 2]> {
-    let in_plane = |observation: &CornerObservation| observation.point_m.truncate();
-    let scale = PointScale::of(observations.iter().map(in_plane));
-    let pairs = observations
-        .iter()
-        .map(|observation| {
-            (
-                scale.scaled(in_plane(observation)),
-                intrinsics.plane_from_pixel(observation.pixel),
-            )
+    observations.chunks(4).all(|corners| {
+        let Some(normal) = normal_of(corners) else {
+            return false;
+        };
+        let toward_viewer = camera_from_anchor.matrix3 * normal;
+        corners.iter().all(|observation| {
+            let in_camera = camera_from_anchor.transform_point3(observation.point_m);
+            in_camera.z > 0.0 && toward_viewer.dot(in_camera) < 0.0
         })
-        .collect::<Vec<_>>();
-    let homography = linear_homography(&pairs)?;
-    // The picture of the centre, and the derivative there.
-    let center = homography.z_axis;
-    let image_center = center.truncate() / center.z;
-    let derivative = |column: DVec3| (column.truncate() - image_center * column.z) / center.z;
-    let jacobian = DMat2::from_cols(derivative(homography.x_axis), derivative(homography.y_axis));
-    let rotations = ippe_rotations(image_center, jacobian)?;
-    let mut poses = [DAffine3::IDENTITY; 2];
-    for (pose, rotation) in poses.iter_mut().zip(rotations) {
-        let translation_m = translation_for(intrinsics, observations, &rotation)?;
-        *pose = DAffine3::from_mat3_translation(rotation, translation_m);
-    }
-    Some(poses)
-}
-
-/// The two rotations of a plane whose centre is seen at `image_center` with the derivative `jacobian` (up to scale).
-fn ippe_rotations(image_center: DVec2, jacobian: DMat2) -> Option<[DMat3; 2]> {
-    // The rotation that turns the optical axis to the centre's ray.
-    let ray = image_center.extend(1.0).normalize();
-    let axis_to_ray = glam::DMat3::from_quat(glam::DQuat::from_rotation_arc(DVec3::Z, ray));
-    let seen = |column: DVec3| column.truncate() - image_center * column.z;
-    let basis = DMat2::from_cols(seen(axis_to_ray.x_axis), seen(axis_to_ray.y_axis));
-    let scaled = basis.inverse() * jacobian;
-    // The largest singular value is what remains of the depth.
-    let (rows_x, rows_y) = (scaled.row(0), scaled.row(1));
-    let (xx, xy, yy) = (
-        rows_x.length_squared(),
-        rows_x.dot(rows_y),
-        rows_y.length_squared(),
-    );
-    let largest = (0.5 * (xx + yy + ((xx - yy).powi(2) + 4.0 * xy * xy).sqrt())).sqrt();
-    if !(largest.is_finite() && largest > 0.0) {
-        return None;
-    }
-    let upper = scaled * (1.0 / largest);
-    // Unit columns that are perpendicular give the last row up to its sign.
-    let first = (1.0 - upper.x_axis.length_squared()).max(0.0).sqrt();
-    let second = (1.0 - upper.y_axis.length_squared()).max(0.0).sqrt();
-    let second = if upper.x_axis.dot(upper.y_axis) > 0.0 {
-        -second
-    } else {
-        second
-    };
-    let rotation = |sign: f64| {
-        let x = upper.x_axis.extend(sign * first);
-        let y = upper.y_axis.extend(sign * second);
-        let x = x.normalize();
-        let y = (y - x * x.dot(y)).normalize();
-        axis_to_ray * DMat3::from_cols(x, y, x.cross(y))
-    };
-    let rotations = [rotation(1.0), rotation(-1.0)];
-    rotations
-        .iter()
-        .all(|rotation| rotation.is_finite())
-        .then_some(rotations)
-}
-
-/// The translation that fits best, linearly, once the rotation is known.
-fn translation_for(
-    intrinsics: &Intrinsics,
-    observations: &[CornerObservation],
-    rotation: &DMat3,
-) -> Option<DVec3> {
-    let mut equations = NormalEquations::<3>::ZERO;
-    for observation in observations {
-        let image = intrinsics.plane_from_pixel(observation.pixel);
-        let turned = *rotation * observation.point_m;
-        equations.add(&[1.0, 0.0, -image.x], image.x * turned.z - turned.x);
-        equations.add(&[0.0, 1.0, -image.y], image.y * turned.z - turned.y);
-    }
-    equations.solve().map(DVec3::from)
+    })
 }
 
 /// A pose that is moved to where it explains the observations.
@@ -299,7 +207,7 @@ pub(super) fn covariance(
 
 #[cfg(test)]
 mod tests {
-    use glam::DQuat;
+    use glam::{DQuat, DVec2};
 
     use super::*;
     use crate::geometry::camera::Distortion;

@@ -4,7 +4,7 @@
 //! the marker. The shift of the prediction under which they say so most clearly is where the marker is; when hardly one
 //! objects it *is* that marker, since a picture of anything else obeys about half of them.
 
-use glam::{DAffine3, DVec2};
+use glam::{DAffine3, DVec2, DVec3};
 
 use super::light::Grey;
 use super::marker_template::MarkerTemplate;
@@ -46,7 +46,7 @@ pub(super) fn find_shift(
     pose: &DAffine3,
     reach: &Reach,
 ) -> Option<DVec2> {
-    let place = |point_m: DVec2| pixel_of(intrinsics, pose, point_m);
+    let place = |point_m: DVec3| pixel_of(intrinsics, pose, point_m);
     let corners = template.corners_m().map(place);
     let [Some(a), Some(b), Some(c), Some(d)] = corners else {
         return None;
@@ -68,7 +68,7 @@ pub(super) fn find_shift(
         DVec2::new(width - 1.0, height - 1.0) - margin,
     );
     let row = picture.size_px[0] as i32;
-    let index = |point_m: DVec2| {
+    let index = |point_m: DVec3| {
         let pixel = place(point_m)?.round();
         let inside = pixel.cmpge(low).all() && pixel.cmple(high).all();
         inside.then(|| pixel.y as i32 * row + pixel.x as i32)

@@ -258,7 +258,7 @@ impl TrackedAnchor {
             for point_m in template.corners_m() {
                 let distorted_px = pixel_of(intrinsics, &pose, point_m)? + *shift;
                 observations.push(CornerObservation {
-                    point_m: point_m.extend(0.0),
+                    point_m,
                     pixel: intrinsics.undistorted_pixel(distorted_px)?,
                 });
             }
@@ -283,14 +283,42 @@ impl TrackedAnchor {
         )
     }
 
+    /// The flipped pose of a board in space instead of `fitted`, where the picture has more of its markers there: of a cube
+    /// of which one face is read, the wrong one of that face's poses shows faces that are not there.
+    fn with_more_faces(
+        &mut self,
+        picture: Grey<'_>,
+        intrinsics: &Intrinsics,
+        fitted: PixelPose,
+    ) -> PixelPose {
+        if self.layout.is_flat() {
+            return fitted;
+        }
+        let flipped = flipped_pose_of(&fitted, intrinsics, &self.layout.templates);
+        let doubtful = flipped.filter(|flipped| flipped.odds < MOST_ODDS);
+        let condition = self.condition;
+        let other = doubtful.and_then(|flipped| {
+            self.fit(picture, intrinsics, flipped.camera_from_anchor)
+                .filter(|other| other.markers() > fitted.markers())
+        });
+        match other {
+            Some(other) => other,
+            None => {
+                self.condition = condition;
+                fitted
+            }
+        }
+    }
+
     /// Takes a pose of this frame for the anchor's, or the flipped one, as this frame and the earlier ones say.
     pub(super) fn take(
         &mut self,
         picture: Grey<'_>,
         intrinsics: &Intrinsics,
-        mut fitted: PixelPose,
+        fitted: PixelPose,
         now_secs: f64,
     ) -> AnchorPose {
+        let mut fitted = self.with_more_faces(picture, intrinsics, fitted);
         let mut flipped = flipped_pose_of(&fitted, intrinsics, &self.layout.templates);
         let mut odds = flipped.map_or(MOST_ODDS, |flipped| flipped.odds);
         let turn_variance = turn_variance(&fitted.covariance);

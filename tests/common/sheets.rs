@@ -24,13 +24,7 @@ pub const WIDE_CAMERA: Intrinsics = Intrinsics {
 pub const FRAME_SECS: f64 = 1.0 / 30.0;
 
 pub fn marker(id: u32, size_m: f64, x_m: f64, y_m: f64) -> Marker {
-    Marker {
-        family: Family::TAG36H11,
-        id,
-        size_m,
-        center_m: DVec2::new(x_m, y_m),
-        rotation_rad: 0.0,
-    }
+    Marker::alone(Family::TAG36H11, id, size_m).in_plane(DVec2::new(x_m, y_m), 0.0)
 }
 
 pub fn anchor(name: &str, markers: &[Marker]) -> Anchor {
@@ -100,17 +94,8 @@ pub fn true_corners_px(
     marker: &Marker,
     camera_from_anchor: &DAffine3,
 ) -> [DVec2; 4] {
-    let half_m = marker.size_m / 2.0;
-    let turn = DVec2::from_angle(marker.rotation_rad);
-    [
-        (-half_m, half_m),
-        (half_m, half_m),
-        (half_m, -half_m),
-        (-half_m, -half_m),
-    ]
-    .map(|corner| {
-        let point_m = marker.center_m + turn.rotate(DVec2::from(corner));
-        let in_camera = camera_from_anchor.transform_point3(point_m.extend(0.0));
+    marker.corners_m().map(|corner_m| {
+        let in_camera = camera_from_anchor.transform_point3(corner_m);
         camera.pixel_from_plane(camera.distort(in_camera.truncate() / in_camera.z))
     })
 }

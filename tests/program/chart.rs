@@ -33,7 +33,7 @@ fn mistakes_are_told() {
     assert!(!unknown.status.success());
     let told = said(&unknown);
     assert!(told.contains("no such chart"), "{told}");
-    assert!(told.contains("tracking, shadows"), "{told}");
+    assert!(told.contains("tracking, footage, shadows"), "{told}");
 
     let folder = tempfile::tempdir().unwrap();
     let elsewhere = chart(folder.path(), &["--only", "tracking", "--out", "out"]);

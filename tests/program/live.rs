@@ -26,6 +26,7 @@ use gnomon::app::truth::TruePoses;
 use gnomon::app::window::Wake;
 use gnomon::capture::{Frame, FrameSource};
 use gnomon::geometry::light_placing::{LightFreedom, PosedCamera};
+use gnomon::geometry::pose::rotation_between;
 use gnomon::light::{Light, Shape};
 use gnomon::render::{Renderer, Shown};
 use gnomon::scene::{CameraSettings, Placement, Scene};
@@ -229,7 +230,7 @@ fn a_recording_is_shown_in_time_with_the_poses_of_its_own_images() {
             let markers = picture.anchors[0]
                 .markers
                 .iter()
-                .map(|m| m.center_m.extend(0.0));
+                .map(|marker| marker.center_m());
             let off = markers.map(|at_m| {
                 let at_px =
                     |pose: DAffine3| picture.intrinsics.pixel_of(pose.transform_point3(at_m));
@@ -258,6 +259,56 @@ fn a_recording_is_shown_in_time_with_the_poses_of_its_own_images() {
         idle_ms <= 1000.0 / 30.0,
         "beyond the stages' own time at most one interval of frames: {idle_ms} ms"
     );
+}
+
+#[test]
+fn a_camera_that_nobody_has_calibrated_is_learnt_while_its_frames_come() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = lamp_in(folder.path());
+    let text = std::fs::read_to_string(&path).unwrap();
+    let text = text.replace("recordings/lamp\"", "recordings/lamp/video.mp4\"");
+    std::fs::write(&path, text).unwrap();
+    let truth = TruePoses::read(&project_file("recordings/lamp")).unwrap();
+    let mut session = open(&path, folder.path(), false);
+    let state = WindowState::new();
+    let mut deviations = Vec::new();
+    let began = Instant::now();
+    while !has_ended(&session) {
+        assert!(began.elapsed() < SOON, "it ends");
+        step(&mut session, &state);
+        let Some(picture) = session.picture() else {
+            continue;
+        };
+        let learnt = picture.learnt.expect("a camera that is learnt");
+        assert_eq!(
+            learnt.intrinsics, picture.intrinsics,
+            "what is tracked with is what is told"
+        );
+        deviations.push(learnt.focal_deviation);
+        // Whatever the camera, the picture shows the board where it is.
+        let pose = &picture.poses[0];
+        let (Some(found), index) = (pose.camera_from_anchor, picture.frame.index) else {
+            continue;
+        };
+        let true_pose = truth.camera_from_anchors(index, &picture.anchors).unwrap()[0];
+        let off = rotation_between(&found, &true_pose).to_degrees();
+        assert!(off < 6.0, "frame {index}: {off}°");
+    }
+    let picture = session.picture().unwrap();
+    let learnt = picture.learnt.expect("a camera");
+    let off = learnt.intrinsics.focal_px.x / 615.0 - 1.0;
+    eprintln!("{}", learnt.in_words());
+    assert!(off.abs() < 0.03, "{}", learnt.in_words());
+    assert!(learnt.is_sure(), "{}", learnt.in_words());
+    let falls = deviations.windows(2).all(|pair| pair[1] <= pair[0]);
+    assert!(
+        falls && deviations[0] > learnt.focal_deviation,
+        "{deviations:?}"
+    );
+    let found = picture.poses[0].camera_from_anchor.expect("the board");
+    let true_pose = truth.camera_from_anchors(119, &picture.anchors).unwrap()[0];
+    let off = found.translation.distance(true_pose.translation) / true_pose.translation.length();
+    assert!(off < 0.03, "{off} of its distance");
 }
 
 #[test]

@@ -9,6 +9,7 @@ mod common;
 
 mod chart;
 mod cli;
+mod cubes;
 mod job_files;
 mod live;
 mod live_panel;

@@ -399,3 +399,109 @@ fn mistakes_say_what_is_allowed_and_leave_nothing() {
         assert_eq!(left, 0, "{arguments}");
     }
 }
+
+/// The frame of a face in the piece to fold, and what it becomes when that is folded backwards along the line between it and
+/// the face to whose right, or above or below which, it hangs.
+fn folded(front: glam::DAffine3, steps: [f64; 2], edge_m: f64) -> glam::DAffine3 {
+    let [right, up] = steps;
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let to_line = DVec3::new(right, up, 0.0) * (edge_m / 2.0);
+    let turn =
+        glam::DQuat::from_rotation_y(quarter * right) * glam::DQuat::from_rotation_x(-quarter * up);
+    front
+        * glam::DAffine3::from_translation(to_line)
+        * glam::DAffine3::from_quat(turn)
+        * glam::DAffine3::from_translation(to_line)
+}
+
+#[test]
+fn a_printed_cube_folds_into_the_board_beside_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    written(
+        folder.path(),
+        "markers --cube 55 --size-mm 41 --first-id 3 --landscape --name die --dpi 150 --out die.png",
+    );
+    let scene = scene_of(folder.path(), "die.toml", "die.png");
+    let die = &scene.anchors[0];
+    assert_eq!((die.name.as_str(), die.is_flat()), ("die", false));
+    // Where the page has each marker, as lone ones.
+    let (frame, intrinsics) = look_at(&folder.path().join("die.png"), 150.0);
+    let mut tracker =
+        Tracker::of_every_marker(&scene.tracking, (die.markers[0].family, 0.041), intrinsics)
+            .expect("a tracker");
+    let poses = tracker.track(&frame).expect("poses");
+    let on_page_m = |id: u32| {
+        let at = tracker
+            .lone_anchors()
+            .iter()
+            .position(|lone| lone.markers[0].id == id);
+        let pose = poses[at.expect("the marker")]
+            .camera_from_anchor
+            .expect("a pose");
+        pose.translation
+    };
+    let edge_m = 0.055;
+    let front = die.markers[0].anchor_from_marker;
+    // Front, right, back, left, top, bottom: each where it hangs on the one before it in the page.
+    let right = folded(front, [1.0, 0.0], edge_m);
+    let wanted = [
+        (3, front, [0.0, 0.0]),
+        (4, right, [1.0, 0.0]),
+        (5, folded(right, [1.0, 0.0], edge_m), [2.0, 0.0]),
+        (6, folded(front, [-1.0, 0.0], edge_m), [-1.0, 0.0]),
+        (7, folded(front, [0.0, 1.0], edge_m), [0.0, 1.0]),
+        (8, folded(front, [0.0, -1.0], edge_m), [0.0, -1.0]),
+    ];
+    for (marker, (id, place, steps)) in die.markers.iter().zip(wanted) {
+        assert_eq!(marker.id, id);
+        assert!(
+            marker.anchor_from_marker.abs_diff_eq(place, 1e-5),
+            "{id}: {place}"
+        );
+        let off_m = on_page_m(id) - on_page_m(3);
+        let expected_m = DVec3::new(steps[0], -steps[1], 0.0) * edge_m;
+        assert!(
+            (off_m - expected_m).truncate().length() < 3e-4,
+            "{id}: {off_m}"
+        );
+    }
+}
+
+#[test]
+fn faces_of_a_cube_that_is_too_large_for_one_piece_are_printed_one_by_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    written(
+        folder.path(),
+        "markers --cube 90 --size-mm 70 --out cube.pdf",
+    );
+    let scene = scene_of(folder.path(), "cube.toml", "cube.pdf");
+    assert_eq!(scene.anchors[0].markers.len(), 6);
+    assert!(
+        scene.anchors[0]
+            .markers
+            .iter()
+            .all(|marker| (marker.center_m().length() - 0.045).abs() < 1e-9)
+    );
+    for (arguments, part) in [
+        (
+            "markers --cube 50 --size-mm 45 --out a.pdf",
+            "--cube 50 is out of range",
+        ),
+        (
+            "markers --cube 300 --size-mm 45 --out a.pdf",
+            "does not fit",
+        ),
+        ("markers --cube 60 --out a.pdf", "--size-mm"),
+        (
+            "markers --cube 60 --size-mm 40 --first-id 585 --out a.pdf",
+            "586",
+        ),
+    ] {
+        let output = gnomon(folder.path(), arguments);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(
+            !output.status.success() && said.contains(part),
+            "{arguments}: {said}"
+        );
+    }
+}

@@ -152,7 +152,7 @@ fn markers_that_no_scene_names_stand_where_the_board_puts_them() {
             .markers
             .iter()
             .find(|marker| marker.id.to_string() == row[2]);
-        let center_m = marker.expect("a marker of the board").center_m.extend(0.0);
+        let center_m = marker.expect("a marker of the board").center_m();
         let expected_m = camera_from_board[&row[0]].transform_point3(center_m);
         off_deg.push(expected_m.angle_between(pose.translation).to_degrees());
         nearness.push(pose.translation.length() / expected_m.length());

@@ -267,7 +267,7 @@ mod edits {
             .unwrap();
         for (old, new) in old.markers.iter().zip(&document.scene().anchors[0].markers) {
             assert!((new.size_m - 0.0429).abs() < 1e-12);
-            assert!((new.center_m - old.center_m * 0.975).length() < 0.8e-5);
+            assert!((new.center_m() - old.center_m() * 0.975).length() < 0.8e-5);
         }
         assert!(
             project
@@ -389,7 +389,7 @@ mod edits {
             for (a, b) in a.markers.iter().zip(&b.markers) {
                 assert!((a.size_m - b.size_m).abs() < 0.51e-5, "{what}");
                 assert!(
-                    (a.center_m - b.center_m).abs().max_element() < 1.1e-5,
+                    (a.center_m() - b.center_m()).abs().max_element() < 1.1e-5,
                     "{what}"
                 );
             }

@@ -13,7 +13,7 @@ use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 use gnomon::app::jobs::board::board_block;
 use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::scene::{Anchor, Family, Marker, Scene, TrackingSettings};
-use gnomon::tracking::mapping::{LearntBoard, MapError, MapSettings, learn_board};
+use gnomon::tracking::mapping::{LearntBoard, MapError, MapSettings, ShapeWanted, learn_board};
 use gnomon::tracking::{Detection, Detector, grey_from_rgba};
 
 const CAMERA: Intrinsics = Intrinsics {
@@ -28,6 +28,7 @@ const SETTINGS: MapSettings = MapSettings {
     gauge: None,
     learns_sizes: false,
     plane_tolerance_m: 0.002,
+    shape: ShapeWanted::Flat,
 };
 
 /// A marker anywhere in space.
@@ -146,12 +147,20 @@ fn learn(pictures: &[Vec<Detection>], settings: &MapSettings) -> Result<LearntBo
 fn errors(learnt: &[Marker], truth: &[Marker]) -> Vec<(f64, f64)> {
     assert_eq!(learnt.len(), truth.len());
     let count = truth.len() as f64;
-    let [from_m, to_m] = [learnt, truth]
-        .map(|markers| markers.iter().map(|marker| marker.center_m).sum::<DVec2>() / count);
+    let [from_m, to_m] = [learnt, truth].map(|markers| {
+        markers
+            .iter()
+            .map(|marker| marker.center_m().truncate())
+            .sum::<DVec2>()
+            / count
+    });
     // The turn of least squares: Procrustes in the plane.
     let (mut cosine, mut sine) = (0.0, 0.0);
     for (learnt, truth) in learnt.iter().zip(truth) {
-        let (a, b) = (learnt.center_m - from_m, truth.center_m - to_m);
+        let (a, b) = (
+            learnt.center_m().truncate() - from_m,
+            truth.center_m().truncate() - to_m,
+        );
         cosine += a.dot(b);
         sine += a.perp_dot(b);
     }
@@ -161,11 +170,11 @@ fn errors(learnt: &[Marker], truth: &[Marker]) -> Vec<(f64, f64)> {
         .zip(truth)
         .map(|(learnt, truth)| {
             assert_eq!(learnt.id, truth.id);
-            let center_m = to_m + turn.rotate(learnt.center_m - from_m);
-            let rotation = turn.rotate(DVec2::from_angle(learnt.rotation_rad));
-            let off = rotation.angle_to(DVec2::from_angle(truth.rotation_rad));
+            let center_m = to_m + turn.rotate(learnt.center_m().truncate() - from_m);
+            let rotation = turn.rotate(DVec2::from_angle(learnt.rotation_rad()));
+            let off = rotation.angle_to(DVec2::from_angle(truth.rotation_rad()));
             (
-                center_m.distance(truth.center_m) * 1e3,
+                center_m.distance(truth.center_m().truncate()) * 1e3,
                 off.abs().to_degrees(),
             )
         })
@@ -180,14 +189,13 @@ fn truth(stuck: &[Stuck]) -> Vec<Marker> {
     stuck
         .iter()
         .map(|stuck| {
-            let x = stuck.world_from_marker.matrix3.x_axis;
-            Marker {
-                family: Family::TAG36H11,
-                id: stuck.id,
-                size_m: stuck.size_m,
-                center_m: stuck.world_from_marker.translation.truncate(),
-                rotation_rad: x.y.atan2(x.x),
-            }
+            let DAffine3 {
+                matrix3,
+                translation,
+            } = stuck.world_from_marker;
+            let turn_rad = matrix3.x_axis.y.atan2(matrix3.x_axis.x);
+            Marker::alone(Family::TAG36H11, stuck.id, stuck.size_m)
+                .in_plane(translation.truncate(), turn_rad)
         })
         .collect()
 }
@@ -210,7 +218,7 @@ fn exact_corners_give_the_exact_layout() {
             center_mm < 1e-4 && turn_deg < 1e-4,
             "{center_mm} mm {turn_deg}°"
         );
-        assert_eq!(learnt.markers[0].marker.center_m, DVec2::ZERO);
+        assert_eq!(learnt.markers[0].marker.center_m(), DVec3::ZERO);
     }
 }
 
@@ -231,10 +239,10 @@ fn errors_are_as_large_as_is_said() {
         all.extend(errors(&markers(&learnt), &truth(&stuck)));
         // In the gauge's own frame, whose deviations are told.
         for (learnt, truth) in learnt.markers.iter().zip(truth(&stuck)).skip(1) {
-            let off_m = learnt.marker.center_m - truth.center_m;
-            squares += (off_m / learnt.center_deviation_m).length_squared();
-            let turn = DVec2::from_angle(learnt.marker.rotation_rad)
-                .angle_to(DVec2::from_angle(truth.rotation_rad));
+            let off_m = (learnt.marker.center_m() - truth.center_m()).truncate();
+            squares += (off_m / learnt.center_deviation_m.truncate()).length_squared();
+            let turn = DVec2::from_angle(learnt.marker.rotation_rad())
+                .angle_to(DVec2::from_angle(truth.rotation_rad()));
             squares += (turn / learnt.rotation_deviation_rad).powi(2);
             count += 3;
         }
@@ -268,14 +276,13 @@ fn photographs_of_random_sheets_give_their_layouts() {
             (2, -1.0, -1.0),
             (17, 1.0, -1.0),
         ]
-        .map(|(id, x, y)| Marker {
-            rotation_rad: random.between(-3.1, 3.1),
-            ..sheets::marker(
-                id,
-                0.04,
+        .map(|(id, x, y)| {
+            let turn_rad = random.between(-3.1, 3.1);
+            let center_m = DVec2::new(
                 x * random.between(0.04, 0.07),
                 y * random.between(0.035, 0.06),
-            )
+            );
+            Marker::alone(Family::TAG36H11, id, 0.04).in_plane(center_m, turn_rad)
         })
         .to_vec();
         let mut detector =
@@ -502,8 +509,8 @@ fn the_block_is_a_board_that_a_scene_takes() {
     assert_eq!((name.as_str(), read.len()), ("the \\ desk", 8));
     for (read, written) in read.iter().zip(markers(&learnt)) {
         assert_eq!((read.family, read.id), (written.family, written.id));
-        assert!(read.center_m.distance(written.center_m) < 1e-6);
-        assert!((read.rotation_rad - written.rotation_rad).abs() < 1e-5);
+        assert!(read.center_m().distance(written.center_m()) < 1e-6);
+        assert!((read.rotation_rad() - written.rotation_rad()).abs() < 1e-5);
         assert!((read.size_m - written.size_m).abs() < 1e-6);
     }
 }
@@ -565,6 +572,34 @@ fn the_board_of_a_session_is_learnt_from_its_video() {
 }
 
 #[test]
+fn the_board_of_a_video_is_learnt_with_its_camera_where_nobody_has_calibrated_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let video = project_file("recordings/lamp/video.mp4");
+    let distance = ["--size-mm", "45", "--distance", "0:2:350"];
+    let arguments = [&["board", "--from", plain(&video)], &distance[..]].concat();
+    let output = gnomon(folder.path(), &arguments);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        said.contains("carries no calibration: focal length"),
+        "{said}"
+    );
+    let learnt = board_of(&output);
+    let scene = Scene::load(&project_file("config/lamp.toml")).unwrap();
+    let known: Vec<Marker> = scene.anchors[0]
+        .markers
+        .iter()
+        .copied()
+        .filter(|marker| marker.id != 5)
+        .collect();
+    let (center_mm, turn_deg) = worst(&errors(&learnt, &known));
+    eprintln!("{said}{center_mm:.3} mm, {turn_deg:.3}°");
+    assert!(
+        center_mm < 1.0 && turn_deg < 0.2,
+        "{center_mm} mm, {turn_deg}°"
+    );
+}
+
+#[test]
 #[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
 fn the_grid_of_the_photographs_is_learnt_from_them() {
     let folder = photographs("yac_mocap");
@@ -591,12 +626,9 @@ fn the_grid_of_the_photographs_is_learnt_from_them() {
     let family = Family::TAG36H11.with_border(2).unwrap();
     let pitch_m = 0.088 * 1.3;
     let grid: Vec<Marker> = (0..36)
-        .map(|id| Marker {
-            family,
-            id,
-            size_m: 0.088,
-            center_m: DVec2::new(f64::from(id % 6), f64::from(id / 6)) * pitch_m,
-            rotation_rad: 0.0,
+        .map(|id| {
+            let center_m = DVec2::new(f64::from(id % 6), f64::from(id / 6)) * pitch_m;
+            Marker::alone(family, id, 0.088).in_plane(center_m, 0.0)
         })
         .collect();
     assert!(learnt.iter().all(|marker| marker.family == family));

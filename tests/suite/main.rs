@@ -11,6 +11,7 @@ mod accuracy;
 mod architecture;
 mod authoring;
 mod board;
+mod boards_in_space;
 mod calibrate;
 mod counting;
 mod detail;

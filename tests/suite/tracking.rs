@@ -208,10 +208,7 @@ fn one_id_in_two_borders_is_two_markers() {
 
 #[test]
 fn a_turned_marker_on_a_board_counts_with_its_turn() {
-    let turned = Marker {
-        rotation_rad: 0.7,
-        ..marker(1, 0.06, 0.08, 0.02)
-    };
+    let turned = marker(1, 0.06, 0.0, 0.0).in_plane(DVec2::new(0.08, 0.02), 0.7);
     let markers = [marker(0, 0.06, -0.08, 0.0), turned];
     let truth = camera_above(20.0, 40.0, DVec3::new(0.0, 0.0, 0.4));
     let frame = photograph(&CAMERA, &[(&markers, truth)], 0.0);
@@ -396,7 +393,7 @@ fn of_two_markers_with_one_id_none_is_trusted_unless_the_board_decides() {
 fn a_marker_in_the_wrong_place_does_not_bend_the_board() {
     let markers = table();
     let mut printed_wrong = table();
-    printed_wrong[2].center_m.x += 0.01;
+    printed_wrong[2].anchor_from_marker.translation.x += 0.01;
     let truth = camera_above(20.0, 10.0, DVec3::new(0.0, 0.0, 0.42));
     let frame = photograph(&CAMERA, &[(&printed_wrong, truth)], 0.0);
     let pose = &track_once(

@@ -107,10 +107,9 @@ fn a_marker_of_another_family_is_none_of_a_weak_one() {
 #[test]
 fn a_board_whose_markers_are_all_turned_alike_is_tracked_and_told() {
     let family = Family::TAG36H11;
-    let marker = |id: u32, x_m: f64, rotation_deg: f64| Marker {
-        center_m: DVec2::new(x_m, 0.0),
-        rotation_rad: rotation_deg.to_radians(),
-        ..Marker::alone(family, id, 0.05)
+    let marker = |id: u32, x_m: f64, rotation_deg: f64| {
+        let center_m = DVec2::new(x_m, 0.0);
+        Marker::alone(family, id, 0.05).in_plane(center_m, rotation_deg.to_radians())
     };
     let printed = [marker(0, -0.05, 90.0), marker(1, 0.05, 90.0)];
     let anchor = Anchor {
@@ -130,10 +129,8 @@ fn a_board_whose_markers_are_all_turned_alike_is_tracked_and_told() {
 #[test]
 fn a_board_that_is_contradicted_is_not_tracked() {
     let family = Family::TAG36H11;
-    let marker = |id: u32, x_m: f64| Marker {
-        center_m: DVec2::new(x_m, 0.0),
-        ..Marker::alone(family, id, 0.05)
-    };
+    let marker =
+        |id: u32, x_m: f64| Marker::alone(family, id, 0.05).in_plane(DVec2::new(x_m, 0.0), 0.0);
     // Its second marker lies on the other side, and farther off than any turn would bring it.
     let printed = [marker(0, -0.05), marker(1, -0.18)];
     let anchor = Anchor {

@@ -325,11 +325,7 @@ fn jitter_of_what_stands_still() {
     let card = vec![marker(17, 0.05, 0.0, 0.0)];
     let small_table: Vec<Marker> = table()
         .into_iter()
-        .map(|m| Marker {
-            size_m: 0.4 * m.size_m,
-            center_m: 0.4 * m.center_m,
-            ..m
-        })
+        .map(|marker| marker.stretched(0.4))
         .collect();
     for (what, markers) in [("card", card), ("board", small_table)] {
         let truth = camera_above(33.0, 20.0, DVec3::new(0.003, -0.002, 0.5));
@@ -1362,10 +1358,8 @@ fn empty_pictures_and_extreme_cameras() {
         let lone = [marker(id, size_m, 0.0, 0.0)];
         let board = [
             marker(id, size_m, -size_m, 0.5 * size_m),
-            Marker {
-                rotation_rad: random.between(-4.0, 4.0),
-                ..marker((id + 1) % 10, 0.5 * size_m, size_m, -size_m)
-            },
+            marker((id + 1) % 10, 0.5 * size_m, 0.0, 0.0)
+                .in_plane(DVec2::new(size_m, -size_m), random.between(-4.0, 4.0)),
         ];
         let anchors = [anchor("lone", &lone), anchor("board", &board)];
         let extreme = random.chance(0.5);

@@ -113,8 +113,7 @@ impl Edit {
                     return false;
                 };
                 for marker in markers {
-                    marker.size_m *= stretch;
-                    marker.center_m *= stretch;
+                    *marker = marker.stretched(stretch);
                 }
             }
             Self::RemoveVirtual(name) if scene.virtuals.iter().any(|thing| thing.name == *name) => {

@@ -375,11 +375,14 @@ impl PicturedThings {
 
     fn is_printed(&self, world_m: DVec3) -> bool {
         self.prints.iter().any(|(anchor_from_world, marker)| {
-            let place = anchor_from_world.transform_point3(world_m);
-            let in_print =
-                DVec2::from_angle(-marker.rotation_rad).rotate(place.truncate() - marker.center_m);
+            let in_anchor_m = anchor_from_world.transform_point3(world_m);
+            let in_print_m = marker
+                .anchor_from_marker
+                .inverse()
+                .transform_point3(in_anchor_m);
             let half_m = marker.size_m * (0.5 + PRINT_MARGIN);
-            place.z.abs() < 0.1 * marker.size_m && in_print.abs().max_element() < half_m
+            in_print_m.z.abs() < 0.1 * marker.size_m
+                && in_print_m.truncate().abs().max_element() < half_m
         })
     }
 

@@ -9,10 +9,10 @@ use super::spliced::{Body, Spliced, bodies, parsed};
 use crate::light::{Light, Shape};
 use crate::scene::format::{AIMED_LIGHT, RECT_LIGHT, SPHERE_LIGHT, SPOT_LIGHT};
 use crate::scene::format::{
-    AMBIENT, AMBIENT_SECTION, BOARD, BOARD_SECTION, DIRECTIONAL_LIGHT, LIGHT, LIGHT_SECTION,
-    LightKind, MARKER, MARKER_SECTION, ON_BOARD, PHANTOM_SECTION, PLACEMENT, POINT_LIGHT,
-    PlacementKeys, SHADOWS_SECTION, SHAPE, STANDING, ShapeKeys, TABLE, TABLE_SECTION, THING,
-    THING_NAME, VIRTUAL_SECTION,
+    AMBIENT, AMBIENT_SECTION, BOARD, BOARD_SECTION, CENTER, DIRECTIONAL_LIGHT, LIGHT,
+    LIGHT_SECTION, LightKind, MARKER, MARKER_SECTION, ON_BOARD, PHANTOM_SECTION, PLACEMENT,
+    POINT_LIGHT, PlacementKeys, SHADOWS_SECTION, SHAPE, STANDING, ShapeKeys, TABLE, TABLE_SECTION,
+    THING, THING_NAME, VIRTUAL_SECTION,
 };
 use crate::scene::schema::key::{Absent, Key};
 use crate::scene::schema::section::Section;
@@ -28,6 +28,9 @@ pub enum Unfit {
     /// The scene's `[table]`.
     #[error("the table's top moves up and down alone; it lies flat, with its rect_m in the world")]
     TableTop,
+    /// Sizes of a board whose markers another file has.
+    #[error("the board's markers are in the file of its bundle; change their sizes there")]
+    InBundle,
     /// A text that no scene is.
     #[error("the scene's file is not TOML any more")]
     NotToml,
@@ -432,11 +435,17 @@ fn resize(
     let markers = &known.ok_or_else(missing)?.markers;
     let stretch = size_m / markers.first().ok_or_else(missing)?.size_m;
     let written: Option<&Item> = board.item(BOARD.markers.name);
+    if written.is_none() {
+        return Err(Unfit::InBundle);
+    }
     for (body, marker) in bodies(written).into_iter().zip(markers) {
         let size_m = [marker.size_m * stretch];
-        let center_m = (marker.center_m * stretch).to_array();
+        let center_m = (marker.center_m() * stretch).to_array();
         spliced.set_numbers(body, size.name, &size_m, size.takes.digits, None);
-        spliced.set_numbers(body, center.name, &center_m, center.takes.digits, None);
+        let in_plane = body.item(center.name).and_then(Item::as_array);
+        let in_plane = in_plane.is_none_or(|written| written.len() == 2);
+        let numbers = if in_plane { &center_m[..2] } else { &center_m };
+        spliced.set_numbers(body, center.name, numbers, CENTER.digits, None);
     }
     Ok(())
 }

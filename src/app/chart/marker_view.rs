@@ -64,12 +64,8 @@ const LONE: &str = "lone marker";
 const BOARD: &str = "board of four";
 
 fn layouts() -> [(&'static str, Vec<Marker>); 2] {
-    let marker = |id, x_m, y_m| Marker {
-        family: Family::TAG36H11,
-        id,
-        size_m: MARKER_M,
-        center_m: DVec2::new(x_m, y_m),
-        rotation_rad: 0.0,
+    let marker = |id, x_m, y_m| {
+        Marker::alone(Family::TAG36H11, id, MARKER_M).in_plane(DVec2::new(x_m, y_m), 0.0)
     };
     let board = [
         (0, -0.06, 0.04),

@@ -7,6 +7,7 @@ mod displacement;
 mod drawing;
 mod family;
 mod figure;
+mod footage;
 pub mod known_scene;
 mod lab;
 mod left_out;
@@ -72,9 +73,10 @@ trait AnyChart {
 }
 
 /// All charts, in the order in which they are made and read.
-fn all() -> [Box<dyn AnyChart>; 11] {
+fn all() -> [Box<dyn AnyChart>; 12] {
     [
         Box::new(tracking::Tracking),
+        Box::new(footage::Footage),
         Box::new(shadows::Shadows),
         Box::new(pictures::PicturesChart),
         Box::new(moved::Moved),

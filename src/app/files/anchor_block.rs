@@ -15,19 +15,36 @@ pub fn board(name: &str, markers: &[Marker]) -> String {
         add_family(&mut text, first.family);
     }
     text.push_str("markers = [\n");
+    let is_in_plane = markers.iter().all(Marker::is_in_plane);
     for marker in markers {
-        let _ = writeln!(
-            text,
-            "    {{ id = {}, size_m = {:.6}, center_m = [{:.6}, {:.6}], rotation_deg = {:.4} }},",
-            marker.id,
-            marker.size_m,
-            marker.center_m.x,
-            marker.center_m.y,
-            marker.rotation_rad.to_degrees()
-        );
+        let (id, size_m) = (marker.id, marker.size_m);
+        let place = match is_in_plane {
+            true => place_in_plane(marker),
+            false => place_in_space(marker),
+        };
+        let _ = writeln!(text, "    {{ id = {id}, size_m = {size_m:.6}, {place} }},");
     }
     text.push_str("]\n");
     text
+}
+
+fn place_in_plane(marker: &Marker) -> String {
+    let (center_m, rotation_rad) = (marker.center_m(), marker.rotation_rad());
+    format!(
+        "center_m = [{:.6}, {:.6}], rotation_deg = {:.4}",
+        center_m.x,
+        center_m.y,
+        rotation_rad.to_degrees()
+    )
+}
+
+fn place_in_space(marker: &Marker) -> String {
+    let center_m = marker.center_m();
+    let turns_deg = marker.rotation_deg();
+    format!(
+        "center_m = [{:.6}, {:.6}, {:.6}], rotation_deg = [{:.4}, {:.4}, {:.4}]",
+        center_m.x, center_m.y, center_m.z, turns_deg.x, turns_deg.y, turns_deg.z
+    )
 }
 
 /// A lone `[[marker]]`.

@@ -5,18 +5,23 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context as _, Result, bail};
+use glam::DVec3;
 
 use crate::app::files::anchor_block;
 use crate::app::files::job_files::{JobFiles, Replacing};
 use crate::app::files::picture_files::write_text;
 use crate::app::files::result_kind::ResultKind;
 use crate::app::input::usual_tracking::usual_tracking;
+use crate::app::stages::known_camera::KnownCamera;
 use crate::app::stages::progress::Progress;
 use crate::app::stages::source::{self, CalibrationNamed};
 use crate::app::talk;
 use crate::capture::{FrameSource, Notice};
-use crate::scene::{CameraSettings, Family, Marker, TrackingSettings};
-use crate::tracking::mapping::{LearntBoard, MapSettings, learn_board};
+use crate::scene::{Anchor, CameraSettings, Family, Marker, TrackingSettings};
+use crate::tracking::focal::{CameraLearner, LearntCamera};
+use crate::tracking::mapping::{
+    BoardShape, LearntBoard, LearntMarker, MapSettings, SpaceFrame, learn_board, off_in_words,
+};
 use crate::tracking::{Detection, Detector, grey_from_rgba};
 
 /// More frames are not looked at: a long video is sampled.
@@ -89,10 +94,23 @@ pub fn board(request: &BoardRequest, stop: &AtomicBool) -> Result<()> {
         BoardInput::Scene(_) => CalibrationNamed::ByKey,
         BoardInput::Recording { .. } => CalibrationNamed::ByOption,
     };
-    let (source, intrinsics) = source::open_calibrated(&camera, named)?;
+    let (source, calibration) = source::open_as_it_is(&camera)?;
+    let size_px = source.size_px();
     let (pictures, notices) = detections(source, &settings, request.family, stop)?;
-    let learnt = learn_board(&intrinsics, request.family, &pictures, &request.map)
-        .with_context(|| format!("{} pictures of {}", pictures.len(), camera.source))?;
+    let learnt = match calibration {
+        Some(intrinsics) => learn_board(&intrinsics, request.family, &pictures, &request.map)
+            .map_err(anyhow::Error::from),
+        None => learn_with_camera(request, &settings, size_px, &pictures).map(
+            |(learnt, camera_found)| {
+                let remark =
+                    KnownCamera::Learnt(camera_found).remark(&camera.source, named.place());
+                talk::say_lines(&remark.unwrap_or_default());
+                learnt
+            },
+        ),
+    };
+    let learnt =
+        learnt.with_context(|| format!("{} pictures of {}", pictures.len(), camera.source))?;
     let learnt = match &request.distance {
         Some(distance) => to_scale(&learnt, distance)?,
         None => learnt,
@@ -111,6 +129,30 @@ pub fn board(request: &BoardRequest, stop: &AtomicBool) -> Result<()> {
         );
     }
     Ok(())
+}
+
+/// The layout in the pictures of a camera that nobody has calibrated: by what each marker alone tells of the camera, and then
+/// anew by what the layout does.
+fn learn_with_camera(
+    request: &BoardRequest,
+    settings: &TrackingSettings,
+    size_px: [u32; 2],
+    pictures: &[Vec<Detection>],
+) -> Result<(LearntBoard, LearntCamera)> {
+    let camera_by = |mut learner: CameraLearner| {
+        pictures.iter().for_each(|seen| learner.look_at(seen));
+        learner.finish()
+    };
+    let by_each = CameraLearner::of_every_marker(settings, request.family, size_px)?;
+    let camera = camera_by(by_each);
+    let rough = learn_board(&camera.intrinsics, request.family, pictures, &request.map)?;
+    let anchor = Anchor {
+        name: request.name.clone(),
+        markers: rough.markers.iter().map(|learnt| learnt.marker).collect(),
+    };
+    let camera = camera_by(CameraLearner::of_anchors(settings, &[anchor], size_px)?);
+    let learnt = learn_board(&camera.intrinsics, request.family, pictures, &request.map)?;
+    Ok((learnt, camera))
 }
 
 /// What the detector sees in each frame that is looked at.
@@ -144,17 +186,19 @@ fn detections(
 fn to_scale(learnt: &LearntBoard, distance: &Distance) -> Result<LearntBoard> {
     let center = |id: u32| {
         let found = learnt.markers.iter().find(|learnt| learnt.marker.id == id);
-        found.map(|learnt| learnt.marker.center_m).with_context(|| {
-            let known: Vec<String> = learnt
-                .markers
-                .iter()
-                .map(|learnt| learnt.marker.id.to_string())
-                .collect();
-            format!(
-                "--distance names marker {id}, which was not learnt; learnt are {}",
-                known.join(", ")
-            )
-        })
+        found
+            .map(|learnt| learnt.marker.center_m())
+            .with_context(|| {
+                let known: Vec<String> = learnt
+                    .markers
+                    .iter()
+                    .map(|learnt| learnt.marker.id.to_string())
+                    .collect();
+                format!(
+                    "--distance names marker {id}, which was not learnt; learnt are {}",
+                    known.join(", ")
+                )
+            })
     };
     let [a, b] = distance.ids;
     Ok(learnt.scaled(distance.distance_m / center(a)?.distance(center(b)?)))
@@ -168,40 +212,37 @@ pub fn board_block(learnt: &LearntBoard, name: &str) -> String {
 
 /// A row for each marker: where it is, how sure that is, and how well the pictures agree.
 fn certainty_text(learnt: &LearntBoard) -> String {
+    let places = match learnt.shape {
+        BoardShape::Flat => format!(
+            "{:>18} {:>18} {:>16} {:>15} {:>8}",
+            "x, mm", "y, mm", "turn, °", "size, mm", "off, mm"
+        ),
+        BoardShape::Space { .. } => format!(
+            "{:>18} {:>18} {:>18} {:>31} {:>15}",
+            "x, mm", "y, mm", "z, mm", "turns about x, y, z, °", "size, mm"
+        ),
+    };
     let mut text = format!(
         "{} markers from {} pictures; corners {:.3} px from where the layout puts them (standard deviation)\n\
-         {:>6} {:>18} {:>18} {:>16} {:>15} {:>8} {:>9} {:>8} {:>8}\n",
+         {}\n{:>6} {places} {:>9} {:>8} {:>8}\n",
         learnt.markers.len(),
         learnt.pictures,
         learnt.noise_px,
+        frame_in_words(learnt),
         "marker",
-        "x, mm",
-        "y, mm",
-        "turn, °",
-        "size, mm",
-        "off, mm",
         "pictures",
         "dropped",
         "rms, px"
     );
-    for learnt in &learnt.markers {
-        let marker = &learnt.marker;
-        let [x_mm, y_mm, size_mm] =
-            [marker.center_m.x, marker.center_m.y, marker.size_m].map(|length_m| length_m * 1e3);
-        let deviation_mm = learnt.center_deviation_m * 1e3;
+    for marker in &learnt.markers {
+        let place = match learnt.shape {
+            BoardShape::Flat => flat_row(marker),
+            BoardShape::Space { .. } => space_row(marker),
+        };
         let _ = writeln!(
             text,
-            "{:>6} {x_mm:>10.2} ± {:<5.3} {y_mm:>10.2} ± {:<5.3} {:>8.2} ± {:<5.3} {size_mm:>7.2} ± {:<5.3} {:>8.2} {:>9} {:>8} {:>8.3}",
-            marker.id,
-            deviation_mm.x,
-            deviation_mm.y,
-            marker.rotation_rad.to_degrees(),
-            learnt.rotation_deviation_rad.to_degrees(),
-            learnt.size_deviation_m * 1e3,
-            learnt.off_plane_m * 1e3,
-            learnt.observations,
-            learnt.dropped,
-            learnt.rms_px
+            "{:>6} {place} {:>9} {:>8} {:>8.3}",
+            marker.marker.id, marker.observations, marker.dropped, marker.rms_px
         );
     }
     for learnt in &learnt.markers {
@@ -225,4 +266,82 @@ fn certainty_text(learnt: &LearntBoard) -> String {
         );
     }
     text
+}
+
+/// What the markers lie in, and which frame that gives the board.
+fn frame_in_words(learnt: &LearntBoard) -> String {
+    let gauge = learnt.gauge;
+    match &learnt.shape {
+        BoardShape::Flat => format!(
+            "they lie in a plane, the board's z = 0; its origin is the middle of marker {gauge}, its x points to that one's right"
+        ),
+        BoardShape::Space { off, frame } => {
+            let why = match off.as_slice() {
+                [] => "the board is in space".to_owned(),
+                off => format!(
+                    "off the plane of the others lie {}, so the board is in space",
+                    off_in_words(off)
+                ),
+            };
+            let frame = match frame {
+                SpaceFrame::Gauge => format!(
+                    "its frame is marker {gauge}'s: origin in its middle, x to its right, y to its top, z out of the print"
+                ),
+                SpaceFrame::PlaneOfMost => format!(
+                    "z = 0 of its frame is the plane of the others; its origin is the middle of marker {gauge}, its x points \
+                     to that one's right"
+                ),
+            };
+            format!("{why}; {frame}")
+        }
+    }
+}
+
+fn flat_row(learnt: &LearntMarker) -> String {
+    let (center_mm, deviation_mm) = centers_mm(learnt);
+    format!(
+        "{:>10.2} ± {:<5.3} {:>10.2} ± {:<5.3} {:>8.2} ± {:<5.3} {} {:>8.2}",
+        center_mm.x,
+        deviation_mm.x,
+        center_mm.y,
+        deviation_mm.y,
+        learnt.marker.rotation_rad().to_degrees(),
+        learnt.rotation_deviation_rad.to_degrees(),
+        size_cell(learnt),
+        learnt.off_plane_m * 1e3,
+    )
+}
+
+fn space_row(learnt: &LearntMarker) -> String {
+    let (center_mm, deviation_mm) = centers_mm(learnt);
+    let turns_deg = learnt.marker.rotation_deg();
+    format!(
+        "{:>10.2} ± {:<5.3} {:>10.2} ± {:<5.3} {:>10.2} ± {:<5.3} {:>7.2} {:>7.2} {:>7.2} ± {:<5.3} {}",
+        center_mm.x,
+        deviation_mm.x,
+        center_mm.y,
+        deviation_mm.y,
+        center_mm.z,
+        deviation_mm.z,
+        turns_deg.x,
+        turns_deg.y,
+        turns_deg.z,
+        learnt.rotation_deviation_rad.to_degrees(),
+        size_cell(learnt),
+    )
+}
+
+fn centers_mm(learnt: &LearntMarker) -> (DVec3, DVec3) {
+    (
+        learnt.marker.center_m() * 1e3,
+        learnt.center_deviation_m * 1e3,
+    )
+}
+
+fn size_cell(learnt: &LearntMarker) -> String {
+    format!(
+        "{:>7.2} ± {:<5.3}",
+        learnt.marker.size_m * 1e3,
+        learnt.size_deviation_m * 1e3
+    )
 }

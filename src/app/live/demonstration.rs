@@ -86,13 +86,7 @@ fn scene_text(camera: &CameraSettings, id: u32, size_m: f64) -> String {
     if camera.mirror {
         text += "mirror = true\n";
     }
-    let marker = Marker {
-        family: Family::TAG36H11,
-        id,
-        size_m,
-        center_m: glam::DVec2::ZERO,
-        rotation_rad: 0.0,
-    };
+    let marker = Marker::alone(Family::TAG36H11, id, size_m);
     let scale = 1.2 * size_m / MESH_SIZE_M;
     let table_m = 12.0 * size_m;
     let [x, y, z] = [-4.0, 3.0, 7.0].map(|side| side * size_m);

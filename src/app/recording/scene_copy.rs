@@ -31,6 +31,7 @@ pub fn copy_folder(kind: FileKind) -> Option<&'static str> {
         FileKind::RoomMesh => Some("room"),
         FileKind::Probe => Some("probe"),
         FileKind::Dictionary => Some("markers"),
+        FileKind::Bundles => Some("bundles"),
     }
 }
 
@@ -157,6 +158,7 @@ impl Copies<'_> {
                 self.put(format!("{own_name}.{extension}"), &bytes)?
             }
             FileKind::Dictionary => self.put(format!("{own_name}.yml"), &read(&named.path)?)?,
+            FileKind::Bundles => self.put(format!("{own_name}.yaml"), &read(&named.path)?)?,
             FileKind::Recording | FileKind::Calibration => return Ok(None),
         };
         self.known.insert(key, name.clone());
@@ -325,11 +327,13 @@ mod tests {
         for name in ["board.yml", "marker.yml", "lens.toml"] {
             fs::write(home.join(name), codes).unwrap();
         }
+        let tags = "tag_bundles: [{layout: [{id: 0, size: 0.04}]}]\n";
+        fs::write(home.join("tags.yaml"), tags).unwrap();
         let probe = config("../recordings/room/probe.hdr");
         fs::copy(probe, home.join("probe.hdr")).unwrap();
         fs::create_dir(home.join("take")).unwrap();
         let text = "[camera]\nsource = \"take\"\ncalibration = \"lens.toml\"\n[tracking]\ndetector = \"aruco\"\n\
-            [[board]]\nname = \"b\"\nfamily = \"board.yml\"\nmarkers = [{ id = 0, size_m = 0.04, center_m = [0, 0] }]\n\
+            [[board]]\nname = \"b\"\nfamily = \"board.yml\"\nbundle = \"tags.yaml\"\n\
             [[marker]]\nname = \"m\"\nfamily = \"marker.yml\"\nid = 1\nsize_m = 0.04\n\
             [[phantom]]\nname = \"p\"\nmesh = \"phantom.obj\"\n[[virtual]]\nname = \"v\"\nmesh = \"virtual.obj\"\n\
             [probe]\nimage = \"probe.hdr\"\nroom = [\"floor.obj\", \"wall.obj\"]\n[[room]]\nmesh = \"shelf.obj\"\n";
@@ -360,7 +364,7 @@ mod tests {
         // Folders that an older session is known by.
         let mut folders: Vec<&str> = copy_folders().collect();
         folders.sort_unstable();
-        assert_eq!(folders, ["markers", "models", "probe", "room"]);
+        assert_eq!(folders, ["bundles", "markers", "models", "probe", "room"]);
     }
 
     #[test]

@@ -65,7 +65,7 @@ pub(crate) fn open_calibrated(
 }
 
 /// A recording, and the calibration that is named or that it carries.
-fn open_as_it_is(camera: &CameraSettings) -> Result<(FrameSource, Option<Intrinsics>)> {
+pub(crate) fn open_as_it_is(camera: &CameraSettings) -> Result<(FrameSource, Option<Intrinsics>)> {
     let source = FrameSource::open(&camera.source)?.mirrored(camera.mirror);
     if let Some(remark) = source.remark() {
         talk::say(remark);

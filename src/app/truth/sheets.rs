@@ -7,7 +7,7 @@ use glam::{DAffine3, DQuat, DVec2, DVec3};
 
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
-use crate::scene::{Codes, Family, Marker};
+use crate::scene::{Codes, Face, Family, Marker};
 
 /// Linear light of paper, of ink, and of what lies around.
 const PAPER: f64 = 0.8;
@@ -45,11 +45,11 @@ pub fn camera_above(tilt_deg: f64, turn_deg: f64, at_m: DVec3) -> DAffine3 {
 
 /// Whether a marker prints white or black at a point of its anchor's plane, metres; `None` beside it.
 pub fn is_white(marker: &Marker, point_m: DVec2) -> Option<bool> {
-    let offset_m = point_m - marker.center_m;
+    let offset_m = point_m - marker.center_m().truncate();
     if offset_m.abs().max_element() > marker.size_m {
         return None;
     }
-    let local = DVec2::from_angle(-marker.rotation_rad).rotate(offset_m);
+    let local = DVec2::from_angle(-marker.rotation_rad()).rotate(offset_m);
     let cells = printed(marker.family, marker.id)?;
     let border = marker.family.border_cells() as i32;
     let across = cells.len() as i32 + 2 * border;
@@ -68,12 +68,20 @@ pub fn is_white(marker: &Marker, point_m: DVec2) -> Option<bool> {
 /// The rectangle of white paper around the markers of a sheet, half a marker beyond them, metres.
 fn paper_m(markers: &[Marker]) -> [DVec2; 2] {
     let beyond = |marker: &Marker| DVec2::splat(marker.size_m);
-    let low = markers.iter().map(|m| m.center_m - beyond(m));
-    let high = markers.iter().map(|m| m.center_m + beyond(m));
+    let low = markers.iter().map(|m| m.center_m().truncate() - beyond(m));
+    let high = markers.iter().map(|m| m.center_m().truncate() + beyond(m));
     [
         low.fold(DVec2::MAX, DVec2::min),
         high.fold(DVec2::MIN, DVec2::max),
     ]
+}
+
+/// A point of a sheet on a ray.
+struct SheetPoint {
+    /// How far along the ray it is, in the ray's lengths.
+    along: f64,
+    /// Linear.
+    light: f64,
 }
 
 /// A sheet as the camera sees it.
@@ -123,8 +131,8 @@ impl<'a> SheetView<'a> {
         (self.from[0]..self.to[0]).contains(&x) && (self.from[1]..self.to[1]).contains(&y)
     }
 
-    /// Light along the ray through a point of the plane z = 1; `None` beside the paper.
-    fn light(&self, point: DVec2) -> Option<f64> {
+    /// What is seen along the ray through a point of the plane z = 1; `None` beside the paper.
+    fn light(&self, point: DVec2) -> Option<SheetPoint> {
         let eye = self.anchor_from_camera.translation;
         let ray = self.anchor_from_camera.transform_vector3(point.extend(1.0));
         let along = -eye.z / ray.z;
@@ -138,11 +146,14 @@ impl<'a> SheetView<'a> {
             .find_map(|marker| is_white(marker, point_m));
         let [low, high] = self.paper_m;
         let on_paper = point_m.cmpge(low).all() && point_m.cmple(high).all();
-        match print {
-            Some(true) => Some(PAPER),
-            Some(false) => Some(INK),
-            None => on_paper.then_some(PAPER),
-        }
+        let light = match (print, eye.z > 0.0) {
+            // The back of a sheet is white.
+            (Some(false), true) => INK,
+            (Some(_), true) => PAPER,
+            _ if on_paper => PAPER,
+            _ => return None,
+        };
+        Some(SheetPoint { along, light })
     }
 }
 
@@ -156,9 +167,36 @@ pub struct Light {
 }
 
 impl Light {
-    /// Of sheets of markers, the first one on top; 16 samples a pixel, no two of them in one row or column, since an edge
-    /// that runs along the rows of a grid lies where a row is, not where it is.
+    /// Of sheets of markers, the first one on top.
     pub fn of(camera: &Intrinsics, sheets: &[(&[Marker], DAffine3)]) -> Self {
+        Self::of_seen(camera, sheets, |seen| seen.next())
+    }
+
+    /// Of boards in space, each with its pose (camera from anchor): of all sheets the nearest is seen.
+    pub fn of_boards(camera: &Intrinsics, boards: &[(&[Marker], DAffine3)]) -> Self {
+        let faces: Vec<(Vec<Marker>, DAffine3)> = boards
+            .iter()
+            .flat_map(|(markers, camera_from_anchor)| {
+                let faces = Face::all_of(markers).into_iter();
+                faces.map(|face| (face.markers, *camera_from_anchor * face.anchor_from_face))
+            })
+            .collect();
+        let sheets: Vec<(&[Marker], DAffine3)> = faces
+            .iter()
+            .map(|(markers, pose)| (markers.as_slice(), *pose))
+            .collect();
+        Self::of_seen(camera, &sheets, |seen| {
+            seen.min_by(|a, b| a.along.total_cmp(&b.along))
+        })
+    }
+
+    /// Of sheets of markers of which `seen` chooses one along each ray; 16 samples a pixel, no two of them in one row or
+    /// column, since an edge that runs along the rows of a grid lies where a row is, not where it is.
+    fn of_seen(
+        camera: &Intrinsics,
+        sheets: &[(&[Marker], DAffine3)],
+        seen: impl Fn(&mut dyn Iterator<Item = SheetPoint>) -> Option<SheetPoint>,
+    ) -> Self {
         const SAMPLES: usize = 16;
         let offsets: [DVec2; SAMPLES] = std::array::from_fn(|k| {
             let mirrored_bits = (k as u8).reverse_bits() >> 4;
@@ -183,8 +221,8 @@ impl Light {
                         point += target - camera.distort(point);
                     }
                 }
-                let seen = views.iter().find_map(|view| view.light(point));
-                seen.unwrap_or(SURROUNDINGS)
+                let mut on_ray = views.iter().filter_map(|view| view.light(point));
+                seen(&mut on_ray).map_or(SURROUNDINGS, |seen| seen.light)
             });
             samples.iter().sum::<f64>() / SAMPLES as f64
         });

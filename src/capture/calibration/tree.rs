@@ -1,16 +1,10 @@
 //! The text of a calibration as one tree of values, whatever language it is written in, with limits on depth and number:
 //! a file of a few bytes must not cost a stack or a memory.
 
-use std::borrow::Cow;
-
 use roxmltree::Node;
-use saphyr_parser::{Event, Parser, ScalarStyle, ScanError, Span};
 use serde_json::{Map, Value};
 
-/// Levels of lists and tables in one another; calib.io's have nine.
-const MOST_LEVELS: u32 = 32;
-/// Values in one file.
-const MOST_VALUES: usize = 200_000;
+use crate::scene::yaml::{MOST_LEVELS, MOST_VALUES, YamlContent, YamlValue};
 
 /// The entries of a TOML file.
 pub(super) fn of_toml(text: &str) -> Result<Map<String, Value>, String> {
@@ -37,113 +31,29 @@ pub(super) fn of_json(text: &str) -> Result<Map<String, Value>, String> {
 
 /// The entries of a YAML file's first document that has any.
 pub(super) fn of_yaml(text: &str) -> Result<Map<String, Value>, String> {
-    let text = without_opencv_directive(text);
-    let mut reader = YamlReader {
-        parser: Parser::new_from_str(&text),
-        values: 0,
-    };
-    loop {
-        let (event, span) = reader.next()?;
-        match event {
-            Event::StreamEnd => return Err("it is empty".to_owned()),
-            Event::MappingStart(..) => {
-                let tree = reader.table(1)?;
-                return Ok(tree);
-            }
-            Event::Scalar(text, ScalarStyle::Plain, ..) if text.is_empty() || text == "~" => {}
-            Event::Scalar(..) | Event::SequenceStart(..) => {
-                return Err(at(&span, "a calibration is a table of keys and values"));
-            }
-            _ => {}
-        }
+    let root = YamlValue::of_text(text)?.ok_or("it is empty")?;
+    let (line, column) = (root.line, root.column);
+    match value_of_yaml(root) {
+        Value::Object(table) => Ok(table),
+        _ => Err(format!(
+            "line {line} column {column}: a calibration is a table of keys and values"
+        )),
     }
 }
 
-/// OpenCV's `%YAML:1.0` is no directive of YAML; its line stays, for the others' numbers.
-fn without_opencv_directive(text: &str) -> Cow<'_, str> {
-    match text.strip_prefix("%YAML:") {
-        Some(rest) => Cow::Owned(format!("# YAML:{rest}")),
-        None => Cow::Borrowed(text),
-    }
-}
-
-struct YamlReader<'text> {
-    parser: Parser<'text, saphyr_parser::StrInput<'text>>,
-    values: usize,
-}
-
-impl<'text> YamlReader<'text> {
-    fn next(&mut self) -> Result<(Event<'text>, Span), String> {
-        match self.parser.next_event() {
-            Some(Ok(found)) => Ok(found),
-            Some(Err(error)) => Err(words_of(&error)),
-            None => Err("it ends too early".to_owned()),
+fn value_of_yaml(value: YamlValue) -> Value {
+    match value.content {
+        YamlContent::Scalar { text, is_plain } => scalar(&text, is_plain),
+        YamlContent::List(list) => list.into_iter().map(value_of_yaml).collect(),
+        YamlContent::Table(table) => {
+            let entries = table.into_iter();
+            Value::Object(
+                entries
+                    .map(|(key, value)| (key, value_of_yaml(value)))
+                    .collect(),
+            )
         }
     }
-
-    fn table(&mut self, level: u32) -> Result<Map<String, Value>, String> {
-        let mut table = Map::new();
-        loop {
-            let (event, span) = self.next()?;
-            let key = match event {
-                Event::MappingEnd => return Ok(table),
-                Event::Scalar(key, ..) => key.into_owned(),
-                _ => return Err(at(&span, "a key must be a word")),
-            };
-            let (event, value_span) = self.next()?;
-            let value = self.value(event, &value_span, level)?;
-            if table.insert(key.clone(), value).is_some() {
-                return Err(at(&span, &format!("the key '{key}' is there twice")));
-            }
-        }
-    }
-
-    fn list(&mut self, level: u32) -> Result<Value, String> {
-        let mut list = Vec::new();
-        loop {
-            let (event, span) = self.next()?;
-            if matches!(event, Event::SequenceEnd) {
-                return Ok(Value::Array(list));
-            }
-            list.push(self.value(event, &span, level)?);
-        }
-    }
-
-    fn value(&mut self, event: Event, span: &Span, level: u32) -> Result<Value, String> {
-        self.values += 1;
-        if level > MOST_LEVELS || self.values > MOST_VALUES {
-            return Err(at(
-                span,
-                &format!("more than {MOST_LEVELS} levels or {MOST_VALUES} values"),
-            ));
-        }
-        match event {
-            Event::Scalar(text, style, ..) => Ok(scalar(&text, style == ScalarStyle::Plain)),
-            Event::SequenceStart(..) => self.list(level + 1),
-            Event::MappingStart(..) => self.table(level + 1).map(Value::Object),
-            // Nine of them make a billion values; no calibration has any.
-            Event::Alias(_) => Err(at(span, "aliases (*name) are not supported")),
-            _ => Err(at(span, "a value is missing")),
-        }
-    }
-}
-
-fn words_of(error: &ScanError) -> String {
-    let place = error.marker();
-    format!(
-        "line {} column {}: {}",
-        place.line(),
-        place.col() + 1,
-        error.info()
-    )
-}
-
-fn at(span: &Span, message: &str) -> String {
-    format!(
-        "line {} column {}: {message}",
-        span.start.line(),
-        span.start.col() + 1
-    )
 }
 
 /// A number, a truth or a word. What is no finite number stays a word, and is refused where a number is wanted.

@@ -16,7 +16,7 @@ use super::{Detection, Detector, TrackingError};
 use crate::capture::Frame;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::homography::{best_homography, mapped};
-use crate::scene::{Anchor, Family, Marker, TrackingSettings};
+use crate::scene::{Anchor, Face, Family, Marker, TrackingSettings};
 use camera_fit::{BoardCorner, FOCAL_PRIOR, fit, information};
 
 /// Tangent of half the angle that a camera nobody has calibrated is taken to see across: most webcams see about 60°.
@@ -134,8 +134,8 @@ pub struct CameraLearner {
 
 /// The boards whose views are learnt from.
 enum WantedBoards {
-    /// Those of a scene.
-    Anchors(Vec<Anchor>),
+    /// Those of a scene, each flat part by itself.
+    Faces(Vec<Face>),
     /// Each marker of a family by itself; of how large it is the focal length does not depend.
     EveryMarker(Family),
 }
@@ -145,7 +145,7 @@ type SeenMarker = (Marker, [DVec2; 4]);
 
 /// A board as a picture shows it.
 struct View {
-    /// The number of the anchor, or the marker's id.
+    /// The number of the face, or the marker's id.
     board: usize,
     corners: Vec<BoardCorner>,
     /// Where a plain homography puts the corners of the box around the board's own corners.
@@ -169,7 +169,10 @@ impl CameraLearner {
             .collect();
         families.sort();
         families.dedup();
-        let wanted = WantedBoards::Anchors(anchors.to_vec());
+        let faces = anchors
+            .iter()
+            .flat_map(|anchor| Face::all_of(&anchor.markers));
+        let wanted = WantedBoards::Faces(faces.collect());
         Self::new(Detector::new(settings, &families)?, wanted, size_px)
     }
 
@@ -217,12 +220,17 @@ impl CameraLearner {
         let detected = grey_from_rgba(frame, &mut grey)
             .and_then(|()| self.detector.detect(&grey, frame.size_px));
         self.grey = grey;
-        self.take(&detected?);
+        self.look_at(&detected?);
+        Ok(())
+    }
+
+    /// Looks at what a detector saw in a picture.
+    pub fn look_at(&mut self, detections: &[Detection]) {
+        self.take(detections);
         let grown = self.views.len() + self.replaced;
         if grown as f64 >= (1.0 + GROWTH) * self.fitted_views as f64 && grown > self.fitted_views {
             self.fit();
         }
-        Ok(())
     }
 
     /// The camera as far as it is learnt.
@@ -310,9 +318,9 @@ impl WantedBoards {
             .filter(|seen| times[&(seen.family, seen.id)] == 1)
             .collect();
         match self {
-            Self::Anchors(anchors) => (anchors.iter().enumerate())
-                .map(|(number, anchor)| {
-                    let seen = anchor.markers.iter().filter_map(|marker| {
+            Self::Faces(faces) => (faces.iter().enumerate())
+                .map(|(number, face)| {
+                    let seen = face.markers.iter().filter_map(|marker| {
                         let is_marker = |seen: &&&Detection| {
                             (seen.family, seen.id) == (marker.family, marker.id)
                         };
@@ -348,13 +356,14 @@ impl View {
         let corners: Vec<BoardCorner> = markers
             .iter()
             .flat_map(|(marker, corners_px)| {
-                let turn = DVec2::from_angle(marker.rotation_rad + f64::from(quarters) * FRAC_PI_2);
+                let turn =
+                    DVec2::from_angle(marker.rotation_rad() + f64::from(quarters) * FRAC_PI_2);
                 let half_m = 0.5 * marker.size_m;
                 let ways = [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
                 ways.into_iter()
                     .zip(corners_px)
                     .map(move |(way, &pixel)| BoardCorner {
-                        center_m: marker.center_m,
+                        center_m: marker.center_m().truncate(),
                         from_center_m: turn.rotate(DVec2::from(way) * half_m),
                         pixel,
                     })

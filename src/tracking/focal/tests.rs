@@ -12,10 +12,7 @@ fn board() -> Vec<Marker> {
     let family = Family::TAG36H11;
     let place = |k: usize| DVec2::new([-0.175, 0.0, 0.175][k % 3], [0.115, -0.115][k / 3]);
     (0..6)
-        .map(|k| Marker {
-            center_m: place(k),
-            ..Marker::alone(family, k as u32, 0.045)
-        })
+        .map(|k| Marker::alone(family, k as u32, 0.045).in_plane(place(k), 0.0))
         .collect()
 }
 
@@ -63,9 +60,9 @@ fn seen(
             family: marker.family,
             id: marker.id,
             corners_px: ways.map(|way| {
-                let turned = DVec2::from_angle(marker.rotation_rad).rotate(way);
+                let turned = DVec2::from_angle(marker.rotation_rad()).rotate(way);
                 let size_m = marker.size_m * (1.0 + size_error);
-                let board_m = (marker.center_m + turned * size_m).extend(0.0);
+                let board_m = marker.center_m() + (turned * size_m).extend(0.0);
                 let in_camera_m = camera_from_board.transform_point3(board_m);
                 camera.pixel_of(in_camera_m).unwrap() + noise()
             }),
@@ -211,10 +208,7 @@ fn a_still_camera_gives_one_view_and_a_long_film_no_more_than_are_worth_it() {
 fn prints_that_are_turned_and_a_marker_that_moved_do_no_harm() {
     let truth = camera(615.0, Distortion::NONE);
     let turned: Vec<Marker> = (board().into_iter())
-        .map(|marker| Marker {
-            rotation_rad: 2.0 * FRAC_PI_2,
-            ..marker
-        })
+        .map(|marker| marker.in_plane(marker.center_m().truncate(), 2.0 * FRAC_PI_2))
         .collect();
     let poses = all_round(&[25.0, 45.0]);
     let mut learner = learner(&board());
@@ -244,12 +238,13 @@ fn the_camera_that_is_learnt_gives_the_poses_that_the_true_one_has() {
     let posed = |camera: &Intrinsics| {
         let corners = board().into_iter().zip(&seen).flat_map(|(marker, seen)| {
             let ways = [(-0.5, 0.5), (0.5, 0.5), (0.5, -0.5), (-0.5, -0.5)];
-            let points = ways.map(|way| marker.center_m + DVec2::from(way) * marker.size_m);
+            let points =
+                ways.map(|way| marker.center_m() + DVec2::from(way).extend(0.0) * marker.size_m);
             points.into_iter().zip(seen.corners_px)
         });
         let observations: Vec<CornerObservation> = corners
             .map(|(point_m, pixel)| CornerObservation {
-                point_m: point_m.extend(0.0),
+                point_m,
                 pixel: camera.undistorted_pixel(pixel).unwrap(),
             })
             .collect();

@@ -1,21 +1,21 @@
-//! Learns the layout of markers in a plane from pictures of them: places at first (`placing.rs`), bundle adjustment in
-//! space (`bundle.rs`), the plane that they lie in (`plane.rs`), and bundle adjustment in it.
+//! Learns the layout of markers from pictures of them: places at first (`placing.rs`), bundle adjustment in space
+//! (`bundle.rs`), the plane that they lie in, if they do (`plane.rs`), and bundle adjustment in it.
 
 use std::collections::BTreeMap;
 
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
 use super::Detection;
 use crate::geometry::camera::Intrinsics;
 use crate::scene::{Family, Marker};
-use bundle::{
-    BoardView, Bundle, Certainty, MARKER_UNKNOWNS, MarkerFreedom, MarkerObservation, PlacedMarker,
-};
+use bundle::{BoardView, Bundle, Certainty, MarkerFreedom, MarkerObservation};
+use shape::{common_plane, in_space_by, lay_into};
 
 mod bundle;
 mod keyframes;
 mod placing;
 mod plane;
+mod shape;
 
 /// A marker in one picture alone is not believed.
 const LEAST_PICTURES: usize = 2;
@@ -37,6 +37,44 @@ pub struct MapSettings {
     pub learns_sizes: bool,
     /// What a corner may be off the common plane, beside what the pictures leave open; metres.
     pub plane_tolerance_m: f64,
+    /// Whether they lie in a plane.
+    pub shape: ShapeWanted,
+}
+
+/// What a board's markers are to lie in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ShapeWanted {
+    /// A plane where the pictures bear that out, otherwise space.
+    AsSeen,
+    /// A plane; a marker off it is an error.
+    Flat,
+    /// Space, even where a plane would do.
+    Space,
+}
+
+/// What a board's markers were found to lie in.
+#[derive(Debug, Clone, PartialEq)]
+pub enum BoardShape {
+    /// A plane, z = 0 of the board's frame; its origin and x axis are the gauge's, laid into the plane.
+    Flat,
+    /// Space.
+    Space {
+        /// Markers off the plane of the others, and by how much their farthest corner is, metres; empty where no plane was
+        /// looked for.
+        off: Vec<(u32, f64)>,
+        /// The board's frame.
+        frame: SpaceFrame,
+    },
+}
+
+/// The frame of a board in space.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SpaceFrame {
+    /// The gauge's: origin in its middle, x to its right, y to its top, z out of its print.
+    Gauge,
+    /// As that of a flat board, by the plane that the gauge and most of the others lie in: a single marker's tilt is told less
+    /// well.
+    PlaneOfMost,
 }
 
 /// A layout, and how sure it is.
@@ -44,6 +82,10 @@ pub struct MapSettings {
 pub struct LearntBoard {
     /// By id.
     pub markers: Vec<LearntMarker>,
+    /// What they lie in.
+    pub shape: BoardShape,
+    /// Id of the marker that the frame goes by.
+    pub gauge: u32,
     /// Pictures that it rests on.
     pub pictures: usize,
     /// Standard deviation of a corner's coordinate around where the layout puts it, pixels.
@@ -58,8 +100,8 @@ pub struct LearntMarker {
     /// Where it is.
     pub marker: Marker,
     /// Standard deviation of its centre's coordinates, metres; 0 for the gauge.
-    pub center_deviation_m: DVec2,
-    /// Standard deviation of its turn, radians; 0 for the gauge.
+    pub center_deviation_m: DVec3,
+    /// Standard deviation of its turn, radians: in the plane, or in space about all axes together; 0 for the gauge.
     pub rotation_deviation_rad: f64,
     /// Standard deviation of its size, metres; 0 where it was given.
     pub size_deviation_m: f64,
@@ -69,7 +111,7 @@ pub struct LearntMarker {
     pub dropped: usize,
     /// Root mean square distance of its corners from where the layout puts them, pixels.
     pub rms_px: f64,
-    /// Its farthest corner's height above or depth below the plane, if it were not held in it, metres.
+    /// Its farthest corner's height above or depth below the plane, if it were not held in it, metres; 0 in space.
     pub off_plane_m: f64,
 }
 
@@ -117,13 +159,21 @@ pub enum MapError {
     NotDetermined,
     /// Markers off the common plane.
     #[error(
-        "a board is flat, but these markers do not lie in the plane of the others: {}",
-        off.iter().map(|(id, off_m)| format!("{id} by {:.1} mm", off_m * 1e3)).collect::<Vec<_>>().join(", ")
+        "the board is to be flat, but these markers do not lie in the plane of the others: {}",
+        off_in_words(off)
     )]
     NotPlanar {
         /// Ids, and by how much their farthest corner is off, metres.
         off: Vec<(u32, f64)>,
     },
+}
+
+/// Markers, and by how much their farthest corners are off.
+pub fn off_in_words(off: &[(u32, f64)]) -> String {
+    let words = off
+        .iter()
+        .map(|(id, off_m)| format!("{id} by {:.1} mm", off_m * 1e3));
+    words.collect::<Vec<_>>().join(", ")
 }
 
 fn list(ids: &[u32]) -> String {
@@ -191,9 +241,30 @@ pub fn learn_board(
     };
     let mut dropped = vec![0; ids.len()];
     let in_space = adjust_without_outliers(&mut bundle, &mut dropped, &ids)?;
-    let off_plane_m = into_plane(&mut bundle, &in_space, settings.plane_tolerance_m, &ids)?;
-    bundle.freedom = MarkerFreedom::Plane;
-    let certainty = adjust_without_outliers(&mut bundle, &mut dropped, &ids)?;
+    let plane = common_plane(&bundle, &in_space, settings.plane_tolerance_m);
+    let is_flat = plane.as_ref().is_some_and(|plane| plane.off.is_empty());
+    let (certainty, off_plane_m, shape) = match (settings.shape, plane) {
+        (ShapeWanted::Flat, None) => return Err(MapError::NotDetermined),
+        (ShapeWanted::Flat, Some(plane)) if !is_flat => {
+            let off = plane.off_by_id(&ids);
+            return Err(MapError::NotPlanar { off });
+        }
+        (ShapeWanted::Flat | ShapeWanted::AsSeen, Some(plane)) if is_flat => {
+            lay_into(&mut bundle, &plane.plane_from_world);
+            bundle.freedom = MarkerFreedom::Plane;
+            let certainty = adjust_without_outliers(&mut bundle, &mut dropped, &ids)?;
+            (certainty, plane.distances_m, BoardShape::Flat)
+        }
+        (_, plane) => {
+            let mut shape = in_space_by(&mut bundle, plane.as_ref(), &ids);
+            if let (ShapeWanted::Space, BoardShape::Space { off, .. }) =
+                (settings.shape, &mut shape)
+            {
+                off.clear();
+            }
+            (in_space, vec![0.0; ids.len()], shape)
+        }
+    };
     let markers = (0..ids.len()).map(|marker| LearntMarker {
         dropped: dropped[marker],
         off_plane_m: off_plane_m[marker],
@@ -201,6 +272,8 @@ pub fn learn_board(
     });
     Ok(LearntBoard {
         markers: markers.collect(),
+        shape,
+        gauge: ids[gauge],
         pictures: bundle.views.len(),
         noise_px: certainty.noise_px,
         left_out,
@@ -213,8 +286,7 @@ impl LearntBoard {
     pub fn scaled(&self, factor: f64) -> Self {
         let mut scaled = self.clone();
         for learnt in &mut scaled.markers {
-            learnt.marker.size_m *= factor;
-            learnt.marker.center_m *= factor;
+            learnt.marker = learnt.marker.stretched(factor);
             learnt.center_deviation_m *= factor;
             learnt.size_deviation_m *= factor;
             learnt.off_plane_m *= factor;
@@ -367,57 +439,6 @@ fn adjust_without_outliers(
     bundle.adjust().ok_or(MapError::NotDetermined)
 }
 
-/// Turns the world so that its plane z = 0 is the markers', and lays them into it; how far each was off.
-fn into_plane(
-    bundle: &mut Bundle,
-    certainty: &Certainty,
-    tolerance_m: f64,
-    ids: &[u32],
-) -> Result<Vec<f64>, MapError> {
-    // Three standard deviations of a height are what the pictures leave open.
-    let may_be_off_m: Vec<f64> = (certainty.deviations.iter().zip(&bundle.markers))
-        .map(|(deviations, placed)| tolerance_m + 3.0 * height_deviation_m(deviations, placed))
-        .collect();
-    let plane_from_world = plane::plane_from_world(&bundle.markers, bundle.gauge, &may_be_off_m)
-        .ok_or(MapError::NotDetermined)?;
-    let off_m: Vec<f64> = bundle
-        .markers
-        .iter()
-        .map(|marker| plane::farthest_m(marker, &plane_from_world))
-        .collect();
-    let off: Vec<(u32, f64)> = (0..ids.len())
-        .filter(|&marker| off_m[marker] > may_be_off_m[marker])
-        .map(|marker| (ids[marker], off_m[marker]))
-        .collect();
-    if !off.is_empty() {
-        return Err(MapError::NotPlanar { off });
-    }
-    let world_from_plane = plane_from_world.inverse();
-    for view in &mut bundle.views {
-        view.camera_from_world *= world_from_plane;
-    }
-    for placed in &mut bundle.markers {
-        let in_plane = plane_from_world * placed.world_from_marker;
-        let center_m = DVec3::new(in_plane.translation.x, in_plane.translation.y, 0.0);
-        placed.world_from_marker = DAffine3::from_translation(center_m)
-            * DAffine3::from_rotation_z(rotation_rad(&in_plane));
-    }
-    Ok(off_m)
-}
-
-/// The standard deviation of a corner's height: that of the centre's, and of the tilt over half a side.
-fn height_deviation_m(deviations: &[f64; MARKER_UNKNOWNS], placed: &PlacedMarker) -> f64 {
-    let [rx, ry, _, _, _, z_m, _] = *deviations;
-    let half_m = 0.5 * placed.size_m;
-    (z_m * z_m + (rx * half_m).powi(2) + (ry * half_m).powi(2)).sqrt()
-}
-
-/// Turn about z.
-fn rotation_rad(plane_from_marker: &DAffine3) -> f64 {
-    let x = plane_from_marker.matrix3.x_axis;
-    x.y.atan2(x.x)
-}
-
 fn rms(distances_px: &[f64]) -> f64 {
     let squares: f64 = distances_px
         .iter()
@@ -427,7 +448,7 @@ fn rms(distances_px: &[f64]) -> f64 {
 }
 
 impl Bundle {
-    /// What an adjustment in the plane tells of a marker.
+    /// What an adjustment tells of a marker.
     fn learnt(
         &self,
         marker: usize,
@@ -435,7 +456,7 @@ impl Bundle {
         id: u32,
         certainty: &Certainty,
     ) -> LearntMarker {
-        let [_, _, turn, x, y, _, size] = certainty.deviations[marker];
+        let [rx, ry, rz, x, y, z, size] = certainty.deviations[marker];
         let placed = &self.markers[marker];
         let (rms_px, observations) = self.rms_px(marker);
         LearntMarker {
@@ -443,11 +464,10 @@ impl Bundle {
                 family,
                 id,
                 size_m: placed.size_m,
-                center_m: placed.world_from_marker.translation.truncate(),
-                rotation_rad: rotation_rad(&placed.world_from_marker),
+                anchor_from_marker: placed.world_from_marker,
             },
-            center_deviation_m: DVec2::new(x, y),
-            rotation_deviation_rad: turn,
+            center_deviation_m: DVec3::new(x, y, z),
+            rotation_deviation_rad: DVec3::new(rx, ry, rz).length(),
             size_deviation_m: size * placed.size_m,
             observations,
             dropped: 0,

@@ -3,7 +3,7 @@
 //! A lone square has two poses that explain its picture about equally well; the wrong one of them differs from picture
 //! to picture, the right one does not. So each new marker is put where one picture says, and the other pictures vote.
 
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 
 use super::super::pose::{self, CornerObservation};
 use super::bundle::{BoardView, MarkerObservation, PlacedMarker, UNIT_CORNERS};
@@ -148,11 +148,12 @@ impl Placing<'_> {
             .step_by(1 + showing.len() / VOTING)
             .copied()
             .collect();
-        let size_m = match sizes_are_free {
-            true => self.size_in_plane(&voting)?,
-            false => self.size_m,
-        };
-        let grown = size_m / self.size_m;
+        let mut sizes_m = vec![self.size_m];
+        if sizes_are_free {
+            // Upright to the gauge it has no size in the gauge's plane that means anything.
+            sizes_m.extend(self.size_in_plane(&voting));
+            sizes_m.extend(self.size_by_views(&voting));
+        }
         let voters: Vec<Voter> = voting
             .iter()
             .map(|&(picture, at)| {
@@ -172,33 +173,39 @@ impl Placing<'_> {
             .collect();
         let mut best: Option<(f64, PlacedMarker)> = None;
         for (picture, at) in showing.iter().take(SAYING) {
-            let Some((camera_from_world, _)) = self.camera(picture, None) else {
-                continue;
-            };
-            for lone in &picture.lone[*at] {
-                let camera_from_marker =
-                    DAffine3::from_mat3_translation(lone.matrix3, lone.translation * grown);
-                let candidates = self
-                    .starts(picture)
-                    .into_iter()
-                    .chain([camera_from_world])
-                    .map(|camera_from_world| camera_from_world.inverse() * camera_from_marker);
-                for world_from_marker in candidates {
-                    let hypothesis = PlacedMarker {
-                        world_from_marker,
-                        size_m,
-                    };
-                    let against: f64 = voters
-                        .iter()
-                        .map(|voter| self.against(voter, marker, &hypothesis).powi(2))
-                        .sum();
-                    if best.as_ref().is_none_or(|(least, _)| against < *least) {
-                        best = Some((against, hypothesis));
-                    }
+            for hypothesis in self.hypotheses(picture, *at, &sizes_m) {
+                let against: f64 = voters
+                    .iter()
+                    .map(|voter| self.against(voter, marker, &hypothesis).powi(2))
+                    .sum();
+                if best.as_ref().is_none_or(|(least, _)| against < *least) {
+                    best = Some((against, hypothesis));
                 }
             }
         }
         best.map(|(_, placed)| placed)
+    }
+
+    /// Where a marker may be by one picture that shows it, if it is of one of the sizes.
+    fn hypotheses(&self, picture: &BoardPicture, at: usize, sizes_m: &[f64]) -> Vec<PlacedMarker> {
+        let Some((camera_from_world, _)) = self.camera(picture, None) else {
+            return Vec::new();
+        };
+        let mut cameras = self.starts(picture);
+        cameras.push(camera_from_world);
+        let mut hypotheses = Vec::new();
+        for &size_m in sizes_m {
+            let grown = size_m / self.size_m;
+            for lone in &picture.lone[at] {
+                let camera_from_marker =
+                    DAffine3::from_mat3_translation(lone.matrix3, lone.translation * grown);
+                hypotheses.extend(cameras.iter().map(|camera_from_world| PlacedMarker {
+                    world_from_marker: camera_from_world.inverse() * camera_from_marker,
+                    size_m,
+                }));
+            }
+        }
+        hypotheses
     }
 
     /// How far a picture shows a marker from where it is thought to be, pixels (root mean square).
@@ -221,6 +228,34 @@ impl Placing<'_> {
                 .map(|(_, rms_px)| rms_px),
         };
         rms_px.map_or(DISAGREES_PX, |rms_px| rms_px.min(DISAGREES_PX))
+    }
+
+    /// The side with which all pictures put a marker's middle in one place, by least squares: what it says of the marker's
+    /// distance from a camera, the others' places say of that camera.
+    fn size_by_views(&self, showing: &[(&BoardPicture, usize)]) -> Option<f64> {
+        // Both poses of a lone marker have its middle in about the same place.
+        let ways: Vec<(DVec3, DVec3)> = showing
+            .iter()
+            .filter_map(|(picture, at)| {
+                let (camera_from_world, _) = self.camera(picture, None)?;
+                let world_from_camera = camera_from_world.inverse();
+                let middle_m = picture.lone[*at].first()?.translation;
+                Some((
+                    world_from_camera.translation,
+                    world_from_camera.transform_vector3(middle_m),
+                ))
+            })
+            .collect();
+        let count = ways.len() as f64;
+        let eye_m = ways.iter().map(|way| way.0).sum::<DVec3>() / count;
+        let way_m = ways.iter().map(|way| way.1).sum::<DVec3>() / count;
+        let (mut along, mut squares) = (0.0, 0.0);
+        for (eye, way) in &ways {
+            along += (*way - way_m).dot(*eye - eye_m);
+            squares += (*way - way_m).length_squared();
+        }
+        let grown = -along / squares;
+        (grown.is_finite() && grown > 0.0).then_some(grown * self.size_m)
     }
 
     /// The side that a marker has if it lies in the plane of the gauge: the median over its pictures.

@@ -1,5 +1,6 @@
 //! Scenes: what a good one becomes, and where each mistake is pointed out.
 
+mod bundles;
 mod meshes;
 mod mistakes;
 mod models;
@@ -241,7 +242,7 @@ frame_budget_ms = 16
         .map(|anchor| anchor.name.as_str())
         .collect();
     assert_eq!(names, ["board", "card"], "boards come first");
-    assert!((scene.anchors[0].markers[0].rotation_rad - FRAC_PI_2).abs() < 1e-12);
+    assert!((scene.anchors[0].markers[0].rotation_rad() - FRAC_PI_2).abs() < 1e-12);
     assert_eq!(
         scene.anchors[1].markers[0].family,
         Family::of(Codes::Aruco {

@@ -17,7 +17,9 @@ use crate::light::{Light, Shape};
 use crate::scene::SceneLight;
 use crate::scene::format::LightKind;
 use crate::scene::format::{SHADOWS, SHADOWS_SECTION};
-use crate::scene::{Anchor, DetectorKind, Object, Quality, Scene, ShadowSettings, ShapeKind};
+use crate::scene::{
+    Anchor, DetectorKind, Face, Marker, Object, Quality, Scene, ShadowSettings, ShapeKind,
+};
 use budget::budget_line;
 use room::room_lines;
 
@@ -211,15 +213,30 @@ fn anchor_row((number, anchor): (usize, &Anchor)) -> TableRow {
         family,
         format!("id {}", ranges(&ids)),
         format!("{} mm", sizes_mm.join(", ")),
-        if number == 0 {
-            "the world".to_owned()
-        } else {
-            String::new()
-        },
+        [planes_in_words(markers), world_in_words(number)]
+            .into_iter()
+            .filter(|words| !words.is_empty())
+            .collect::<Vec<_>>()
+            .join(", "),
     ];
     TableRow {
         cells,
         ..TableRow::default()
+    }
+}
+
+/// In how many planes the markers of a board in space lie; nothing of a flat one.
+fn planes_in_words(markers: &[Marker]) -> String {
+    match Face::all_of(markers).len() {
+        0 | 1 => String::new(),
+        planes => format!("in space, {planes} planes"),
+    }
+}
+
+fn world_in_words(number: usize) -> String {
+    match number {
+        0 => "the world".to_owned(),
+        _ => String::new(),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Markers: sheets to print, with the text that a scene file takes beside them.
 
+mod cube;
 mod page;
 mod pdf;
 mod png;
@@ -67,6 +68,19 @@ pub enum MarkerSheet {
         /// The anchor's name.
         name: String,
     },
+    /// The six faces of a cube, which are one anchor.
+    Cube {
+        /// Of all markers.
+        family: Family,
+        /// Id of the front's marker; those of right, back, left, top and bottom follow.
+        first_id: u32,
+        /// Edge of the cube.
+        edge_mm: f64,
+        /// Side of the black squares.
+        size_mm: f64,
+        /// The anchor's name.
+        name: String,
+    },
     /// Markers to be cut out, each an anchor of its own.
     Lone {
         /// Of all markers.
@@ -107,6 +121,23 @@ pub fn markers(request: &MarkersRequest) -> Result<Vec<PathBuf>> {
             let (page, block) = board(&request.sheet, size_mm)?;
             (vec![page], Some(block))
         }
+        MarkerSheet::Cube {
+            family,
+            first_id,
+            edge_mm,
+            size_mm: marker_mm,
+            name,
+        } => {
+            let sheet = cube::CubeSheet {
+                family: *family,
+                first_id: *first_id,
+                marker_mm: *marker_mm,
+                edge_mm: *edge_mm,
+                name,
+            };
+            let (pages, block) = cube::cube(&sheet, size_mm)?;
+            (pages, Some(block))
+        }
         MarkerSheet::Lone {
             family,
             ids,
@@ -141,7 +172,9 @@ impl MarkersRequest {
         let mut files = JobFiles::new(self.replacing);
         files.writes("--out", &self.out, kind);
         let family = match &self.sheet {
-            MarkerSheet::Board { family, .. } | MarkerSheet::Lone { family, .. } => Some(*family),
+            MarkerSheet::Board { family, .. }
+            | MarkerSheet::Cube { family, .. }
+            | MarkerSheet::Lone { family, .. } => Some(*family),
             MarkerSheet::Target(target) => target.markers.as_ref().map(|markers| markers.family),
         };
         if let Some(family) = family {
@@ -225,14 +258,10 @@ fn board(sheet: &MarkerSheet, size_mm: [f64; 2]) -> Result<(Page, String)> {
             ];
             print_marker(&mut page, at, *marker_mm, (*family, id))?;
             let from_center = [0, 1].map(|k| at[k] + marker_mm / 2.0 - origin[k] - extent[k] / 2.0);
-            placed.push(Marker {
-                family: *family,
-                id,
-                size_m: marker_mm / 1000.0,
-                // y runs up on the board.
-                center_m: DVec2::new(from_center[0], -from_center[1]) / 1000.0,
-                rotation_rad: 0.0,
-            });
+            let marker = Marker::alone(*family, id, marker_mm / 1000.0);
+            // y runs up on the board.
+            let center_m = DVec2::new(from_center[0], -from_center[1]) / 1000.0;
+            placed.push(marker.in_plane(center_m, 0.0));
         }
     }
     Ok((page, anchor_block::board(name, &placed)))
@@ -281,13 +310,7 @@ fn lone(
             print_marker(&mut page, marker_at, marker_mm, (family, id))?;
             let label = format!("{} {id}  {marker_mm} mm", family.name());
             page.write([at[0] + quiet_mm, at[1] + card_mm[1] - 1.2], 2.5, &label);
-            let marker = Marker {
-                family,
-                id,
-                size_m: marker_mm / 1000.0,
-                center_m: DVec2::ZERO,
-                rotation_rad: 0.0,
-            };
+            let marker = Marker::alone(family, id, marker_mm / 1000.0);
             if !block.is_empty() {
                 block.push('\n');
             }

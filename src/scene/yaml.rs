@@ -1,0 +1,173 @@
+//! YAML as a tree of values that know where they stand, with limits on depth and number: a file of a few bytes must not cost
+//! a stack or a memory.
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use saphyr_parser::{Event, Parser, ScalarStyle, ScanError, Span};
+
+/// Levels of lists and tables in one another; calib.io's have nine.
+pub const MOST_LEVELS: u32 = 32;
+/// Values in one file.
+pub const MOST_VALUES: usize = 200_000;
+
+/// A value, and where it begins: line and column, from 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct YamlValue {
+    /// Its line.
+    pub line: usize,
+    /// Its column in characters.
+    pub column: usize,
+    /// What it is.
+    pub content: YamlContent,
+}
+
+/// What a value is.
+#[derive(Debug, Clone, PartialEq)]
+pub enum YamlContent {
+    /// A word or a number; a plain one has no quotes.
+    Scalar {
+        /// As written, without quotes.
+        text: String,
+        /// Whether it has none.
+        is_plain: bool,
+    },
+    /// Values in order.
+    List(Vec<YamlValue>),
+    /// Keys, each once, with their values.
+    Table(Vec<(String, YamlValue)>),
+}
+
+impl YamlValue {
+    /// The first document of a text that has anything in it; `None` where none has.
+    ///
+    /// # Errors
+    /// What is no YAML, or beyond the limits, with line and column.
+    pub fn of_text(text: &str) -> Result<Option<Self>, String> {
+        let text = without_opencv_directive(text);
+        let mut reader = Reader {
+            parser: Parser::new_from_str(&text),
+            values: 0,
+        };
+        loop {
+            let (event, span) = reader.next()?;
+            match event {
+                Event::StreamEnd => return Ok(None),
+                Event::Scalar(text, ScalarStyle::Plain, ..) if text.is_empty() || text == "~" => {}
+                Event::Scalar(..) | Event::SequenceStart(..) | Event::MappingStart(..) => {
+                    return reader.value(event, &span, 0).map(Some);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// The bytes of the text that it was read from where it begins, up to the end of the word there.
+    pub fn span_in(&self, text: &str) -> Range<usize> {
+        let lines = text.split_inclusive('\n');
+        let line_start: usize = lines.take(self.line.saturating_sub(1)).map(str::len).sum();
+        let line = text.get(line_start..).unwrap_or_default();
+        let before = line.char_indices().nth(self.column.saturating_sub(1));
+        let start = line_start + before.map_or(0, |(at, _)| at);
+        let word = text.get(start..).unwrap_or_default();
+        let length = word.find(|c: char| c.is_whitespace() || ",]}".contains(c));
+        start..start + length.unwrap_or(word.len()).max(1)
+    }
+}
+
+/// OpenCV's `%YAML:1.0` is no directive of YAML; its line stays, for the others' numbers.
+fn without_opencv_directive(text: &str) -> Cow<'_, str> {
+    match text.strip_prefix("%YAML:") {
+        Some(rest) => Cow::Owned(format!("# YAML:{rest}")),
+        None => Cow::Borrowed(text),
+    }
+}
+
+struct Reader<'text> {
+    parser: Parser<'text, saphyr_parser::StrInput<'text>>,
+    values: usize,
+}
+
+impl<'text> Reader<'text> {
+    fn next(&mut self) -> Result<(Event<'text>, Span), String> {
+        match self.parser.next_event() {
+            Some(Ok(found)) => Ok(found),
+            Some(Err(error)) => Err(words_of(&error)),
+            None => Err("it ends too early".to_owned()),
+        }
+    }
+
+    fn table(&mut self, level: u32) -> Result<Vec<(String, YamlValue)>, String> {
+        let mut known = std::collections::HashSet::new();
+        let mut table = Vec::new();
+        loop {
+            let (event, span) = self.next()?;
+            let key = match event {
+                Event::MappingEnd => return Ok(table),
+                Event::Scalar(key, ..) => key.into_owned(),
+                _ => return Err(at(&span, "a key must be a word")),
+            };
+            let (event, value_span) = self.next()?;
+            let value = self.value(event, &value_span, level)?;
+            if !known.insert(key.clone()) {
+                return Err(at(&span, &format!("the key '{key}' is there twice")));
+            }
+            table.push((key, value));
+        }
+    }
+
+    fn list(&mut self, level: u32) -> Result<Vec<YamlValue>, String> {
+        let mut list = Vec::new();
+        loop {
+            let (event, span) = self.next()?;
+            if matches!(event, Event::SequenceEnd) {
+                return Ok(list);
+            }
+            list.push(self.value(event, &span, level)?);
+        }
+    }
+
+    fn value(&mut self, event: Event, span: &Span, level: u32) -> Result<YamlValue, String> {
+        self.values += 1;
+        if level > MOST_LEVELS || self.values > MOST_VALUES {
+            return Err(at(
+                span,
+                &format!("more than {MOST_LEVELS} levels or {MOST_VALUES} values"),
+            ));
+        }
+        let content = match event {
+            Event::Scalar(text, style, ..) => YamlContent::Scalar {
+                text: text.into_owned(),
+                is_plain: style == ScalarStyle::Plain,
+            },
+            Event::SequenceStart(..) => YamlContent::List(self.list(level + 1)?),
+            Event::MappingStart(..) => YamlContent::Table(self.table(level + 1)?),
+            // Nine of them make a billion values; no file of a camera or of markers has any.
+            Event::Alias(_) => return Err(at(span, "aliases (*name) are not supported")),
+            _ => return Err(at(span, "a value is missing")),
+        };
+        Ok(YamlValue {
+            line: span.start.line(),
+            column: span.start.col() + 1,
+            content,
+        })
+    }
+}
+
+fn words_of(error: &ScanError) -> String {
+    let place = error.marker();
+    format!(
+        "line {} column {}: {}",
+        place.line(),
+        place.col() + 1,
+        error.info()
+    )
+}
+
+fn at(span: &Span, message: &str) -> String {
+    format!(
+        "line {} column {}: {message}",
+        span.start.line(),
+        span.start.col() + 1
+    )
+}
