@@ -1,4 +1,5 @@
-//! What lets light through, held against closed forms: sheets under suns above a table that nothing else lights.
+//! What lets light through, and what a mask leaves, held against closed forms: sheets under suns above a table that nothing else
+//! lights.
 
 use glam::{DVec2, DVec3};
 use gnomon::geometry::camera::{Distortion, Intrinsics};
@@ -23,6 +24,8 @@ struct Sheet {
     half: DVec2,
     albedo: f64,
     opacity: f64,
+    /// A disc, of its half side as the radius.
+    is_round: bool,
 }
 
 /// Whither its light goes, and the irradiance that it gives the table.
@@ -37,6 +40,7 @@ const LOW: Sheet = Sheet {
     half: DVec2::new(0.06, 0.04),
     albedo: 0.8,
     opacity: 0.5,
+    is_round: false,
 };
 /// Before the other as the camera sees them.
 const HIGH: Sheet = Sheet {
@@ -44,6 +48,7 @@ const HIGH: Sheet = Sheet {
     half: DVec2::new(0.04, 0.05),
     albedo: 0.2,
     opacity: 0.3,
+    is_round: false,
 };
 const SUNS: [Sun; 2] = [
     Sun {
@@ -92,7 +97,11 @@ fn scene(sheets: &[Sheet], suns: &[Sun], keys: &str) -> Scene {
 fn hit(sheet: &Sheet, from: DVec3, direction: DVec3) -> Option<DVec3> {
     let place = from + direction * ((sheet.middle.z - from.z) / direction.z);
     let off = (place - sheet.middle).truncate().abs();
-    (off.cmple(sheet.half).all() && (place - from).dot(direction) > 1e-9).then_some(place)
+    let is_within = match sheet.is_round {
+        true => off.length() <= sheet.half.x,
+        false => off.cmple(sheet.half).all(),
+    };
+    (is_within && (place - from).dot(direction) > 1e-9).then_some(place)
 }
 
 /// Part of the suns' light that sheets let through to a place.
@@ -210,4 +219,56 @@ fn sheets_are_sorted_and_a_frame_is_as_if_it_were_the_first() {
     let [one, other] = [shoot(&[LOW, HIGH]), shoot(&[HIGH, LOW])];
     let off = one.iter().zip(&other).filter(|(a, b)| a.abs_diff(**b) > 1);
     assert_eq!(off.count(), 0);
+}
+
+/// A disc that a picture's opacity cuts out of a square card: its edge is where the opacity passes a half.
+const DISC: Sheet = Sheet {
+    middle: DVec3::new(-0.03, 0.03, 0.06),
+    half: DVec2::splat(0.045),
+    albedo: 0.8,
+    opacity: 1.0,
+    is_round: true,
+};
+
+fn write_card(folder: &std::path::Path) {
+    /// Texels of the card's side, and of the disc's radius: three quarters of half of it.
+    const SIDE: u32 = 64;
+    const RADIUS: f64 = 24.0;
+    let grey = |x: u32, y: u32| {
+        let off = DVec2::new(f64::from(x), f64::from(y)) - 0.5 * f64::from(SIDE - 1);
+        let opacity = (0.5 + 0.5 * (RADIUS - off.length())).clamp(0.0, 1.0);
+        image::Luma([(255.0 * opacity).round() as u8])
+    };
+    let mask = image::GrayImage::from_fn(SIDE, SIDE, grey);
+    mask.save(folder.join("mask.png")).expect("a picture");
+    let half = 0.045 / RADIUS * 0.5 * f64::from(SIDE);
+    let mut obj = "mtllib card.mtl\nusemtl card\n".to_owned();
+    for (x, y) in [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)] {
+        let [across, up] = [x, y].map(|side| (2.0 * side - 1.0) * half);
+        obj += &format!("v {across} {up} 0\nvt {x} {y}\n");
+    }
+    obj += "f 1/1 2/2 3/3 4/4\n";
+    std::fs::write(folder.join("card.obj"), obj).expect("a file");
+    let mtl = "newmtl card\nKd 0.8 0.8 0.8\nmap_d mask.png\n";
+    std::fs::write(folder.join("card.mtl"), mtl).expect("a file");
+}
+
+#[test]
+fn what_a_mask_leaves_is_seen_and_throws_its_own_shadow() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_card(folder.path());
+    for (suns, samples) in [(&SUNS[..1], 1), (&SUNS[..], 4)] {
+        let keys = format!(
+            "[[virtual]]\nname = \"card\"\nmesh = {:?}\nposition_m = {:?}\n[shadows]\nsamples = {samples}\n",
+            folder.path().join("card.obj"),
+            DISC.middle.to_array()
+        );
+        let mut renderer = Stage::of_scene(scene(&[], suns, &keys)).renderer(CAMERA);
+        renderer.draw(&[Some(look_at(EYE, DVec3::ZERO))], Shown::Composite);
+        let picture = Picture::new(renderer.read_picture().expect("a picture"));
+        let (wrong, judged) = wrong(&picture, &[DISC], suns);
+        println!("a mask's disc: {wrong} of {judged} pixels are off");
+        assert!(judged > 60_000, "{judged} pixels judged");
+        assert!(wrong == 0, "{wrong} of {judged} pixels are off");
+    }
 }
