@@ -27,7 +27,8 @@ struct MaterialOnGpu {
     occlusion_strength: f32,
     // 1 if the colour is the radiance itself.
     unlit: u32,
-    padding_1: u32,
+    // 1 if it lets light through.
+    translucent: u32,
     padding_2: u32,
     padding_3: u32,
     // Colour, emission, roughness, metallic, normal, occlusion.
@@ -207,6 +208,7 @@ fn material_at(number: u32, uv: vec4f, color: vec4f, tangent: vec4f, normal: vec
     }
     let albedo = material.albedo * base.rgb;
     let is_unlit = material.unlit != 0u;
+    let opacity = select(1.0, min(material.opacity * base.a, 1.0), material.translucent != 0u);
     // (A mirror's lobe is narrower than any light.)
     let roughness = select(0.0, max(material.roughness * rough * rough, 0.01), material.roughness > 0.0);
     return Look(
@@ -215,7 +217,7 @@ fn material_at(number: u32, uv: vec4f, color: vec4f, tangent: vec4f, normal: vec
         select(material.metallic * metal, 0.0, is_unlit),
         select(emission, albedo, is_unlit),
         1.0 + material.occlusion_strength * (occluded - 1.0),
-        select(0.0, 1.0, material.opacity * base.a >= material.cutoff),
+        select(0.0, opacity, material.opacity * base.a >= material.cutoff),
         bent * side,
     );
 }

@@ -49,7 +49,7 @@ struct Look {
     emission: vec3f,
     // Part of the surroundings' light that arrives.
     occlusion: f32,
-    // 0 where there is nothing.
+    // 0 where there is nothing, below 1 where light passes.
     opacity: f32,
     // Unit length, on the side that is seen.
     normal: vec3f,

@@ -1,5 +1,7 @@
 //! Decoded pictures that lie on surfaces, and what they say at a place: the CPU twin of materials.wgsl.
 
+use std::ops::{Add, Mul};
+
 use glam::{DVec2, DVec4, Vec2};
 
 use super::material::{Encoding, Filter, Map, Wrap};
@@ -32,28 +34,39 @@ impl Texture {
 
     /// What lies at a corner's texture coordinates, between the four texels around it, linear.
     pub fn sample(&self, map: &Map, uv: Vec2, encoding: Encoding) -> DVec4 {
-        let [width, height] = self.size_px;
-        let size = DVec2::new(f64::from(width), f64::from(height));
-        let place = map.picture_from_corner.transform_point2(uv).as_dvec2() * size;
-        if !place.is_finite() {
-            return self.texel([0, 0], encoding);
-        }
-        let texel = |column: f64, row: f64| {
-            let column = wrapped(column, width, map.wrap[0]);
-            self.texel([column, wrapped(row, height, map.wrap[1])], encoding)
-        };
-        if map.filter == Filter::Pixels {
-            return texel(place.x.floor(), place.y.floor());
-        }
-        let low = (place - 0.5).floor();
-        let share = place - 0.5 - low;
-        let row = |row: f64| texel(low.x, row).lerp(texel(low.x + 1.0, row), share.x);
-        row(low.y).lerp(row(low.y + 1.0), share.y)
+        map.sample(self.size_px, uv, |texel| self.texel(texel, encoding))
     }
 
     /// Memory that its texels take, bytes.
     pub fn bytes(&self) -> usize {
         self.rgba.len()
+    }
+}
+
+impl Map {
+    /// What lies at a corner's texture coordinates in a picture of some width and height, texels; `texel` has what is at a
+    /// column and a row. Where the coordinates are no numbers it is the first.
+    pub fn sample<T>(&self, [width, height]: [u32; 2], uv: Vec2, texel: impl Fn([u32; 2]) -> T) -> T
+    where
+        T: Add<Output = T> + Mul<f64, Output = T>,
+    {
+        let size = DVec2::new(f64::from(width), f64::from(height));
+        let place = self.picture_from_corner.transform_point2(uv).as_dvec2() * size;
+        if !place.is_finite() {
+            return texel([0, 0]);
+        }
+        let texel = |column: f64, row: f64| {
+            let column = wrapped(column, width, self.wrap[0]);
+            texel([column, wrapped(row, height, self.wrap[1])])
+        };
+        if self.filter == Filter::Pixels {
+            return texel(place.x.floor(), place.y.floor());
+        }
+        let low = (place - 0.5).floor();
+        let share = place - 0.5 - low;
+        let row =
+            |row: f64| texel(low.x, row) * (1.0 - share.x) + texel(low.x + 1.0, row) * share.x;
+        row(low.y) * (1.0 - share.y) + row(low.y + 1.0) * share.y
     }
 }
 

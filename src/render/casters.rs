@@ -30,6 +30,8 @@ pub(super) struct Casters {
     depth_pass: bool,
     /// Whether what has not changed since the last frame is made anew all the same.
     forgets: bool,
+    /// What stands on this node is not drawn.
+    unseen: Option<usize>,
 }
 
 /// The shadow of one caster in one light.
@@ -85,7 +87,13 @@ impl Casters {
             depth_pass: shadows.counting == scene::VolumeCounting::Auto
                 && !shadows.without.has(Shortcut::DepthPass),
             forgets: shadows.without.has(Shortcut::Kept),
+            unseen: None,
         }
+    }
+
+    /// What stands on a node is not drawn from now on: depth-pass would need its surface in the place of the near cap.
+    pub fn set_unseen(&mut self, node: Option<usize>) {
+        self.unseen = node;
     }
 
     /// Makes room for the pieces of lights.
@@ -152,7 +160,8 @@ impl Casters {
                 let place = slot * things.len() + number;
                 self.lights
                     .write(&gpu.queue, place, &CastingLight::new(light, end));
-                let counting = match self.depth_pass && !placed.sees_past(end) {
+                let is_seen = self.unseen != Some(thing.anchor);
+                let counting = match self.depth_pass && is_seen && !placed.sees_past(end) {
                     true => counting::counting(&thing.bounds, light, &placed.near),
                     false => Counting::DepthFail,
                 };

@@ -100,6 +100,8 @@ pub(super) struct GpuScene {
     /// Where things stand and which are there: phantoms, then virtual ones.
     standing: Vec<(DAffine3, bool)>,
     known_levels: KnownLevels,
+    /// What stands on this node casts shadows, but is not seen.
+    unseen: Option<usize>,
 }
 
 impl GpuScene {
@@ -116,6 +118,7 @@ impl GpuScene {
         let light_kinds = light_kinds.collect();
         Self {
             standing: standing(scene),
+            unseen: None,
             known_levels,
             casters: Casters::new(gpu, things.len(), &scene.shadows),
             indirect: match lit_by {
@@ -175,6 +178,12 @@ impl GpuScene {
         self.max_silhouette_error_px = max_silhouette_error_px;
     }
 
+    /// What stands on a node casts shadows from now on, but is not seen.
+    pub fn set_unseen(&mut self, node: Option<usize>) {
+        self.unseen = node;
+        self.casters.set_unseen(node);
+    }
+
     /// Number of lights.
     pub fn light_count(&self) -> usize {
         self.lights.count()
@@ -226,7 +235,9 @@ impl GpuScene {
                 let Some(camera_from_anchor) = camera_from_anchor[thing.anchor] else {
                     return Insides::Unseen;
                 };
-                if self.shadows.without.has(Shortcut::Insides) {
+                // (Of what is not seen no surface lies before its volume's caps.)
+                let is_unseen = self.unseen == Some(thing.anchor);
+                if is_unseen || self.shadows.without.has(Shortcut::Insides) {
                     return Insides::Anywhere;
                 }
                 match insides(thing, level, &camera_from_anchor, &self.intrinsics) {
@@ -579,8 +590,9 @@ impl GpuScene {
     /// The batches of a role whose anchor has a pose, in a world that has one.
     fn placed(&self, role: Role) -> impl Iterator<Item = &SurfaceBatch> {
         let has_pose = |anchor: usize| self.camera_from_anchor[anchor].is_some();
+        let is_seen = move |anchor: usize| has_pose(anchor) && self.unseen != Some(anchor);
         let batches = self.batches.iter();
-        batches.filter(move |b| b.role == role && has_pose(0) && has_pose(b.anchor))
+        batches.filter(move |b| b.role == role && has_pose(0) && is_seen(b.anchor))
     }
 
     /// What a role has on an anchor.

@@ -32,7 +32,7 @@ pub(super) const MATERIALS_GROUP: GroupLayout = GroupLayout {
 /// Stacks of each encoding, by the longest side of their pictures, texels.
 const STACKS_PX: [u32; 3] = [256, 1024, u32::MAX];
 /// What has less opacity than this is not drawn, of what is half transparent.
-const CLEAR: f32 = 0.1;
+const CLEAR: f32 = 0.004;
 
 /// How a picture lies on a surface: the twin of `MapOnGpu` in materials.wgsl.
 #[repr(C)]
@@ -57,7 +57,7 @@ pub(super) struct MaterialOnGpu {
     pub normal_scale: f32,
     pub occlusion_strength: f32,
     pub unlit: u32,
-    pub padding_1: u32,
+    pub translucent: u32,
     pub padding_2: u32,
     pub padding_3: u32,
     pub maps: [MapOnGpu; 6],
@@ -146,6 +146,7 @@ fn on_gpu<'a>(
         normal_scale: maps.normal_scale as f32,
         occlusion_strength: maps.occlusion_strength as f32,
         unlit: u32::from(material.shading == Shading::Unlit),
+        translucent: u32::from(material.coverage == Coverage::Blend),
         maps: [
             map(maps.color, Encoding::Srgb),
             map(maps.emission, Encoding::Srgb),

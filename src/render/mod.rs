@@ -19,6 +19,7 @@ mod gpu_clock;
 mod gpu_scene;
 mod indirect;
 mod insides;
+mod layered_scene;
 mod layers;
 mod light_kind;
 mod light_piece;
@@ -40,6 +41,7 @@ mod shown;
 mod stencil;
 mod surfaces;
 mod technique;
+mod translucent;
 mod uniforms;
 mod volumes;
 

@@ -1,6 +1,7 @@
 //! The frame from top to bottom: recorded picture, surfaces, shadow volumes light by light, composite.
 
 mod chosen_technique;
+mod layering;
 mod read_back;
 
 use std::sync::Arc;
@@ -24,6 +25,7 @@ use super::fade::{self, Fade};
 use super::gpu::{Gpu, RenderError};
 use super::gpu_clock::{GpuClock, GpuTimes};
 use super::gpu_scene::GpuScene;
+use super::layered_scene::{LayeredScene, TranslucentLayer};
 use super::layers::LayerPasses;
 use super::light_kind::LightKind;
 use super::passes::{Passes, RecordedPasses};
@@ -32,6 +34,7 @@ use super::readback::Readback;
 use super::screen_bounds::ScreenBounds;
 use super::shown::Shown;
 use super::technique::FrameContext;
+use super::translucent::Translucent;
 use chosen_technique::ChosenTechnique;
 
 /// Draws the frames of one scene through one camera.
@@ -50,6 +53,12 @@ pub struct Renderer {
     /// Made when something fades for the first time.
     fade: Option<Fade>,
     layer_passes: Option<LayerPasses>,
+    /// What lets light through.
+    layers: Vec<TranslucentLayer>,
+    /// Made when any of it is drawn for the first time.
+    translucent: Option<Translucent>,
+    /// Where all else stood in the last frame, if any of it was in it.
+    opaque_nodes: Option<Vec<Option<DAffine3>>>,
     /// What the frame that was drawn last showed.
     shown: Shown,
     /// What things and their shadows could reach in that frame; `None` where nothing was placed.
@@ -131,6 +140,8 @@ impl Renderer {
             });
         }
         let background = Background::new(&gpu, &intrinsics);
+        let LayeredScene { scene, layers } = LayeredScene::new(scene);
+        let scene = scene.as_ref();
         let (technique, gpu_scene) =
             ChosenTechnique::new(&gpu, scene, intrinsics, &background, transport);
         let made_for = Shape::of(scene, &scene.outlined_lights());
@@ -154,6 +165,9 @@ impl Renderer {
                 .map(|period_ns| GpuClock::new(device, period_ns)),
             fade: None,
             layer_passes: None,
+            layers,
+            translucent: None,
+            opaque_nodes: None,
             shown: Shown::Bare,
             bounds: None,
             pass_names: Vec::new(),
@@ -171,11 +185,14 @@ impl Renderer {
     /// elsewhere, are shown or hidden. Light that surroundings reflect is not gathered anew. False where more has
     /// changed: that takes a new renderer.
     pub fn follow(&mut self, scene: &Scene) -> bool {
+        let LayeredScene { scene, layers } = LayeredScene::new(scene);
+        let scene = scene.as_ref();
         let lights = scene.outlined_lights();
         let follows =
             self.made_for == Shape::of(scene, &lights) && self.technique.passes_mut().follow(scene);
         if follows {
             self.gpu_scene.follow(&self.gpu, scene, lights);
+            self.layers = layers;
             self.stale = PixelRect::whole(self.size_px);
         }
         follows
@@ -256,10 +273,8 @@ impl Renderer {
         }
     }
 
-    /// Draws the uploaded picture with what stands on the nodes, whose poses come as [`Scene::camera_from_nodes`] gives
-    /// them; where nothing moves by itself these are the anchors, in the scene's order. Without
-    /// the world's pose nobody knows where the light comes from, and the video is shown alone.
-    pub fn draw(&mut self, camera_from_anchor: &[Option<DAffine3>], shown: Shown) {
+    /// Draws the uploaded picture with what stands on the nodes, layers too; one that is not there has no pose.
+    fn draw_once(&mut self, camera_from_anchor: &[Option<DAffine3>], shown: Shown) {
         self.shown = shown;
         self.gpu_scene.place(&self.gpu, camera_from_anchor);
         let technique = self.technique.passes_mut();
@@ -302,7 +317,8 @@ impl Renderer {
 
     /// Takes note of a frame that is not drawn, so that the next one is what it would be after it.
     pub fn pass_over(&mut self, camera_from_anchor: &[Option<DAffine3>]) {
-        self.gpu_scene.choose_levels(camera_from_anchor);
+        let nodes = self.without_layers(camera_from_anchor);
+        self.gpu_scene.choose_levels(&nodes);
     }
 
     /// The picture that is drawn: sRGB-encoded bytes, whatever the format says. It stays the same texture.

@@ -11,7 +11,7 @@ macro_rules! files {
 }
 
 /// All files under `shaders/`.
-const FILES: [(&str, &str); 27] = files![
+const FILES: [(&str, &str); 28] = files![
     "area_lights.wgsl",
     "background.wgsl",
     "common.wgsl",
@@ -37,6 +37,7 @@ const FILES: [(&str, &str); 27] = files![
     "shaft_mips.wgsl",
     "shafts.wgsl",
     "surfaces.wgsl",
+    "translucent.wgsl",
     "video.wgsl",
     "volumes.wgsl",
 ];

@@ -328,7 +328,7 @@ mod tests {
             normal_scale,
             occlusion_strength,
             unlit,
-            padding_1,
+            translucent,
             padding_2,
             padding_3,
             maps

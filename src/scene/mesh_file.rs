@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use super::error::SceneError;
+use super::mask_cut::cut_masks;
 use super::named_files::FileKind;
 use super::obj::files::named_file;
 use super::plain_file::{self, MOST_MESH};
@@ -118,6 +119,7 @@ fn read(
         }
     };
     drop(bytes);
+    cut_masks(&mut model, path)?;
     note_coverage(&mut model, path, reading.normals);
     place(
         &mut model,
@@ -224,27 +226,14 @@ impl MeshFormat {
     }
 }
 
-/// Tells what becomes of materials that are not opaque.
+/// Tells what becomes of materials that let light through.
 fn note_coverage(model: &mut RawModel, path: &Path, normals: Normals) {
-    let mut has = |is_meant: fn(&Coverage) -> bool, of_phantom, of_virtual| {
-        let mut coverages = model.materials.iter().map(|given| given.material.coverage);
-        if coverages.any(|coverage| is_meant(&coverage)) {
-            let is_phantom = normals == Normals::Flat;
-            model
-                .notes
-                .add_of(path, if is_phantom { of_phantom } else { of_virtual });
-        }
-    };
-    has(
-        |coverage| *coverage == Coverage::Blend,
-        "what is half transparent hides as if it were opaque: a phantom is there or not",
-        "what is half transparent is drawn, and casts its shadow, as if it were opaque",
-    );
-    has(
-        |coverage| matches!(coverage, Coverage::Mask { .. }),
-        "what is cut out by a picture's opacity is there all the same: a phantom has its whole triangles",
-        "what is cut out by a picture's opacity still casts the shadow of its whole triangles",
-    );
+    let mut materials = model.materials.iter();
+    if normals == Normals::Flat && materials.any(|given| given.material.coverage == Coverage::Blend)
+    {
+        let note = "what is half transparent hides as if it were opaque: a phantom is there or not";
+        model.notes.add_of(path, note);
+    }
 }
 
 /// Turns a model upright and scales it.

@@ -27,6 +27,7 @@ pub mod format;
 pub mod gltf;
 mod lights;
 mod load;
+mod mask_cut;
 pub mod mesh_file;
 mod mip_36h12;
 mod motion;

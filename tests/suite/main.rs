@@ -35,4 +35,5 @@ mod tracking_families;
 mod tracking_photographs;
 mod tracking_sessions;
 mod tracking_stability;
+mod translucent;
 mod volumes;

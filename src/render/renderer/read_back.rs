@@ -22,6 +22,7 @@ impl Renderer {
     /// # Errors
     /// The device failed since it was opened.
     pub fn layers(&mut self) -> Result<Layers, RenderError> {
+        self.redraw_opaque();
         let gain = self.read_gain()?;
         self.cast_on_all_pixels();
         let (gpu, gpu_scene, size_px) = (&self.gpu, &self.gpu_scene, self.size_px);
@@ -68,6 +69,7 @@ impl Renderer {
     /// # Errors
     /// The device failed since it was opened.
     pub fn stencil_counts(&mut self) -> Result<Vec<u8>, RenderError> {
+        self.redraw_opaque();
         self.cast_on_all_pixels();
         let (gpu, gpu_scene, size_px) = (&self.gpu, &self.gpu_scene, self.size_px);
         let passes = self
