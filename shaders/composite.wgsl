@@ -33,7 +33,9 @@ fn composite(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let pixel = vec2i(position.xy);
     let recorded = undistorted(pixel);
     let change = change(pixel);
-    if !change.is_changed {
+    // (So little may be taken that nothing is: the way to linear light and back would move a level all the same.)
+    let is_same = all(change.gain == vec3f(1.0)) && all(change.added == vec3f(0.0));
+    if !change.is_changed || is_same {
         return vec4f(recorded, 1.0);
     }
     return vec4f(srgb_from_linear(linear_from_srgb(recorded) * change.gain + change.added), 1.0);

@@ -9,8 +9,8 @@ use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::geometry::bounds::Bounds;
-use crate::light::irradiance;
 use crate::light::irradiance_records::IrradianceRecords;
+use crate::light::{Light, irradiance};
 use crate::shafts::light_of_room::hemisphere;
 
 use super::placed::{OFFSET_M, PlacedScene, PlacedThing, SeenSurface, way_to};
@@ -22,6 +22,8 @@ const NEAR_PART: f32 = 1.0 / 20.0;
 const AWAY_PART: f32 = 0.25;
 /// A point of which more of its rays than this part start in a solid is inside of it.
 const INSIDE_PART: f32 = 0.5;
+/// Places that a light of some size shines from on what rays meet.
+const PLACES_OF_A_LIGHT: usize = 8;
 /// Points inside of a solid have the light of those outside for so many edges.
 const EDGES_INWARDS: usize = 2;
 /// Changes below this part of all light at a point are none, so that what nothing touches stays as it is.
@@ -43,6 +45,16 @@ pub struct Gathering {
     pub sky: Sky,
     /// From each record.
     pub rays: usize,
+    /// Of each compact light of the scene the places that it shines from, so that each ray's end sees one of them.
+    pub shining_from: Vec<Vec<Light>>,
+}
+
+/// Places that a light of some size shines from.
+pub fn shining_from(light: &Light) -> Vec<Light> {
+    match light.has_size() {
+        true => light.pieces(PLACES_OF_A_LIGHT),
+        false => vec![*light],
+    }
 }
 
 /// Points of a surface that get light, and where it is gathered for them.
@@ -142,17 +154,17 @@ impl PlacedScene<'_> {
         let rays = how.sky.rays(how.rays);
         let [mut without, mut with] = [Vec3::ZERO; 2];
         let (mut inside_real, mut inside) = (0, 0);
-        for direction in hemisphere(normal, rays) {
+        for (number, direction) in hemisphere(normal, rays).enumerate() {
             let real = self.seen(start, direction, is_real);
             let reach = real.map_or(f32::INFINITY, |seen| seen.distance);
             let before = self.seen_within(start, direction, reach, is_virtual_caster);
             let [of_real, behind] = match &real {
-                Some(seen) => self.reflected_by(seen, &how.sky),
+                Some(seen) => self.reflected_by(seen, how, number),
                 None => [how.sky.radiance; 2],
             };
             without += of_real;
             with += match &before {
-                Some(seen) => self.reflected_by(seen, &how.sky)[1],
+                Some(seen) => self.reflected_by(seen, how, number)[1],
                 None => behind,
             };
             inside_real += usize::from(real.is_some_and(|seen| seen.is_inside));
@@ -164,7 +176,7 @@ impl PlacedScene<'_> {
         Sample {
             without: without * weight + of_sky,
             with: with * weight + left_of_sky,
-            direct: self.direct(start, normal)[0],
+            direct: self.direct(start, normal, how, 0)[0],
             is_inside_real: inside_real > most_inside,
             is_inside: inside > most_inside,
         }
@@ -194,19 +206,20 @@ impl PlacedScene<'_> {
 
     /// Radiance that a surface reflects of the lights and of the sky, which it sees all of: without virtual things, and with
     /// them.
-    fn reflected_by(&self, seen: &SeenSurface, sky: &Sky) -> [Vec3; 2] {
+    fn reflected_by(&self, seen: &SeenSurface, how: &Gathering, number: usize) -> [Vec3; 2] {
         let start = seen.place + seen.normal * OFFSET_M;
-        let of_sky = sky.irradiance(seen.normal);
-        let direct = self.direct(start, seen.normal);
+        let of_sky = how.sky.irradiance(seen.normal);
+        let direct = self.direct(start, seen.normal, how, number);
         direct.map(|direct| seen.albedo * (of_sky + direct) * FRAC_1_PI)
     }
 
-    /// Irradiance of a place of the lights themselves: without virtual things, and with them.
-    fn direct(&self, start: Vec3, normal: Vec3) -> [Vec3; 2] {
+    /// Irradiance of a place of the lights themselves, without virtual things and with them, as that of their places whose turn
+    /// it is sees it.
+    fn direct(&self, start: Vec3, normal: Vec3, how: &Gathering, turn: usize) -> [Vec3; 2] {
         let mut arriving = [Vec3::ZERO; 2];
-        for light in self.compact {
+        for (light, places) in self.compact.iter().zip(&how.shining_from) {
             let given = irradiance(light, start.as_dvec3(), normal.as_dvec3()).as_vec3();
-            let (way, reach) = way_to(light, start);
+            let (way, reach) = way_to(&places[turn % places.len()], start);
             let is_hidden = |is_real: bool| {
                 let counts = |placed: &PlacedThing<'_>| placed.thing.is_real == is_real;
                 self.is_hidden_by(counts, start, way, reach)

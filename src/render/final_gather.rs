@@ -10,7 +10,9 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DVec3, Vec3};
 
 use crate::environment::distant_light::DistantLight;
-use crate::environment::final_gather::{GatherPoints, Gathered, Gathering, longest_edge_m};
+use crate::environment::final_gather::{
+    GatherPoints, Gathered, Gathering, longest_edge_m, shining_from,
+};
 use crate::environment::placed::{PlacedScene, PlacedThing};
 use crate::environment::sky::Sky;
 use crate::environment::thing::Thing;
@@ -208,6 +210,7 @@ impl FinalGather {
         let how = Gathering {
             sky: self.sky.clone(),
             rays: self.rays.div_ceil(fineness.rays_for_one),
+            shining_from: gathered.lights.iter().map(shining_from).collect(),
         };
         let mut pixels = PixelRect::NONE;
         for model in gpu_scene.drawn_real() {

@@ -15,8 +15,8 @@ use crate::shafts::difference::Difference;
 choices! {
     /// How shadows are made.
     pub enum Technique, "technique" {
-        /// What the scene's light calls for: with a probe shadow volumes of what is compact and shafts of the rest, else
-        /// volumes.
+        /// What the scene's light calls for: with a probe shadow volumes of what is compact, and of the rest shafts in a room
+        /// and the environment's shadows without one; else volumes.
         Auto = "auto",
         /// Shadow volumes (Haller, Drab & Hartmann 2003).
         Volumes = "volumes",
@@ -377,11 +377,6 @@ fn difference_keys(difference: Difference) -> [KeyChange; 2] {
 }
 
 impl Scene {
-    fn has_moving_phantoms(&self) -> bool {
-        let mut phantoms = self.phantoms.iter();
-        phantoms.any(|phantom| phantom.visible && phantom.anchor != 0)
-    }
-
     /// The technique that makes this scene's shadows, and why.
     pub fn chosen_technique(&self) -> (ShadowTechnique, &'static str) {
         match self.shadows.technique {
@@ -391,15 +386,9 @@ impl Scene {
                     ShadowTechnique::Shafts,
                     "the scene has a probe; only a ratio is taken of several lights' sum",
                 ),
-                // (What shafts know of a room they work out once.)
-                Some(probe) if probe.is_far && self.has_moving_phantoms() => {
-                    let reason =
-                        "the scene has a probe whose light comes from afar, and phantoms that move";
-                    (ShadowTechnique::Environment, reason)
-                }
                 Some(probe) if probe.is_far => {
                     let reason = "the scene has a probe; without a room its light comes from afar";
-                    (ShadowTechnique::Both, reason)
+                    (ShadowTechnique::Environment, reason)
                 }
                 Some(_) => (ShadowTechnique::Both, "the scene has a probe and a room"),
             },
@@ -439,6 +428,7 @@ mod tests {
             ("quality", Some("\"accurate\"")),
             ("samples", None),
             ("light_samples", None),
+            ("ambient_samples", None),
             ("max_silhouette_error_px", None),
             ("sources", None),
         ];

@@ -288,7 +288,8 @@ fn layers_are_the_contract_s() {
         let gain = picture(&format!("{frame}_gain.png"))
             .into_rgb16()
             .into_raw();
-        assert_eq!(gain.iter().max(), Some(&32768), "1 is the most");
+        let unchanged = gain.iter().filter(|&&gain| gain == 32768).count();
+        assert!(2 * unchanged > gain.len(), "1 is without a change");
         assert!(gain.iter().min().is_some_and(|&least| least < 20_000));
 
         let exr = folder.path().join(format!("DIR/{frame}_depth.exr"));

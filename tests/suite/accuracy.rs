@@ -41,7 +41,7 @@ fn hold(folder: &Path, name: &str) {
             shadow.wrong_pct <= 0.05 && shadow.far == 0,
             "{name}: shadow mask: {e:?}"
         );
-        assert!(e.change_real <= 0.15, "{name}: shadow: {e:?}");
+        assert!(e.change_real <= 0.08, "{name}: shadow: {e:?}");
         assert!(e.residual_virtual <= 0.15, "{name}: shading: {e:?}");
         assert!(
             e.untouched_wrong == 0 && e.untouched_pct > 50.0,
@@ -88,6 +88,27 @@ fn lamp() {
 #[test]
 fn hand() {
     hold(&project_file("recordings/hand"), "hand");
+}
+
+/// Lights of a size: soft edges, ambient light and what things reflect.
+fn hold_soft(name: &str) {
+    let folder = project_file("recordings").join(name);
+    for e in &errors_of(&folder, &scene_of(name), name) {
+        assert!(e.role_pct <= 0.5, "{name}: roles: {e:?}");
+        assert!(e.change_real <= 0.08, "{name}: shadow: {e:?}");
+        assert!(e.residual_virtual <= 0.05, "{name}: shading: {e:?}");
+        assert!(e.untouched_wrong == 0, "{name}: untouched: {e:?}");
+    }
+}
+
+#[test]
+fn bulb() {
+    hold_soft("bulb");
+}
+
+#[test]
+fn window() {
+    hold_soft("window");
 }
 
 #[test]

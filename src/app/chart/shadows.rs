@@ -109,6 +109,7 @@ fn ways(scene: &Scene) -> Vec<ShadowWay> {
             samples,
             max_silhouette_error_px,
             counting,
+            ambient_samples: 0,
             ..ShadowSettings::default()
         };
         add(series(samples), setting, shadows);
