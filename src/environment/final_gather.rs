@@ -26,8 +26,9 @@ const INSIDE_PART: f32 = 0.5;
 const PLACES_OF_A_LIGHT: usize = 8;
 /// Points inside of a solid have the light of those outside for so many edges.
 const EDGES_INWARDS: usize = 2;
-/// Changes below this part of all light at a point are none, so that what nothing touches stays as it is.
-const LEAST_CHANGE: f32 = 0.001;
+/// Changes below the first of these parts of all light at a point are none, so that what nothing touches stays as it is; from
+/// the second on they are whole. (A level of a display is more than either.)
+const SEEN_CHANGE: [f32; 2] = [0.002, 0.004];
 
 /// Light on a point of a real surface, linear irradiance.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -244,10 +245,11 @@ fn is_virtual_caster(placed: &PlacedThing<'_>) -> bool {
     !placed.thing.is_real && placed.thing.casts
 }
 
-/// A change without what is too little to be seen.
+/// A change, faded out where it is too little to be seen.
 fn seen_change(change: Vec3, of: Vec3) -> Vec3 {
-    let least = LEAST_CHANGE * of;
-    change.signum() * (change.abs() - least).max(Vec3::ZERO)
+    let [none, whole] = SEEN_CHANGE;
+    let part = (change.abs() / of.max(Vec3::splat(1e-9)) - none) / (whole - none);
+    change * part.clamp(Vec3::ZERO, Vec3::ONE)
 }
 
 /// For each point those that share an edge with it. (Points of one place with several normals are each other's border.)
