@@ -22,6 +22,8 @@ fn scene(lights: Vec<Light>, light_samples: u32) -> Scene {
     scene.lights = lights.into_iter().map(SceneLight::from).collect();
     scene.shadows.samples = 1;
     scene.shadows.light_samples = light_samples;
+    // (What things reflect of a light is gathered from other places of it than these.)
+    scene.shadows.ambient_samples = 0;
     scene
 }
 

@@ -89,6 +89,8 @@ fn ways(scene: &Scene) -> Vec<ShadowWay> {
     for (name, quality) in Quality::BY_NAME {
         let shadows = ShadowSettings {
             technique: Technique::Volumes,
+            // (Of the lights alone: docs/volumes.md has what is gathered.)
+            ambient_samples: 0,
             ..quality.shadows()
         };
         add(series(shadows.samples), name.to_owned(), shadows);
