@@ -298,8 +298,3 @@ fn lobe(roughness: f32, normal: vec3f, toward: vec3f, to_camera: vec3f, spread: 
     let width = cosine * cosine * (squared - 1.0) + 1.0;
     return squared / (PI * width * width);
 }
-
-// For what is drawn into depth alone.
-@fragment
-fn nothing() {
-}

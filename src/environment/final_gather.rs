@@ -41,9 +41,9 @@ pub struct Gathered {
 
 /// How light is gathered.
 #[derive(Debug, Clone)]
-pub struct Gathering {
+pub struct Gathering<'a> {
     /// What comes from where rays meet nothing.
-    pub sky: Sky,
+    pub sky: &'a Sky,
     /// From each record.
     pub rays: usize,
     /// Of each compact light of the scene the places that it shines from, so that each ray's end sees one of them.
@@ -122,7 +122,7 @@ impl PlacedScene<'_> {
         &self,
         on: &GatherPoints,
         world_from_points: &DAffine3,
-        how: &Gathering,
+        how: &Gathering<'_>,
     ) -> Vec<Gathered> {
         let records = &on.records;
         let places = records.places.par_iter();
@@ -151,7 +151,7 @@ impl PlacedScene<'_> {
         .collect()
     }
 
-    fn sample(&self, start: Vec3, normal: Vec3, how: &Gathering) -> Sample {
+    fn sample(&self, start: Vec3, normal: Vec3, how: &Gathering<'_>) -> Sample {
         let rays = how.sky.rays(how.rays);
         let [mut without, mut with] = [Vec3::ZERO; 2];
         let (mut inside_real, mut inside) = (0, 0);
@@ -172,7 +172,7 @@ impl PlacedScene<'_> {
             inside += usize::from(before.or(real).is_some_and(|seen| seen.is_inside));
         }
         let weight = PI / rays.max(1) as f32;
-        let [of_sky, left_of_sky] = self.of_sources(start, normal, &how.sky);
+        let [of_sky, left_of_sky] = self.of_sources(start, normal, how.sky);
         let most_inside = (INSIDE_PART * rays as f32) as usize;
         Sample {
             without: without * weight + of_sky,
@@ -207,7 +207,7 @@ impl PlacedScene<'_> {
 
     /// Radiance that a surface reflects of the lights and of the sky, which it sees all of: without virtual things, and with
     /// them.
-    fn reflected_by(&self, seen: &SeenSurface, how: &Gathering, number: usize) -> [Vec3; 2] {
+    fn reflected_by(&self, seen: &SeenSurface, how: &Gathering<'_>, number: usize) -> [Vec3; 2] {
         let start = seen.place + seen.normal * OFFSET_M;
         let of_sky = how.sky.irradiance(seen.normal);
         let direct = self.direct(start, seen.normal, how, number);
@@ -216,7 +216,7 @@ impl PlacedScene<'_> {
 
     /// Irradiance of a place of the lights themselves, without virtual things and with them, as that of their places whose turn
     /// it is sees it.
-    fn direct(&self, start: Vec3, normal: Vec3, how: &Gathering, turn: usize) -> [Vec3; 2] {
+    fn direct(&self, start: Vec3, normal: Vec3, how: &Gathering<'_>, turn: usize) -> [Vec3; 2] {
         let mut arriving = [Vec3::ZERO; 2];
         for (light, places) in self.compact.iter().zip(&how.shining_from) {
             let given = irradiance(light, start.as_dvec3(), normal.as_dvec3()).as_vec3();

@@ -107,6 +107,26 @@ impl PlacedThing<'_> {
     }
 }
 
+impl<'a> PlacedScene<'a> {
+    /// Of things with their numbers, of which those are there whose anchors are.
+    pub fn new(
+        things: impl Iterator<Item = (usize, &'a Thing)>,
+        world_from_anchor: &[Option<DAffine3>],
+        distant: &'a DistantLight,
+        compact: &'a [Light],
+    ) -> Self {
+        let placed = things.filter_map(|(number, thing)| {
+            let pose = world_from_anchor[thing.anchor].as_ref()?;
+            Some(PlacedThing::new(number, thing, pose))
+        });
+        Self {
+            things: placed.collect(),
+            distant,
+            compact,
+        }
+    }
+}
+
 impl PlacedScene<'_> {
     /// How far behind a caster what casts shadows and catches them can be: across all casters.
     pub fn reach_m(&self) -> f32 {

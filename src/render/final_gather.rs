@@ -122,10 +122,14 @@ impl FinalGather {
     pub fn of_ambient(gpu: &Gpu, scene: &Scene) -> Option<Self> {
         let rays = scene.shadows.ambient_samples as usize;
         let sky = |_| Sky::constant(scene.ambient_radiance);
-        (rays > 0).then(|| Self::new(gpu, scene, rays, sky))?
+        match rays {
+            0 => None,
+            _ => Self::new(gpu, scene, rays, sky),
+        }
     }
 
-    /// By so many rays from each point, where nothing moves; `sky` makes one for so many rays. `None` where there is nothing real or nothing virtual.
+    /// By so many rays from each point, where nothing moves; `sky` makes one for so many rays. `None` where there is nothing
+    /// real or nothing virtual.
     pub fn new(
         gpu: &Gpu,
         scene: &Scene,
@@ -191,45 +195,17 @@ impl FinalGather {
             return PixelRect::NONE;
         };
         let mut gathered = self.gathered_for(world_from_anchor, gpu_scene.shining());
-        let mut scene = PlacedScene {
-            things: Vec::new(),
-            distant: &self.distant,
-            compact: &gathered.lights,
-        };
-        for (number, thing) in self.things.iter().enumerate() {
-            if let Some(pose) = &gathered.world_from_anchor[thing.anchor] {
-                scene.things.push(PlacedThing::new(number, thing, pose));
-            }
+        let models: Vec<DrawnModel<'_>> = gpu_scene.drawn_real().collect();
+        let is_known = |model: &&DrawnModel<'_>| gathered.on_models.contains_key(&key(model));
+        if !models.iter().all(|model| is_known(&model)) {
+            self.gather(gpu, &models, &mut gathered);
         }
-        let virtuals = scene.things.iter().filter(|placed| !placed.thing.is_real);
-        let virtuals: Vec<Bounds> = virtuals.map(PlacedThing::bounds).collect();
-        let fineness = match gathered.is_fine {
-            true => FINE,
-            false => COARSE,
-        };
-        let how = Gathering {
-            sky: self.sky.clone(),
-            rays: self.rays.div_ceil(fineness.rays_for_one),
-            shining_from: gathered.lights.iter().map(shining_from).collect(),
-        };
         let mut pixels = PixelRect::NONE;
-        for model in gpu_scene.drawn_real() {
-            let Some(pose) = gathered.world_from_anchor[model.anchor] else {
+        for model in &models {
+            let Some(on_model) = gathered.on_models.get(&key(model)) else {
                 continue;
             };
-            let key = (model.number, model.level);
-            let on_model = gathered.on_models.entry(key).or_insert_with(|| {
-                let known = (model.number, model.level, gathered.is_fine);
-                let parts = self.known.remove(&known);
-                let parts =
-                    parts.unwrap_or_else(|| Parts::new(&model, &virtuals, &pose, &fineness));
-                let on_model = OnModel::new(gpu, &scene, &parts, &model, &pose, &how);
-                if parts.corners.len() == model.corner_count() {
-                    self.known.insert(known, parts);
-                }
-                on_model
-            });
-            self.drawn.push(key);
+            self.drawn.push(key(model));
             let camera_from_anchor = gpu_scene.camera_from_anchor()[model.anchor];
             let changed = on_model.changed.zip(camera_from_anchor);
             let changed = changed.map(|(bounds, camera_from_anchor)| {
@@ -240,6 +216,44 @@ impl FinalGather {
         }
         self.gathered = Some(gathered);
         pixels
+    }
+
+    /// Gathers on the models that are not known yet.
+    fn gather(&mut self, gpu: &Gpu, models: &[DrawnModel<'_>], gathered: &mut GatheredFor) {
+        let GatheredFor {
+            world_from_anchor,
+            lights,
+            is_fine,
+            on_models,
+        } = gathered;
+        let things = self.things.iter().enumerate();
+        let scene = PlacedScene::new(things, world_from_anchor, &self.distant, lights);
+        let virtuals = scene.things.iter().filter(|placed| !placed.thing.is_real);
+        let virtuals: Vec<Bounds> = virtuals.map(PlacedThing::bounds).collect();
+        let fineness = match is_fine {
+            true => FINE,
+            false => COARSE,
+        };
+        let how = Gathering {
+            sky: &self.sky,
+            rays: self.rays.div_ceil(fineness.rays_for_one),
+            shining_from: lights.iter().map(shining_from).collect(),
+        };
+        for model in models {
+            let Some(pose) = world_from_anchor[model.anchor] else {
+                continue;
+            };
+            on_models.entry(key(model)).or_insert_with(|| {
+                let known = (model.number, model.level, *is_fine);
+                let parts = self.known.remove(&known);
+                let parts = parts.unwrap_or_else(|| Parts::new(model, &virtuals, &pose, &fineness));
+                let on_model = OnModel::new(gpu, &scene, &parts, model, &pose, &how);
+                if parts.corners.len() == model.corner_count() {
+                    self.known.insert(known, parts);
+                }
+                on_model
+            });
+        }
     }
 
     /// What is known of things at these places under these lights.
@@ -283,6 +297,11 @@ impl FinalGather {
             pass.draw(0..on_model.count, 0..1);
         }
     }
+}
+
+/// What `on_models` knows a model by.
+fn key(model: &DrawnModel<'_>) -> (usize, usize) {
+    (model.number, model.level)
 }
 
 /// All things that are there.

@@ -314,9 +314,9 @@ impl GpuScene {
     /// Gives each batch, in their order, what its corners hide from themselves (as [`OCCLUSION_LAYOUT`] has it).
     ///
     /// [`OCCLUSION_LAYOUT`]: super::anchor_geometry::OCCLUSION_LAYOUT
-    pub fn set_occlusion(&mut self, occlusions: impl Iterator<Item = wgpu::Buffer>) {
+    pub fn set_occlusion(&mut self, occlusions: impl Iterator<Item = Option<wgpu::Buffer>>) {
         for (batch, occlusion) in self.batches.iter_mut().zip(occlusions) {
-            batch.occlusion = Some(occlusion);
+            batch.occlusion = occlusion;
         }
     }
 

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 #[allow(unused_imports)] // Each test uses its own part.
-pub use gnomon::app::truth::sheets::{Light, camera_above, photograph, with_noise};
+pub use gnomon::app::truth::sheets::{Light, camera_above, cube_sides, photograph, with_noise};
 use gnomon::capture::Frame;
 use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::scene::{Anchor, DetectorKind, Family, Marker, SearchArea, TrackingSettings};

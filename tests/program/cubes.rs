@@ -1,15 +1,15 @@
 //! A cube of markers from its pictures to the composite: its layout learnt, the cube tracked and drawn upon, the scene checked
 //! and recorded.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::PI;
 use std::path::Path;
 
 use assert_cmd::Command;
 use glam::{DAffine3, DQuat, DVec3};
-use gnomon::app::truth::sheets::{Light, with_noise};
+use gnomon::app::truth::sheets::{Light, cube, with_noise};
 use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::geometry::pose::{pose_from_rodrigues, rotation_between};
-use gnomon::scene::{Family, Marker, Scene};
+use gnomon::scene::Scene;
 
 const CAMERA: Intrinsics = Intrinsics {
     size_px: [640, 480],
@@ -60,22 +60,6 @@ intensity = [0.3, 0.3, 0.3]
 [ambient]
 radiance = [0.1, 0.1, 0.1]
 ";
-
-fn cube() -> Vec<Marker> {
-    let sides = [
-        DQuat::IDENTITY,
-        DQuat::from_rotation_x(FRAC_PI_2),
-        DQuat::from_rotation_y(FRAC_PI_2),
-        DQuat::from_rotation_x(-FRAC_PI_2),
-        DQuat::from_rotation_y(-FRAC_PI_2),
-        DQuat::from_rotation_x(PI),
-    ];
-    let placed = |(id, side): (u32, DQuat)| Marker {
-        anchor_from_marker: DAffine3::from_rotation_translation(side, side * DVec3::Z * 0.04),
-        ..Marker::alone(Family::TAG36H11, id, 0.04)
-    };
-    (0..6).zip(sides).map(placed).collect()
-}
 
 /// A hand turns it: half a turn in two dozen pictures, about an axis that turns itself.
 fn pose(frame: u32) -> DAffine3 {

@@ -13,23 +13,11 @@ use gnomon::tracking::{AnchorPose, Detection, Status, Tracker};
 
 use crate::common::random::Random;
 use crate::common::sheets::{
-    CAMERA, FRAME_SECS, Light, anchor, settings, tracker, true_corners_px, with_noise,
+    CAMERA, FRAME_SECS, Light, anchor, cube_sides, settings, tracker, true_corners_px, with_noise,
 };
 
 /// Side of a cube's markers, half of the cube's, metres.
 const MARKER_M: f64 = 0.04;
-
-/// The turns that bring a face that looks along z to each side of a cube.
-fn sides() -> [DQuat; 6] {
-    [
-        DQuat::IDENTITY,
-        DQuat::from_rotation_x(FRAC_PI_2),
-        DQuat::from_rotation_y(FRAC_PI_2),
-        DQuat::from_rotation_x(-FRAC_PI_2),
-        DQuat::from_rotation_y(-FRAC_PI_2),
-        DQuat::from_rotation_x(PI),
-    ]
-}
 
 fn placed(id: u32, size_m: f64, at_m: DVec3, turn: DQuat) -> Marker {
     Marker {
@@ -41,7 +29,7 @@ fn placed(id: u32, size_m: f64, at_m: DVec3, turn: DQuat) -> Marker {
 /// Markers 0 to 5 on the sides of a cube around the origin, each turned in its own way.
 fn cube() -> Vec<Marker> {
     (0..6)
-        .zip(sides())
+        .zip(cube_sides())
         .map(|(id, side)| {
             let turn = side * DQuat::from_rotation_z(f64::from(id) * FRAC_PI_2);
             placed(id, MARKER_M, side * DVec3::Z * MARKER_M, turn)

@@ -2,7 +2,7 @@
 //! of rendered sheets in a hand are off, beside the bare libraries. All see the same pictures.
 
 use std::collections::BTreeSet;
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{PI, TAU};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
@@ -14,7 +14,7 @@ use super::figure::{Axis, Figure, FigurePanel, Point, Series};
 use super::lab::Lab;
 use super::measured::rounded;
 use super::tracking::bare_library;
-use crate::app::truth::sheets::{Light, camera_above, with_noise};
+use crate::app::truth::sheets::{Light, camera_above, cube, with_noise};
 use crate::app::truth::{PoseErrors, shifts_px};
 use crate::capture::Frame;
 use crate::geometry::camera::{Distortion, Intrinsics};
@@ -185,23 +185,6 @@ fn rows_of_stills(lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<FootageRow>>> 
         });
     }
     Ok(Some(rows))
-}
-
-/// The sides of a cube with edges of 80 mm around the origin.
-fn cube() -> Vec<Marker> {
-    let sides = [
-        DQuat::IDENTITY,
-        DQuat::from_rotation_x(FRAC_PI_2),
-        DQuat::from_rotation_y(FRAC_PI_2),
-        DQuat::from_rotation_x(-FRAC_PI_2),
-        DQuat::from_rotation_y(-FRAC_PI_2),
-        DQuat::from_rotation_x(PI),
-    ];
-    let placed = |(id, side): (u32, DQuat)| Marker {
-        anchor_from_marker: DAffine3::from_rotation_translation(side, side * DVec3::Z * 0.04),
-        ..Marker::alone(Family::TAG36H11, id, 0.04)
-    };
-    (0..6).zip(sides).map(placed).collect()
 }
 
 /// What is filmed, and where it is in a frame.

@@ -1,7 +1,7 @@
 //! Sheets of markers as printed, and what a camera sees of them. The prints are written down here, so that no library
 //! under test draws its own question.
 
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 
@@ -13,6 +13,27 @@ use crate::scene::{Codes, Face, Family, Marker};
 const PAPER: f64 = 0.8;
 const INK: f64 = 0.02;
 const SURROUNDINGS: f64 = 0.25;
+
+/// The turns that bring a face that looks along z to each side of a cube.
+pub fn cube_sides() -> [DQuat; 6] {
+    [
+        DQuat::IDENTITY,
+        DQuat::from_rotation_x(FRAC_PI_2),
+        DQuat::from_rotation_y(FRAC_PI_2),
+        DQuat::from_rotation_x(-FRAC_PI_2),
+        DQuat::from_rotation_y(-FRAC_PI_2),
+        DQuat::from_rotation_x(PI),
+    ]
+}
+
+/// Markers of 40 mm on the sides of a cube with edges of 80 mm around the origin.
+pub fn cube() -> Vec<Marker> {
+    let placed = |(id, side): (u32, DQuat)| Marker {
+        anchor_from_marker: DAffine3::from_rotation_translation(side, side * DVec3::Z * 0.04),
+        ..Marker::alone(Family::TAG36H11, id, 0.04)
+    };
+    (0..6).zip(cube_sides()).map(placed).collect()
+}
 
 /// The cells of a marker as printed, without its black border; `#` is white. `None` for those not written down.
 pub fn printed(family: Family, id: u32) -> Option<&'static [&'static str]> {

@@ -10,7 +10,7 @@ use glam::{DAffine3, DVec3, Vec3};
 
 use crate::environment::distant_light::DistantLight;
 use crate::environment::occlusion_map::OcclusionMap;
-use crate::environment::placed::{PlacedScene, PlacedThing};
+use crate::environment::placed::PlacedScene;
 use crate::environment::reflected::DiscTree;
 use crate::environment::self_occlusion::{SelfOcclusion, TRANSFER_DEGREE, self_occlusions};
 use crate::environment::sky::Sky;
@@ -57,8 +57,8 @@ pub(super) struct Environment {
     /// Triangles of all casters, each in its anchor's space, and which are whose.
     triangles: wgpu::Buffer,
     ranges: Vec<std::ops::Range<u32>>,
-    /// For each batch what its corners hide from themselves.
-    occlusions: Vec<BatchOcclusion>,
+    /// For each batch what its corners hide from themselves; `None` where its light is gathered otherwise.
+    occlusions: Vec<Option<BatchOcclusion>>,
     pipelines: Pipelines,
     /// What real surfaces get, where rays tell that.
     final_gather: Option<FinalGather>,
@@ -118,15 +118,23 @@ impl Environment {
             })
             .collect();
         let objects: Vec<&Object> = scene.phantoms.iter().chain(&scene.virtuals).collect();
-        let occlusions = occlusions(&objects, gpu_scene);
-        let buffers: Vec<wgpu::Buffer> = gpu_scene
+        let rays = (RAYS_FOR_ONE * scene.shadows.ambient_samples as usize).max(FEWEST_RAYS);
+        let final_gather = match settings.method {
+            EnvironmentMethod::Rays => FinalGather::new(gpu, scene, rays, |rays| {
+                Sky::new(&rest, probe.exposure, rays)
+            }),
+            EnvironmentMethod::Penumbrae | EnvironmentMethod::Maps => None,
+        };
+        let occlusions = occlusions(&objects, gpu_scene, final_gather.is_some());
+        let buffers: Vec<Option<wgpu::Buffer>> = gpu_scene
             .corners()
             .zip(&occlusions)
             .map(|((_, _, corners), batch)| {
+                let batch = batch.as_ref()?;
                 let visibility =
                     |corner: usize| batch.occlusions[batch.point_of_corner[corner]].visibility;
                 let contents = occlusion_corners(&corners.thing_of, visibility);
-                gpu.buffer("self-occlusion", &contents, wgpu::BufferUsages::VERTEX)
+                Some(gpu.buffer("self-occlusion", &contents, wgpu::BufferUsages::VERTEX))
             })
             .collect();
         gpu_scene.set_occlusion(buffers.into_iter());
@@ -134,16 +142,10 @@ impl Environment {
         let largest_px = gpu.device.limits().max_texture_dimension_2d;
         let tiling = Tiling::new(count, settings.map_px, largest_px);
         let kinds = gpu_scene.kinds;
-        let rays = (RAYS_FOR_ONE * scene.shadows.ambient_samples as usize).max(FEWEST_RAYS);
         let glossy = kinds.glossy.then(|| (rest.as_ref(), probe.exposure as f32));
         Self {
             pipelines: Pipelines::new(gpu, scene.shadows.samples, kinds, settings.method),
-            final_gather: match settings.method {
-                EnvironmentMethod::Rays => FinalGather::new(gpu, scene, rays, |rays| {
-                    Sky::new(&rest, probe.exposure, rays)
-                }),
-                EnvironmentMethod::Penumbrae | EnvironmentMethod::Maps => None,
-            },
+            final_gather,
             atlas: MapAtlas::new(gpu, tiling, "occlusion_maps.wgsl"),
             tiling,
             triangles: gpu.buffer(
@@ -183,22 +185,16 @@ impl Environment {
         world_from_anchor: &[Option<DAffine3>],
         compact: &[Light],
     ) -> Placed {
-        let mut scene = PlacedScene {
-            things: Vec::new(),
-            distant: &self.distant,
-            compact,
-        };
-        for (number, thing) in self.things.iter().enumerate() {
-            let Some(thing) = thing else { continue };
-            if let Some(pose) = &world_from_anchor[thing.anchor] {
-                scene.things.push(PlacedThing::new(number, thing, pose));
-            }
-        }
+        let things = self.things.iter().enumerate();
+        let things = things.filter_map(|(number, thing)| Some((number, thing.as_ref()?)));
+        let scene = PlacedScene::new(things, world_from_anchor, &self.distant, compact);
         let bounds: Vec<Bounds> = scene.things.iter().map(|placed| placed.bounds()).collect();
         let discs = scene.reflecting();
         let lit = self.light_of_corners(&scene, &bounds, &discs, world_from_anchor);
         for (number, irradiances) in lit.iter().enumerate() {
-            gpu_scene.write_indirect(&gpu.queue, number, irradiances);
+            if let Some(irradiances) = irradiances {
+                gpu_scene.write_indirect(&gpu.queue, number, irradiances);
+            }
         }
         let maps = self.maps(&scene);
         let regions = &self.distant.regions;
@@ -281,16 +277,20 @@ impl Environment {
         bounds: &[Bounds],
         discs: &DiscTree,
         world_from_anchor: &[Option<DAffine3>],
-    ) -> Vec<Vec<Vec3>> {
-        let lights: Vec<LocalLight> = (0..scene.things.len())
-            .map(|index| LocalLight::new(scene, bounds[index], index))
+    ) -> Vec<Option<Vec<Vec3>>> {
+        let lights: Vec<Option<LocalLight>> = (0..scene.things.len())
+            .map(|index| {
+                let is_wanted = !scene.things[index].thing.is_real || self.final_gather.is_none();
+                is_wanted.then(|| LocalLight::new(scene, bounds[index], index))
+            })
             .collect();
         let of_batch = |batch: &BatchOcclusion| {
             let Some(pose) = &world_from_anchor[batch.anchor] else {
                 return vec![Vec3::ZERO; batch.point_of_corner.len()];
             };
             let turn = Turn::new(pose.matrix3.transpose(), TRANSFER_DEGREE);
-            let lights: Vec<LocalLight> = lights.iter().map(|light| light.turned(&turn)).collect();
+            let turned = |light: &Option<LocalLight>| Some(light.as_ref()?.turned(&turn));
+            let lights: Vec<Option<LocalLight>> = lights.iter().map(turned).collect();
             let points = batch
                 .points
                 .iter()
@@ -301,8 +301,11 @@ impl Environment {
                     let Some(index) = scene.position(*thing) else {
                         return Vec3::ZERO;
                     };
+                    let Some(light) = &lights[index] else {
+                        return Vec3::ZERO;
+                    };
                     let place = pose.transform_point3(point.0);
-                    let around = occlusion.irradiance(&lights[index].at(place));
+                    let around = occlusion.irradiance(&light.at(place));
                     let of_itself = match scene.things[index].thing.is_real {
                         true => Vec3::ZERO,
                         false => {
@@ -316,12 +319,18 @@ impl Environment {
             let corners = batch.point_of_corner.iter();
             corners.map(|&point| at_points[point]).collect()
         };
-        self.occlusions.iter().map(of_batch).collect()
+        let batches = self.occlusions.iter();
+        batches.map(|batch| batch.as_ref().map(of_batch)).collect()
     }
 }
 
-/// For each batch what its corners hide from themselves; `objects` by their numbers.
-fn occlusions(objects: &[&Object], gpu_scene: &GpuScene) -> Vec<BatchOcclusion> {
+/// For each batch what its corners hide from themselves, but for real ones where their light is gathered; `objects` by their
+/// numbers.
+fn occlusions(
+    objects: &[&Object],
+    gpu_scene: &GpuScene,
+    is_real_gathered: bool,
+) -> Vec<Option<BatchOcclusion>> {
     let casters: Vec<(RayCaster, f64)> = objects
         .iter()
         .map(|object| {
@@ -336,24 +345,28 @@ fn occlusions(objects: &[&Object], gpu_scene: &GpuScene) -> Vec<BatchOcclusion> 
             (RayCaster::new(&corners), size_m)
         })
         .collect();
-    let of_batch = |(_, anchor, corners): (Role, usize, &super::anchor_geometry::BatchCorners)| {
-        let (points, point_of_corner) = points(&corners.corners.0, &corners.corners.1);
-        let mut thing_of_point = vec![0; points.len()];
-        for (&point, &thing) in point_of_corner.iter().zip(&corners.thing_of) {
-            thing_of_point[point] = thing as usize;
-        }
-        let occlusions = self_occlusions(&points, |point| {
-            let (caster, size_m) = &casters[thing_of_point[point]];
-            (caster, size_m * START_OFFSET)
-        });
-        BatchOcclusion {
-            anchor,
-            points,
-            occlusions,
-            point_of_corner,
-            thing_of_point,
-        }
-    };
+    let of_batch =
+        |(role, anchor, corners): (Role, usize, &super::anchor_geometry::BatchCorners)| {
+            if role == Role::Real && is_real_gathered {
+                return None;
+            }
+            let (points, point_of_corner) = points(&corners.corners.0, &corners.corners.1);
+            let mut thing_of_point = vec![0; points.len()];
+            for (&point, &thing) in point_of_corner.iter().zip(&corners.thing_of) {
+                thing_of_point[point] = thing as usize;
+            }
+            let occlusions = self_occlusions(&points, |point| {
+                let (caster, size_m) = &casters[thing_of_point[point]];
+                (caster, size_m * START_OFFSET)
+            });
+            Some(BatchOcclusion {
+                anchor,
+                points,
+                occlusions,
+                point_of_corner,
+                thing_of_point,
+            })
+        };
     gpu_scene.corners().map(of_batch).collect()
 }
 

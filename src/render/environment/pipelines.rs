@@ -59,13 +59,15 @@ impl Pipelines {
             description.vertex_buffers.push(OCCLUSION_LAYOUT);
             Sided::new(gpu, &description)
         };
-        let format = gpu.light_format;
         let depth_alone = PipelineDescription {
+            shader: "surfaces.wgsl",
+            flags: Vec::new(),
+            constants: vec![("MULTISAMPLED", f64::from(samples > 1))],
             targets: vec![untouched(format), untouched(format)],
-            ..described("nothing")
+            ..described("ambient_on_real")
         };
         Self {
-            depth_of_real: with_occlusion(depth_alone),
+            depth_of_real: Sided::new(gpu, &depth_alone),
             light_on_real: with_occlusion(described("light_on_real")),
             light_on_virtual: with_occlusion(kinds.of_virtual(described("light_on_virtual"))),
         }
