@@ -2,10 +2,15 @@
 //! equations 1 and 11): worked out once, whichever way the thing is turned later.
 
 use std::f64::consts::PI;
+use std::hash::{DefaultHasher, Hasher as _};
 
-use glam::{DVec3, Vec3};
+use bytemuck::{Pod, Zeroable};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
+use crate::geometry::bounds::Bounds;
+use crate::geometry::corner_points::corner_points;
+use crate::geometry::mesh::Mesh;
 use crate::geometry::ray_caster::RayCaster;
 use crate::light::harmonics::{basis, count, sphere};
 
@@ -25,8 +30,14 @@ const RAYS: usize = 512;
 const COSINE_LOBE: [f64; TRANSFER_DEGREE + 1] =
     [PI, 2.0 * PI / 3.0, PI / 4.0, 0.0, -PI / 24.0, 0.0];
 
-/// A corner's self-occlusion, in its thing's anchor's space.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Rays start this part of a thing's size off its surface.
+const START_OFFSET: f64 = 1e-4;
+/// How far an orientation's axes may be from square, in parts of their length.
+const SQUARE: f64 = 1e-9;
+
+/// A corner's self-occlusion, in its thing's own orientation.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct SelfOcclusion {
     /// Irradiance of the corner for each harmonic of radiance (π times T of Tamura et al. 2005, equation 1).
     pub transfer: [f32; TRANSFERS],
@@ -35,21 +46,119 @@ pub struct SelfOcclusion {
     pub visibility: [f32; VISIBILITIES],
 }
 
-/// Of corners (place and unit normal); `caster` says for each of them what its thing is, and how far above it rays start,
-/// metres.
-pub fn self_occlusions<'a>(
-    corners: &[(DVec3, DVec3)],
-    caster: impl Fn(usize) -> (&'a RayCaster, f64) + Sync,
-) -> Vec<SelfOcclusion> {
-    let rays: Vec<(DVec3, Vec<f64>)> = sphere(RAYS)
-        .map(|direction| (direction, basis(direction, TRANSFER_DEGREE)))
-        .collect();
-    let of_corner = |(number, &(place, normal)): (usize, &(DVec3, DVec3))| {
-        let (caster, offset_m) = caster(number);
-        let start = (place + normal * offset_m).as_vec3();
-        occlusion(start, normal, &rays, caster)
-    };
-    corners.par_iter().enumerate().map(of_corner).collect()
+/// The orientation and the size that a thing has of its own: what it hides from itself stays the same there however it is moved,
+/// turned and scaled evenly.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OwnSpace {
+    /// From its file's space.
+    pub own_from_object: DMat3,
+    /// Turns directions into its anchor's.
+    pub anchor_from_own: DMat3,
+}
+
+impl OwnSpace {
+    /// Of a thing's placement. One that shears has no orientation of its own: it takes its anchor's.
+    pub fn new(anchor_from_object: &DAffine3) -> Self {
+        let (scale, rotation, _) = anchor_from_object.to_scale_rotation_translation();
+        let anchor_from_own = DMat3::from_quat(rotation);
+        let linear = anchor_from_object.matrix3;
+        let largest = scale.abs().max_element();
+        let off = anchor_from_own * DMat3::from_diagonal(scale) - linear;
+        let is_square = off.abs_diff_eq(DMat3::ZERO, SQUARE * largest);
+        match is_square {
+            // (Rounded, so that turns of one thing share it.)
+            true => Self {
+                own_from_object: DMat3::from_diagonal((scale / largest).as_vec3().as_dvec3()),
+                anchor_from_own,
+            },
+            false => Self {
+                own_from_object: linear,
+                anchor_from_own: DMat3::IDENTITY,
+            },
+        }
+    }
+
+    /// What all of a mesh's self-occlusion depends on here.
+    pub fn key(&self, mesh: &Mesh) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        for number in self.own_from_object.to_cols_array() {
+            hasher.write_u64(number.to_bits());
+        }
+        hasher.write(bytemuck::cast_slice(&mesh.positions));
+        hasher.write(bytemuck::cast_slice(&mesh.triangles));
+        for normals in &mesh.corner_normals {
+            hasher.write(bytemuck::cast_slice(normals));
+        }
+        hasher.finish()
+    }
+}
+
+/// A thing's surface in its own space, at which self-occlusion is worked out.
+pub struct OwnSurface {
+    /// What all of it depends on.
+    pub key: u64,
+    /// For each corner of each triangle, those of coarser levels too, its point.
+    pub point_of_corner: Vec<usize>,
+    points: Vec<(DVec3, DVec3)>,
+    caster: RayCaster,
+    offset: f64,
+}
+
+impl OwnSurface {
+    /// Of a thing's mesh and its coarser versions in their order.
+    pub fn new<'a>(
+        mesh: &'a Mesh,
+        coarser: impl Iterator<Item = &'a Mesh>,
+        space: &OwnSpace,
+    ) -> Self {
+        let linear = space.own_from_object;
+        let normal_matrix = linear.inverse().transpose();
+        let place = |position: Vec3| (linear * position.as_dvec3()).as_vec3();
+        let mut corners: Vec<(Vec3, Vec3)> = Vec::new();
+        for level in std::iter::once(mesh).chain(coarser) {
+            for (triangle, normals) in level.triangles.iter().zip(&level.corner_normals) {
+                corners.extend(triangle.iter().zip(normals).map(|(&index, normal)| {
+                    let normal = (normal_matrix * normal.as_dvec3()).normalize_or_zero();
+                    (place(level.positions[index as usize]), normal.as_vec3())
+                }));
+            }
+        }
+        let triangles: Vec<[u32; 3]> = (0..corners.len() as u32 / 3)
+            .map(|triangle| [0, 1, 2].map(|corner| 3 * triangle + corner))
+            .collect();
+        let (points, point_of_corner) = corner_points(&corners, &triangles);
+        let own: Vec<[Vec3; 3]> = mesh
+            .triangles
+            .iter()
+            .map(|triangle| triangle.map(|index| place(mesh.positions[index as usize])))
+            .collect();
+        let bounds = Bounds::around(own.iter().flatten().map(|corner| corner.as_dvec3()));
+        let size = bounds.map_or(0.0, |bounds| (bounds.high - bounds.low).length());
+        Self {
+            key: space.key(mesh),
+            point_of_corner,
+            points,
+            caster: RayCaster::new(&own),
+            offset: size * START_OFFSET,
+        }
+    }
+
+    /// How many points there are.
+    pub fn point_count(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Works out the self-occlusion of each point by rays, on all cores.
+    pub fn self_occlusions(&self) -> Vec<SelfOcclusion> {
+        let rays: Vec<(DVec3, Vec<f64>)> = sphere(RAYS)
+            .map(|direction| (direction, basis(direction, TRANSFER_DEGREE)))
+            .collect();
+        let of_point = |&(place, normal): &(DVec3, DVec3)| {
+            let start = (place + normal * self.offset).as_vec3();
+            occlusion(start, normal, &rays, &self.caster)
+        };
+        self.points.par_iter().map(of_point).collect()
+    }
 }
 
 /// What nothing hides, less what the thing does: so the error of the rays is in the hidden part alone.

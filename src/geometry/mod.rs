@@ -9,6 +9,7 @@
 pub mod bounds;
 pub mod camera;
 pub mod coincidence;
+pub mod corner_points;
 pub mod counting;
 pub mod cuboid;
 pub mod homography;

@@ -1,6 +1,8 @@
 //! A probe's light cut into regions, each as one light from afar (Kollig & Keller 2003): as many as are asked for, smaller
 //! where more light comes from.
 
+use std::f64::consts::PI;
+
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -163,11 +165,16 @@ fn outer(one: DVec3, other: DVec3) -> DMat3 {
 fn sums(pixels: &[Pixel], middles: &[DVec3]) -> Vec<Sum> {
     /// Pixels that are looked at in one go. (Fixed, so that sums do not depend on the number of cores.)
     const CHUNK: usize = 4096;
+    /// Of those, pixels beside each other, which have few middles near them.
+    const BESIDE: usize = 16;
     let of_chunk = |pixels: &[Pixel]| {
         let mut sums = vec![Sum::NONE; middles.len()];
-        for pixel in pixels {
-            let nearest = nearest(middles, pixel.direction);
-            sums[nearest].add(pixel, middles[nearest]);
+        for beside in pixels.chunks(BESIDE) {
+            let near = near(middles, beside);
+            for pixel in beside {
+                let nearest = nearest(&near, pixel.direction);
+                sums[nearest].add(pixel, middles[nearest]);
+            }
         }
         sums
     };
@@ -181,12 +188,36 @@ fn sums(pixels: &[Pixel], middles: &[DVec3]) -> Vec<Sum> {
     all
 }
 
-fn nearest(middles: &[DVec3], direction: DVec3) -> usize {
+/// The middles, with their numbers, one of which is the nearest to any of the pixels: what is nearest to a pixel is no farther
+/// from the pixels' own middle than what is nearest to that, and twice as far as the pixel lies off it.
+fn near(middles: &[DVec3], pixels: &[Pixel]) -> Vec<(usize, DVec3)> {
+    /// Past the rounding of angles, radians.
+    const ROUNDING_RAD: f64 = 1e-6;
+    let sum: DVec3 = pixels.iter().map(|pixel| pixel.direction).sum();
+    let numbered = middles.iter().copied().enumerate();
+    let Some(middle) = sum.try_normalize() else {
+        return numbered.collect();
+    };
+    let angle = |cosine: f64| cosine.clamp(-1.0, 1.0).acos();
+    let cosines = pixels.iter().map(|pixel| pixel.direction.dot(middle));
+    let radius = angle(cosines.fold(1.0, f64::min));
+    let cosines: Vec<f64> = middles.iter().map(|it| it.dot(middle)).collect();
+    let nearest = angle(cosines.iter().copied().fold(-1.0, f64::max));
+    let reach = (nearest + 2.0 * radius + ROUNDING_RAD).min(PI).cos();
+    numbered
+        .zip(&cosines)
+        .filter(|(_, cosine)| **cosine >= reach)
+        .map(|(numbered, _)| numbered)
+        .collect()
+}
+
+/// Number of the middle that is nearest to a direction, of those with the same distance the first.
+fn nearest(middles: &[(usize, DVec3)], direction: DVec3) -> usize {
     let mut best = (f64::MIN, 0);
-    for (index, middle) in middles.iter().enumerate() {
+    for &(number, middle) in middles {
         let cosine = middle.dot(direction);
         if cosine > best.0 {
-            best = (cosine, index);
+            best = (cosine, number);
         }
     }
     best.1

@@ -170,6 +170,12 @@ impl KnownLevels {
         });
         &self.0[index].1
     }
+
+    /// Those that are known.
+    pub fn known(&self, mesh: &Mesh) -> &[Level] {
+        let known = self.0.iter().find(|(known, _)| known == mesh);
+        known.map_or(&[], |(_, levels)| levels)
+    }
 }
 
 impl AnchorGeometry {

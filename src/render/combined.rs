@@ -25,7 +25,7 @@ pub(super) trait BroadLight: Send {
     fn set_sources(&mut self, _sources: Option<u32>) {}
 
     /// Works out what is hidden where things are now. Returns the pixels that it can change, `None` if none.
-    fn update(&mut self, gpu: &Gpu, gpu_scene: &GpuScene) -> Option<PixelRect>;
+    fn update(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene) -> Option<PixelRect>;
 
     /// Draws its maps where they are not drawn yet.
     fn draw_maps(&mut self, gpu: &Gpu, passes: &mut Passes<'_>);

@@ -17,6 +17,7 @@ use crate::environment::placed::{PlacedScene, PlacedThing};
 use crate::environment::sky::Sky;
 use crate::environment::thing::Thing;
 use crate::geometry::bounds::Bounds;
+use crate::geometry::corner_points::corner_points;
 use crate::geometry::reach::{self, PixelRect};
 use crate::geometry::subdivide::{Corner, subdivided};
 use crate::light::Light;
@@ -24,7 +25,6 @@ use crate::scene::Scene;
 
 use super::gpu::Gpu;
 use super::gpu_scene::{DrawnModel, GpuScene};
-use super::indirect::points;
 use super::pipelines::{PipelineDescription, overwritten};
 use super::stencil::{IN_A_SURFACE, depth_stencil_state};
 use super::uniforms::VIEW_GROUP;
@@ -151,10 +151,7 @@ impl FinalGather {
         Some(Self {
             things: things(scene),
             distant: DistantLight::default(),
-            sky: sky(match moves {
-                true => rays.div_ceil(COARSE.rays_for_one),
-                false => rays,
-            }),
+            sky: sky(rays_of_sky(rays, moves)),
             rays,
             pipeline: gpu.pipeline(&PipelineDescription {
                 shader: "final_gather.wgsl",
@@ -178,10 +175,21 @@ impl FinalGather {
         })
     }
 
+    /// Takes other light from afar; `sky` makes one for so many rays.
+    pub fn set_sky(&mut self, sky: impl FnOnce(usize) -> Sky) {
+        self.sky = sky(rays_of_sky(self.rays, self.moves));
+        self.forget_light();
+    }
+
     /// Takes another state of its scene: things elsewhere, shown or hidden.
     pub fn follow(&mut self, scene: &Scene) {
         self.things = things(scene);
         self.known.clear();
+        self.forget_light();
+    }
+
+    /// What was gathered is of no use any more.
+    fn forget_light(&mut self) {
         if let Some(gathered) = &mut self.gathered {
             // As for another scene, which moves.
             gathered.world_from_anchor.clear();
@@ -299,6 +307,14 @@ impl FinalGather {
     }
 }
 
+/// For how many rays light from afar is taken apart, of so many that the scene asks for.
+fn rays_of_sky(rays: usize, moves: bool) -> usize {
+    match moves {
+        true => rays.div_ceil(COARSE.rays_for_one),
+        false => rays,
+    }
+}
+
 /// What `on_models` knows a model by.
 fn key(model: &DrawnModel<'_>) -> (usize, usize) {
     (model.number, model.level)
@@ -331,7 +347,7 @@ impl Parts {
             .map(|triangle| [0, 1, 2].map(|corner| 3 * triangle + corner))
             .collect();
         let (points, point_of_corner): (Vec<(DVec3, DVec3)>, Vec<usize>) =
-            points(&corners, &triangles);
+            corner_points(&corners, &triangles);
         let of_points =
             |triangle: &[u32; 3]| triangle.map(|it| point_of_corner[it as usize] as u32);
         let joined: Vec<[u32; 3]> = triangles.iter().map(of_points).collect();

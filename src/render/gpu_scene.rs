@@ -6,6 +6,7 @@ use glam::{DAffine3, Vec3};
 use rayon::prelude::*;
 
 use crate::geometry::camera::Intrinsics;
+use crate::geometry::mesh::Mesh;
 use crate::geometry::reach::PixelRect;
 use crate::geometry::subdivide::Corner;
 use crate::light::Light;
@@ -303,6 +304,14 @@ impl GpuScene {
             let arriving: Vec<_> = corners.par_iter().map(of_corner).collect();
             queue.write_buffer(&batch.indirect, 0, bytemuck::cast_slice(&arriving));
         }
+    }
+
+    /// The coarser versions of a thing's mesh, in their order.
+    pub fn coarser_meshes(&self, mesh: &Mesh) -> impl Iterator<Item = &Mesh> {
+        self.known_levels
+            .known(mesh)
+            .iter()
+            .map(|level| &level.mesh)
     }
 
     /// All batches' corners as values: what they are of, their anchor, and they.

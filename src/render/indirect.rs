@@ -3,10 +3,9 @@
 //!
 //! Virtual things on moving anchors keep the plain ambient light: their surroundings change in every frame.
 
-use std::collections::HashMap;
+use glam::{DAffine3, Vec3};
 
-use glam::{DAffine3, DVec3, Vec3};
-
+use crate::geometry::corner_points::corner_points;
 use crate::light::bounce::{Gathering, Mover, Surroundings};
 use crate::light::irradiance_records::IrradianceRecords;
 use crate::scene::{Object, Scene};
@@ -23,9 +22,6 @@ const MOVING: Budget = Budget {
     rays: 75_000,
     rays_per_record: 64,
 };
-/// Part of the way to its triangle's middle at which a corner's surroundings are gathered: a corner that stands on the
-/// table would see into it.
-const CORNER_INSET: f64 = 0.05;
 
 /// How many rays there are, and from how many of them on more places tell less than more rays.
 struct Budget {
@@ -63,7 +59,7 @@ impl Indirect {
             .collect();
         let surroundings =
             Surroundings::new(on_anchor(0), scene.world_lights(), scene.ambient_radiance);
-        let (points, point_of_corner) = points(corners, triangles);
+        let (points, point_of_corner) = corner_points(corners, triangles);
         let Budget {
             rays,
             rays_per_record,
@@ -114,35 +110,4 @@ impl Indirect {
         queue.write_buffer(batch, 0, bytemuck::cast_slice(&corners));
         self.settled = self.movers.is_empty();
     }
-}
-
-/// One point for all corners that share place and normal, and for each corner its point.
-pub(super) fn points(
-    corners: &[(Vec3, Vec3)],
-    triangles: &[[u32; 3]],
-) -> (Vec<(DVec3, DVec3)>, Vec<usize>) {
-    let mut point_at: HashMap<[u32; 6], usize> = HashMap::new();
-    let mut points = Vec::new();
-    let mut point_of_corner = vec![0; corners.len()];
-    for triangle in triangles {
-        let corners = triangle.map(|corner| corners[corner as usize]);
-        let middle = corners
-            .iter()
-            .map(|(place, _)| place.as_dvec3())
-            .sum::<DVec3>()
-            / 3.0;
-        for (&index, (place, normal)) in triangle.iter().zip(corners) {
-            let [x, y, z] = place.to_array().map(f32::to_bits);
-            let [nx, ny, nz] = normal.to_array().map(f32::to_bits);
-            let point = *point_at.entry([x, y, z, nx, ny, nz]).or_insert_with(|| {
-                points.push((
-                    place.as_dvec3().lerp(middle, CORNER_INSET),
-                    normal.as_dvec3(),
-                ));
-                points.len() - 1
-            });
-            point_of_corner[index as usize] = point;
-        }
-    }
-    (points, point_of_corner)
 }

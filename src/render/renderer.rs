@@ -16,8 +16,6 @@ use crate::light::texture::Texture;
 use crate::scene::{
     Object, Scene, SceneLight, ShadowSettings, ShadowTechnique, Shortcut, Shortcuts,
 };
-use crate::shafts::room::Room;
-use crate::shafts::room_transport::RoomTransport;
 
 use super::attachments::texture;
 use super::background::{Background, PICTURE_FORMAT};
@@ -29,6 +27,7 @@ use super::layered_scene::{LayeredScene, TranslucentLayer};
 use super::layers::LayerPasses;
 use super::light_kind::LightKind;
 use super::passes::{Passes, RecordedPasses};
+use super::precomputation::{Afresh, Precomputation};
 use super::quality_controller::{QualityController, Setting};
 use super::readback::Readback;
 use super::screen_bounds::ScreenBounds;
@@ -110,23 +109,24 @@ impl Shape {
 }
 
 impl Renderer {
-    /// Prepares all that does not change from frame to frame; the light of a room is worked out, which takes seconds.
+    /// Prepares all that does not change from frame to frame; the light of a room, and what things hide of an environment from
+    /// themselves, are worked out, which takes seconds.
     ///
     /// # Errors
     /// A picture larger than the adapter can hold, or a device that failed.
     pub fn new(gpu: Arc<Gpu>, scene: &Scene, intrinsics: Intrinsics) -> Result<Self, RenderError> {
-        Self::with_transport(gpu, scene, intrinsics, |room| room.transport())
+        Self::with_precomputation(gpu, scene, intrinsics, &Afresh)
     }
 
-    /// The same, where the light of a room comes from somebody who may know it already.
+    /// The same, where what takes long comes from somebody who may know it already.
     ///
     /// # Errors
     /// A picture larger than the adapter can hold, or a device that failed.
-    pub fn with_transport(
+    pub fn with_precomputation(
         gpu: Arc<Gpu>,
         scene: &Scene,
         intrinsics: Intrinsics,
-        transport: impl FnOnce(&Room<'_>) -> RoomTransport,
+        precomputation: &dyn Precomputation,
     ) -> Result<Self, RenderError> {
         let device = &gpu.device;
         let size_px = intrinsics.size_px;
@@ -143,7 +143,7 @@ impl Renderer {
         let LayeredScene { scene, layers } = LayeredScene::new(scene);
         let scene = scene.as_ref();
         let (technique, gpu_scene) =
-            ChosenTechnique::new(&gpu, scene, intrinsics, &background, transport);
+            ChosenTechnique::new(&gpu, scene, intrinsics, &background, precomputation);
         let made_for = Shape::of(scene, &scene.outlined_lights());
         Ok(Self {
             technique,

@@ -19,11 +19,12 @@ const FLOORS: [&str; 10] = [
 ];
 
 /// The groups of `app`, lowest first; the jobs stand on all of them.
-const APP_GROUPS: [&str; 11] = [
+const APP_GROUPS: [&str; 12] = [
     "stopwatch",
     "talk",
     "files",
-    "room_transport_cache",
+    "disk_cache",
+    "precomputed",
     "input",
     "recording",
     "stages",

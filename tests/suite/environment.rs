@@ -233,6 +233,77 @@ fn more_regions_are_nearer_to_the_sum() {
 }
 
 #[test]
+fn a_renderer_that_follows_an_edit_draws_what_a_new_one_draws() {
+    let turned =
+        |by: f64| DAffine3::from_mat3(DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), by));
+    let edits: [(&str, &dyn Fn(&mut Scene)); 7] = [
+        ("moved and turned", &|scene| {
+            let place = &mut scene.virtuals[1].anchor_from_object;
+            *place =
+                DAffine3::from_translation(DVec3::new(0.02, -0.01, 0.05)) * turned(0.9) * *place;
+        }),
+        ("a virtual thing hidden", &|scene| {
+            scene.virtuals[0].visible = false
+        }),
+        ("a real thing hidden", &|scene| {
+            scene.phantoms[1].visible = false
+        }),
+        ("the probe turned", &|scene| {
+            scene.probe = Some(probe_scene(sky(31)))
+        }),
+        ("brighter", &|scene| {
+            scene.probe.as_mut().expect("a probe").exposure *= 1.7;
+        }),
+        ("a virtual thing shown", &|scene| {
+            scene.virtuals[0].visible = true
+        }),
+        ("a real thing moved", &|scene| {
+            scene.phantoms[1].visible = true;
+            scene.phantoms[1].anchor_from_object.translation.x -= 0.03;
+        }),
+    ];
+    for method in [
+        EnvironmentMethod::Rays,
+        EnvironmentMethod::Penumbrae,
+        EnvironmentMethod::Maps,
+    ] {
+        let mut scene = three_boxes();
+        let ball = sphere(0.02, 8, 12);
+        let mut ball = object(
+            "ball",
+            flat_mesh(ball.positions, ball.triangles),
+            DVec3::splat(0.3),
+            DAffine3::from_translation(DVec3::new(0.0, -0.05, 0.02)),
+        );
+        ball.materials[0].roughness = Some(0.2);
+        scene.virtuals.push(ball);
+        scene.shadows.environment.method = method;
+        let mut following = Stage::of_scene(scene.clone()).renderer(CAMERA);
+        let seen = |renderer: &mut gnomon::render::Renderer| {
+            // Where something has just moved, light is gathered finely from the next frame on.
+            for _ in 0..2 {
+                renderer.draw(&[Some(camera())], Shown::Composite);
+            }
+            renderer.read_picture().expect("a picture")
+        };
+        let mut before = seen(&mut following);
+        for (what, edit) in &edits {
+            edit(&mut scene);
+            assert!(following.follow(&scene), "{method:?}: {what}: not followed");
+            let kept = seen(&mut following);
+            assert!(kept != before, "{method:?}: {what}: nothing changes");
+            let anew = seen(&mut Stage::of_scene(scene.clone()).renderer(CAMERA));
+            let off = kept.iter().zip(&anew).map(|(a, b)| a.abs_diff(*b)).max();
+            assert!(kept == anew, "{method:?}: {what}: off by {off:?} levels");
+            before = kept;
+        }
+        // What it hides from itself is another.
+        scene.virtuals[1].anchor_from_object.matrix3.z_axis *= 2.0;
+        assert!(!following.follow(&scene), "{method:?}");
+    }
+}
+
+#[test]
 fn a_turned_probe_is_a_turned_scene() {
     let columns = 17;
     let turn = DAffine3::from_mat3(DMat3::from_rotation_z(

@@ -195,7 +195,7 @@ fn renderer(scene: &Scene) -> Renderer {
     let calibration = project_file("recordings/room/camera.toml");
     let intrinsics = load_calibration(Path::new(&calibration)).expect("the calibration");
     let mut renderer =
-        gnomon::app::room_transport_cache::renderer(gpu(), scene, intrinsics).expect("a renderer");
+        gnomon::app::precomputed::renderer(gpu(), scene, intrinsics).expect("a renderer");
     renderer.upload(&frame().0).expect("an uploaded frame");
     renderer
 }

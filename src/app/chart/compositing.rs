@@ -13,7 +13,7 @@ use super::figure::{Axis, Figure, FigurePanel, Point, Series};
 use super::lab::Lab;
 use super::measured::rounded;
 use super::shots::{Shots, mean};
-use crate::app::room_transport_cache;
+use crate::app::precomputed;
 use crate::scene::{Difference, Scene};
 use crate::shafts::intensity_transfers::{encoded, intensity_transfers};
 use crate::shafts::luminance;
@@ -213,8 +213,7 @@ fn set_name(in_first: usize) -> String {
 fn sets(scene: &Scene, trials: usize) -> Result<Vec<CompositingRow>> {
     let probe = scene.probe.as_ref().context("the room has a probe")?;
     let room = scene.room(probe);
-    let room =
-        room_transport_cache::ready(&room, room_transport_cache::folder().as_deref()).transport;
+    let room = precomputed::ready_room(&room).transport;
     let mut random = fastrand::Rng::with_seed(3);
     let vertices = vertices_near(&room, scene);
     let mut rows = Vec::new();

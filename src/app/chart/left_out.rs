@@ -97,11 +97,8 @@ impl Looks {
 }
 
 fn draw(lab: &Lab<'_>, looks: &Looks) -> Result<Vec<DrawnRow>> {
-    let mut renderer = crate::app::room_transport_cache::renderer(
-        Arc::clone(&lab.gpu()?),
-        &looks.scene,
-        looks.intrinsics,
-    )?;
+    let mut renderer =
+        crate::app::precomputed::renderer(Arc::clone(&lab.gpu()?), &looks.scene, looks.intrinsics)?;
     let drawn = looks.frames.iter().map(|(frame, camera_from_anchor)| {
         renderer.upload(frame)?;
         renderer.draw(camera_from_anchor, Shown::Composite);

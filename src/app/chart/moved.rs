@@ -107,7 +107,7 @@ impl AnyChart for Moved {
                 if lab.is_stopped() {
                     return Ok(false);
                 }
-                let mut renderer = crate::app::room_transport_cache::renderer(
+                let mut renderer = crate::app::precomputed::renderer(
                     Arc::clone(&lab.gpu()?),
                     scene,
                     shots.intrinsics,

@@ -55,11 +55,8 @@ impl AnyChart for PicturesChart {
             for (name, shadows) in ways(&scene, lab.quick) {
                 let mut scene = scene.clone();
                 scene.shadows = shadows;
-                let mut renderer = crate::app::room_transport_cache::renderer(
-                    lab.gpu()?,
-                    &scene,
-                    shots.intrinsics,
-                )?;
+                let mut renderer =
+                    crate::app::precomputed::renderer(lab.gpu()?, &scene, shots.intrinsics)?;
                 let pictures = shots.draw_with(&mut renderer)?;
                 let took_ms = frame_ms(lab, &shots, &mut renderer)?;
                 let factor = mean(&shots.errors(&pictures)?, |errors| errors.factor);

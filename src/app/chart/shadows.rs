@@ -162,11 +162,8 @@ impl Chart for Shadows {
             if lab.is_stopped() {
                 return Ok(None);
             }
-            let mut renderer = crate::app::room_transport_cache::renderer(
-                Arc::clone(&gpu),
-                &way.scene,
-                shots.intrinsics,
-            )?;
+            let mut renderer =
+                crate::app::precomputed::renderer(Arc::clone(&gpu), &way.scene, shots.intrinsics)?;
             let drawn = shots.draw_with(&mut renderer)?;
             rows.push(row(unit, way.technique, &way.setting, &shots, &drawn)?);
             renderers.push(renderer);

@@ -83,7 +83,7 @@ impl Shots {
     /// # Errors
     /// A device that failed.
     pub fn draw(&self, gpu: &Arc<Gpu>, scene: &Scene) -> Result<Vec<Drawn>> {
-        self.draw_with(&mut crate::app::room_transport_cache::renderer(
+        self.draw_with(&mut crate::app::precomputed::renderer(
             Arc::clone(gpu),
             scene,
             self.intrinsics,

@@ -80,11 +80,8 @@ impl Chart for WrongPose {
         let scene = recording.load_scene()?;
         let shots = Shots::of(lab, &recording, &scene)?;
         let intrinsics = shots.intrinsics;
-        let mut renderer = crate::app::room_transport_cache::renderer(
-            Arc::clone(&lab.gpu()?),
-            &scene,
-            intrinsics,
-        )?;
+        let mut renderer =
+            crate::app::precomputed::renderer(Arc::clone(&lab.gpu()?), &scene, intrinsics)?;
         let ways: &[DVec2] = match unit {
             TURNED => &[DVec2::X, DVec2::NEG_X],
             _ => &[DVec2::X, DVec2::Y, DVec2::NEG_X, DVec2::NEG_Y],

@@ -53,7 +53,7 @@ impl SceneCanvas {
                 let cores = rayon::ThreadPoolBuilder::new().build().ok();
                 while let Some(order) = orders.take() {
                     let make = || {
-                        crate::app::room_transport_cache::renderer(
+                        crate::app::precomputed::renderer(
                             Arc::clone(&gpu),
                             &order.scene,
                             order.intrinsics,
@@ -225,7 +225,7 @@ impl SceneCanvas {
             ..(*self.scene).clone()
         });
         let renderer =
-            crate::app::room_transport_cache::renderer(Arc::clone(&self.gpu), &empty, intrinsics)?;
+            crate::app::precomputed::renderer(Arc::clone(&self.gpu), &empty, intrinsics)?;
         let order = RendererOrder {
             scene: empty,
             intrinsics,

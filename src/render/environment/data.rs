@@ -1,7 +1,7 @@
 //! What the environment's shaders read.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DAffine3, DVec4, Mat4, Vec3, Vec4};
+use glam::{DAffine3, DMat3, DVec4, Mat4, Vec3, Vec4};
 use wgpu::util::DeviceExt as _;
 
 use crate::environment::occlusion_map::OcclusionMap;
@@ -100,10 +100,11 @@ pub(super) fn disc_texels(node: &DiscNode) -> [[u32; 4]; 5] {
     ]
 }
 
-/// For a thing its middle, and for each region the harmonics in its direction as the thing's anchor sees it: turning the thing
-/// turns them. `open` says which regions the table leaves open.
+/// For a thing its middle, and for each region the harmonics in its direction as the thing sees it: turning the thing
+/// turns them. `anchor_from_own` says how its anchor is turned from it, `open` which regions the table leaves open.
 pub(super) fn receiver_texels(
     thing: Option<&Thing>,
+    anchor_from_own: DMat3,
     world_from_anchor: &[Option<DAffine3>],
     regions: &[Region],
     open: &[bool],
@@ -114,7 +115,7 @@ pub(super) fn receiver_texels(
     };
     let center = pose.transform_point3(thing.ball.center.as_dvec3());
     let mut texels = vec![words(center.as_vec3().extend(0.0))];
-    let turn = pose.matrix3.transpose();
+    let turn = (pose.matrix3 * anchor_from_own).transpose();
     for (region, &is_open) in regions.iter().zip(open) {
         let basis = basis((turn * region.toward).normalize(), VISIBILITY_DEGREE);
         let scale = f64::from(u8::from(is_open));
@@ -125,13 +126,10 @@ pub(super) fn receiver_texels(
 }
 
 /// The contents of a batch's buffer of self-occlusion.
-pub(super) fn occlusion_corners(
-    thing_of: &[u32],
-    visibility: impl Fn(usize) -> [f32; VISIBILITIES],
-) -> Vec<u8> {
+pub(super) fn occlusion_corners(thing_of: &[u32], visibilities: &[[f32; VISIBILITIES]]) -> Vec<u8> {
     let mut contents = Vec::new();
-    for (corner, thing) in thing_of.iter().enumerate() {
-        contents.extend_from_slice(bytemuck::bytes_of(&visibility(corner)));
+    for (visibility, thing) in visibilities.iter().zip(thing_of) {
+        contents.extend_from_slice(bytemuck::bytes_of(visibility));
         contents.extend_from_slice(bytemuck::bytes_of(thing));
     }
     contents

@@ -3,44 +3,35 @@
 //!
 //! What depends on where things are in the world is worked out when they move, not when the camera does.
 
+mod casting;
 mod data;
+mod own_light;
 mod pipelines;
 
-use glam::{DAffine3, DVec3, Vec3};
+use glam::DAffine3;
 
 use crate::environment::distant_light::DistantLight;
-use crate::environment::occlusion_map::OcclusionMap;
 use crate::environment::placed::PlacedScene;
-use crate::environment::reflected::DiscTree;
-use crate::environment::self_occlusion::{SelfOcclusion, TRANSFER_DEGREE, self_occlusions};
 use crate::environment::sky::Sky;
-use crate::environment::surroundings::LocalLight;
 use crate::environment::thing::Thing;
 use crate::geometry::bounds::Bounds;
-use crate::geometry::ray_caster::RayCaster;
 use crate::geometry::reach::{self, PixelRect};
 use crate::light::Light;
-use crate::light::harmonics::Turn;
-use crate::scene::{EnvironmentMethod, Object, ProbeScene, Scene};
-use crate::shafts::shadow_atlas::Tiling;
+use crate::light::probe::Probe;
+use crate::scene::{EnvironmentMethod, EnvironmentSettings, Object, ProbeScene, Scene};
 
 use super::anchor_geometry::Role;
 use super::combined::BroadLight;
 use super::final_gather::FinalGather;
 use super::gpu::Gpu;
 use super::gpu_scene::{DrawnLight, GpuScene};
-use super::indirect::points;
-use super::map_atlas::MapAtlas;
 use super::mirrored_probe::MirroredProbe;
 use super::passes::Passes;
-use data::{
-    EnvironmentFrame, disc_texels, map_texels, occlusion_corners, receiver_texels, region_texels,
-    table,
-};
+use super::precomputation::Precomputation;
+use casting::Casting;
+use data::{EnvironmentFrame, disc_texels, map_texels, receiver_texels, region_texels, table};
+use own_light::OwnLight;
 use pipelines::{ENVIRONMENT_GROUP, Pipelines};
-
-/// Rays start this part of a thing's size off its surface.
-const START_OFFSET: f64 = 1e-4;
 
 /// Rays from each point of real surfaces for one that the ambient light of lamps gets: here it is all light.
 const RAYS_FOR_ONE: usize = 2;
@@ -49,37 +40,28 @@ const FEWEST_RAYS: usize = 128;
 
 /// The broad light of a probe.
 pub(super) struct Environment {
+    settings: EnvironmentSettings,
+    /// All broad light, linear radiance, and the camera's exposure.
+    rest: (Probe, f64),
     distant: DistantLight,
     /// By their numbers in the scene, phantoms first; `None`: not there.
     things: Vec<Option<Thing>>,
-    /// Those that have maps, the real ones first.
-    casters: Vec<usize>,
-    /// Triangles of all casters, each in its anchor's space, and which are whose.
-    triangles: wgpu::Buffer,
-    ranges: Vec<std::ops::Range<u32>>,
-    /// For each batch what its corners hide from themselves; `None` where its light is gathered otherwise.
-    occlusions: Vec<Option<BatchOcclusion>>,
+    /// Where light is summed up by corners.
+    own_light: OwnLight,
     pipelines: Pipelines,
     /// What real surfaces get, where rays tell that.
     final_gather: Option<FinalGather>,
-    tiling: Tiling,
-    atlas: MapAtlas,
+    /// `None`: things have changed.
+    casting: Option<Casting>,
     frame: wgpu::Buffer,
     sampler: wgpu::Sampler,
-    mirrored: MirroredProbe,
+    /// Whether any virtual thing is glossy.
+    is_glossy: bool,
+    /// `None`: light has changed.
+    mirrored: Option<MirroredProbe>,
     /// What `placed` was worked out for: where anchors are in the world, and the compact lights.
     placed_for: Option<(Vec<Option<DAffine3>>, Vec<Light>)>,
     placed: Option<Placed>,
-}
-
-/// A batch's corners as light from afar meets them.
-struct BatchOcclusion {
-    anchor: usize,
-    points: Vec<(DVec3, DVec3)>,
-    occlusions: Vec<SelfOcclusion>,
-    point_of_corner: Vec<usize>,
-    /// Number of each point's thing.
-    thing_of_point: Vec<usize>,
 }
 
 /// What depends on where things are.
@@ -93,67 +75,38 @@ struct Placed {
 }
 
 impl Environment {
-    /// Works out what the things hide from themselves, which takes a while.
-    pub fn new(gpu: &Gpu, scene: &Scene, probe: &ProbeScene, gpu_scene: &mut GpuScene) -> Self {
+    /// What things hide from themselves takes a while to work out; `precomputation` may know it.
+    pub fn new(
+        gpu: &Gpu,
+        scene: &Scene,
+        probe: &ProbeScene,
+        gpu_scene: &GpuScene,
+        precomputation: &dyn Precomputation,
+    ) -> Self {
         let settings = scene.shadows.environment;
-        let rest = scene.split_light(probe).rest;
-        let distant = DistantLight::new(&rest, probe.exposure, settings.regions as usize);
-        let real = scene.real_occluders();
-        let virtuals = scene.occluders();
-        let things: Vec<Option<Thing>> = real
-            .iter()
-            .map(|thing| Thing::new(thing, true))
-            .chain(virtuals.iter().map(|thing| Thing::new(thing, false)))
-            .collect();
-        let casters: Vec<usize> = (0..things.len())
-            .filter(|&number| things[number].as_ref().is_some_and(|thing| thing.casts))
-            .collect();
-        let mut triangles: Vec<[Vec3; 3]> = Vec::new();
-        let ranges = casters.iter().filter_map(|&number| things[number].as_ref());
-        let ranges = ranges
-            .map(|thing| {
-                let first = 3 * triangles.len() as u32;
-                triangles.extend(&thing.triangles);
-                first..3 * triangles.len() as u32
-            })
-            .collect();
-        let objects: Vec<&Object> = scene.phantoms.iter().chain(&scene.virtuals).collect();
+        let rest = (scene.split_light(probe).rest.into_owned(), probe.exposure);
         let rays = (RAYS_FOR_ONE * scene.shadows.ambient_samples as usize).max(FEWEST_RAYS);
         let final_gather = match settings.method {
-            EnvironmentMethod::Rays => FinalGather::new(gpu, scene, rays, |rays| {
-                Sky::new(&rest, probe.exposure, rays)
-            }),
+            EnvironmentMethod::Rays => {
+                FinalGather::new(gpu, scene, rays, |rays| Sky::new(&rest.0, rest.1, rays))
+            }
             EnvironmentMethod::Penumbrae | EnvironmentMethod::Maps => None,
         };
-        let occlusions = occlusions(&objects, gpu_scene, final_gather.is_some());
-        let buffers: Vec<Option<wgpu::Buffer>> = gpu_scene
-            .corners()
-            .zip(&occlusions)
-            .map(|((_, _, corners), batch)| {
-                let batch = batch.as_ref()?;
-                let visibility =
-                    |corner: usize| batch.occlusions[batch.point_of_corner[corner]].visibility;
-                let contents = occlusion_corners(&corners.thing_of, visibility);
-                Some(gpu.buffer("self-occlusion", &contents, wgpu::BufferUsages::VERTEX))
-            })
-            .collect();
-        gpu_scene.set_occlusion(buffers.into_iter());
-        let count = casters.len() * distant.regions.len();
-        let largest_px = gpu.device.limits().max_texture_dimension_2d;
-        let tiling = Tiling::new(count, settings.map_px, largest_px);
         let kinds = gpu_scene.kinds;
-        let glossy = kinds.glossy.then(|| (rest.as_ref(), probe.exposure as f32));
         Self {
+            distant: DistantLight::new(&rest.0, rest.1, settings.regions as usize),
+            rest,
+            things: things(scene),
+            own_light: OwnLight::new(
+                &objects(scene),
+                scene.phantoms.len(),
+                final_gather.is_some(),
+                gpu_scene,
+                precomputation,
+            ),
             pipelines: Pipelines::new(gpu, scene.shadows.samples, kinds, settings.method),
             final_gather,
-            atlas: MapAtlas::new(gpu, tiling, "occlusion_maps.wgsl"),
-            tiling,
-            triangles: gpu.buffer(
-                "environment's casters",
-                bytemuck::cast_slice(&triangles),
-                wgpu::BufferUsages::VERTEX,
-            ),
-            ranges,
+            casting: None,
             frame: gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("environment"),
                 size: size_of::<EnvironmentFrame>() as u64,
@@ -167,11 +120,9 @@ impl Environment {
                 mipmap_filter: wgpu::MipmapFilterMode::Linear,
                 ..Default::default()
             }),
-            mirrored: MirroredProbe::new(&gpu.device, &gpu.queue, glossy),
-            distant,
-            things,
-            casters,
-            occlusions,
+            is_glossy: kinds.glossy,
+            mirrored: None,
+            settings,
             placed_for: None,
             placed: None,
         }
@@ -184,25 +135,25 @@ impl Environment {
         gpu_scene: &GpuScene,
         world_from_anchor: &[Option<DAffine3>],
         compact: &[Light],
+        (casting, mirrored): (&Casting, &MirroredProbe),
     ) -> Placed {
         let things = self.things.iter().enumerate();
         let things = things.filter_map(|(number, thing)| Some((number, thing.as_ref()?)));
         let scene = PlacedScene::new(things, world_from_anchor, &self.distant, compact);
         let bounds: Vec<Bounds> = scene.things.iter().map(|placed| placed.bounds()).collect();
         let discs = scene.reflecting();
-        let lit = self.light_of_corners(&scene, &bounds, &discs, world_from_anchor);
-        for (number, irradiances) in lit.iter().enumerate() {
-            if let Some(irradiances) = irradiances {
-                gpu_scene.write_indirect(&gpu.queue, number, irradiances);
-            }
-        }
-        let maps = self.maps(&scene);
+        self.own_light
+            .write(gpu, gpu_scene, &scene, &bounds, &discs);
+        let maps = casting.maps(&scene, &self.distant);
         let regions = &self.distant.regions;
         let open = scene.open_regions(self.things.len());
         let receivers = self.things.iter().zip(open.chunks(regions.len().max(1)));
         let receivers: Vec<[u32; 4]> = receivers
-            .flat_map(|(thing, open)| {
-                receiver_texels(thing.as_ref(), world_from_anchor, regions, open)
+            .enumerate()
+            .flat_map(|(number, (thing, open))| {
+                let anchor_from_own = self.own_light.anchor_from_own(number);
+                let thing = thing.as_ref();
+                receiver_texels(thing, anchor_from_own, world_from_anchor, regions, open)
             })
             .collect();
         let flat = |texels: Vec<[[u32; 4]; 5]>| texels.into_flattened();
@@ -228,10 +179,10 @@ impl Environment {
         let tables = tables.iter().map(wgpu::BindingResource::TextureView);
         let frame = [self.frame.as_entire_binding()];
         let rest = [
-            wgpu::BindingResource::TextureView(&self.atlas.view),
+            wgpu::BindingResource::TextureView(&casting.atlas.view),
             wgpu::BindingResource::Sampler(&self.sampler),
-            wgpu::BindingResource::TextureView(&self.mirrored.view),
-            wgpu::BindingResource::Sampler(&self.mirrored.sampler),
+            wgpu::BindingResource::TextureView(&mirrored.view),
+            wgpu::BindingResource::Sampler(&mirrored.sampler),
         ];
         let group = gpu.bind_group(
             &ENVIRONMENT_GROUP,
@@ -246,149 +197,85 @@ impl Environment {
         }
     }
 
-    /// For each caster and region its map.
-    fn maps(&self, scene: &PlacedScene<'_>) -> Vec<OcclusionMap> {
-        let reach_m = scene.reach_m();
-        let mut maps = Vec::new();
-        for &caster in &self.casters {
-            let placed = scene.position(caster);
-            for region in &self.distant.regions {
-                let index = maps.len() as u32;
-                maps.push(match placed {
-                    Some(placed) => OcclusionMap::new(
-                        &scene.things[placed],
-                        region,
-                        reach_m,
-                        (&self.tiling, index),
-                        caster as u32,
-                    ),
-                    None => OcclusionMap::NOWHERE,
-                });
-            }
+    /// Places all anew where things or compact lights are elsewhere than before.
+    fn follow_poses(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene) -> Option<()> {
+        self.own_light.place(gpu, gpu_scene);
+        let casting = self.casting.take().unwrap_or_else(|| {
+            let region_count = self.distant.regions.len();
+            Casting::new(gpu, &self.things, region_count, self.settings.map_px)
+        });
+        let mirrored = self.mirrored.take().unwrap_or_else(|| {
+            let (rest, exposure) = &self.rest;
+            let glossy = self.is_glossy.then_some((rest, *exposure as f32));
+            MirroredProbe::new(&gpu.device, &gpu.queue, glossy)
+        });
+        let placed_for = (gpu_scene.world_from_anchor()?, gpu_scene.shining());
+        if self.placed_for.as_ref() != Some(&placed_for) {
+            let (anchors, compact) = &placed_for;
+            let made = (&casting, &mirrored);
+            self.placed = Some(self.place(gpu, gpu_scene, anchors, compact, made));
+            self.placed_for = Some(placed_for);
         }
-        maps
-    }
-
-    /// For each batch the irradiance of its corners: on virtual things of all broad light that they do not hide from
-    /// themselves, on real ones of what others reflect.
-    fn light_of_corners(
-        &self,
-        scene: &PlacedScene<'_>,
-        bounds: &[Bounds],
-        discs: &DiscTree,
-        world_from_anchor: &[Option<DAffine3>],
-    ) -> Vec<Option<Vec<Vec3>>> {
-        let lights: Vec<Option<LocalLight>> = (0..scene.things.len())
-            .map(|index| {
-                let is_wanted = !scene.things[index].thing.is_real || self.final_gather.is_none();
-                is_wanted.then(|| LocalLight::new(scene, bounds[index], index))
-            })
-            .collect();
-        let of_batch = |batch: &BatchOcclusion| {
-            let Some(pose) = &world_from_anchor[batch.anchor] else {
-                return vec![Vec3::ZERO; batch.point_of_corner.len()];
-            };
-            let turn = Turn::new(pose.matrix3.transpose(), TRANSFER_DEGREE);
-            let turned = |light: &Option<LocalLight>| Some(light.as_ref()?.turned(&turn));
-            let lights: Vec<Option<LocalLight>> = lights.iter().map(turned).collect();
-            let points = batch
-                .points
-                .iter()
-                .zip(&batch.occlusions)
-                .zip(&batch.thing_of_point);
-            let of_point =
-                |((point, occlusion), thing): ((&(DVec3, DVec3), &SelfOcclusion), &usize)| {
-                    let Some(index) = scene.position(*thing) else {
-                        return Vec3::ZERO;
-                    };
-                    let Some(light) = &lights[index] else {
-                        return Vec3::ZERO;
-                    };
-                    let place = pose.transform_point3(point.0);
-                    let around = occlusion.irradiance(&light.at(place));
-                    let of_itself = match scene.things[index].thing.is_real {
-                        true => Vec3::ZERO,
-                        false => {
-                            let normal = pose.transform_vector3(point.1).as_vec3();
-                            discs.irradiance_from_itself(index, place.as_vec3(), normal)
-                        }
-                    };
-                    around + of_itself
-                };
-            let at_points: Vec<Vec3> = points.map(of_point).collect();
-            let corners = batch.point_of_corner.iter();
-            corners.map(|&point| at_points[point]).collect()
-        };
-        let batches = self.occlusions.iter();
-        batches.map(|batch| batch.as_ref().map(of_batch)).collect()
+        (self.casting, self.mirrored) = (Some(casting), Some(mirrored));
+        Some(())
     }
 }
 
-/// For each batch what its corners hide from themselves, but for real ones where their light is gathered; `objects` by their
-/// numbers.
-fn occlusions(
-    objects: &[&Object],
-    gpu_scene: &GpuScene,
-    is_real_gathered: bool,
-) -> Vec<Option<BatchOcclusion>> {
-    let casters: Vec<(RayCaster, f64)> = objects
-        .iter()
-        .map(|object| {
-            let positions = object.positions_in_anchor(&object.mesh);
-            let triangles = object.mesh.triangles.iter();
-            let corners: Vec<[Vec3; 3]> = triangles
-                .map(|triangle| triangle.map(|index| positions[index as usize]))
-                .collect();
-            let size_m = object
-                .bounds_in_anchor()
-                .map_or(0.0, |bounds| (bounds.high - bounds.low).length());
-            (RayCaster::new(&corners), size_m)
-        })
-        .collect();
-    let of_batch =
-        |(role, anchor, corners): (Role, usize, &super::anchor_geometry::BatchCorners)| {
-            if role == Role::Real && is_real_gathered {
-                return None;
-            }
-            let (points, point_of_corner) = points(&corners.corners.0, &corners.corners.1);
-            let mut thing_of_point = vec![0; points.len()];
-            for (&point, &thing) in point_of_corner.iter().zip(&corners.thing_of) {
-                thing_of_point[point] = thing as usize;
-            }
-            let occlusions = self_occlusions(&points, |point| {
-                let (caster, size_m) = &casters[thing_of_point[point]];
-                (caster, size_m * START_OFFSET)
-            });
-            Some(BatchOcclusion {
-                anchor,
-                points,
-                occlusions,
-                point_of_corner,
-                thing_of_point,
-            })
-        };
-    gpu_scene.corners().map(of_batch).collect()
+/// A scene's objects by their numbers.
+fn objects(scene: &Scene) -> Vec<&Object> {
+    scene.phantoms.iter().chain(&scene.virtuals).collect()
+}
+
+/// They as light from afar meets them.
+fn things(scene: &Scene) -> Vec<Option<Thing>> {
+    let real = scene.real_occluders();
+    let real = real.iter().map(|thing| Thing::new(thing, true));
+    let virtuals = scene.occluders();
+    let virtuals = virtuals.iter().map(|thing| Thing::new(thing, false));
+    real.chain(virtuals).collect()
 }
 
 impl BroadLight for Environment {
-    /// Things that are elsewhere on their anchors take a new renderer.
-    fn follow(&mut self, _scene: &Scene) -> bool {
-        false
+    /// False where what a thing hides from itself is not known, or there is no probe any more.
+    fn follow(&mut self, scene: &Scene) -> bool {
+        let Some(probe) = &scene.probe else {
+            return false;
+        };
+        let is_real_gathered = self.final_gather.is_some();
+        let (objects, real_count) = (objects(scene), scene.phantoms.len());
+        if !self
+            .own_light
+            .follow(&objects, real_count, is_real_gathered)
+        {
+            return false;
+        }
+        let rest = scene.split_light(probe).rest;
+        let (known, exposure) = &self.rest;
+        if (known, *exposure) != (rest.as_ref(), probe.exposure) {
+            self.rest = (rest.into_owned(), probe.exposure);
+            let (rest, exposure) = (&self.rest.0, self.rest.1);
+            self.distant = DistantLight::new(rest, exposure, self.settings.regions as usize);
+            self.mirrored = None;
+            if let Some(final_gather) = &mut self.final_gather {
+                final_gather.set_sky(|rays| Sky::new(rest, exposure, rays));
+            }
+        }
+        if let Some(final_gather) = &mut self.final_gather {
+            final_gather.follow(scene);
+        }
+        self.things = things(scene);
+        self.casting = None;
+        self.placed_for = None;
+        true
     }
 
-    fn update(&mut self, gpu: &Gpu, gpu_scene: &GpuScene) -> Option<PixelRect> {
+    fn update(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene) -> Option<PixelRect> {
         let camera_from_world = (*gpu_scene.camera_from_anchor().first()?)?;
         let world_from_camera = camera_from_world.inverse();
-        let world_from_anchor = gpu_scene.world_from_anchor()?;
-        let placed_for = (world_from_anchor, gpu_scene.shining());
-        if self.placed_for.as_ref() != Some(&placed_for) {
-            let (anchors, compact) = &placed_for;
-            self.placed = Some(self.place(gpu, gpu_scene, anchors, compact));
-            self.placed_for = Some(placed_for);
-        }
+        self.follow_poses(gpu, gpu_scene)?;
         let gathered = self.final_gather.as_mut();
         let gathered = gathered.map(|gathered| gathered.update(gpu, gpu_scene));
-        let placed = self.placed.as_ref()?;
+        let (placed, casting) = (self.placed.as_ref()?, self.casting.as_ref()?);
         let is_real = |&&number: &&usize| {
             self.things[number]
                 .as_ref()
@@ -397,8 +284,8 @@ impl BroadLight for Environment {
         let frame = EnvironmentFrame {
             world_from_camera: glam::DMat4::from(world_from_camera).as_mat4(),
             region_count: self.distant.regions.len() as u32,
-            caster_count: self.casters.len() as u32,
-            real_caster_count: self.casters.iter().filter(is_real).count() as u32,
+            caster_count: casting.casters.len() as u32,
+            real_caster_count: casting.casters.iter().filter(is_real).count() as u32,
             disc_count: placed.disc_count,
         };
         gpu.queue
@@ -422,15 +309,10 @@ impl BroadLight for Environment {
         let Some(placed) = self.placed.as_mut().filter(|placed| !placed.are_maps_drawn) else {
             return;
         };
-        let regions = self.distant.regions.len();
-        self.atlas.draw(
-            gpu,
-            passes,
-            &placed.maps,
-            (self.casters.len() * regions) as u32,
-            &self.triangles,
-            |tile| self.ranges[tile as usize / regions].clone(),
-        );
+        let Some(casting) = &self.casting else {
+            return;
+        };
+        casting.draw(gpu, passes, &placed.maps);
         placed.are_maps_drawn = true;
     }
 

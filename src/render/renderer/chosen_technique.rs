@@ -10,13 +10,12 @@ use super::super::gpu::Gpu;
 use super::super::gpu_scene::GpuScene;
 use super::super::light_kind::LightKind;
 use super::super::light_piece::LitBy;
+use super::super::precomputation::Precomputation;
 use super::super::shafts::{Shafts, ShaftsAlone};
 use super::super::surfaces::First;
 use super::super::technique::TechniquePasses;
 use crate::geometry::camera::Intrinsics;
 use crate::scene::{Scene, SceneLight, ShadowTechnique, Shortcut};
-use crate::shafts::room::Room;
-use crate::shafts::room_transport::RoomTransport;
 
 /// A renderer's technique.
 pub(super) enum ChosenTechnique {
@@ -31,19 +30,19 @@ pub(super) enum ChosenTechnique {
 }
 
 impl ChosenTechnique {
-    /// The technique of a scene, and the scene as it draws it; `transport` gives the light of a room.
+    /// The technique of a scene, and the scene as it draws it.
     pub fn new(
         gpu: &Gpu,
         scene: &Scene,
         intrinsics: Intrinsics,
         background: &Background,
-        transport: impl FnOnce(&Room<'_>) -> RoomTransport,
+        precomputation: &dyn Precomputation,
     ) -> (Self, GpuScene) {
         match (scene.chosen_technique().0, &scene.probe) {
             (ShadowTechnique::Shafts | ShadowTechnique::Both, Some(probe)) => {
                 let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Room);
                 let kinds = gpu_scene.kinds;
-                let shafts = Shafts::new(gpu, scene, probe, kinds, transport);
+                let shafts = Shafts::new(gpu, scene, probe, kinds, precomputation);
                 let technique = match gpu_scene.light_count() {
                     0 => {
                         let alone = ShaftsAlone::new(gpu, scene, background, shafts);
@@ -58,9 +57,9 @@ impl ChosenTechnique {
                 (technique, gpu_scene)
             }
             (ShadowTechnique::Environment, Some(probe)) => {
-                let mut gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Room);
+                let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Room);
                 let (samples, kinds) = (scene.shadows.samples, gpu_scene.kinds);
-                let broad = Environment::new(gpu, scene, probe, &mut gpu_scene);
+                let broad = Environment::new(gpu, scene, probe, &gpu_scene, precomputation);
                 let compact = Accumulated::new(gpu, background, samples, kinds, First::DepthAlone);
                 let combined = Combined::new(compact, Box::new(broad));
                 (Self::Combined(Box::new(combined)), gpu_scene)

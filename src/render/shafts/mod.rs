@@ -16,7 +16,6 @@ use crate::shafts::casters::{PlacedCasters, ShaftCasters};
 use crate::shafts::hidden_light::{HiddenLight, ShadowOptions};
 use crate::shafts::patches::RoomPatch;
 use crate::shafts::receiver_patches::ReflectedCorner;
-use crate::shafts::room::Room;
 use crate::shafts::room_transport::RoomTransport;
 use crate::shafts::shadow_atlas::Tiling;
 use crate::shafts::surfels::{GroupedSurfels, interreflected_irradiance};
@@ -32,6 +31,7 @@ use super::light_sums::{BY_GAIN, CompositeShader, LightSums};
 use super::map_atlas::MapAtlas;
 use super::mirrored_probe::MirroredProbe;
 use super::passes::Passes;
+use super::precomputation::Precomputation;
 use super::screen_bounds::ScreenBounds;
 use super::shown::Shown;
 use super::surfaces::SurfaceKinds;
@@ -91,17 +91,17 @@ struct Hidden {
 }
 
 impl Shafts {
-    /// `transport` gives the light of the scene's room.
+    /// `precomputation` gives the light of the scene's room.
     pub fn new(
         gpu: &Gpu,
         scene: &Scene,
         probe: &ProbeScene,
         kinds: SurfaceKinds,
-        transport: impl FnOnce(&Room<'_>) -> RoomTransport,
+        precomputation: &dyn Precomputation,
     ) -> Self {
         let parts = scene.room(probe);
         let surfaces_key = parts.surfaces_key();
-        let room = transport(&parts);
+        let room = precomputation.transport(&parts);
         let device = &gpu.device;
         let standing = parts.standing;
         let is_standing = |patch: &&RoomPatch| patch.piece < standing;
@@ -338,7 +338,7 @@ impl BroadLight for Shafts {
         self.world_from_anchor.clear();
     }
 
-    fn update(&mut self, gpu: &Gpu, gpu_scene: &GpuScene) -> Option<PixelRect> {
+    fn update(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene) -> Option<PixelRect> {
         self.update(gpu, gpu_scene)
     }
 

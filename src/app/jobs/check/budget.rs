@@ -57,8 +57,7 @@ fn measured(scene: &Scene) -> Result<String> {
         bail!("the recording's first frames do not show where the world is");
     };
     let gpu = Arc::new(Gpu::open(None)?);
-    let mut renderer =
-        crate::app::room_transport_cache::renderer(Arc::clone(&gpu), scene, intrinsics)?;
+    let mut renderer = crate::app::precomputed::renderer(Arc::clone(&gpu), scene, intrinsics)?;
     let watch = Stopwatch::start();
     let mut frames_ms = Vec::new();
     while frames_ms.len() < DRAWS && watch.elapsed_ms() < LONGEST_MS {

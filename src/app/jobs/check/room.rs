@@ -1,6 +1,6 @@
 //! What `gnomon check` says of a room that shafts take their light from.
 
-use crate::app::room_transport_cache;
+use crate::app::precomputed;
 use crate::app::scene_warnings::counted;
 use crate::app::stopwatch::Stopwatch;
 use crate::scene::{
@@ -91,9 +91,7 @@ pub fn room_lines(scene: &Scene, probe: &ProbeScene) -> Vec<(&'static str, Strin
     if !technique.has_shafts() {
         return lines;
     }
-    let folder = room_transport_cache::folder();
-    let (ready, took_ms) =
-        Stopwatch::time(|| room_transport_cache::ready(&room, folder.as_deref()));
+    let (ready, took_ms) = Stopwatch::time(|| precomputed::ready_room(&room));
     let transport = &ready.transport;
     lines.push((
         "patches",

@@ -223,8 +223,7 @@ impl ReplayDrawing {
     ) -> Result<Self> {
         let gpu = Arc::new(Gpu::open(request.adapter.as_deref())?);
         talk::say(format_args!("drawing on {}", gpu.description()));
-        let renderer =
-            crate::app::room_transport_cache::renderer(Arc::clone(&gpu), scene, intrinsics)?;
+        let renderer = crate::app::precomputed::renderer(Arc::clone(&gpu), scene, intrinsics)?;
         let sink = request
             .out
             .as_ref()

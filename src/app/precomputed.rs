@@ -1,0 +1,148 @@
+//! What takes seconds to work out before a scene's first frame, kept on disk by what it was made from: rooms' transport of light,
+//! and what things hide from themselves.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crate::environment::self_occlusion::{OwnSurface, SelfOcclusion};
+use crate::geometry::camera::Intrinsics;
+use crate::render::{Gpu, Precomputation, RenderError, Renderer};
+use crate::scene::Scene;
+use crate::shafts::room::Room;
+use crate::shafts::room_transport::RoomTransport;
+
+use super::disk_cache::DiskCache;
+
+/// A room's transport, and where it was found.
+pub struct ReadyRoom {
+    /// The transport.
+    pub transport: RoomTransport,
+    /// The file that it was read from; `None` where it was worked out just now.
+    pub read_from: Option<PathBuf>,
+}
+
+/// The user's folder for something; `None` on systems that have no such place.
+fn folder(name: &str) -> Option<PathBuf> {
+    Some(dirs::cache_dir()?.join("gnomon").join(name))
+}
+
+/// Rooms in a folder.
+fn rooms(folder: Option<PathBuf>) -> DiskCache {
+    DiskCache {
+        folder,
+        extension: "room",
+        version: 3,
+        most_bytes: 1 << 30,
+        most_files: 16,
+    }
+}
+
+/// Things' self-occlusion in a folder.
+fn self_occlusions(folder: Option<PathBuf>) -> DiskCache {
+    DiskCache {
+        folder,
+        extension: "occlusion",
+        version: 1,
+        most_bytes: 1 << 28,
+        most_files: 64,
+    }
+}
+
+/// What is in the user's folders, or is put there.
+#[derive(Debug, Clone, Copy)]
+pub struct KeptOnDisk;
+
+impl Precomputation for KeptOnDisk {
+    fn transport(&self, room: &Room<'_>) -> RoomTransport {
+        ready_room(room).transport
+    }
+
+    fn self_occlusions(&self, surface: &OwnSurface) -> Vec<SelfOcclusion> {
+        occlusions(surface, &self_occlusions(folder("self-occlusion")))
+    }
+}
+
+/// A renderer of a scene for which what takes long is in the user's folders, or is put there.
+///
+/// # Errors
+/// A picture larger than the adapter can hold, or a device that failed.
+pub fn renderer(
+    gpu: Arc<Gpu>,
+    scene: &Scene,
+    intrinsics: Intrinsics,
+) -> Result<Renderer, RenderError> {
+    Renderer::with_precomputation(gpu, scene, intrinsics, &KeptOnDisk)
+}
+
+/// A room's transport from the user's folder, or worked out and put there.
+pub fn ready_room(room: &Room<'_>) -> ReadyRoom {
+    ready(room, &rooms(folder("rooms")))
+}
+
+fn ready(room: &Room<'_>, rooms: &DiskCache) -> ReadyRoom {
+    let key = room.key();
+    if let Some(transport) = rooms.read::<RoomTransport>(key) {
+        return ReadyRoom {
+            transport: transport.with_caster(&room.compact),
+            read_from: rooms.path(key),
+        };
+    }
+    let transport = room.transport();
+    rooms.keep(key, &transport);
+    ReadyRoom {
+        transport,
+        read_from: None,
+    }
+}
+
+fn occlusions(surface: &OwnSurface, cache: &DiskCache) -> Vec<SelfOcclusion> {
+    let known: Option<Vec<f32>> = cache.read(surface.key);
+    let known = known.and_then(|numbers| {
+        let occlusions = bytemuck::try_cast_slice(&numbers).ok()?.to_vec();
+        (occlusions.len() == surface.point_count()).then_some(occlusions)
+    });
+    known.unwrap_or_else(|| {
+        let occlusions = surface.self_occlusions();
+        let numbers: &[f32] = bytemuck::cast_slice(&occlusions);
+        cache.keep(surface.key, &numbers);
+        occlusions
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_room_is_read_as_it_was_kept_and_damage_is_worked_out_again() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let mut scene = Scene::load(&root.join("config/room.toml")).unwrap();
+        scene.shadows.shafts.patches = 300;
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        let ready_from = |scene: &Scene| {
+            let probe = scene.probe.as_ref().unwrap();
+            ready(&scene.room(probe), &rooms(Some(folder.to_owned())))
+        };
+        let first = ready_from(&scene);
+        assert_eq!(first.read_from, None);
+        let again = ready_from(&scene);
+        let path = again.read_from.unwrap();
+        let bytes = |room: &RoomTransport| postcard::to_stdvec(room).unwrap();
+        assert!(bytes(&again.transport) == bytes(&first.transport));
+        let (origin, down) = (glam::Vec3::new(0.3, 0.2, 0.5), -glam::Vec3::Z);
+        let seen = |room: &RoomTransport| room.radiance_along(origin, down);
+        assert!(seen(&first.transport).is_some());
+        assert_eq!(seen(&again.transport), seen(&first.transport));
+
+        let whole = fs::read(&path).unwrap();
+        fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+        assert_eq!(ready_from(&scene).read_from, None);
+        assert!(fs::read(&path).unwrap() == whole);
+
+        // What the room depends on makes it another one.
+        scene.probe.as_mut().unwrap().exposure *= 1.5;
+        assert_eq!(ready_from(&scene).read_from, None);
+        assert_eq!(fs::read_dir(folder).unwrap().count(), 2);
+    }
+}

@@ -1,0 +1,274 @@
+//! The corners of things as light from afar meets them: what each hides from itself, and the irradiance that is left.
+//! Reads the batches' corners. Writes their self-occlusion and indirect light.
+
+use std::sync::Arc;
+
+use glam::{DAffine3, DMat3, DVec3, Vec3};
+
+use crate::environment::placed::PlacedScene;
+use crate::environment::reflected::DiscTree;
+use crate::environment::self_occlusion::{
+    OwnSpace, OwnSurface, SelfOcclusion, TRANSFER_DEGREE, VISIBILITIES,
+};
+use crate::environment::surroundings::LocalLight;
+use crate::geometry::bounds::Bounds;
+use crate::geometry::corner_points::corner_points;
+use crate::light::harmonics::Turn;
+use crate::scene::Object;
+
+use super::super::anchor_geometry::BatchCorners;
+use super::super::gpu::Gpu;
+use super::super::gpu_scene::GpuScene;
+use super::super::precomputation::Precomputation;
+use super::data::occlusion_corners;
+
+/// What a thing hides from itself, wherever it stands.
+struct OwnOcclusion {
+    /// What it was worked out for.
+    key: u64,
+    /// One a point.
+    occlusions: Vec<SelfOcclusion>,
+    /// For each corner of each triangle, those of coarser levels too, its point.
+    point_of_corner: Vec<usize>,
+}
+
+/// A thing among those whose light is worked out at corners.
+struct OwnLitThing {
+    own: Arc<OwnOcclusion>,
+    /// Turns directions of its own space into its anchor's.
+    anchor_from_own: DMat3,
+    /// Where its corners are, once that is known.
+    corners: Option<PlacedCorners>,
+}
+
+/// A thing's corners in their batch.
+struct PlacedCorners {
+    /// Number of the batch.
+    batch: usize,
+    anchor: usize,
+    /// Place and unit normal in the anchor's space.
+    points: Vec<(DVec3, DVec3)>,
+    /// For each point the number of its self-occlusion.
+    occlusion_of_point: Vec<usize>,
+    /// The batch's corners, each with its point.
+    corners: Vec<(usize, usize)>,
+}
+
+/// The things whose light is worked out at their corners.
+pub(super) struct OwnLight {
+    /// By their numbers in the scene, phantoms first; `None`: not there, or its light is gathered otherwise.
+    things: Vec<Option<OwnLitThing>>,
+    /// What is known of each, also of those that are not there now.
+    known: Vec<Option<Arc<OwnOcclusion>>>,
+    is_placed: bool,
+}
+
+impl OwnLight {
+    /// Of objects by their numbers, of which the first ones are real; `is_real_gathered`: those get their light otherwise.
+    pub fn new(
+        objects: &[&Object],
+        real_count: usize,
+        is_real_gathered: bool,
+        gpu_scene: &GpuScene,
+        precomputation: &dyn Precomputation,
+    ) -> Self {
+        let of_thing = |(number, object): (usize, &&Object)| {
+            if !object.visible || (is_real_gathered && number < real_count) {
+                return None;
+            }
+            let space = OwnSpace::new(&object.anchor_from_object);
+            let coarser = gpu_scene.coarser_meshes(&object.mesh);
+            let surface = OwnSurface::new(&object.mesh, coarser, &space);
+            Some(OwnLitThing {
+                own: Arc::new(OwnOcclusion {
+                    key: surface.key,
+                    occlusions: precomputation.self_occlusions(&surface),
+                    point_of_corner: surface.point_of_corner,
+                }),
+                anchor_from_own: space.anchor_from_own,
+                corners: None,
+            })
+        };
+        let things: Vec<Option<OwnLitThing>> = objects.iter().enumerate().map(of_thing).collect();
+        let own = |thing: &Option<OwnLitThing>| Some(Arc::clone(&thing.as_ref()?.own));
+        Self {
+            known: things.iter().map(own).collect(),
+            things,
+            is_placed: false,
+        }
+    }
+
+    /// Takes the same objects as they are now. False where not all of what they hide from themselves is known.
+    pub fn follow(
+        &mut self,
+        objects: &[&Object],
+        real_count: usize,
+        is_real_gathered: bool,
+    ) -> bool {
+        let mut followed = Vec::new();
+        for (number, object) in objects.iter().enumerate() {
+            if !object.visible || (is_real_gathered && number < real_count) {
+                followed.push(None);
+                continue;
+            }
+            let space = OwnSpace::new(&object.anchor_from_object);
+            let known = self.known.get(number).and_then(Option::as_ref);
+            let Some(known) = known.filter(|known| known.key == space.key(&object.mesh)) else {
+                return false;
+            };
+            followed.push(Some(OwnLitThing {
+                own: Arc::clone(known),
+                anchor_from_own: space.anchor_from_own,
+                corners: None,
+            }));
+        }
+        self.things = followed;
+        self.is_placed = false;
+        true
+    }
+
+    /// How a thing's anchor is turned from its own space.
+    pub fn anchor_from_own(&self, number: usize) -> DMat3 {
+        let thing = self.things[number].as_ref();
+        thing.map_or(DMat3::IDENTITY, |thing| thing.anchor_from_own)
+    }
+
+    /// Finds the things' corners among the scene's, and gives these their self-occlusion, where that is not done.
+    pub fn place(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene) {
+        if std::mem::replace(&mut self.is_placed, true) {
+            return;
+        }
+        let mut buffers = Vec::new();
+        for (batch, (_, anchor, corners)) in gpu_scene.corners().enumerate() {
+            let mut visibilities = vec![[0.0; VISIBILITIES]; corners.thing_of.len()];
+            let mut is_any = false;
+            for (number, thing) in self.things.iter_mut().enumerate() {
+                let Some(thing) = thing else {
+                    continue;
+                };
+                let Some(placed) = PlacedCorners::new((batch, anchor), corners, number, &thing.own)
+                else {
+                    continue;
+                };
+                for &(corner, point) in &placed.corners {
+                    let occlusion = placed.occlusion_of_point[point];
+                    visibilities[corner] = thing.own.occlusions[occlusion].visibility;
+                }
+                is_any = true;
+                thing.corners = Some(placed);
+            }
+            buffers.push(is_any.then(|| {
+                let contents = occlusion_corners(&corners.thing_of, &visibilities);
+                gpu.buffer("self-occlusion", &contents, wgpu::BufferUsages::VERTEX)
+            }));
+        }
+        gpu_scene.set_occlusion(buffers.into_iter());
+    }
+
+    /// Writes the irradiance of all corners: on virtual things of all broad light that they do not hide from themselves, on
+    /// real ones of what others reflect.
+    pub fn write(
+        &self,
+        gpu: &Gpu,
+        gpu_scene: &GpuScene,
+        scene: &PlacedScene<'_>,
+        bounds: &[Bounds],
+        discs: &DiscTree,
+    ) {
+        let world_from_anchor = gpu_scene.world_from_anchor().unwrap_or_default();
+        let batches = gpu_scene.corners();
+        let mut irradiances: Vec<Option<Vec<Vec3>>> = batches.map(|_| None).collect();
+        let sizes: Vec<usize> = gpu_scene
+            .corners()
+            .map(|(_, _, corners)| corners.thing_of.len())
+            .collect();
+        for (number, thing) in self.things.iter().enumerate() {
+            let Some((thing, placed)) = thing
+                .as_ref()
+                .and_then(|thing| Some((thing, thing.corners.as_ref()?)))
+            else {
+                continue;
+            };
+            let of_batch = &mut irradiances[placed.batch];
+            let of_batch = of_batch.get_or_insert_with(|| vec![Vec3::ZERO; sizes[placed.batch]]);
+            let there = scene.position(number).zip(world_from_anchor[placed.anchor]);
+            let Some((index, pose)) = there else {
+                continue;
+            };
+            let light = LocalLight::new(scene, bounds[index], index);
+            let at_points = thing.irradiances(placed, &pose, &light, |place, normal| {
+                match scene.things[index].thing.is_real {
+                    true => Vec3::ZERO,
+                    false => discs.irradiance_from_itself(index, place, normal),
+                }
+            });
+            for &(corner, point) in &placed.corners {
+                of_batch[corner] = at_points[point];
+            }
+        }
+        for (batch, irradiances) in irradiances.iter().enumerate() {
+            if let Some(irradiances) = irradiances {
+                gpu_scene.write_indirect(&gpu.queue, batch, irradiances);
+            }
+        }
+    }
+}
+
+impl OwnLitThing {
+    /// Irradiance of each point; `from_itself` says what the thing itself reflects on to a place with a normal, in the world.
+    fn irradiances(
+        &self,
+        placed: &PlacedCorners,
+        world_from_anchor: &DAffine3,
+        light: &LocalLight,
+        from_itself: impl Fn(Vec3, Vec3) -> Vec3,
+    ) -> Vec<Vec3> {
+        let world_from_own = world_from_anchor.matrix3 * self.anchor_from_own;
+        let turn = Turn::new(world_from_own.transpose(), TRANSFER_DEGREE);
+        let light = light.turned(&turn);
+        let points = placed.points.iter().zip(&placed.occlusion_of_point);
+        points
+            .map(|(&(place, normal), &occlusion)| {
+                let place = world_from_anchor.transform_point3(place);
+                let normal = world_from_anchor.transform_vector3(normal);
+                let around = self.own.occlusions[occlusion].irradiance(&light.at(place));
+                around + from_itself(place.as_vec3(), normal.as_vec3())
+            })
+            .collect()
+    }
+}
+
+impl PlacedCorners {
+    /// The corners of a thing (its number) in a batch (number and anchor); `None` where none of it is in that.
+    fn new(
+        (batch, anchor): (usize, usize),
+        BatchCorners { corners, thing_of }: &BatchCorners,
+        number: usize,
+        own: &OwnOcclusion,
+    ) -> Option<Self> {
+        let (values, triangles) = corners;
+        let is_of_thing = |triangle: &&[u32; 3]| thing_of[triangle[0] as usize] as usize == number;
+        let triangles: Vec<[u32; 3]> = triangles.iter().filter(is_of_thing).copied().collect();
+        if triangles.is_empty() {
+            return None;
+        }
+        let (points, point_of_corner) = corner_points(values, &triangles);
+        let mut occlusion_of_point = vec![0; points.len()];
+        let mut corners = Vec::new();
+        // (Triangles come in one order wherever a thing stands.)
+        for (&corner, &occlusion) in triangles.iter().flatten().zip(&own.point_of_corner) {
+            let point = point_of_corner[corner as usize];
+            occlusion_of_point[point] = occlusion;
+            corners.push((corner as usize, point));
+        }
+        corners.sort_unstable();
+        corners.dedup();
+        Some(Self {
+            batch,
+            anchor,
+            points,
+            occlusion_of_point,
+            corners,
+        })
+    }
+}

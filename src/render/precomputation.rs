@@ -1,0 +1,24 @@
+//! What a renderer works out before its first frame and what takes seconds: somebody may know it already.
+
+use crate::environment::self_occlusion::{OwnSurface, SelfOcclusion};
+use crate::shafts::room::Room;
+use crate::shafts::room_transport::RoomTransport;
+
+/// Gives what takes long.
+pub trait Precomputation {
+    /// A room's transport of light.
+    fn transport(&self, room: &Room<'_>) -> RoomTransport {
+        room.transport()
+    }
+
+    /// What a thing hides from itself, for each of its points.
+    fn self_occlusions(&self, surface: &OwnSurface) -> Vec<SelfOcclusion> {
+        surface.self_occlusions()
+    }
+}
+
+/// Works all of it out.
+#[derive(Debug, Clone, Copy)]
+pub struct Afresh;
+
+impl Precomputation for Afresh {}
