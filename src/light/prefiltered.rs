@@ -44,8 +44,8 @@ pub fn prefiltered(probe: &Probe, exposure: f32) -> Vec<PrefilteredLevel> {
     [vec![sharpest], rough].concat()
 }
 
-/// The mean radiance over each pixel of a smaller picture.
-fn shrunk(probe: &Probe, size_px: [usize; 2], exposure: f32) -> PrefilteredLevel {
+/// The mean radiance over each pixel of a smaller picture, times `exposure`.
+pub fn shrunk(probe: &Probe, size_px: [usize; 2], exposure: f32) -> PrefilteredLevel {
     let [width, height] = size_px;
     let [columns, rows] = probe.size_px();
     // At least a sample in each of the probe's pixels.

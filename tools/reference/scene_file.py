@@ -37,6 +37,16 @@ class Marker:
 
 
 @dataclass
+class Probe:
+    """Light from afar, turned to the left by so much: a panorama, or a picture in latitude and longitude as gnomon has it."""
+
+    image: Path
+    exposure: float
+    turn_deg: float
+    is_panorama: bool
+
+
+@dataclass
 class Scene:
     path: Path
     source: Path | None
@@ -44,6 +54,7 @@ class Scene:
     markers: list = field(default_factory=list)
     lights: list = field(default_factory=list)
     ambient: list = field(default_factory=lambda: [0.0] * 3)
+    probe: Probe | None = None
     anchors: list = field(default_factory=list)  # the first is the world
 
 
@@ -113,6 +124,11 @@ def read_scene(path):
                                       thing.get("rect_m")))
     scene.lights = tree.get("light", [])
     scene.ambient = rgb(tree.get("ambient", {}).get("radiance", 0))
+    if probe := tree.get("probe"):
+        kind = probe.get("kind", "latitude-longitude")
+        if kind not in ("latitude-longitude", "panorama") or tree.get("room"):
+            raise SceneError(f"{path}: of probes only light from afar is known here: latitude-longitude or panorama, no [[room]]")
+        scene.probe = Probe(find(probe["image"]), probe.get("exposure", 1), probe.get("turn_deg", 0), kind == "panorama")
     return scene
 
 

@@ -122,6 +122,22 @@ def emitter(light):
     raise SceneError(f"a light of kind {kind} is not known here; allowed: point, directional, sphere, rect")
 
 
+def surroundings(probe):
+    """Light from afar. Mitsuba's own columns go to the right as seen from inside, its y goes up."""
+    pixels = np.array(mi.Bitmap(str(probe.image)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32))
+    if probe.is_panorama:
+        axes = [[-1, 0, 0], [0, 0, 1], [0, 1, 0]]
+    else:
+        # Its columns go to the left, and its middle looks along +x.
+        pixels, axes = pixels[:, ::-1], [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
+    turn = math.radians(probe.turn_deg)
+    left = np.array([[math.cos(turn), -math.sin(turn), 0], [math.sin(turn), math.cos(turn), 0], [0, 0, 1]])
+    place = np.eye(4)
+    place[:3, :3] = left @ np.array(axes)
+    return {"type": "envmap", "bitmap": mi.Bitmap(np.ascontiguousarray(pixels)), "scale": float(probe.exposure),
+            "to_world": matrix(place)}
+
+
 def area(power, share):
     return {"type": "area", "radiance": colour(np.array(_three(power)) / share)}
 
@@ -152,6 +168,8 @@ class Set:
         self.lights = {f"light {k}": emitter(light) for k, light in enumerate(scene.lights)}
         if any(scene.ambient):
             self.lights["ambient"] = {"type": "constant", "radiance": colour(scene.ambient)}
+        if scene.probe:
+            self.lights["probe"] = surroundings(scene.probe)
         self.real, self.virtual = {}, {}
         casting = {True: {}, False: {}}
         for thing in scene.things:

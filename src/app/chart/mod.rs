@@ -5,6 +5,7 @@ mod canvas;
 mod compositing;
 mod displacement;
 mod drawing;
+mod environment;
 mod family;
 mod figure;
 mod footage;
@@ -73,11 +74,12 @@ trait AnyChart {
 }
 
 /// All charts, in the order in which they are made and read.
-fn all() -> [Box<dyn AnyChart>; 12] {
+fn all() -> [Box<dyn AnyChart>; 13] {
     [
         Box::new(tracking::Tracking),
         Box::new(footage::Footage),
         Box::new(shadows::Shadows),
+        Box::new(environment::EnvironmentChart),
         Box::new(pictures::PicturesChart),
         Box::new(moved::Moved),
         Box::new(compositing::Compositing),

@@ -14,7 +14,7 @@ use crate::app::stages::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
 use crate::app::truth::{Drawn, LinearPicture};
 use crate::render::{Renderer, Shown, VIRTUAL};
-use crate::scene::{Quality, Scene, ShadowSettings};
+use crate::scene::{EnvironmentMethod, Quality, Scene, ShadowSettings, ShadowTechnique};
 
 const NAME: &str = "shadow-pictures";
 /// The error is shown so much stronger, about a middle grey.
@@ -33,7 +33,7 @@ impl AnyChart for PicturesChart {
     }
 
     fn shows(&self) -> &'static str {
-        "The qualities, or numbers of sources, beside the truth, in the middle key frame of each recording (the part that the virtual \
+        "The qualities, numbers of sources, or an environment's methods beside the truth, in the middle key frame of each recording (the part that the virtual \
          things change, enlarged twice), with the time of a frame and the rms error of the shadow's factor. Below each its error, four times stronger about a middle grey: of virtual surfaces as they are, of real ones by \
          what changes on them."
     }
@@ -87,6 +87,9 @@ impl AnyChart for PicturesChart {
 /// What the technique of a scene has to offer: the qualities, or so many sources (Gibson et al. 2003, fig. 9).
 fn ways(scene: &Scene, quick: bool) -> Vec<(String, ShadowSettings)> {
     let technique = scene.shadows.technique;
+    if scene.chosen_technique().0 == ShadowTechnique::Environment {
+        return environment_ways(scene);
+    }
     if !scene.chosen_technique().0.has_shafts() {
         let qualities = Quality::BY_NAME.into_iter();
         return qualities
@@ -108,6 +111,23 @@ fn ways(scene: &Scene, quick: bool) -> Vec<(String, ShadowSettings)> {
             let mut shadows = scene.shadows;
             shadows.shafts.sources = sources;
             (format!("{name} sources"), shadows)
+        })
+        .collect()
+}
+
+/// The third paper's own way with fewer and more regions (Tamura et al. 2005, fig. 6), and ours.
+fn environment_ways(scene: &Scene) -> Vec<(String, ShadowSettings)> {
+    let ways = [
+        (EnvironmentMethod::Maps, 32, "maps, 32 regions"),
+        (EnvironmentMethod::Maps, 64, "maps, 64 regions"),
+        (EnvironmentMethod::Rays, 64, "rays"),
+    ];
+    ways.into_iter()
+        .map(|(method, regions, name)| {
+            let mut shadows = scene.shadows;
+            shadows.environment.method = method;
+            shadows.environment.regions = regions;
+            (name.to_owned(), shadows)
         })
         .collect()
 }

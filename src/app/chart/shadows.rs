@@ -40,9 +40,13 @@ pub struct ShadowsRow {
 
 const VOLUMES_4: &str = "volumes, 4 samples";
 const SHAFTS: &str = "shafts, by sources";
+const GATHERED: &str = "volumes and gathered light, by rays";
+const ENVIRONMENT: &str = "environment, by quality";
 const VOLUMES_1: &str = "volumes, 1 sample";
 /// A series each, in the order of their colours.
-const TECHNIQUES: [&str; 3] = [VOLUMES_4, VOLUMES_1, SHAFTS];
+const TECHNIQUES: [&str; 5] = [VOLUMES_4, VOLUMES_1, SHAFTS, ENVIRONMENT, GATHERED];
+/// Rays from each point for light that is gathered.
+const GATHERING_SAMPLES: [u32; 3] = [64, 256, 512];
 /// How many sources get a shadow each; `None`: all that are hidden.
 const SHAFT_SOURCES: [Option<u32>; 6] = [Some(5), Some(10), Some(20), Some(50), Some(100), None];
 /// For a look these do.
@@ -83,17 +87,34 @@ fn ways(scene: &Scene) -> Vec<ShadowWay> {
             add(SHAFTS, setting, shadows);
         }
     }
+    if scene.probe.as_ref().is_some_and(|probe| probe.is_far) {
+        for (name, quality) in Quality::BY_NAME {
+            let shadows = ShadowSettings {
+                technique: Technique::Environment,
+                ..quality.shadows()
+            };
+            add(ENVIRONMENT, name.to_owned(), shadows);
+        }
+    }
     if scene.lights.is_empty() {
         return ways;
     }
     for (name, quality) in Quality::BY_NAME {
         let shadows = ShadowSettings {
             technique: Technique::Volumes,
-            // (Of the lights alone: docs/volumes.md has what is gathered.)
+            // (Of the lights alone: what is gathered has ways of its own.)
             ambient_samples: 0,
             ..quality.shadows()
         };
         add(series(shadows.samples), name.to_owned(), shadows);
+    }
+    for ambient_samples in GATHERING_SAMPLES {
+        let shadows = ShadowSettings {
+            technique: Technique::Volumes,
+            ambient_samples,
+            ..ShadowSettings::default()
+        };
+        add(GATHERED, ambient_samples.to_string(), shadows);
     }
     for (samples, max_silhouette_error_px, counting) in [
         (1, 0.0, VolumeCounting::Auto),
@@ -133,7 +154,8 @@ impl Chart for Shadows {
         pixels that the virtual things change, over that of the bare video; what the video's own noise leaves, with the \
         true change put on it, is the floor. Factor: rms error of what the shadow leaves of the light, 1 without a shadow. \
         A setting is the samples per pixel and by how much coarser versions of things may move their silhouettes; \
-        `depth-fail` counts volumes that way everywhere. What is left of the error is light between surfaces and what the \
+        `depth-fail` counts volumes that way everywhere. Volumes draw lights alone; where light is gathered \
+        besides, the setting is its rays. What is left of the error is light between surfaces and what the \
         torus hides of the surroundings, which point lights do not have.";
     type Row = ShadowsRow;
 
