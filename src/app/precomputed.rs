@@ -112,6 +112,38 @@ fn occlusions(surface: &OwnSurface, cache: &DiskCache) -> Vec<SelfOcclusion> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::environment::self_occlusion::OwnSpace;
+    use std::fs;
+    use std::path::Path;
+
+    #[test]
+    fn what_a_thing_hides_from_itself_is_kept_whichever_way_it_is_turned_and_evenly_scaled() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let scene = Scene::load(&root.join("config/lamp.toml")).unwrap();
+        let torus = &scene.virtuals[0];
+        let folder = tempfile::tempdir().unwrap();
+        let cache = self_occlusions(Some(folder.path().to_owned()));
+        let kept = || fs::read_dir(folder.path()).unwrap().count();
+        let surface = |scale: glam::DVec3, turned: f64| {
+            let place = glam::DAffine3::from_rotation_x(turned) * glam::DAffine3::from_scale(scale);
+            OwnSurface::new(&torus.mesh, std::iter::empty(), &OwnSpace::new(&place))
+        };
+        let first = occlusions(&surface(glam::DVec3::ONE, 0.3), &cache);
+        assert_eq!(
+            (first.len(), kept()),
+            (surface(glam::DVec3::ONE, 0.0).point_count(), 1)
+        );
+        let turned = surface(glam::DVec3::splat(2.0), 1.3);
+        let path = cache.path(turned.key).unwrap();
+        let as_kept = fs::read(&path).unwrap();
+        assert!(occlusions(&turned, &cache) == first && kept() == 1);
+        assert!(turned.self_occlusions() == first);
+        // Another form is another thing; damage is worked out again.
+        let squeezed = surface(glam::DVec3::new(1.0, 1.0, 0.5), 0.3);
+        assert!(occlusions(&squeezed, &cache) != first && kept() == 2);
+        fs::write(&path, &as_kept[..100]).unwrap();
+        assert!(occlusions(&turned, &cache) == first && fs::read(&path).unwrap() == as_kept);
+    }
 
     #[test]
     fn a_room_is_read_as_it_was_kept_and_damage_is_worked_out_again() {

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
 use super::error::SceneError;
+use super::model_cache::ModelCache;
 use super::named_files::NamedFile;
 use super::plain_file::{self, MOST_TEXT};
 use super::reader::{Document, Table};
@@ -57,7 +58,15 @@ impl Scene {
 
     /// Reads a scene from its text as [`Scene::parse`] does, and tells which other files it depends on.
     pub fn read(path: &Path, text: &str) -> Reading {
-        let document = Document::new(path, text);
+        Self::read_from(Document::new(path, text, None))
+    }
+
+    /// The same, where models that were read before are in `models`, or are put there.
+    pub fn read_with(path: &Path, text: &str, models: &ModelCache) -> Reading {
+        Self::read_from(Document::new(path, text, Some(models)))
+    }
+
+    fn read_from(document: Document) -> Reading {
         let scene = Self::from_document(&document);
         let (files, named) = document.files();
         Reading {

@@ -1,6 +1,7 @@
 //! The meshes that a scene names, of whatever format, as the renderer takes them: turned upright, in metres, welded.
 
-use std::path::Path;
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
@@ -20,7 +21,7 @@ use crate::light::material::{Coverage, Map};
 use crate::light::texture::Texture;
 
 /// A mesh, what was done to it, and its materials (never none).
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct LoadedMesh {
     /// Its triangles, welded.
     pub mesh: Mesh,
@@ -85,10 +86,36 @@ impl MeshReading {
 /// Reads the mesh that a scene's value names.
 pub fn load(value: &Value, kind: FileKind, reading: MeshReading) -> Result<LoadedMesh, SceneError> {
     let path = value.existing_path(kind)?;
-    let bytes = plain_file::read(&path, MOST_MESH)
+    let Some(models) = value.models() else {
+        return read_named(value, &path, reading, &|file| value.note_consulted(file));
+    };
+    let how = format!("{reading:?}");
+    if let Some((loaded, files)) = models.get::<LoadedMesh>(&path, &how) {
+        files.iter().for_each(|file| value.note_consulted(file));
+        return Ok((*loaded).clone());
+    }
+    let loaded = models.keep(&path, &how, || {
+        let besides: RefCell<Vec<PathBuf>> = RefCell::default();
+        let note_read = |file: &Path| {
+            value.note_consulted(file);
+            besides.borrow_mut().push(file.to_owned());
+        };
+        let loaded = read_named(value, &path, reading, &note_read)?;
+        Ok((loaded, besides.into_inner()))
+    })?;
+    Ok((*loaded).clone())
+}
+
+/// Reads the mesh of a file that a scene's value names.
+fn read_named(
+    value: &Value,
+    path: &Path,
+    reading: MeshReading,
+    note_read: &dyn Fn(&Path),
+) -> Result<LoadedMesh, SceneError> {
+    let bytes = plain_file::read(path, MOST_MESH)
         .map_err(|error| value.error(format!("the mesh cannot be read: {error}")))?;
-    let note_read = |path: &Path| value.note_consulted(path);
-    read(&path, bytes, reading, &note_read).map_err(|mut error| {
+    read(path, bytes, reading, note_read).map_err(|mut error| {
         error.message += &format!(" (a mesh of {})", value.location());
         error
     })

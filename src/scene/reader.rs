@@ -11,6 +11,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::{SceneError, TextPlace, suggestion};
+use super::model_cache::ModelCache;
 use super::named_files::{FileKind, NamedFile};
 use super::ranges::{Numbers, Whole};
 
@@ -18,6 +19,8 @@ use super::ranges::{Numbers, Whole};
 pub struct Document<'a> {
     pub path: &'a Path,
     pub text: &'a str,
+    /// Models that were read before, where they are kept.
+    models: Option<&'a ModelCache>,
     /// Files that were read, or looked for, on the way.
     consulted: RefCell<BTreeSet<PathBuf>>,
     /// Files that the text names.
@@ -25,10 +28,11 @@ pub struct Document<'a> {
 }
 
 impl<'a> Document<'a> {
-    pub fn new(path: &'a Path, text: &'a str) -> Self {
+    pub fn new(path: &'a Path, text: &'a str, models: Option<&'a ModelCache>) -> Self {
         Self {
             path,
             text,
+            models,
             consulted: RefCell::default(),
             named: RefCell::default(),
         }
@@ -361,6 +365,11 @@ impl<'a> Value<'a> {
                 tried.join(" and ")
             ))
         })
+    }
+
+    /// Models that were read before, where they are kept.
+    pub fn models(&self) -> Option<&'a ModelCache> {
+        self.document.models
     }
 
     /// Remembers a file on which what the value means depends, whether it is there or not.

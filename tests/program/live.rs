@@ -14,8 +14,9 @@ use gnomon::app::input::live_capture::Tapped;
 use gnomon::app::input::live_input::LiveInput;
 use gnomon::app::input::mailbox::Taken;
 use gnomon::app::live::TrackingPlan;
+use gnomon::app::live::adding::{WantedShape, WantedThing};
 use gnomon::app::live::beginning::Opening;
-use gnomon::app::live::command::{Clicks, RecordingCommand, SceneCommand};
+use gnomon::app::live::command::{Clicks, RecordingCommand, SceneCommand, Selected};
 use gnomon::app::live::meters::Sample;
 use gnomon::app::live::pipeline::{Pipeline, PipelineInput};
 use gnomon::app::live::session::LiveSession;
@@ -373,6 +374,106 @@ fn what_is_edited_is_drawn_as_if_it_had_always_been_so() {
     );
     step(&mut session, &state);
     assert!(shown(&session) == drawn_afresh(&session, &before), "undone");
+}
+
+#[test]
+fn what_is_added_is_read_beside_the_picture_and_drawn_copied_and_renamed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = lamp_in(folder.path());
+    // A cube in millimetres.
+    let cube = "v 0 0 0\nv 80 0 0\nv 80 80 0\nv 0 80 0\nv 0 0 80\nv 80 0 80\nv 80 80 80\nv 0 80 80\n\
+                f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+    std::fs::write(folder.path().join("cube, large.obj"), cube).unwrap();
+    let before = std::fs::read_to_string(&path).unwrap();
+    let mut session = open(&path, folder.path(), true);
+    let mut state = WindowState::new();
+    run_until(&mut session, &state, "the scene is drawn", |session| {
+        session.picture().is_some() && session.is_settled()
+    });
+    let wanted = |shape, is_real| {
+        SceneCommand::Add(WantedThing {
+            is_real,
+            shape,
+            on: None,
+        })
+    };
+    let model = WantedShape::Model(folder.path().join("cube, large.obj"));
+    session.edit_scene(wanted(model, false), &state);
+    // It is on its way: the file says nothing of it yet.
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), before);
+    let has = |name: &'static str| {
+        move |session: &LiveSession| {
+            let scene = session.scene().unwrap();
+            let mut things = scene.phantoms.iter().chain(&scene.virtuals);
+            things.any(|thing| thing.name == name)
+        }
+    };
+    run_until(
+        &mut session,
+        &state,
+        "the model is read",
+        has("cube_ large"),
+    );
+    let selected = Some(Selected::Thing("cube_ large".to_owned()));
+    state.selected = session.take_selected();
+    assert_eq!(state.selected, selected);
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert!(
+        text.contains("mesh = \"cube, large.obj\"\nfit_m = 0.1\n"),
+        "{text}"
+    );
+
+    session.edit_scene(SceneCommand::DuplicateSelected, &state);
+    let rename = SceneCommand::Rename {
+        thing: "cube_ large".to_owned(),
+        name: " die ".to_owned(),
+    };
+    session.edit_scene(rename, &state);
+    session.edit_scene(wanted(WantedShape::Ball, true), &state);
+    for name in ["cube_ large 2", "die", "ball"] {
+        assert!(has(name)(&session), "{name}");
+    }
+    assert!(!has("cube_ large")(&session));
+    // No two of them stand in one place.
+    let written = Scene::load(&path).unwrap();
+    let places: Vec<f64> = (written.phantoms.iter().chain(&written.virtuals))
+        .filter(|thing| ["cube_ large 2", "die", "ball"].contains(&thing.name.as_str()))
+        .map(|thing| thing.anchor_from_object.translation.x)
+        .collect();
+    for (index, place) in places.iter().enumerate() {
+        assert!(
+            places[..index]
+                .iter()
+                .all(|other| (other - place).abs() > 0.05),
+            "{places:?}"
+        );
+    }
+    run_until(
+        &mut session,
+        &state,
+        "all is drawn",
+        LiveSession::is_settled,
+    );
+    step(&mut session, &state);
+    assert!(
+        shown(&session) == drawn_afresh(&session, &written),
+        "the additions"
+    );
+
+    // What cannot be read is told, and changes nothing.
+    let text = std::fs::read_to_string(&path).unwrap();
+    let missing = WantedShape::Model(folder.path().join("none.obj"));
+    session.edit_scene(wanted(missing, false), &state);
+    let is_told = |session: &LiveSession| {
+        let shown = session.notices.shown(session.now_secs());
+        shown.iter().any(|(_, text)| text.contains("none.obj"))
+    };
+    run_until(&mut session, &state, "the missing file is told", is_told);
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+    for _ in 0..4 {
+        session.edit_scene(SceneCommand::Undo, &state);
+    }
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), before);
 }
 
 #[test]

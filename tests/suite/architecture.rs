@@ -41,7 +41,7 @@ const LARGE_JOBS: [&str; 2] = ["live", "chart"];
 const WINDOWS: &[&str] = &["app/window/", "app/live/", "app/jobs/calibrate/watched/"];
 
 /// A word of code, and the only places (below `src/`) where it may stand.
-const HOMES: [(&str, &[&str]); 17] = [
+const HOMES: [(&str, &[&str]); 18] = [
     // The window shows a texture of the renderer's.
     ("wgpu", &["render/", "app/window/screen.rs"]),
     ("eframe", WINDOWS),
@@ -59,6 +59,7 @@ const HOMES: [(&str, &[&str]); 17] = [
         ],
     ),
     ("nokhwa", &["capture/"]),
+    ("rfd", &["app/live/"]),
     ("v4l", &["capture/"]),
     ("yuv", &["capture/"]),
     ("zune_jpeg", &["capture/"]),

@@ -7,7 +7,9 @@ use std::time::Duration;
 
 use crate::common::random::Random;
 use glam::DVec3;
-use gnomon::app::authoring::{Edit, EditError, NewVirtual, SceneDocument, SceneNews, SceneWatch};
+use gnomon::app::authoring::{
+    Edit, EditError, NewForm, NewThing, SceneDocument, SceneNews, SceneWatch,
+};
 use gnomon::app::stopwatch::Stopwatch;
 use gnomon::app::truth::{draw, key_frames};
 use gnomon::light::{Light, Shape};
@@ -149,7 +151,7 @@ mod edits {
             &format!("{to_the_right}visible = false\n"),
         );
         let bottle = &before[before.find("\n[[virtual]]\nname = \"bottle\"").unwrap()..];
-        changed_to(&Edit::RemoveVirtual("bottle".to_owned()), bottle, "");
+        changed_to(&Edit::RemoveThing("bottle".to_owned()), bottle, "");
         // What another editor makes of the shape meanwhile is kept, and a place that it gave wins.
         let cube = before.replace("[0.15, 0.21, 0.03]", "[0.1, 0.1, 0.1]");
         fs::write(project.file(), &cube).unwrap();
@@ -235,9 +237,13 @@ mod edits {
                 "{end}\n[shadows]\nsamples = 1\ncounting = \"depth-fail\"\nframe_budget_ms = 16.0\n"
             ),
         );
-        let block = NewVirtual {
+        let block = NewThing {
+            is_real: false,
             name: "block".to_owned(),
-            mesh: "models/block.obj".to_owned(),
+            form: NewForm::Mesh {
+                file: "models/block.obj".to_owned(),
+                fit_m: None,
+            },
             on: "table".to_owned(),
             placement: Placement {
                 position_m: DVec3::new(0.05, 0.0, 0.0),
@@ -246,11 +252,120 @@ mod edits {
         };
         let end = "material = { albedo = [0.75, 0.16, 0.12] }\n";
         changed_to(
-            &Edit::AddVirtual(block),
+            &Edit::AddThing(block),
             end,
             &format!(
                 "{end}\n[[virtual]]\nname = \"block\"\nmesh = \"models/block.obj\"\nposition_m = [0.05, 0.0, 0.0]\n"
             ),
+        );
+    }
+
+    #[test]
+    fn things_come_as_phantoms_and_shapes_are_copied_renamed_and_painted() {
+        let project = Project::with(|text| {
+            let dotted = "\n# Mine.\n[[virtual]] # a cup\nname = \"cup\"\ncylinder_m = [0.04, 0.1] # 8 cm wide\n[virtual.material] # blue\nalbedo = [0.1, 0.1, 0.8]\n";
+            text + dotted
+        });
+        let before = project.text();
+        let mut document = project.open();
+        let mut changed_to = |edit: &Edit, old: &str, new: &str| {
+            assert_changed_to(&project, &mut document, edit, old, new);
+        };
+        let new = |is_real, name: &str, form| {
+            Edit::AddThing(NewThing {
+                is_real,
+                name: name.to_owned(),
+                form,
+                on: "table".to_owned(),
+                placement: Placement::default(),
+            })
+        };
+        let house =
+            &before[before.find("[[phantom]]").unwrap()..before.find("[[virtual]]").unwrap()];
+        let house = house.trim_end();
+        changed_to(
+            &new(true, "book", NewForm::Box(DVec3::new(0.15, 0.21, 0.03))),
+            house,
+            &format!(
+                "{house}\n\n[[phantom]]\nname = \"book\"\nbox_m = [0.15, 0.21, 0.03]\nposition_m = [0.0, 0.0, 0.0]"
+            ),
+        );
+        let cup = &before[before.find("[[virtual]] # a cup").unwrap()..];
+        let cup = cup.trim_end();
+        let model = NewForm::Mesh {
+            file: "models/tin.obj".to_owned(),
+            fit_m: Some(0.1),
+        };
+        changed_to(
+            &new(false, "tin of mine", model),
+            cup,
+            &format!(
+                "{cup}\n\n[[virtual]]\nname = \"tin of mine\"\nmesh = \"models/tin.obj\"\nfit_m = 0.1\nposition_m = [0.0, 0.0, 0.0]"
+            ),
+        );
+        changed_to(
+            &Edit::Duplicate {
+                thing: "cup".to_owned(),
+                name: "cup 2".to_owned(),
+                position_m: DVec3::X * 0.06,
+            },
+            cup,
+            &format!(
+                "{cup}\n\n[[virtual]] # a cup\nname = \"cup 2\"\ncylinder_m = [0.04, 0.1] # 8 cm wide\nposition_m = [0.06, 0.0, 0.0]\n[virtual.material] # blue\nalbedo = [0.1, 0.1, 0.8]"
+            ),
+        );
+        changed_to(
+            &Edit::Rename {
+                thing: "cup".to_owned(),
+                name: "mug".to_owned(),
+            },
+            "name = \"cup\"",
+            "name = \"mug\"",
+        );
+        let painted = |thing: &str, roughness| Edit::Material {
+            thing: thing.to_owned(),
+            albedo: DVec3::new(0.5, 0.25, 0.125),
+            roughness,
+        };
+        changed_to(
+            &painted("cup", Some(0.3)),
+            "albedo = [0.1, 0.1, 0.8]\n",
+            "albedo = [0.5, 0.25, 0.125]\nroughness = 0.3\n",
+        );
+        changed_to(
+            &painted("torus", None),
+            "{ albedo = [0.75, 0.16, 0.12] }",
+            "{ albedo = [0.5, 0.25, 0.125] }",
+        );
+        changed_to(
+            &Edit::RemoveThing("cup".to_owned()),
+            &before[before.find("\n# Mine.").unwrap()..],
+            "",
+        );
+    }
+
+    #[test]
+    fn what_is_copied_in_a_list_of_braces_is_another_member() {
+        let project = Project::with(|text| {
+            text + "\n[[marker]]\nname = \"card\"\nfamily = \"tag36h11\"\nid = 9\nsize_m = 0.04\n"
+        });
+        let text = project.text();
+        let at = text.find("[[virtual]]").unwrap();
+        let list = "virtual = [ { name = \"a\", sphere_m = 0.02 }, { name = \"b\", cone_m = [0.02, 0.05] } ] # all\n";
+        let virtuals_end = text[at..].find("\n\n").map_or(text.len(), |end| at + end);
+        let text = format!("{list}{}{}", &text[..at], &text[virtuals_end..]);
+        fs::write(project.file(), &text).unwrap();
+        let mut document = project.open();
+        assert_changed_to(
+            &project,
+            &mut document,
+            &Edit::Duplicate {
+                thing: "a".to_owned(),
+                name: "c".to_owned(),
+                position_m: DVec3::ZERO,
+            },
+            "{ name = \"a\", sphere_m = 0.02 }",
+            "{ name = \"a\", sphere_m = 0.02 }, { name = \"c\", sphere_m = 0.02, position_m = [0.0, 0.0, 0.0] }",
         );
     }
 
@@ -305,8 +420,8 @@ mod edits {
         );
         refused(
             &mut document,
-            Edit::RemoveVirtual("house".to_owned()),
-            "no thing with the name \"house\"",
+            Edit::RemoveThing("shed".to_owned()),
+            "no thing with the name \"shed\"",
         );
         let flat = Placement {
             rotation_deg: DVec3::X,
@@ -317,15 +432,16 @@ mod edits {
             placement: flat,
         };
         refused(&mut document, tilted, "up and down alone");
-        let same_name = NewVirtual {
+        let same_name = NewThing {
+            is_real: false,
             name: "house".to_owned(),
-            mesh: "models/block.obj".to_owned(),
+            form: NewForm::Sphere(0.03),
             on: "table".to_owned(),
             placement: Placement::default(),
         };
         refused(
             &mut document,
-            Edit::AddVirtual(same_name),
+            Edit::AddThing(same_name),
             "the name is taken on line",
         );
         let mut rights = fs::metadata(project.file()).unwrap().permissions();
@@ -402,6 +518,11 @@ mod edits {
                     (&b.name, b.visible, b.casts, b.anchor),
                     "{what}"
                 );
+                for (a, b) in a.materials.iter().zip(&b.materials) {
+                    assert!(near(a.albedo, b.albedo), "{what}");
+                    let (a, b) = (a.roughness.unwrap_or(9.0), b.roughness.unwrap_or(9.0));
+                    assert!((a - b).abs() < 1e-3 * a, "{what}: {a} {b}");
+                }
                 assert_eq!(
                     (&a.mesh.positions, &a.mesh.triangles),
                     (&b.mesh.positions, &b.mesh.triangles),
@@ -444,7 +565,7 @@ mod edits {
             .map(|o| o.name.as_str())
             .collect();
         let thing = |random: &mut Random| things[random.below(things.len())].to_owned();
-        match random.below(9) {
+        match random.below(10) {
             0 if !scene.lights.is_empty() => Edit::Light {
                 index: random.below(scene.lights.len()),
                 light: light(random),
@@ -495,7 +616,23 @@ mod edits {
                 anchor: "table".to_owned(),
                 size_m: random.between(0.02, 0.08),
             },
-            7 if scene.virtuals.len() > 1 => Edit::RemoveVirtual(
+            7 => {
+                let things: Vec<&str> =
+                    things.iter().copied().filter(|it| *it != "table").collect();
+                let thing = things[random.below(things.len())].to_owned();
+                match random.chance(0.5) {
+                    true => Edit::Rename {
+                        name: format!("{thing} {}", random.below(1000)),
+                        thing,
+                    },
+                    false => Edit::Material {
+                        thing,
+                        albedo: vector(random, 1.0).abs().min(DVec3::ONE),
+                        roughness: random.chance(0.5).then(|| random.between(0.1, 1.0)),
+                    },
+                }
+            }
+            8 if scene.virtuals.len() > 1 => Edit::RemoveThing(
                 scene.virtuals[random.below(scene.virtuals.len())]
                     .name
                     .clone(),
@@ -560,7 +697,7 @@ mod edits {
                     let text = project.text();
                     assert_eq!(text, document.text());
                     steps += u32::from(text != text_before);
-                    let removes = matches!(edit, Edit::RemoveLight(_) | Edit::RemoveVirtual(_));
+                    let removes = matches!(edit, Edit::RemoveLight(_) | Edit::RemoveThing(_));
                     // A budget that is taken back, and what another quality says itself: with their keys go their comments.
                     let drops_key = match &edit {
                         Edit::Shadows(change) => {
@@ -627,7 +764,7 @@ mod history {
         assert!(project.text().contains("[0.05, 0.0, 0.036]"));
         document.undo().unwrap();
         document
-            .commit(&Edit::RemoveVirtual("torus".to_owned()))
+            .commit(&Edit::RemoveThing("torus".to_owned()))
             .unwrap();
         assert_eq!(document.next_redo(), None);
         assert!(document.scene().virtuals.is_empty());

@@ -236,7 +236,8 @@ fn more_regions_are_nearer_to_the_sum() {
 fn a_renderer_that_follows_an_edit_draws_what_a_new_one_draws() {
     let turned =
         |by: f64| DAffine3::from_mat3(DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), by));
-    let edits: [(&str, &dyn Fn(&mut Scene)); 7] = [
+    type Edit<'a> = (&'a str, &'a dyn Fn(&mut Scene));
+    let edits: [Edit<'_>; 7] = [
         ("moved and turned", &|scene| {
             let place = &mut scene.virtuals[1].anchor_from_object;
             *place =

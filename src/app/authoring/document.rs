@@ -9,7 +9,7 @@ use super::watch::{KnownText, OutsideChange, SceneWatch};
 use super::written::{Unfit, placement_of, touched_by, with_edit};
 use crate::app::files::output_error::OutputError;
 use crate::app::files::picture_files::write_text;
-use crate::scene::{Placement, Scene, SceneError};
+use crate::scene::{ModelCache, Placement, Scene, SceneError};
 
 /// What an outside change is called in the history.
 const OUTSIDE: &str = "change of the file from outside";
@@ -24,6 +24,8 @@ pub struct SceneDocument {
     files: Vec<PathBuf>,
     history: History,
     known: KnownText,
+    /// Read once, whatever is edited.
+    models: ModelCache,
 }
 
 /// Why an edit was not made; the scene and its file are as they were, but for what [`EditError::ChangedOutside`] says.
@@ -61,8 +63,10 @@ impl SceneDocument {
     /// The first mistake in it.
     pub fn open(path: &Path) -> Result<Self, SceneError> {
         let text = Scene::read_text(path)?;
-        let reading = Scene::read(path, &text);
+        let models = ModelCache::default();
+        let reading = Scene::read_with(path, &text, &models);
         Ok(Self {
+            models,
             path: path.to_owned(),
             scene: reading.scene?,
             shown: None,
@@ -78,7 +82,7 @@ impl SceneDocument {
         SceneWatch::start(
             self.path.clone(),
             self.files.clone(),
-            Arc::clone(&self.known),
+            (Arc::clone(&self.known), self.models.clone()),
             on_news,
         )
     }
@@ -143,6 +147,25 @@ impl SceneDocument {
             label: edit.label(),
             before,
             after,
+        });
+        Ok(())
+    }
+
+    /// Reads on another thread what an edit would give, so that [`commit`](Self::commit) finds its models read. `done` gets the
+    /// scene that it gives, or its mistake.
+    ///
+    /// # Errors
+    /// The edit does not fit the scene.
+    pub fn read_ahead(
+        &self,
+        edit: &Edit,
+        done: impl FnOnce(Result<Scene, EditError>) + Send + 'static,
+    ) -> Result<(), EditError> {
+        let text = with_edit(&self.text, &self.scene, edit)?;
+        let (path, models) = (self.path.clone(), self.models.clone());
+        std::thread::spawn(move || {
+            let reading = Scene::read_with(&path, &text, &models);
+            done(reading.scene.map_err(EditError::from));
         });
         Ok(())
     }
@@ -220,7 +243,7 @@ impl SceneDocument {
         if text == self.text {
             return Ok(false);
         }
-        let reading = Scene::read(&self.path, &text);
+        let reading = Scene::read_with(&self.path, &text, &self.models);
         let scene = reading.scene?;
         *self.known.lock().unwrap_or_else(PoisonError::into_inner) = text.clone();
         self.accept(OutsideChange {
@@ -233,7 +256,7 @@ impl SceneDocument {
 
     /// Makes a text the scene's, in memory and in the file.
     fn put(&mut self, text: String) -> Result<(), EditError> {
-        let reading = Scene::read(&self.path, &text);
+        let reading = Scene::read_with(&self.path, &text, &self.models);
         let scene = reading.scene?;
         {
             // Held while the file changes, so that the watch never sees one without the other.

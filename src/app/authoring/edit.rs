@@ -44,23 +44,70 @@ pub enum Edit {
         /// Side of its (first) marker's black square, metres.
         size_m: f64,
     },
-    /// One more virtual thing.
-    AddVirtual(NewVirtual),
-    /// A virtual thing less, by its name.
-    RemoveVirtual(String),
+    /// One more phantom or virtual thing.
+    AddThing(NewThing),
+    /// One more that is like another: all that the file says of that, under another name and at another place.
+    Duplicate {
+        /// Name of what is there.
+        thing: String,
+        /// A name that no other thing has.
+        name: String,
+        /// Where the new one stands, metres in the space of what both stand on.
+        position_m: DVec3,
+    },
+    /// Another name of a phantom or a virtual thing.
+    Rename {
+        /// What it is called now.
+        thing: String,
+        /// A name that no other thing has.
+        name: String,
+    },
+    /// What a phantom or a virtual thing is made of, in place of what its file says.
+    Material {
+        /// Its name.
+        thing: String,
+        /// Diffuse reflectance, linear RGB, 0 to 1.
+        albedo: DVec3,
+        /// Of a GGX layer over it; `None`: matt, or as its file says.
+        roughness: Option<f64>,
+    },
+    /// A phantom or a virtual thing less, by its name.
+    RemoveThing(String),
 }
 
-/// A virtual thing that the scene does not have yet.
+/// A phantom or a virtual thing that the scene does not have yet.
 #[derive(Debug, Clone, PartialEq)]
-pub struct NewVirtual {
+pub struct NewThing {
+    /// Whether it is a phantom: a real thing that only lets light and shadow know of it.
+    pub is_real: bool,
     /// A name that no other thing has.
     pub name: String,
-    /// Its OBJ file, as it is to be written.
-    pub mesh: String,
+    /// Its shape.
+    pub form: NewForm,
     /// Name of the anchor that it stands on.
     pub on: String,
     /// Where it stands.
     pub placement: Placement,
+}
+
+/// The shape of a new thing, metres.
+#[derive(Debug, Clone, PartialEq)]
+pub enum NewForm {
+    /// A model's file.
+    Mesh {
+        /// As it is to be written: from the scene's own folder, or a whole path.
+        file: String,
+        /// What its longest side is scaled to; `None`: its numbers are metres.
+        fit_m: Option<f64>,
+    },
+    /// A box of these sides.
+    Box(DVec3),
+    /// A cylinder: its radius and its height.
+    Cylinder(f64, f64),
+    /// A cone: its radius and its height.
+    Cone(f64, f64),
+    /// A ball: its radius.
+    Sphere(f64),
 }
 
 impl Edit {
@@ -77,8 +124,11 @@ impl Edit {
             }
             Self::Shadows(_) => "change how shadows are made".to_owned(),
             Self::AnchorSize { anchor, .. } => format!("resize \"{anchor}\""),
-            Self::AddVirtual(new) => format!("add \"{}\"", new.name),
-            Self::RemoveVirtual(name) => format!("remove \"{name}\""),
+            Self::AddThing(new) => format!("add \"{}\"", new.name),
+            Self::Duplicate { thing, .. } => format!("duplicate \"{thing}\""),
+            Self::Rename { thing, name } => format!("rename \"{thing}\" to \"{name}\""),
+            Self::Material { thing, .. } => format!("paint \"{thing}\""),
+            Self::RemoveThing(name) => format!("remove \"{name}\""),
         }
     }
 
@@ -116,10 +166,31 @@ impl Edit {
                     *marker = marker.stretched(stretch);
                 }
             }
-            Self::RemoveVirtual(name) if scene.virtuals.iter().any(|thing| thing.name == *name) => {
+            Self::RemoveThing(name) if thing_of(scene, name).is_some() => {
+                scene.phantoms.retain(|thing| thing.name != *name);
                 scene.virtuals.retain(|thing| thing.name != *name);
             }
-            Self::RemoveLight(_) | Self::RemoveVirtual(_) | Self::AddVirtual(_) => return false,
+            Self::Rename { thing, name } => match thing_of(scene, thing) {
+                Some(object) => object.name.clone_from(name),
+                None => return false,
+            },
+            Self::Material {
+                thing,
+                albedo,
+                roughness,
+            } => match thing_of(scene, thing) {
+                Some(object) => {
+                    for material in &mut object.materials {
+                        material.albedo = *albedo;
+                        material.roughness = roughness.or(material.roughness);
+                    }
+                }
+                None => return false,
+            },
+            Self::RemoveLight(_)
+            | Self::RemoveThing(_)
+            | Self::AddThing(_)
+            | Self::Duplicate { .. } => return false,
         }
         true
     }

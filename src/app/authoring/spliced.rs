@@ -242,6 +242,41 @@ impl<'a> Spliced<'a> {
         }
     }
 
+    /// One of several tables once more, with other values of some keys: behind that which is there, without the comments above it.
+    pub fn repeat_table(&mut self, siblings: &[Body], index: usize, keys: &[(&str, String)]) {
+        let body = siblings[index];
+        let (before, span, end) = match body {
+            Body::Headed(table) => {
+                let head = table.span().unwrap_or_default();
+                let end = self.table_end(body.end());
+                ("", self.line_start(head.start)..end, end)
+            }
+            Body::Braced(_) => ("it = ", body.span(), body.span().end),
+        };
+        let written = format!("{before}{}", &self.text[span]);
+        let Some(document) = parsed(&written) else {
+            return;
+        };
+        let mut repeated = Spliced::new(&written);
+        let found: Vec<Body> = document
+            .iter()
+            .flat_map(|(_, item)| bodies(Some(item)))
+            .collect();
+        let Some(&first) = found.first() else {
+            return;
+        };
+        for (key, text) in keys {
+            repeated.set(first, key, text.clone());
+        }
+        let repeated = repeated.text();
+        let repeated = repeated.strip_prefix(before).unwrap_or(&repeated);
+        let between = match body {
+            Body::Headed(_) => self.line_end.repeat(2),
+            Body::Braced(_) => ", ".to_owned(),
+        };
+        self.changes.push((end..end, between + repeated));
+    }
+
     /// Takes one of several tables away: with the comment right above it, and one empty line.
     pub fn remove_table(&mut self, siblings: &[Body], index: usize) {
         let span = match siblings[index] {

@@ -2,7 +2,6 @@
 //! nothing, and it sees what events of the system miss (network drives, containers, files replaced by renaming, files
 //! that are not there yet).
 
-use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -11,7 +10,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use crate::app::stopwatch::Stopwatch;
-use crate::scene::{Reading, Scene, SceneError};
+use crate::scene::{FileStamp, ModelCache, Reading, Scene, SceneError};
 
 /// The text that the program itself knows the file to have.
 pub(super) type KnownText = Arc<Mutex<String>>;
@@ -53,13 +52,13 @@ impl SceneWatch {
     pub(super) fn start(
         path: PathBuf,
         files: Vec<PathBuf>,
-        known: KnownText,
+        (known, models): (KnownText, ModelCache),
         on_news: impl Fn() + Send + 'static,
     ) -> Self {
         let (sender, news) = channel();
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
-        let mut watched = Watched::new(path, files);
+        let mut watched = Watched::new(path, files, models);
         let thread = thread::spawn(move || {
             run(&mut watched, &known, &stopped, &sender, &on_news);
         });
@@ -109,25 +108,6 @@ fn run(
     }
 }
 
-/// What tells one state of a file from another; `None` where there is none.
-#[derive(Debug, Clone)]
-struct Stamp(Option<Metadata>);
-
-impl PartialEq for Stamp {
-    fn eq(&self, other: &Self) -> bool {
-        match (&self.0, &other.0) {
-            (Some(a), Some(b)) if a.is_dir() && b.is_dir() => true,
-            (Some(a), Some(b)) => {
-                a.is_dir() == b.is_dir()
-                    && a.len() == b.len()
-                    && a.modified().ok() == b.modified().ok()
-            }
-            (None, None) => true,
-            _ => false,
-        }
-    }
-}
-
 /// A scene's file and those that it depends on, and what became of them.
 struct Watched {
     path: PathBuf,
@@ -141,16 +121,17 @@ struct Watched {
     mistake: Option<(SceneError, Vec<PathBuf>)>,
     /// The mistake that was told last, unless the files have given a scene since.
     told: Option<SceneError>,
+    models: ModelCache,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 struct Stamps {
-    scene: Stamp,
-    others: Vec<Stamp>,
+    scene: FileStamp,
+    others: Vec<FileStamp>,
 }
 
 impl Watched {
-    fn new(path: PathBuf, files: Vec<PathBuf>) -> Self {
+    fn new(path: PathBuf, files: Vec<PathBuf>, models: ModelCache) -> Self {
         let seen = stamps(&path, &files);
         Self {
             path,
@@ -160,6 +141,7 @@ impl Watched {
             seen_at_secs: 0.0,
             mistake: None,
             told: None,
+            models,
         }
     }
 
@@ -194,7 +176,7 @@ impl Watched {
                 return None;
             }
             let reading = match &text {
-                Ok(text) => Scene::read(&self.path, text),
+                Ok(text) => Scene::read_with(&self.path, text, &self.models),
                 Err(error) => Reading {
                     scene: Err(error.clone()),
                     files: self.files.clone(),
@@ -249,9 +231,8 @@ impl Watched {
 }
 
 fn stamps(path: &Path, files: &[PathBuf]) -> Stamps {
-    let stamp = |path: &Path| Stamp(std::fs::metadata(path).ok());
     Stamps {
-        scene: stamp(path),
-        others: files.iter().map(|file| stamp(file)).collect(),
+        scene: FileStamp::of(path),
+        others: files.iter().map(|file| FileStamp::of(file)).collect(),
     }
 }

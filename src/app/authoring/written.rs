@@ -3,16 +3,16 @@
 use glam::DVec3;
 use toml_edit::{Document, Item, Value};
 
-use super::edit::{Edit, NewVirtual};
-use super::numbers::number_of;
+use super::edit::{Edit, NewForm, NewThing};
+use super::numbers::{self, number_of};
 use super::spliced::{Body, Spliced, bodies, parsed};
 use crate::light::{Light, Shape};
 use crate::scene::format::{AIMED_LIGHT, RECT_LIGHT, SPHERE_LIGHT, SPOT_LIGHT};
 use crate::scene::format::{
     AMBIENT, AMBIENT_SECTION, BOARD, BOARD_SECTION, CENTER, DIRECTIONAL_LIGHT, LIGHT,
-    LIGHT_SECTION, LightKind, MARKER, MARKER_SECTION, ON_BOARD, PHANTOM_SECTION, PLACEMENT,
-    POINT_LIGHT, PlacementKeys, SHADOWS_SECTION, SHAPE, STANDING, ShapeKeys, TABLE, TABLE_SECTION,
-    THING, THING_NAME, VIRTUAL_SECTION,
+    LIGHT_SECTION, LightKind, MARKER, MARKER_SECTION, MATERIAL, ON_BOARD, PHANTOM_SECTION,
+    PLACEMENT, POINT_LIGHT, PlacementKeys, SHADOWS_SECTION, SHAPE, STANDING, ShapeKeys, TABLE,
+    TABLE_SECTION, THING, THING_NAME, VIRTUAL_SECTION,
 };
 use crate::scene::schema::key::{Absent, Key};
 use crate::scene::schema::section::Section;
@@ -87,14 +87,41 @@ pub fn with_edit(text: &str, scene: &Scene, edit: &Edit) -> Result<String, Unfit
         Edit::AnchorSize { anchor, size_m } => {
             resize(&mut spliced, &document, scene, anchor, *size_m)?;
         }
-        Edit::AddVirtual(new) => {
-            let keys = virtual_keys(new, scene);
-            add_table(&mut spliced, &document, &VIRTUAL_SECTION, &keys);
+        Edit::AddThing(new) => {
+            let section = match new.is_real {
+                true => &PHANTOM_SECTION,
+                false => &VIRTUAL_SECTION,
+            };
+            add_table(&mut spliced, &document, section, &thing_keys(new, scene));
         }
-        Edit::RemoveVirtual(name) => {
-            let virtuals = tables(&document, &VIRTUAL_SECTION);
-            let index = virtuals.iter().position(|body| body.has_name(name));
-            spliced.remove_table(&virtuals, index.ok_or_else(|| no_thing(name))?);
+        Edit::Duplicate {
+            thing,
+            name,
+            position_m,
+        } => {
+            let (siblings, index) = listed(&document, thing)?;
+            let keys = [
+                new_key(&THING_NAME.name, name),
+                new_key(&PLACEMENT.position_m, position_m),
+            ];
+            spliced.repeat_table(&siblings, index, &keys);
+        }
+        Edit::Rename { thing, name } => {
+            let (siblings, index) = listed(&document, thing)?;
+            let (key, text) = new_key(&THING_NAME.name, name);
+            spliced.set(siblings[index], key, text);
+        }
+        Edit::Material {
+            thing,
+            albedo,
+            roughness,
+        } => {
+            let (siblings, index) = listed(&document, thing)?;
+            set_material(&mut spliced, siblings[index], *albedo, *roughness);
+        }
+        Edit::RemoveThing(name) => {
+            let (siblings, index) = listed(&document, name)?;
+            spliced.remove_table(&siblings, index);
         }
     }
     Ok(spliced.text())
@@ -127,7 +154,9 @@ pub fn touched_by(text: &str, edit: &Edit) -> Option<String> {
             thing(name, &keys)
         }
         Edit::Show { thing: name, .. } => thing(name, &[THING.visible.name]),
-        Edit::RemoveVirtual(name) => thing(name, &VIRTUAL_SECTION.names()),
+        Edit::RemoveThing(name) => thing(name, &VIRTUAL_SECTION.names()),
+        Edit::Rename { thing: name, .. } => thing(name, &[THING_NAME.name.name]),
+        Edit::Material { thing: name, .. } => thing(name, &[THING.material.name]),
         Edit::Shadows(change) => {
             let keys: Vec<&str> = change.keys().iter().map(|change| change.key).collect();
             Some(said(&tables(&document, &SHADOWS_SECTION), &keys))
@@ -142,7 +171,8 @@ pub fn touched_by(text: &str, edit: &Edit) -> Option<String> {
                 .collect();
             Some(said(&named, &[BOARD.markers.name, MARKER.size_m.name]))
         }
-        Edit::AddLight(_) | Edit::AddVirtual(_) => Some(String::new()),
+        Edit::Duplicate { thing: name, .. } => thing(name, &VIRTUAL_SECTION.names()),
+        Edit::AddLight(_) | Edit::AddThing(_) => Some(String::new()),
     }
 }
 
@@ -223,6 +253,47 @@ fn thing_of<'a>(document: &'a Document<&str>, name: &str) -> Result<WrittenThing
         .map(WrittenThing::Object)
         .or_else(top)
         .ok_or_else(|| no_thing(name))
+}
+
+/// The tables among which a thing's is, and its number there.
+fn listed<'a>(document: &'a Document<&str>, name: &str) -> Result<(Vec<Body<'a>>, usize), Unfit> {
+    [&PHANTOM_SECTION, &VIRTUAL_SECTION]
+        .into_iter()
+        .find_map(|section| {
+            let siblings = tables(document, section);
+            let index = siblings.iter().position(|body| body.has_name(name))?;
+            Some((siblings, index))
+        })
+        .ok_or_else(|| no_thing(name))
+}
+
+fn set_material(spliced: &mut Spliced, thing: Body, albedo: DVec3, roughness: Option<f64>) {
+    let key = THING.material.name;
+    match bodies(thing.item(key)).first() {
+        Some(&body) => {
+            let key = &MATERIAL.albedo;
+            spliced.set_numbers(
+                body,
+                key.name,
+                &albedo.to_array(),
+                key.takes.numbers.digits,
+                None,
+            );
+            if let Some(roughness) = roughness {
+                let (key, text) = new_key(&MATERIAL.roughness, &Some(roughness));
+                spliced.set(body, key, text);
+            }
+        }
+        None => {
+            let mut keys = vec![new_key(&MATERIAL.albedo, &Some(albedo))];
+            keys.extend(roughness.map(|it| new_key(&MATERIAL.roughness, &Some(it))));
+            let pairs: Vec<String> = keys
+                .iter()
+                .map(|(key, text)| format!("{key} = {text}"))
+                .collect();
+            spliced.insert_key(thing, key, &format!("{{ {} }}", pairs.join(", ")));
+        }
+    }
 }
 
 fn no_thing(name: &str) -> Unfit {
@@ -450,11 +521,25 @@ fn resize(
     Ok(())
 }
 
-fn virtual_keys(new: &NewVirtual, scene: &Scene) -> Vec<NewKey> {
-    let mut keys = vec![
-        new_key(&THING_NAME.name, &new.name),
-        (SHAPE.mesh.name, quoted(&new.mesh)),
-    ];
+fn thing_keys(new: &NewThing, scene: &Scene) -> Vec<NewKey> {
+    let mut keys = vec![new_key(&THING_NAME.name, &new.name)];
+    let lengths = |lengths_m: &[f64]| {
+        numbers::new_array(lengths_m, PLACEMENT.position_m.takes.numbers.digits)
+    };
+    match &new.form {
+        NewForm::Mesh { file, fit_m } => {
+            keys.push((SHAPE.mesh.name, quoted(file)));
+            keys.extend(fit_m.map(|fit_m| new_key(&SHAPE.fit_m, &Some(fit_m))));
+        }
+        NewForm::Box(sides) => keys.push((SHAPE.box_m.name, lengths(&sides.to_array()))),
+        NewForm::Cylinder(radius, height) => {
+            keys.push((SHAPE.cylinder_m.name, lengths(&[*radius, *height])));
+        }
+        NewForm::Cone(radius, height) => {
+            keys.push((SHAPE.cone_m.name, lengths(&[*radius, *height])));
+        }
+        NewForm::Sphere(radius) => keys.push(new_key(&SHAPE.sphere_m, &Some(*radius))),
+    }
     let world = scene.anchors.first();
     if world.is_none_or(|world| world.name != new.on) {
         keys.push((STANDING.on.name, quoted(&new.on)));

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use glam::DVec2;
 
+use super::adding::WantedThing;
 use super::views::ViewMode;
 use crate::app::authoring::Edit;
 use crate::geometry::light_placing::LightFreedom;
@@ -41,6 +42,17 @@ pub enum SceneCommand {
     ToggleSelected,
     /// Take the selected thing or light out of the scene.
     RemoveSelected,
+    /// Put a thing into the scene.
+    Add(WantedThing),
+    /// Put the selected thing into the scene once more.
+    DuplicateSelected,
+    /// Call a thing otherwise.
+    Rename {
+        /// What it is called.
+        thing: String,
+        /// What it is to be called.
+        name: String,
+    },
     /// Put a demonstration on a marker.
     Demonstrate {
         /// The marker's number in tag36h11.

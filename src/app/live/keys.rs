@@ -104,6 +104,12 @@ pub fn bindings() -> Vec<Binding> {
             SceneCommand::ToggleSelected.into(),
         ),
         plain(
+            Key::D,
+            "D",
+            "duplicate the selected thing",
+            SceneCommand::DuplicateSelected.into(),
+        ),
+        plain(
             Key::Delete,
             "Del",
             "take the selected thing or light out of the scene",

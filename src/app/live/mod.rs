@@ -4,6 +4,7 @@
 //! [`session`] is all of it but the window, which knows nothing that a test could not do; `window` and what it shows are
 //! the only home of egui.
 
+pub mod adding;
 pub mod beginning;
 mod canvas;
 pub mod command;
@@ -19,6 +20,7 @@ mod overlays;
 pub mod panel;
 pub mod pipeline;
 mod recorders;
+mod selected_outline;
 mod selection;
 pub mod session;
 mod shadow_clicks;

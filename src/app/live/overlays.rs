@@ -6,6 +6,7 @@ use glam::{DAffine3, DVec2, DVec3};
 use super::command::Overlay;
 use super::frame_tracker::TrackedPicture;
 use super::gizmo::{Gizmo, GizmoTarget, Handle, light_place_m};
+use super::selected_outline::SelectedOutline;
 use super::shadow_clicks::ShadowClicks;
 use super::shadow_lines::ShadowLines;
 use super::views::ViewMode;
@@ -70,6 +71,22 @@ impl Overlays<'_> {
                 continue;
             };
             self.label(place, &seen.id.to_string(), SEEN);
+        }
+    }
+
+    /// The outline of a thing.
+    pub fn selected(&self, scene: &Scene, name: &str, outline: &mut SelectedOutline) {
+        let mut things = scene.phantoms.iter().chain(&scene.virtuals);
+        let thing = things.find(|thing| thing.name == name && thing.visible);
+        let camera_from_node = self.picture.camera_from_nodes(scene);
+        let placed = thing.and_then(|thing| Some((thing, camera_from_node[thing.anchor]?)));
+        let Some((thing, camera_from_anchor)) = placed else {
+            return;
+        };
+        for edge_m in outline.edges_m(thing, &camera_from_anchor) {
+            if let [Some(a), Some(b)] = edge_m.map(|end| self.place(&camera_from_anchor, end)) {
+                self.painter.line_segment([a, b], Stroke::new(2.0, GRIP));
+            }
         }
     }
 

@@ -1,6 +1,8 @@
 //! The live program without its window: scene, camera, tracking, drawing and recording, moved on frame by frame by
 //! whoever shows the picture.
 
+mod things;
+
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -31,6 +33,7 @@ use crate::capture::live::Now;
 use crate::geometry::camera::Intrinsics;
 use crate::render::{Gpu, Renderer};
 use crate::scene::{CameraSettings, Placement, Scene};
+use things::ReadAhead;
 
 /// For composites of sources that do not say their rate.
 const ASSUMED_FPS: f64 = 30.0;
@@ -53,6 +56,8 @@ struct OpenScene {
     origin: Origin,
     /// What is shown while it lasts.
     previewed: Option<Edit>,
+    /// Models that are on their way into it.
+    reading: Vec<ReadAhead>,
 }
 
 /// The place of a scene's file.
@@ -112,6 +117,8 @@ pub struct LiveSession {
     pub meters: Meters,
     /// Renderers that drew, one after the other: a new one has another picture.
     renderers: u64,
+    /// What has just come into the scene.
+    newly_selected: Option<Selected>,
 }
 
 impl SceneState {
@@ -127,6 +134,7 @@ impl SceneState {
             document,
             origin,
             previewed: None,
+            reading: Vec::new(),
         }))
     }
 
@@ -246,6 +254,7 @@ impl LiveSession {
             scene: SceneState::of(document, &wake),
             picture: PictureState::Awaited,
             renderers: 0,
+            newly_selected: None,
             calibration: input.calibration,
             pipeline,
             camera,
@@ -275,6 +284,7 @@ impl LiveSession {
             self.notices.take(now_secs, &event);
         }
         self.take_scene_news();
+        self.take_read();
         if let Some(said) = self.recorders.take_failure(&self.pipeline) {
             self.say(said);
         }
@@ -488,10 +498,17 @@ impl LiveSession {
                 }
             }
             SceneCommand::RemoveSelected => match &state.selected {
-                Some(Selected::Thing(name)) => self.commit(&Edit::RemoveVirtual(name.clone())),
+                Some(Selected::Thing(name)) => self.commit(&Edit::RemoveThing(name.clone())),
                 Some(Selected::Light(index)) => self.commit(&Edit::RemoveLight(*index)),
                 None => {}
             },
+            SceneCommand::Add(wanted) => self.add(&wanted),
+            SceneCommand::DuplicateSelected => {
+                if let Some(Selected::Thing(name)) = &state.selected {
+                    self.duplicate(name);
+                }
+            }
+            SceneCommand::Rename { thing, name } => self.rename(&thing, &name),
         }
     }
 

@@ -113,7 +113,8 @@ impl ShadowLines {
     }
 }
 
-fn caster_of(thing: &Object) -> Caster {
+/// A thing as it casts shadows, in its anchor's space.
+pub fn caster_of(thing: &Object) -> Caster {
     let place = |position: &glam::Vec3| {
         let position = thing
             .anchor_from_object

@@ -18,6 +18,7 @@ use super::gizmo::{Drag, Gizmo, GizmoTarget};
 use super::keys::bindings;
 use super::overlays::Overlays;
 use super::panel::{Facts, Panel};
+use super::selected_outline::SelectedOutline;
 use super::selection::selected_at;
 use super::session::LiveSession;
 use super::shadow_lines::ShadowLines;
@@ -55,6 +56,7 @@ pub struct LiveWindow {
     state: WindowState,
     panel: Panel,
     shadow_lines: ShadowLines,
+    outline: SelectedOutline,
     drag: Option<Drag>,
     adapter: String,
     shared: WindowShared,
@@ -77,6 +79,7 @@ impl LiveWindow {
             state: WindowState::new(),
             panel: Panel::default(),
             shadow_lines: ShadowLines::default(),
+            outline: SelectedOutline::default(),
             drag: None,
             full_screen: false,
         }
@@ -96,6 +99,9 @@ impl LiveWindow {
                 LiveCommand::Window(command) => self.state.apply(&command),
                 LiveCommand::Quit => ctx.send_viewport_cmd(ViewportCommand::Close),
             }
+        }
+        if let Some(selected) = self.session.take_selected() {
+            self.state.selected = Some(selected);
         }
         if self.state.full_screen != self.full_screen {
             self.full_screen = self.state.full_screen;
@@ -171,6 +177,9 @@ impl LiveWindow {
         if let Some(clicks) = self.session.clicks() {
             overlays.clicks(clicks);
         } else if let Some((target, sight)) = self.target() {
+            if let (Some(scene), Some(Selected::Thing(name))) = (scene, &self.state.selected) {
+                overlays.selected(scene, name, &mut self.outline);
+            }
             overlays.handles(&target, &sight);
         }
         command
@@ -264,7 +273,7 @@ impl LiveWindow {
     fn notices(&self, ctx: &Context, area: Rect) {
         let shown = self.session.notices.shown(self.session.now_secs());
         let [session, video] = self.session.records();
-        if shown.is_empty() && !session && !video {
+        if shown.is_empty() && !session && !video && !self.state.holds {
             return;
         }
         let place = area.left_top() + Vec2::splat(10.0);
@@ -273,6 +282,12 @@ impl LiveWindow {
             .interactable(false)
             .show(ctx, |ui| {
                 ui.set_max_width((area.width() - 20.0).clamp(60.0, 620.0));
+                if self.state.holds {
+                    boxed(
+                        ui,
+                        RichText::new("held: the picture stands still").color(TROUBLE),
+                    );
+                }
                 for (recording, what) in [(session, "the camera"), (video, "the composite")] {
                     if recording {
                         boxed(
@@ -292,6 +307,35 @@ impl LiveWindow {
                     );
                 }
             });
+    }
+
+    /// Files that were dropped on the window; while they are held over it, it says what becomes of them.
+    fn dropped(&self, ctx: &Context, area: Rect) -> Commands {
+        let mut commands = Commands::default();
+        let (hovers, dropped) = ctx.input(|input| {
+            let hovers = !input.raw.hovered_files.is_empty();
+            (hovers, input.raw.dropped_files.clone())
+        });
+        for file in dropped {
+            let path = file.path();
+            if !path.as_os_str().is_empty() {
+                self.panel.add_model(path.to_owned(), &mut commands);
+            }
+        }
+        if hovers {
+            let painter = ctx.debug_painter();
+            painter.rect_filled(area, 0.0, Color32::from_black_alpha(140));
+            let text = "Let go to put it on the table";
+            let font = FontId::proportional(22.0);
+            painter.text(
+                area.center(),
+                Align2::CENTER_CENTER,
+                text,
+                font,
+                Color32::WHITE,
+            );
+        }
+        commands
     }
 
     fn list_of_keys(&mut self, ctx: &Context) {
@@ -368,6 +412,7 @@ impl eframe::App for LiveWindow {
                 ui.max_rect()
             })
             .inner;
+        commands.append(self.dropped(&ctx, area));
         self.notices(&ctx, area);
         if self.state.keys {
             self.list_of_keys(&ctx);

@@ -53,7 +53,8 @@ pub fn number(ui: &mut Ui, name: &str, value: &mut f64, speed: f64, allowed: &Nu
 pub fn vector(ui: &mut Ui, name: &str, value: &mut DVec3, speed: f64, allowed: &Numbers) -> bool {
     ui.horizontal(|ui| {
         let [x, y, z] = value.as_mut();
-        let fields = [x, y, z].map(|component| field(ui, component, speed, allowed));
+        let fields = [("x ", x), ("y ", y), ("z ", z)]
+            .map(|(axis, component)| axis_field(ui, axis, component, speed, allowed));
         let label = ui.label(name);
         fields
             .map(|field| field.labelled_by(label.id).changed())
@@ -89,6 +90,17 @@ pub fn power(ui: &mut Ui, name: &str, value: &mut DVec3, allowed: &Numbers) -> b
 
 /// A number alone, with its unit. What it is changed to is allowed.
 pub fn field(ui: &mut Ui, value: &mut f64, speed: f64, allowed: &Numbers) -> Response {
+    axis_field(ui, "", value, speed, allowed)
+}
+
+/// The same with the name of an axis before it.
+fn axis_field(
+    ui: &mut Ui,
+    axis: &'static str,
+    value: &mut f64,
+    speed: f64,
+    allowed: &Numbers,
+) -> Response {
     let suffix = match allowed.unit {
         "" => String::new(),
         "degrees" => "°".to_owned(),
@@ -98,6 +110,7 @@ pub fn field(ui: &mut Ui, value: &mut f64, speed: f64, allowed: &Numbers) -> Res
         DragValue::new(value)
             .speed(speed)
             .max_decimals(4)
+            .prefix(axis)
             .suffix(suffix)
             .update_while_editing(false),
     );

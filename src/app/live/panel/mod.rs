@@ -1,5 +1,6 @@
 //! The panel beside the picture. It is shown facts and gives back commands; it changes nothing itself.
 
+mod adding;
 mod editing;
 mod first_use;
 mod light_from_picture;
@@ -9,18 +10,21 @@ mod things;
 mod times;
 mod tracking;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use eframe::egui::{CollapsingHeader, ScrollArea, Ui};
 
+use super::adding::WantedShape;
 use super::command::{Commands, Overlay, RecordingCommand, SceneCommand, WindowCommand};
 use super::frame_tracker::TrackedPicture;
 use super::meters::Meters;
 use super::views::ViewMode;
 use super::window_state::WindowState;
 use crate::scene::{Placement, Scene, Shortcut, Shortcuts};
+use adding::Adding;
 use editing::Editing;
 use first_use::FirstUse;
+use things::Renaming;
 
 /// Where a thing stands, in the numbers of the scene's file; `None` where it has none there.
 pub type Placements<'a> = dyn Fn(&str) -> Option<Placement> + 'a;
@@ -60,9 +64,16 @@ pub struct Facts<'a> {
 pub struct Panel {
     editing: Editing,
     first_use: FirstUse,
+    adding: Adding,
+    things: Renaming,
 }
 
 impl Panel {
+    /// A model that was dropped on the picture, as what was chosen for the next thing.
+    pub fn add_model(&self, path: PathBuf, commands: &mut Commands) {
+        self.adding.add(WantedShape::Model(path), commands);
+    }
+
     /// Shows it: what is asked for.
     pub fn show(&mut self, ui: &mut Ui, facts: &Facts<'_>, look: &WindowState) -> Commands {
         let mut commands = Commands::default();
@@ -77,7 +88,9 @@ impl Panel {
                 });
                 if let Some(scene) = facts.scene {
                     section(ui, "Things", true, |ui| {
-                        things::show(ui, (scene, facts.placement), look, editing, &mut commands);
+                        self.adding.show(ui, scene, &mut commands);
+                        let fields = (&mut *editing, &mut self.things);
+                        things::show(ui, (scene, facts.placement), look, fields, &mut commands);
                     });
                     section(ui, "Lights", true, |ui| {
                         lights::show(ui, scene, look, editing, &mut commands);

@@ -1,24 +1,32 @@
 //! Phantoms and virtual things: what is there, and where.
 
-use eframe::egui::Ui;
+use eframe::egui::{TextEdit, Ui};
+use glam::DVec3;
 
 use super::Placements;
-use super::editing::{Editing, vector};
+use super::editing::{Editing, number, vector};
 use crate::app::authoring::Edit;
 use crate::app::live::command::{Commands, SceneCommand, Selected, WindowCommand};
 use crate::app::live::window_state::WindowState;
-use crate::scene::format::PLACEMENT;
+use crate::scene::format::{MATERIAL, PLACEMENT};
 use crate::scene::{Object, Placement, Scene};
 
 /// Metres, degrees and factors per point that a field is dragged.
 const SPEEDS: [f64; 3] = [0.0005, 0.5, 0.005];
+
+/// The name that is being written.
+#[derive(Debug, Default)]
+pub struct Renaming {
+    thing: String,
+    name: String,
+}
 
 /// Shows them.
 pub fn show(
     ui: &mut Ui,
     (scene, placement): (&Scene, &Placements<'_>),
     look: &WindowState,
-    editing: &mut Editing,
+    (editing, renaming): (&mut Editing, &mut Renaming),
     commands: &mut Commands,
 ) {
     for (kind, things) in [("phantoms", &scene.phantoms), ("virtual", &scene.virtuals)] {
@@ -32,7 +40,9 @@ pub fn show(
                 row(ui, thing, placed.is_some(), look, commands);
                 let selected = Selected::Thing(thing.name.clone());
                 if let (Some(placement), true) = (placed, look.selected == Some(selected)) {
+                    actions(ui, thing, renaming, commands);
                     fields(ui, scene, thing, placement, editing, commands);
+                    material(ui, thing, editing, commands);
                 }
             });
         }
@@ -57,6 +67,62 @@ fn row(ui: &mut Ui, thing: &Object, can_move: bool, look: &WindowState, commands
             commands.push(SceneCommand::Commit(Edit::Show { thing, visible }));
         }
     });
+}
+
+/// Its name, to be written otherwise, a copy of it, and its end.
+fn actions(ui: &mut Ui, thing: &Object, renaming: &mut Renaming, commands: &mut Commands) {
+    if renaming.thing != thing.name {
+        renaming.thing.clone_from(&thing.name);
+        renaming.name.clone_from(&thing.name);
+    }
+    ui.horizontal(|ui| {
+        let field = TextEdit::singleline(&mut renaming.name).desired_width(90.0);
+        let field = ui.add(field);
+        let label = ui.label("name");
+        if field.labelled_by(label.id).lost_focus() && renaming.name != thing.name {
+            let (thing, name) = (thing.name.clone(), renaming.name.clone());
+            // (What becomes of it is shown when it has become it.)
+            renaming.thing.clear();
+            commands.push(SceneCommand::Rename { thing, name });
+        }
+        if ui.small_button("duplicate").clicked() {
+            commands.push(SceneCommand::DuplicateSelected);
+        }
+        if ui.small_button("remove").clicked() {
+            commands.push(SceneCommand::RemoveSelected);
+        }
+    });
+}
+
+/// What it is made of: of several materials the first, in place of all.
+fn material(ui: &mut Ui, thing: &Object, editing: &mut Editing, commands: &mut Commands) {
+    let Some(first) = thing.materials.first() else {
+        return;
+    };
+    let mut albedo = first.albedo.as_vec3().to_array();
+    let mut roughness = first.roughness.unwrap_or(1.0);
+    let colour_changed = ui
+        .horizontal(|ui| {
+            let colour = ui.color_edit_button_rgb(&mut albedo);
+            let name = match thing.materials.len() {
+                1 => "albedo".to_owned(),
+                count => format!("albedo, in place of {count} materials"),
+            };
+            let label = ui.label(name);
+            colour.labelled_by(label.id).changed()
+        })
+        .inner;
+    let takes = &MATERIAL.roughness.takes;
+    let roughness_changed =
+        number(ui, "roughness (1: matt)", &mut roughness, 0.01, takes).changed();
+    if colour_changed || roughness_changed {
+        let edit = Edit::Material {
+            thing: thing.name.clone(),
+            albedo: DVec3::from_array(albedo.map(f64::from)),
+            roughness: roughness_changed.then_some(roughness).or(first.roughness),
+        };
+        editing.changed(ui, edit, commands);
+    }
 }
 
 fn fields(

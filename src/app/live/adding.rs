@@ -1,0 +1,211 @@
+//! What a person adds to a scene: a model's file or a shape, with a name that is free at a place that is free.
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use crate::app::authoring::{NewForm, NewThing};
+use crate::scene::{Object, Placement, Scene};
+
+/// A thing that somebody wants to have.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WantedThing {
+    /// Whether it is a phantom.
+    pub is_real: bool,
+    /// Its shape.
+    pub shape: WantedShape,
+    /// Name of the anchor that it is to stand on; `None`: the world.
+    pub on: Option<String>,
+}
+
+/// The shape of a wanted thing.
+#[derive(Debug, Clone, PartialEq)]
+pub enum WantedShape {
+    /// A model's file.
+    Model(PathBuf),
+    /// A box as large as a stack of notes.
+    Box,
+    /// A cylinder as large as a mug.
+    Cylinder,
+    /// A cone.
+    Cone,
+    /// A ball.
+    Ball,
+}
+
+impl WantedShape {
+    /// Those that need no file, with their names.
+    pub const SHAPES: [(&'static str, Self); 4] = [
+        ("box", Self::Box),
+        ("cylinder", Self::Cylinder),
+        ("cone", Self::Cone),
+        ("ball", Self::Ball),
+    ];
+
+    fn name(&self) -> String {
+        match self {
+            Self::Model(path) => {
+                allowed_name(&path.file_stem().unwrap_or_default().to_string_lossy())
+            }
+            shape => {
+                let mut named = Self::SHAPES.iter().filter(|(_, named)| named == shape);
+                named.next().map_or("thing", |(name, _)| name).to_owned()
+            }
+        }
+    }
+
+    /// As a scene in a folder has it.
+    fn form(&self, folder: &Path) -> NewForm {
+        match self {
+            Self::Model(path) => NewForm::Mesh {
+                file: file_from(folder, path),
+                fit_m: None,
+            },
+            Self::Box => NewForm::Box(DVec3::new(0.08, 0.06, 0.04)),
+            Self::Cylinder => NewForm::Cylinder(0.04, 0.1),
+            Self::Cone => NewForm::Cone(0.03, 0.08),
+            Self::Ball => NewForm::Sphere(0.03),
+        }
+    }
+}
+
+impl WantedThing {
+    /// What is added to a scene in a folder.
+    pub fn in_scene(&self, scene: &Scene, folder: &Path) -> NewThing {
+        let on = self.on.clone().unwrap_or_else(|| {
+            let world = scene.anchors.first();
+            world.map_or_else(String::new, |world| world.name.clone())
+        });
+        let anchor = scene.anchors.iter().position(|anchor| anchor.name == on);
+        NewThing {
+            is_real: self.is_real,
+            name: free_name(scene, &self.shape.name()),
+            form: self.shape.form(folder),
+            placement: Placement {
+                position_m: free_place(scene, anchor.unwrap_or(0), DVec3::ZERO),
+                ..Placement::default()
+            },
+            on,
+        }
+    }
+}
+
+/// All things but the table, which has no place of its own.
+fn things(scene: &Scene) -> impl Iterator<Item = &Object> {
+    scene.phantoms.iter().chain(&scene.virtuals)
+}
+
+/// A name that a scene does not have yet: the wanted one, or with a number behind it.
+pub fn free_name(scene: &Scene, wanted: &str) -> String {
+    let is_free = |name: &str| things(scene).all(|thing| thing.name != name);
+    let numbered = (2..).map(|number| format!("{wanted} {number}"));
+    let mut names = std::iter::once(wanted.to_owned()).chain(numbered);
+    names.find(|name| is_free(name)).unwrap_or_default()
+}
+
+/// What of a text a name may have.
+pub fn allowed_name(text: &str) -> String {
+    let allowed = |character: char| match character {
+        ',' | ';' | '"' | '\'' | '\n' | '\r' => '_',
+        other if other.is_control() => '_',
+        other => other,
+    };
+    let name: String = text.chars().map(allowed).collect();
+    match name.trim() {
+        "" => "thing".to_owned(),
+        name => name.to_owned(),
+    }
+}
+
+/// A place on an anchor where nothing that casts shadows is, at `wanted` or to its right, metres.
+pub fn free_place(scene: &Scene, anchor: usize, wanted: DVec3) -> DVec3 {
+    const STEP_M: f64 = 0.06;
+    // (About half of what comes.)
+    const MARGIN_M: f64 = 0.03;
+    let boxes = || {
+        let there = things(scene).filter(|thing| thing.stands_on() == anchor && thing.casts);
+        there.filter_map(Object::bounds_in_anchor)
+    };
+    let is_free = |place: &DVec3| {
+        boxes().all(|bounds| {
+            let low = bounds.low.truncate() - MARGIN_M;
+            let high = bounds.high.truncate() + MARGIN_M;
+            let place = place.truncate();
+            place.cmplt(low).any() || place.cmpgt(high).any()
+        })
+    };
+    let mut places = (0..32).map(|step| wanted + DVec3::X * (STEP_M * f64::from(step)));
+    places.find(is_free).unwrap_or(wanted)
+}
+
+/// How a scene in a folder names a file: from there if it lies there.
+fn file_from(folder: &Path, file: &Path) -> String {
+    let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let (folder, file) = (whole(folder), whole(file));
+    file.strip_prefix(&folder)
+        .unwrap_or(&file)
+        .to_string_lossy()
+        .into_owned()
+}
+
+/// What a model whose numbers cannot be metres on a table is scaled to: its longest side, metres. `None`: it may be so large.
+pub fn fit_m(thing: &Object) -> Option<f64> {
+    const LARGEST_M: f64 = 1.0;
+    const SMALLEST_M: f64 = 0.002;
+    const FITTING_M: f64 = 0.1;
+    let bounds = thing.bounds_in_anchor()?;
+    let longest_m = (bounds.high - bounds.low).max_element();
+    (!(SMALLEST_M..=LARGEST_M).contains(&longest_m)).then_some(FITTING_M)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene(things: &str) -> Scene {
+        let text = format!(
+            "[camera]\nsource = \"webcam:0\"\n[[marker]]\nname = \"m\"\nid = 0\nsize_m = 0.05\n{things}"
+        );
+        Scene::parse(Path::new("scene.toml"), &text).expect("a scene")
+    }
+
+    #[test]
+    fn names_and_places_are_free() {
+        let box_at_origin = "[[virtual]]\nname = \"box\"\nbox_m = [0.1, 0.1, 0.1]\n";
+        let scene = scene(&format!(
+            "{box_at_origin}[[phantom]]\nname = \"box 2\"\nsphere_m = 0.02\nposition_m = [0.12, 0, 0]\n"
+        ));
+        let wanted = WantedThing {
+            is_real: false,
+            shape: WantedShape::Box,
+            on: None,
+        };
+        let new = wanted.in_scene(&scene, Path::new("/somewhere"));
+        assert_eq!((new.name.as_str(), new.on.as_str()), ("box 3", "m"));
+        assert!(new.placement.position_m.distance(DVec3::X * 0.18) < 1e-9);
+        assert_eq!(allowed_name(" a,\"b\"; "), "a__b__");
+        assert_eq!(allowed_name(" "), "thing");
+        assert_eq!(
+            file_from(Path::new("/a/b"), Path::new("/a/b/c/d.obj")),
+            "c/d.obj"
+        );
+        assert_eq!(
+            file_from(Path::new("/a/b"), Path::new("/a/x.obj")),
+            "/a/x.obj"
+        );
+    }
+
+    #[test]
+    fn models_in_millimetres_and_houses_are_scaled() {
+        let fit = |side: f64| {
+            let scene = scene(&format!(
+                "[[virtual]]\nname = \"t\"\nbox_m = [{side}, {side}, {side}]\n"
+            ));
+            fit_m(&scene.virtuals[0])
+        };
+        assert_eq!(fit(0.1), None);
+        assert_eq!(fit(0.8), None);
+        assert_eq!(fit(80.0), Some(0.1));
+        assert_eq!(fit(0.001), Some(0.1));
+    }
+}

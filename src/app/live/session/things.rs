@@ -1,0 +1,153 @@
+//! Things come, are copied and renamed: models are read beside the picture, which goes on meanwhile.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+
+use glam::DVec3;
+
+use super::super::adding::{self, WantedThing, allowed_name, free_name, free_place};
+use super::super::command::Selected;
+use super::LiveSession;
+use crate::app::authoring::{Edit, EditError, NewForm, NewThing};
+use crate::app::window::notices::Weight;
+use crate::scene::Scene;
+
+/// How far beside a thing its copy stands, metres.
+const COPY_BESIDE: DVec3 = DVec3::new(0.06, 0.0, 0.0);
+
+/// A model that is being read.
+pub(super) struct ReadAhead {
+    thing: NewThing,
+    given: Receiver<Result<Scene, EditError>>,
+}
+
+impl LiveSession {
+    /// Adds a thing, at once or when its model is read.
+    pub(super) fn add(&mut self, wanted: &WantedThing) {
+        let wake = Arc::clone(&self.wake);
+        let Some(scene) = self.scene.open_mut() else {
+            return self.tell(Weight::Trouble, "There is no scene yet to add anything to.");
+        };
+        let document = &scene.document;
+        let folder = document.path().parent().unwrap_or(Path::new(""));
+        let mut thing = wanted.in_scene(document.scene(), folder);
+        // (What is being read has its name already.)
+        while scene
+            .reading
+            .iter()
+            .any(|other| other.thing.name == thing.name)
+        {
+            thing.name += "'";
+        }
+        if !matches!(thing.form, NewForm::Mesh { .. }) {
+            return self.add_thing(thing);
+        }
+        let (giver, given) = channel();
+        let read = document.read_ahead(&Edit::AddThing(thing.clone()), move |read| {
+            // (Nobody waits for it where the window has closed meanwhile.)
+            _ = giver.send(read);
+            wake();
+        });
+        match read {
+            Ok(()) => {
+                let text = format!("Reading \"{}\" …", thing.name);
+                scene.reading.push(ReadAhead { thing, given });
+                self.tell(Weight::Done, text);
+            }
+            Err(error) => self.tell(Weight::Trouble, error.to_string()),
+        }
+    }
+
+    /// Adds what has been read.
+    pub(super) fn take_read(&mut self) {
+        let Some(scene) = self.scene.open_mut() else {
+            return;
+        };
+        let mut ready = Vec::new();
+        let mut index = 0;
+        while let Some(waiting) = scene.reading.get(index) {
+            match waiting.given.try_recv() {
+                Ok(read) => ready.push((scene.reading.remove(index).thing, read)),
+                Err(_) => index += 1,
+            }
+        }
+        for (mut thing, read) in ready {
+            match read {
+                Ok(scene) => {
+                    let things = scene.phantoms.iter().chain(&scene.virtuals);
+                    let found = things.clone().find(|found| found.name == thing.name);
+                    if let (Some(wanted), NewForm::Mesh { fit_m, .. }) =
+                        (found.and_then(adding::fit_m), &mut thing.form)
+                    {
+                        *fit_m = Some(wanted);
+                        let text = format!(
+                            "The numbers of \"{}\" cannot be metres: it is scaled to {} cm (fit_m).",
+                            thing.name,
+                            wanted * 100.0
+                        );
+                        self.tell(Weight::Trouble, text);
+                    }
+                    self.add_thing(thing);
+                }
+                Err(error) => self.tell(Weight::Trouble, error.to_string()),
+            }
+        }
+    }
+
+    fn add_thing(&mut self, thing: NewThing) {
+        let name = thing.name.clone();
+        self.commit_named(&Edit::AddThing(thing), name);
+    }
+
+    /// Copies a thing.
+    pub(super) fn duplicate(&mut self, thing: &str) {
+        let (Some(scene), Some(placement)) = (self.scene(), self.placement(thing)) else {
+            return;
+        };
+        let mut things = scene.phantoms.iter().chain(&scene.virtuals);
+        let Some(anchor) = things
+            .find(|found| found.name == thing)
+            .map(|found| found.stands_on())
+        else {
+            return;
+        };
+        let name = free_name(scene, thing);
+        let edit = Edit::Duplicate {
+            thing: thing.to_owned(),
+            name: name.clone(),
+            position_m: free_place(scene, anchor, placement.position_m + COPY_BESIDE),
+        };
+        self.commit_named(&edit, name);
+    }
+
+    /// Gives a thing another name.
+    pub(super) fn rename(&mut self, thing: &str, name: &str) {
+        let name = allowed_name(name);
+        if name != thing {
+            let edit = Edit::Rename {
+                thing: thing.to_owned(),
+                name: name.clone(),
+            };
+            self.commit_named(&edit, name);
+        }
+    }
+
+    /// Makes an edit by which a thing gets a name, and selects it.
+    fn commit_named(&mut self, edit: &Edit, name: String) {
+        self.commit(edit);
+        let scene = self.scene();
+        let has = |scene: &Scene| {
+            let mut things = scene.phantoms.iter().chain(&scene.virtuals);
+            things.any(|thing| thing.name == name)
+        };
+        if scene.is_some_and(has) {
+            self.newly_selected = Some(Selected::Thing(name));
+        }
+    }
+
+    /// What is to be selected from now on, once.
+    pub fn take_selected(&mut self) -> Option<Selected> {
+        self.newly_selected.take()
+    }
+}
