@@ -199,10 +199,10 @@ impl FinalGather {
     /// Gathers what the frame needs and is not known. Returns the pixels that virtual things can change.
     pub fn update(&mut self, gpu: &Gpu, gpu_scene: &GpuScene) -> PixelRect {
         self.drawn.clear();
-        let Some(world_from_anchor) = gpu_scene.world_from_anchor() else {
+        let Some(world_from_anchor) = gpu_scene.light_from_anchor() else {
             return PixelRect::NONE;
         };
-        let mut gathered = self.gathered_for(world_from_anchor, gpu_scene.shining());
+        let mut gathered = self.gathered_for(world_from_anchor, gpu_scene.shining_in_light());
         let models: Vec<DrawnModel<'_>> = gpu_scene.drawn_real().collect();
         let is_known = |model: &&DrawnModel<'_>| gathered.on_models.contains_key(&key(model));
         if !models.iter().all(|model| is_known(&model)) {

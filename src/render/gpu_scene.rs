@@ -103,6 +103,8 @@ pub(super) struct GpuScene {
     known_levels: KnownLevels,
     /// What stands on this node casts shadows, but is not seen.
     unseen: Option<usize>,
+    /// The node that light from afar turns with.
+    light_anchor: usize,
 }
 
 impl GpuScene {
@@ -120,6 +122,7 @@ impl GpuScene {
         Self {
             standing: standing(scene),
             unseen: None,
+            light_anchor: scene.probe.as_ref().map_or(0, |probe| probe.anchor),
             known_levels,
             casters: Casters::new(gpu, things.len(), &scene.shadows),
             indirect: match lit_by {
@@ -335,11 +338,6 @@ impl GpuScene {
         queue.write_buffer(&self.batches[number].indirect, 0, contents);
     }
 
-    /// The lights that cast shadow volumes and shine, in world space.
-    pub fn shining(&self) -> Vec<Light> {
-        self.lights.shining()
-    }
-
     /// The real things as the frame has them.
     pub fn drawn_real(&self) -> impl Iterator<Item = DrawnModel<'_>> {
         let batches = self.placed(Role::Real);
@@ -405,6 +403,45 @@ impl GpuScene {
             .collect();
         placed[0] = Some(DAffine3::IDENTITY);
         Some(placed)
+    }
+
+    /// The turn of the space that light from afar is known in, from the world; `None` where what it turns with is not there.
+    fn light_from_world(&self) -> Option<DAffine3> {
+        let world_from_light = self.world_from_anchor()?[self.light_anchor]?;
+        Some(DAffine3::from_mat3(world_from_light.matrix3.transpose()))
+    }
+
+    /// Where the anchors are in the space that light from afar is known in; `None` where that or the world has no pose.
+    pub fn light_from_anchor(&self) -> Option<Vec<Option<DAffine3>>> {
+        let light_from_world = self.light_from_world()?;
+        let anchors = self.world_from_anchor()?.into_iter();
+        Some(match self.light_anchor {
+            0 => anchors.collect(),
+            _ => anchors
+                .map(|pose| pose.map(|world_from_anchor| light_from_world * world_from_anchor))
+                .collect(),
+        })
+    }
+
+    /// The camera in that space.
+    pub fn camera_from_light(&self) -> Option<DAffine3> {
+        let camera_from_world = (*self.camera_from_anchor.first()?)?;
+        match self.light_anchor {
+            0 => Some(camera_from_world),
+            _ => Some(camera_from_world * self.light_from_world()?.inverse()),
+        }
+    }
+
+    /// The lights that cast shadow volumes and shine, in that space.
+    pub fn shining_in_light(&self) -> Vec<Light> {
+        let shining = self.lights.shining();
+        match self.light_from_world() {
+            Some(light_from_world) if self.light_anchor != 0 => {
+                let lights = shining.iter();
+                lights.map(|light| light.moved(&light_from_world)).collect()
+            }
+            _ => shining,
+        }
     }
 
     /// Makes the shadow volumes that the picture shows. Returns where the placed things and their shadows can be; `None`

@@ -93,7 +93,8 @@ impl Scene {
                 if kind == ProbeLightKind::Compact {
                     let walls = walls.get_or_insert_with(|| walls_of(scene));
                     let light = placed(&taken, scene, walls);
-                    split.compact.push(SceneLight { anchor: 0, light });
+                    let anchor = scene.anchor;
+                    split.compact.push(SceneLight { anchor, light });
                 }
             }
             split.found.push(ProbeLight {
@@ -138,9 +139,9 @@ impl Scene {
     /// The light of the scene that a bright part of the probe shows.
     fn same_light(&self, scene: &ProbeScene, region: &BrightRegion) -> Option<ProbeLightKind> {
         let reach_rad = SAME_PLACE_RAD + width_rad(region) / 2.0;
-        // (What stands on another anchor than the world's moves, and a probe was taken once.)
+        // (What stands on another anchor moves against the probe, which was taken once.)
         let numbered = self.lights.iter().enumerate();
-        let numbered = numbered.filter(|(_, light)| light.anchor == 0);
+        let numbered = numbered.filter(|(_, light)| light.anchor == scene.anchor);
         let candidates = numbered.filter_map(|(index, SceneLight { light, .. })| {
             let toward = match *light {
                 Light::Point { position_m, .. } => (position_m - scene.position_m).normalize(),

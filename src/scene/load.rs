@@ -88,7 +88,7 @@ impl Scene {
         let anchors = anchors::anchors(&root, tracking.detector)?;
         let lights = lights::lights(&root, &anchors)?;
         let ambient_radiance = lights::ambient_radiance(&root)?;
-        let probe = probe::probe(&root)?;
+        let probe = probe::probe(&root, &anchors)?;
         let shadows = shadows::shadows(&root, probe.as_ref())?;
         let (phantoms, virtuals) = objects::objects(&root, &anchors)?;
         Ok(Self {

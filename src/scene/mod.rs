@@ -279,6 +279,8 @@ pub struct ProbeScene {
     pub probe: Probe,
     /// What its file says that is passed over or taken for something else, one sentence each.
     pub notes: Vec<String>,
+    /// Index into [`Scene::anchors`] of the anchor that all of its light turns with.
+    pub anchor: usize,
     /// Where it was taken, in the world, metres.
     pub position_m: DVec3,
     /// Display white over the probe's unit of radiance.

@@ -9,7 +9,7 @@ use super::anchors::unique_name;
 use super::error::SceneError;
 use super::mesh_file::{self, MeshReading, Normals};
 use super::named_files::FileKind;
-use super::objects::ALBEDO;
+use super::objects::{ALBEDO, STANDING, StandingKeys, anchor_index};
 use super::placement::{ANGLE, POSITION, PlacementKeys, placement};
 use super::probe_file::{ProbeFile, ProbeKind, ProbeReading, read};
 use super::ranges::Numbers;
@@ -17,7 +17,7 @@ use super::reader::{Table, Value};
 use super::schema::key::Missing::{Is, Means};
 use super::schema::section::{Example, Section, Times};
 use super::schema::values::{InWords, Vectors, Written};
-use super::{ProbeScene, RoomPiece};
+use super::{Anchor, ProbeScene, RoomPiece};
 use crate::geometry::cuboid::cuboid;
 use crate::geometry::winding::winding_number;
 
@@ -74,11 +74,12 @@ pub static PROBE_SECTION: Section = Section {
     says: "The light of a room, seen by a light probe (gnomon probe makes one); then technique \"shafts\" is there. Without \
            a [[room]] all light comes from far away.",
     times: Times::UpToOnce,
-    groups: &[ProbeKeys::ALL],
+    groups: &[ProbeKeys::ALL, StandingKeys::ALL],
     shown: &[
         ("image", Example::Live("\"probe.hdr\"")),
         ("layer", Example::Aside("\"ViewLayer.Combined\"")),
         ("position_m", Example::Live("[0, 0, 0.06]")),
+        ("on", Example::Aside("\"dial\"")),
         ("room", Example::Live("\"room.obj\"")),
     ],
     is_aside: true,
@@ -104,7 +105,7 @@ pub static ROOM_SECTION: Section = Section {
 };
 
 /// The probe and its room; `None` without `[probe]`.
-pub fn probe(root: &Table) -> Result<Option<ProbeScene>, SceneError> {
+pub fn probe(root: &Table, anchors: &[Anchor]) -> Result<Option<ProbeScene>, SceneError> {
     let rooms = ROOM_SECTION.tables(root)?;
     let Some(table) = PROBE_SECTION.table(root)? else {
         return match rooms.first() {
@@ -142,6 +143,17 @@ pub fn probe(root: &Table) -> Result<Option<ProbeScene>, SceneError> {
         room.push(piece(table, &mut name_lines)?);
     }
     let is_far = room.is_empty();
+    let anchor = match STANDING.on.value(&table) {
+        Some(on) => {
+            let anchor = anchor_index(&on, anchors)?;
+            if anchor != 0 && !is_far {
+                let message = "light of a room stays where the room is; allowed: a probe without a room, or in the world";
+                return Err(on.error(message));
+            }
+            anchor
+        }
+        None => 0,
+    };
     if is_far {
         let around = [-FAR_M, FAR_M].map(|way| position_m.as_vec3() + way);
         room.push(box_between(around, None));
@@ -153,6 +165,7 @@ pub fn probe(root: &Table) -> Result<Option<ProbeScene>, SceneError> {
         image: path,
         probe,
         notes,
+        anchor,
         position_m,
         exposure,
         room,

@@ -329,6 +329,9 @@ fn check_technique(table: &Table, probe: Option<&ProbeScene>) -> Result<(), Scen
         ("shafts", None) => Err(value.error(
             "the scene has no [probe], which shafts take their light from; allowed: auto, volumes",
         )),
+        ("shafts", Some(probe)) if probe.anchor != 0 => Err(value.error(
+            "the probe turns with a marker (probe.on), which shafts cannot follow; allowed: auto, environment",
+        )),
         _ => Ok(()),
     }
 }

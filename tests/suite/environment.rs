@@ -4,8 +4,8 @@ use glam::{DAffine3, DMat3, DVec2, DVec3, Vec3};
 use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::geometry::ray_caster::RayCaster;
 use gnomon::light::probe::Probe;
-use gnomon::render::{REAL, Shown, VIRTUAL};
-use gnomon::scene::{EnvironmentMethod, Object, ProbeScene, Scene, Technique};
+use gnomon::render::{Layers, REAL, Shown, VIRTUAL};
+use gnomon::scene::{Anchor, EnvironmentMethod, Object, ProbeScene, Scene, Technique};
 
 use crate::common::shapes::{cuboid, rectangle, sphere};
 use crate::common::{Picture, Stage, flat_mesh, look_at, object, scene};
@@ -42,6 +42,7 @@ fn probe_scene(probe: Probe) -> ProbeScene {
         image: "sky.hdr".into(),
         probe,
         notes: Vec::new(),
+        anchor: 0,
         position_m: DVec3::new(0.0, 0.0, 0.05),
         exposure: 0.3,
         room: Vec::new(),
@@ -332,6 +333,67 @@ fn a_turned_probe_is_a_turned_scene() {
     // What differs is where the texels of the maps lie: no more than either is off the exact sum.
     let rms = (squares / compared as f32).sqrt();
     assert!(compared > 3000 && rms < 0.008, "{compared} compared: {rms}");
+}
+
+#[test]
+fn a_probe_on_a_marker_turns_with_it() {
+    let columns = 17;
+    let turn =
+        DAffine3::from_rotation_z(std::f64::consts::TAU * columns as f64 / PROBE_PX[0] as f64);
+    let anchor = |name: &str| Anchor {
+        name: name.to_owned(),
+        markers: Vec::new(),
+    };
+    // A lamp in the probe that is drawn with outlines turns as well.
+    let probe = |turned: usize| {
+        let sky = sky(turned);
+        let mut pixels = sky.pixels().to_vec();
+        let (row, column) = (14, (40 + turned) % PROBE_PX[0]);
+        pixels[row * PROBE_PX[0] + column] = Vec3::splat(400.0);
+        Probe::new(PROBE_PX, pixels).expect("pixels")
+    };
+    let scene = |turned: usize, on: usize| {
+        let mut scene = three_boxes();
+        scene.anchors = vec![anchor("table"), anchor("dial")];
+        scene.shadows.compact_penumbra_px = 1000.0;
+        scene.probe = Some(ProbeScene {
+            anchor: on,
+            ..probe_scene(probe(turned))
+        });
+        scene
+    };
+    for method in [EnvironmentMethod::Rays, EnvironmentMethod::Penumbrae] {
+        let drawn = |mut scene: Scene, dial: DAffine3| {
+            scene.shadows.environment.method = method;
+            let mut renderer = Stage::of_scene(scene).renderer(CAMERA);
+            // The dial may lie anywhere.
+            let aside = DAffine3::from_translation(DVec3::new(0.3, -0.2, 0.0));
+            let poses = [Some(camera()), Some(camera() * aside * dial)];
+            renderer.draw(&poses, Shown::Composite);
+            let picture = renderer.read_picture().expect("a picture");
+            (picture, renderer.layers().expect("layers"))
+        };
+        let (_, of_probe) = drawn(scene(columns, 0), DAffine3::IDENTITY);
+        let (_, of_dial) = drawn(scene(0, 1), turn);
+        let (_, still) = drawn(scene(0, 1), DAffine3::IDENTITY);
+        let rms = |one: &Layers, other: &Layers| {
+            let pairs = one.gain.iter().zip(&other.gain);
+            let squares = pairs.map(|(a, b)| (a[1] - b[1]).powi(2));
+            (squares.sum::<f32>() / one.gain.len() as f32).sqrt()
+        };
+        let (off, moved) = (rms(&of_probe, &of_dial), rms(&of_probe, &still));
+        // What differs is where regions, texels and rays lie.
+        assert!(
+            off < 0.02 && moved > 5.0 * off,
+            "{method:?}: {off}, turned by {moved}"
+        );
+    }
+    // What it turns with is not there: neither is its light.
+    let mut renderer = Stage::of_scene(scene(0, 1)).renderer(CAMERA);
+    renderer.draw(&[Some(camera()), None], Shown::Composite);
+    let without = renderer.read_picture().expect("a picture");
+    renderer.draw(&[Some(camera()), Some(camera())], Shown::Composite);
+    assert!(renderer.read_picture().expect("a picture") != without);
 }
 
 #[test]

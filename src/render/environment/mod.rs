@@ -1,7 +1,8 @@
 //! An environment's broad light on things that move and turn (Tamura et al. 2005): what each thing hides of its regions, by maps.
 //! Reads the probe and poses. Writes the things' maps, and light sums.
 //!
-//! What depends on where things are in the world is worked out when they move, not when the camera does.
+//! What depends on where things are in the world is worked out when they move, not when the camera does. "The world" here is as
+//! the probe's light has it: a probe on a marker turns with that, and so does all that is worked out.
 
 mod casting;
 mod data;
@@ -43,6 +44,8 @@ pub(super) struct Environment {
     settings: EnvironmentSettings,
     /// All broad light, linear radiance, and the camera's exposure.
     rest: (Probe, f64),
+    /// The node that it turns with.
+    anchor: usize,
     distant: DistantLight,
     /// By their numbers in the scene, phantoms first; `None`: not there.
     things: Vec<Option<Thing>>,
@@ -96,6 +99,7 @@ impl Environment {
         Self {
             distant: DistantLight::new(&rest.0, rest.1, settings.regions as usize),
             rest,
+            anchor: probe.anchor,
             things: things(scene),
             own_light: OwnLight::new(
                 &objects(scene),
@@ -209,7 +213,7 @@ impl Environment {
             let glossy = self.is_glossy.then_some((rest, *exposure as f32));
             MirroredProbe::new(&gpu.device, &gpu.queue, glossy)
         });
-        let placed_for = (gpu_scene.world_from_anchor()?, gpu_scene.shining());
+        let placed_for = (gpu_scene.light_from_anchor()?, gpu_scene.shining_in_light());
         if self.placed_for.as_ref() != Some(&placed_for) {
             let (anchors, compact) = &placed_for;
             let made = (&casting, &mirrored);
@@ -241,6 +245,9 @@ impl BroadLight for Environment {
         let Some(probe) = &scene.probe else {
             return false;
         };
+        if probe.anchor != self.anchor {
+            return false;
+        }
         let is_real_gathered = self.final_gather.is_some();
         let (objects, real_count) = (objects(scene), scene.phantoms.len());
         if !self
@@ -270,7 +277,7 @@ impl BroadLight for Environment {
     }
 
     fn update(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene) -> Option<PixelRect> {
-        let camera_from_world = (*gpu_scene.camera_from_anchor().first()?)?;
+        let camera_from_world = gpu_scene.camera_from_light()?;
         let world_from_camera = camera_from_world.inverse();
         self.follow_poses(gpu, gpu_scene)?;
         let gathered = self.final_gather.as_mut();

@@ -175,7 +175,7 @@ impl OwnLight {
         bounds: &[Bounds],
         discs: &DiscTree,
     ) {
-        let world_from_anchor = gpu_scene.world_from_anchor().unwrap_or_default();
+        let world_from_anchor = gpu_scene.light_from_anchor().unwrap_or_default();
         let batches = gpu_scene.corners();
         let mut irradiances: Vec<Option<Vec<Vec3>>> = batches.map(|_| None).collect();
         let sizes: Vec<usize> = gpu_scene

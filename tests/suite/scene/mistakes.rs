@@ -203,3 +203,30 @@ fn each_mistake_has_its_place_and_says_what_is_allowed() {
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
+
+#[test]
+fn a_probe_turns_with_a_marker_that_is_there_and_not_with_a_room() {
+    let project = project();
+    let probe = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/room/probe.hdr");
+    std::fs::copy(probe, project.path().join("probe.hdr")).unwrap();
+    let dial =
+        "[[marker]]\nname = \"dial\"\nid = 9\nsize_m = 0.04\n[probe]\nimage = \"probe.hdr\"\n";
+    let loaded = |more: &str| load_in(&project, &format!("{HEAD}{dial}{more}"));
+    let scene = loaded("on = \"dial\"\n").unwrap();
+    assert_eq!(scene.probe.unwrap().anchor, 1);
+    assert_eq!(loaded("").unwrap().probe.unwrap().anchor, 0);
+    for (more, told) in [
+        ("on = \"dail\"\n", "did you mean \"dial\"?"),
+        (
+            "on = \"dial\"\n[[room]]\nbox_m = [-1, -1, -1, 1, 1, 1]\n",
+            "probe.on = \"dial\": light of a room stays where the room is",
+        ),
+        (
+            "on = \"dial\"\n[shadows]\ntechnique = \"shafts\"\n",
+            "which shafts cannot follow; allowed: auto, environment",
+        ),
+    ] {
+        let error = loaded(more).unwrap_err().to_string();
+        assert!(error.contains(told) && error.contains('^'), "{error}");
+    }
+}
