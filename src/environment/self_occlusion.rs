@@ -41,7 +41,16 @@ pub fn self_occlusions<'a>(
     corners: &[(DVec3, DVec3)],
     caster: impl Fn(usize) -> (&'a RayCaster, f64) + Sync,
 ) -> Vec<SelfOcclusion> {
-    let rays: Vec<(DVec3, Vec<f64>)> = sphere(RAYS)
+    self_occlusions_by(RAYS, corners, caster)
+}
+
+/// The same by another number of rays from each corner, half of them above its surface.
+pub fn self_occlusions_by<'a>(
+    ray_count: usize,
+    corners: &[(DVec3, DVec3)],
+    caster: impl Fn(usize) -> (&'a RayCaster, f64) + Sync,
+) -> Vec<SelfOcclusion> {
+    let rays: Vec<(DVec3, Vec<f64>)> = sphere(ray_count)
         .map(|direction| (direction, basis(direction, TRANSFER_DEGREE)))
         .collect();
     let of_corner = |(number, &(place, normal)): (usize, &(DVec3, DVec3))| {

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use glam::{DVec3, Vec3};
 
 use super::looks::looks_of_faces;
-pub use super::looks::{CornerLook, RawLooks};
+pub use super::looks::{CornerLook, RawLooks, RigPoint};
 use super::mend::{Mended, has_three_vertices, mend, restore_backs};
 use super::normals::{face_normal, made_normals};
 use super::orient::turned_triangles;
@@ -28,6 +28,28 @@ pub struct Mesh {
     pub looks: Vec<CornerLook>,
     /// Indices into `looks` for each corner of each triangle; empty with them.
     pub corner_looks: Vec<[u32; 3]>,
+    /// For each corner of each triangle what holds it, where the mesh follows a rig; else empty.
+    pub held: Vec<[HeldCorner; 3]>,
+}
+
+/// How a corner of a triangle follows a rig.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeldCorner {
+    /// Where it is.
+    pub point: RigPoint,
+    /// Where its normal comes from.
+    pub normal: HeldNormal,
+}
+
+/// Where the normal of a corner that follows a rig comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HeldNormal {
+    /// From the rig's vertices.
+    OfRig,
+    /// From them, but towards the other side: the triangle was turned over.
+    OfRigTurned,
+    /// From the faces around it.
+    OfFaces,
 }
 
 /// What [`Mesh::weld`] found and did.
@@ -85,22 +107,12 @@ impl Mesh {
         crease_rad: f64,
     ) -> (Self, MeshReport) {
         let mut welder = Welder::new(raw_positions.len());
-        let faces: Vec<Face> = raw
-            .iter()
-            .zip(0..)
-            .map(|(triangle, source)| Face {
-                vertices: triangle
-                    .vertices
-                    .map(|vertex| welder.index(raw_positions, vertex)),
-                front: Side {
-                    normals: triangle.normals,
-                    material: triangle.material,
-                    source,
-                },
-                back: None,
-            })
-            .filter(|face| has_three_vertices(face.vertices))
-            .collect();
+        let at = |vertex: u32| {
+            // Adding 0 makes 0 of -0, which is the same place.
+            let place = raw_positions[vertex as usize] + Vec3::ZERO;
+            place.to_array().map(f32::to_bits)
+        };
+        let faces = welder.faces(raw_positions, raw, at);
         let exactly_merged = welder.used - welder.positions.len();
         let positions = welder.positions;
         let Mended {
@@ -121,20 +133,85 @@ impl Mesh {
             ..Self::from_faces(positions, &faces, crease_rad)
         };
         let dropped_duplicates = duplicates - restored;
-        let uses = edge_uses(mesh.triangles.iter().copied());
-        let open_edges = unbalanced_edges(&uses);
         let report = MeshReport {
             merged_vertices: exactly_merged + merged_vertices,
             dropped_without_area: raw.len() + splits - dropped_duplicates - mesh.triangles.len(),
             dropped_duplicates,
             splits,
             turned_triangles,
-            open_edges,
-            crowded_edges: by_edge(&uses).filter(|around| around.len() > 2).count(),
-            components: component_count(&uses, mesh.triangles.len()),
-            closed: open_edges == 0 && !mesh.triangles.is_empty(),
+            ..mesh.topology()
         };
         (mesh, report)
+    }
+
+    /// The mesh of a model that a rig moves, of whose looks each says what holds it. Vertices are one where `together` has
+    /// one number for them: not where they lie in one place at rest, if they may part. Nothing is mended and nothing left out,
+    /// for what has no area at rest may get one.
+    ///
+    /// # Panics
+    /// If a triangle names a vertex or a look that is not there.
+    pub fn weld_moving(
+        raw_positions: &[Vec3],
+        raw: &[RawTriangle],
+        looks: &RawLooks,
+        together: &[u32],
+        crease_rad: f64,
+    ) -> (Self, MeshReport) {
+        let mut welder = Welder::new(raw_positions.len());
+        let number = |vertex: u32| [together[vertex as usize], 0, 0];
+        let mut faces = welder.faces(raw_positions, raw, number);
+        let merged_vertices = welder.used - welder.positions.len();
+        let positions = std::mem::take(&mut welder.positions);
+        let turned_triangles = orient(&positions, &mut faces);
+        // Nothing was cut: each corner is one of its raw triangle's.
+        let raw_corner = |face: &Face, corner: usize| {
+            let vertices = raw[face.front.source as usize].vertices;
+            let is_it = |&vertex: &u32| {
+                welder.index_of_raw[vertex as usize] == Some(face.vertices[corner])
+            };
+            vertices.iter().position(is_it).unwrap_or(corner)
+        };
+        let corner_looks: Vec<[u32; 3]> = faces
+            .iter()
+            .map(|face| {
+                let own = looks.corners[face.front.source as usize];
+                [0, 1, 2].map(|corner| own[raw_corner(face, corner)])
+            })
+            .collect();
+        let held = faces.iter().zip(&corner_looks).map(|(face, own)| {
+            let raw = &raw[face.front.source as usize];
+            [0, 1, 2].map(|corner| HeldCorner {
+                point: looks.looks[own[corner] as usize].held_by,
+                normal: held_normal(face, raw, corner),
+            })
+        });
+        let held = held.collect();
+        let mesh = Self {
+            held,
+            looks: looks.looks.clone(),
+            corner_looks,
+            ..Self::from_faces(positions, &faces, crease_rad)
+        };
+        let report = MeshReport {
+            merged_vertices,
+            dropped_without_area: raw.len() - mesh.triangles.len(),
+            turned_triangles,
+            ..mesh.topology()
+        };
+        (mesh, report)
+    }
+
+    /// What a report says of how its triangles hang together.
+    fn topology(&self) -> MeshReport {
+        let uses = edge_uses(self.triangles.iter().copied());
+        let open_edges = unbalanced_edges(&uses);
+        MeshReport {
+            open_edges,
+            crowded_edges: by_edge(&uses).filter(|around| around.len() > 2).count(),
+            components: component_count(&uses, self.triangles.len()),
+            closed: open_edges == 0 && !self.triangles.is_empty(),
+            ..MeshReport::default()
+        }
     }
 
     fn from_faces(positions: Vec<Vec3>, faces: &[Face], crease_rad: f64) -> Self {
@@ -200,6 +277,7 @@ impl Mesh {
         self.corner_looks
             .iter_mut()
             .for_each(|looks| looks.swap(1, 2));
+        self.held.iter_mut().for_each(|held| held.swap(1, 2));
         self
     }
 
@@ -228,10 +306,20 @@ impl Mesh {
     }
 }
 
-/// Gives vertices at the same place the same index, in the order of their first use.
+/// Where the normal of a face's corner comes from; `raw` is the triangle that the face was.
+fn held_normal(face: &Face, raw: &RawTriangle, corner: usize) -> HeldNormal {
+    let is_as_given = (face.front.normals.iter()).all(|normal| raw.normals.contains(normal));
+    match face.front.normals[corner] {
+        None => HeldNormal::OfFaces,
+        Some(_) if is_as_given => HeldNormal::OfRig,
+        Some(_) => HeldNormal::OfRigTurned,
+    }
+}
+
+/// Gives vertices that are one the same index, in the order of their first use.
 struct Welder {
     positions: Vec<Vec3>,
-    index_at: HashMap<[u32; 3], u32>,
+    index_of_key: HashMap<[u32; 3], u32>,
     index_of_raw: Vec<Option<u32>>,
     used: usize,
 }
@@ -240,26 +328,50 @@ impl Welder {
     fn new(raw_count: usize) -> Self {
         Self {
             positions: Vec::new(),
-            index_at: HashMap::new(),
+            index_of_key: HashMap::new(),
             index_of_raw: vec![None; raw_count],
             used: 0,
         }
     }
 
-    fn index(&mut self, raw_positions: &[Vec3], raw: u32) -> u32 {
+    /// Raw triangles as faces; vertices with one key are one. What then has fewer than three is left out.
+    fn faces(
+        &mut self,
+        raw_positions: &[Vec3],
+        raw: &[RawTriangle],
+        key_of: impl Fn(u32) -> [u32; 3],
+    ) -> Vec<Face> {
+        let faces = raw.iter().zip(0..).map(|(triangle, source)| Face {
+            vertices: triangle
+                .vertices
+                .map(|vertex| self.index(raw_positions, vertex, &key_of)),
+            front: Side {
+                normals: triangle.normals,
+                material: triangle.material,
+                source,
+            },
+            back: None,
+        });
+        faces
+            .filter(|face| has_three_vertices(face.vertices))
+            .collect()
+    }
+
+    fn index(
+        &mut self,
+        raw_positions: &[Vec3],
+        raw: u32,
+        key_of: &impl Fn(u32) -> [u32; 3],
+    ) -> u32 {
         let known = &mut self.index_of_raw[raw as usize];
         if let Some(index) = *known {
             return index;
         }
-        // Adding 0 makes 0 of -0, which is the same place.
-        let position = raw_positions[raw as usize] + Vec3::ZERO;
         let next = self.positions.len() as u32;
-        let index = *self
-            .index_at
-            .entry(position.to_array().map(f32::to_bits))
-            .or_insert(next);
+        let index = *self.index_of_key.entry(key_of(raw)).or_insert(next);
         if index == next {
-            self.positions.push(position);
+            // (0 and -0 are one place.)
+            self.positions.push(raw_positions[raw as usize] + Vec3::ZERO);
         }
         self.used += 1;
         *known = Some(index);

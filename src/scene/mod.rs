@@ -16,6 +16,7 @@ pub use crate::shafts::difference::Difference;
 pub mod schema;
 
 mod anchors;
+mod animation;
 mod bundle;
 mod camera;
 mod compact;
@@ -57,6 +58,7 @@ mod transport;
 mod vertex_colors;
 pub mod yaml;
 
+pub use animation::Animation;
 pub use camera::{CameraSettings, PixelFormat, WantedFormat};
 pub use compact::{ProbeLight, ProbeLightKind, SplitLight};
 pub use dictionary::Dictionary;
@@ -69,6 +71,7 @@ pub use motion::{Motion, PathEnd, Station};
 pub use named_files::{FileKind, NamedFile};
 pub use placement::Placement;
 pub use quality::Quality;
+pub use raw_model::ClipInfo;
 pub use ranges::{Digits, Numbers, Whole};
 pub use reference::reference;
 pub use shadows::{
@@ -244,6 +247,10 @@ pub struct Object {
     pub textures: Vec<Arc<Texture>>,
     /// What of its file is passed over or taken for something else, one sentence each.
     pub notes: Vec<String>,
+    /// The animations that its file has.
+    pub clips: Vec<ClipInfo>,
+    /// The one that plays. What it makes of `mesh` at a time, [`Object::take_shape`] says.
+    pub animation: Option<Animation>,
     /// The node that it stands still on: an anchor, or, beyond the anchors, one that moves with it
     /// ([`Scene::camera_from_nodes`]).
     pub anchor: usize,

@@ -101,6 +101,8 @@ pub fn object(name: &str, mesh: Mesh, albedo: DVec3, world_from_object: DAffine3
         notes: Vec::new(),
         anchor: 0,
         motion: None,
+        clips: Vec::new(),
+        animation: None,
         anchor_from_object: world_from_object,
         casts: true,
         visible: true,

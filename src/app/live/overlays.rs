@@ -188,7 +188,8 @@ impl Overlays<'_> {
             .iter()
             .map(|pose| pose.map(|camera_from_node| world_from_camera * camera_from_node))
             .collect();
-        for line in lines.lines(scene, &world_from_anchor) {
+        let scene = scene.shaped_at(self.picture.frame.time_secs);
+        for line in lines.lines(&scene, &world_from_anchor) {
             let Some(camera_from_anchor) = camera_from_node[line.anchor] else {
                 continue;
             };

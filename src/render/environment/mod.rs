@@ -4,6 +4,7 @@
 //! What depends on where things are in the world is worked out when they move, not when the camera does.
 
 mod data;
+mod deforming;
 mod pipelines;
 
 use glam::{DAffine3, DVec3, Vec3};
@@ -26,6 +27,7 @@ use crate::shafts::shadow_atlas::Tiling;
 
 use super::anchor_geometry::Role;
 use super::combined::BroadLight;
+use super::deforming::DeformingThing;
 use super::final_gather::FinalGather;
 use super::gpu::Gpu;
 use super::gpu_scene::{DrawnLight, GpuScene};
@@ -151,7 +153,7 @@ impl Environment {
             triangles: gpu.buffer(
                 "environment's casters",
                 bytemuck::cast_slice(&triangles),
-                wgpu::BufferUsages::VERTEX,
+                wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
             ),
             ranges,
             frame: gpu.device.create_buffer(&wgpu::BufferDescriptor {
@@ -374,6 +376,15 @@ impl BroadLight for Environment {
     /// Things that are elsewhere on their anchors take a new renderer.
     fn follow(&mut self, _scene: &Scene) -> bool {
         false
+    }
+
+    fn deform(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene, things: &[&DeformingThing]) {
+        for thing in things {
+            self.deform_thing(gpu, gpu_scene, thing);
+        }
+        if let Some(final_gather) = &mut self.final_gather {
+            final_gather.deform(things);
+        }
     }
 
     fn update(&mut self, gpu: &Gpu, gpu_scene: &GpuScene) -> Option<PixelRect> {
