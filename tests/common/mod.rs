@@ -8,6 +8,7 @@ pub mod near_edges;
 pub mod photographs;
 pub mod prints;
 pub mod random;
+pub mod rigs;
 pub mod shapes;
 pub mod sheets;
 #[cfg(unix)]
