@@ -100,7 +100,7 @@ fn a_box_morphs_along_the_spline_and_a_phantom_as_well() {
 
 #[test]
 fn parts_that_touch_at_rest_part_in_motion() {
-    let (still, opened) = shapes(&hinge(), "animation = 0\nsmooth_deg = 0\n", 1.0);
+    let (still, opened) = shapes(&hinge(), "animation = 0\nanimation_loop = false\nsmooth_deg = 0\n", 1.0);
     // Two boxes, of which none lends the other its corners: eight each, and both closed.
     assert_eq!(still.mesh.positions.len(), 16);
     assert!(opened.mesh.closed_and_consistent());
@@ -149,7 +149,7 @@ fn speed_and_loop_say_which_moment_is_shown() {
 #[test]
 fn what_a_scene_asks_for_amiss_is_told_with_what_there_is() {
     let of = |model: &Value, keys: &str| scene_of("virtual", model, keys).unwrap_err();
-    let none = json!({"asset": {"version": "2.0"}, "meshes": [], "nodes": [], "scenes": [{}]});
+    let none = json!({"asset": {"version": "2.0"}, "nodes": [{}], "scenes": [{"nodes": [0]}]});
     for (model, keys, expected) in [
         (bar(), "animation = \"Walk\"\n", "allowed: those of its file: 0 \"Bend\""),
         (hinge(), "animation = 2\n", "0, 1 \"Jump\""),
@@ -196,7 +196,7 @@ fn without_an_animation_a_file_is_in_its_rest_pose_and_its_animations_are_not_lo
 #[test]
 fn hostile_animations_are_errors_with_their_place() {
     type Spoil = fn(&mut Value);
-    let spoiled: [(&str, Spoil, &str); 13] = [
+    let spoiled: [(&str, Spoil, &str); 14] = [
         ("joint", |j| j["skins"][0]["joints"] = json!([1]), "joint 1 of 1"),
         ("binds", |j| j["accessors"][4]["count"] = json!(1), "skins[0]"),
         (
@@ -236,6 +236,11 @@ fn hostile_animations_are_errors_with_their_place() {
             "node",
             |j| j["animations"][0]["channels"][0]["target"]["node"] = json!(70),
             "animations[0].channels[0].target.node",
+        ),
+        (
+            "path",
+            |j| j["animations"][0]["channels"][0]["target"]["path"] = json!("pointer"),
+            "animations[0].channels[0].target.path: not read; allowed: translation",
         ),
         (
             "weights of nothing",

@@ -4,6 +4,8 @@ use glam::{DQuat, DVec3};
 use gltf::Document;
 use gltf::accessor::Dimensions;
 use gltf::animation::{Interpolation as Given, Property};
+use gltf::json::animation::VALID_PROPERTIES;
+use gltf::json::validation::Checked;
 
 use super::file::GltfFile;
 use crate::geometry::rig::sampler::{Interpolation, Keyed, Sampler};
@@ -39,6 +41,7 @@ pub(super) fn clip(
     let Some(animation) = document.animations().nth(number) else {
         return Err(file.error(&format!("animations[{number}]"), "it is not there"));
     };
+    check_targets(file, document, number)?;
     let mut channels: Vec<Channel> = Vec::new();
     for channel in animation.channels() {
         let place = format!("animations[{number}].channels[{}]", channel.index());
@@ -59,6 +62,30 @@ pub(super) fn clip(
         duration_s: ends.fold(0.0, f64::max),
         channels,
     })
+}
+
+/// The crate does not look at what channels are for, and stops where that is none.
+fn check_targets(
+    file: &GltfFile<'_>,
+    document: &Document,
+    number: usize,
+) -> Result<(), SceneError> {
+    let root = document.as_json();
+    let animations = root.animations.get(number).into_iter();
+    let channels = animations.flat_map(|animation| animation.channels.iter().enumerate());
+    for (channel, json) in channels {
+        let place = format!("animations[{number}].channels[{channel}].target");
+        let (node, count) = (json.target.node.value(), root.nodes.len());
+        if node >= count {
+            let message = format!("node {node} of {count}");
+            return Err(file.error(&format!("{place}.node"), message));
+        }
+        if !matches!(json.target.path, Checked::Valid(_)) {
+            let message = format!("not read; allowed: {}", VALID_PROPERTIES.join(", "));
+            return Err(file.error(&format!("{place}.path"), message));
+        }
+    }
+    Ok(())
 }
 
 fn track(
