@@ -166,9 +166,8 @@ impl Mesh {
         // Nothing was cut: each corner is one of its raw triangle's.
         let raw_corner = |face: &Face, corner: usize| {
             let vertices = raw[face.front.source as usize].vertices;
-            let is_it = |&vertex: &u32| {
-                welder.index_of_raw[vertex as usize] == Some(face.vertices[corner])
-            };
+            let is_it =
+                |&vertex: &u32| welder.index_of_raw[vertex as usize] == Some(face.vertices[corner]);
             vertices.iter().position(is_it).unwrap_or(corner)
         };
         let corner_looks: Vec<[u32; 3]> = faces
@@ -371,7 +370,8 @@ impl Welder {
         let index = *self.index_of_key.entry(key_of(raw)).or_insert(next);
         if index == next {
             // (0 and -0 are one place.)
-            self.positions.push(raw_positions[raw as usize] + Vec3::ZERO);
+            self.positions
+                .push(raw_positions[raw as usize] + Vec3::ZERO);
         }
         self.used += 1;
         *known = Some(index);

@@ -317,13 +317,15 @@ fn thing(
     })
 }
 
+/// What corners are told apart by: thing, place, normal and material, what else a corner has, and what moves it.
+type CornerKey = (u32, [u32; 10], [u32; 13], [u32; 7]);
+
 /// Corners that triangles share, and the triangles.
 #[derive(Default)]
 struct SharedCorners {
     corners: Vec<SurfaceCorner>,
     triangles: Vec<[u32; 3]>,
-    /// By thing, place, normal and material, by what else the corner has, and by what moves it.
-    index_of: HashMap<(u32, [u32; 10], [u32; 13], [u32; 7]), u32>,
+    index_of: HashMap<CornerKey, u32>,
     /// For each corner the number of its thing.
     thing_of: Vec<u32>,
     /// Number of the thing at hand, phantoms first.
@@ -441,7 +443,13 @@ impl SurfaceBatch {
             places[index as usize] = (corner.position, corner.normal);
         }
         queue.write_buffer(&self.corners, 0, bytemuck::cast_slice(&shared));
-        let has_tangents = || object.mesh.looks.iter().any(|look| look.tangent != Vec4::ZERO);
+        let has_tangents = || {
+            object
+                .mesh
+                .looks
+                .iter()
+                .any(|look| look.tangent != Vec4::ZERO)
+        };
         if let Some(looks) = self.looks.as_ref().filter(|_| has_tangents()) {
             let mut turned = vec![CornerOfMaterial::zeroed(); places.len()];
             for (number, &index) in indices.iter().enumerate() {
@@ -466,7 +474,11 @@ impl AnchoredModel {
             .extend(triangles.map(|triangle| triangle.map(place)));
         let around = Bounds::around(positions.iter().map(|position| position.as_dvec3()));
         self.bounds = around.unwrap_or(self.bounds);
-        if let Some(caster) = self.levels.first_mut().and_then(|level| level.caster.as_mut()) {
+        if let Some(caster) = self
+            .levels
+            .first_mut()
+            .and_then(|level| level.caster.as_mut())
+        {
             caster.smooth_normals = smooth_normals(&corners(object, mesh));
             caster.caster.set_positions(positions);
             let vertices = caster.caster.volume_vertices();

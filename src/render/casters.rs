@@ -98,7 +98,10 @@ impl Casters {
 
     /// What a thing casts is to be made anew, by its number: it has another shape.
     pub fn forget(&mut self, number: usize) {
-        let of_thing = self.shadows.iter_mut().filter_map(|of_slot| of_slot.get_mut(number));
+        let of_thing = self
+            .shadows
+            .iter_mut()
+            .filter_map(|of_slot| of_slot.get_mut(number));
         for shadow in of_thing {
             shadow.volume.forget();
             shadow.lit_for = None;

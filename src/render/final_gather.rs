@@ -194,9 +194,8 @@ impl FinalGather {
     pub fn deform(&mut self, things: &[&DeformingThing]) {
         for DeformingThing { role, object, .. } in things {
             let is_real = *role == Role::Real;
-            let is_it = |thing: &&mut Thing| {
-                (thing.is_real, thing.anchor) == (is_real, object.anchor)
-            };
+            let is_it =
+                |thing: &&mut Thing| (thing.is_real, thing.anchor) == (is_real, object.anchor);
             let deformed = Thing::whole(&object.occluder(), is_real);
             if let Some((thing, deformed)) = self.things.iter_mut().find(is_it).zip(deformed) {
                 *thing = deformed;

@@ -138,10 +138,13 @@ impl<'a> WantedAnimation<'a> {
             }
         };
         found.ok_or_else(|| {
-            let known = clips.iter().enumerate().map(|(number, clip)| match &clip.name[..] {
-                "" => number.to_string(),
-                name => format!("{number} \"{name}\""),
-            });
+            let known = clips
+                .iter()
+                .enumerate()
+                .map(|(number, clip)| match &clip.name[..] {
+                    "" => number.to_string(),
+                    name => format!("{number} \"{name}\""),
+                });
             let known = known.collect::<Vec<_>>().join(", ");
             let message = format!("no such animation; allowed: those of its file: {known}");
             self.which.error(message)

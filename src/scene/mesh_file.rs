@@ -299,12 +299,7 @@ impl Up {
 }
 
 /// Turns a model upright and scales it, by the factor that it returns.
-fn place(
-    model: &mut RawModel,
-    path: &Path,
-    up: Up,
-    fit_m: Option<f64>,
-) -> Result<f64, SceneError> {
+fn place(model: &mut RawModel, path: &Path, up: Up, fit_m: Option<f64>) -> Result<f64, SceneError> {
     let upright = |vector: Vec3| match up {
         Up::Y => Vec3::new(vector.x, -vector.z, vector.y),
         Up::Z => vector,

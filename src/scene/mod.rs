@@ -71,8 +71,8 @@ pub use motion::{Motion, PathEnd, Station};
 pub use named_files::{FileKind, NamedFile};
 pub use placement::Placement;
 pub use quality::Quality;
-pub use raw_model::ClipInfo;
 pub use ranges::{Digits, Numbers, Whole};
+pub use raw_model::ClipInfo;
 pub use reference::reference;
 pub use shadows::{
     EnvironmentMethod, EnvironmentSettings, ShadowChange, ShadowSettings, ShadowTechnique,

@@ -84,7 +84,12 @@ fn quads(corners: &[[u16; 4]]) -> Vec<[u16; 1]> {
 }
 
 /// A quarter turn about z.
-const QUARTER: [f32; 4] = [0.0, 0.0, std::f32::consts::FRAC_1_SQRT_2, std::f32::consts::FRAC_1_SQRT_2];
+const QUARTER: [f32; 4] = [
+    0.0,
+    0.0,
+    std::f32::consts::FRAC_1_SQRT_2,
+    std::f32::consts::FRAC_1_SQRT_2,
+];
 /// No turn.
 const NONE: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
 
@@ -100,7 +105,12 @@ pub fn bar() -> Value {
     let rings = 9_u16;
     let ring = |number: u16| {
         let y = f32::from(number) / 4.0;
-        [[-0.2, y, -0.2], [-0.2, y, 0.2], [0.2, y, 0.2], [0.2, y, -0.2]]
+        [
+            [-0.2, y, -0.2],
+            [-0.2, y, 0.2],
+            [0.2, y, 0.2],
+            [0.2, y, -0.2],
+        ]
     };
     let positions: Vec<[f32; 3]> = (0..rings).flat_map(ring).collect();
     let joints: Vec<[u16; 4]> = positions.iter().map(|_| [0, 1, 0, 0]).collect();
@@ -154,7 +164,13 @@ pub fn bar() -> Value {
 /// The corners of a box, and its sides.
 fn cuboid([x, y, z]: [f32; 3]) -> (Vec<[f32; 3]>, Vec<[u16; 1]>) {
     let positions = (0..8_u8).map(|corner| {
-        let bit = |number: u8, length: f32| if corner >> number & 1 == 1 { length } else { 0.0 };
+        let bit = |number: u8, length: f32| {
+            if corner >> number & 1 == 1 {
+                length
+            } else {
+                0.0
+            }
+        };
         [bit(0, x), bit(1, y), bit(2, z)]
     });
     let sides = [
@@ -179,7 +195,9 @@ pub fn morphing_box() -> Value {
         .iter()
         .map(|&[_, y, _]| if y > 0.5 { LEANING } else { [0.0; 3] })
         .collect();
-    let keys: Vec<[f32; 1]> = [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0].map(|it| [it]).to_vec();
+    let keys: Vec<[f32; 1]> = [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
+        .map(|it| [it])
+        .to_vec();
     let [position, indices, moves, times, keys] = [
         file.floats(&positions),
         file.shorts(&indices),

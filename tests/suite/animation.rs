@@ -100,7 +100,11 @@ fn a_box_morphs_along_the_spline_and_a_phantom_as_well() {
 
 #[test]
 fn parts_that_touch_at_rest_part_in_motion() {
-    let (still, opened) = shapes(&hinge(), "animation = 0\nanimation_loop = false\nsmooth_deg = 0\n", 1.0);
+    let (still, opened) = shapes(
+        &hinge(),
+        "animation = 0\nanimation_loop = false\nsmooth_deg = 0\n",
+        1.0,
+    );
     // Two boxes, of which none lends the other its corners: eight each, and both closed.
     assert_eq!(still.mesh.positions.len(), 16);
     assert!(opened.mesh.closed_and_consistent());
@@ -112,7 +116,12 @@ fn parts_that_touch_at_rest_part_in_motion() {
             .fold(f64::INFINITY, f64::min)
     };
     // The lid stands up at the edge, the box lies as it lay.
-    for corner in [[0.0, 1.4, 1.0], [-0.4, 1.4, 0.0], [1.0, 0.4, 1.0], [0.0, 0.0, 0.0]] {
+    for corner in [
+        [0.0, 1.4, 1.0],
+        [-0.4, 1.4, 0.0],
+        [1.0, 0.4, 1.0],
+        [0.0, 0.0, 0.0],
+    ] {
         assert!(opened_to(DVec3::from_array(corner)) < 1e-6, "{corner:?}");
     }
     let volume = opened.mesh.signed_volume_m3();
@@ -137,12 +146,25 @@ fn speed_and_loop_say_which_moment_is_shown() {
         ("animation_speed = -1\nanimation_loop = false\n", 9.0, 0.0),
     ] {
         let (found, expected) = (height(keys, time_s), at(same_as));
-        assert!((found - expected).abs() < 1e-6, "{keys}: {found} {expected}");
+        assert!(
+            (found - expected).abs() < 1e-6,
+            "{keys}: {found} {expected}"
+        );
     }
     assert!(at(0.0) > at(1.0) + 0.5);
     // What has ended stays as it ends: the jump's last key, not its first.
-    let jumped = shapes(&hinge(), "animation = \"Jump\"\nanimation_loop = false\n", 5.0).1;
-    let highest = jumped.mesh.positions.iter().map(|place| place.z).fold(0.0, f32::max);
+    let jumped = shapes(
+        &hinge(),
+        "animation = \"Jump\"\nanimation_loop = false\n",
+        5.0,
+    )
+    .1;
+    let highest = jumped
+        .mesh
+        .positions
+        .iter()
+        .map(|place| place.z)
+        .fold(0.0, f32::max);
     assert!((highest - 1.3).abs() < 1e-6, "{highest}");
 }
 
@@ -151,7 +173,11 @@ fn what_a_scene_asks_for_amiss_is_told_with_what_there_is() {
     let of = |model: &Value, keys: &str| scene_of("virtual", model, keys).unwrap_err();
     let none = json!({"asset": {"version": "2.0"}, "nodes": [{}], "scenes": [{"nodes": [0]}]});
     for (model, keys, expected) in [
-        (bar(), "animation = \"Walk\"\n", "allowed: those of its file: 0 \"Bend\""),
+        (
+            bar(),
+            "animation = \"Walk\"\n",
+            "allowed: those of its file: 0 \"Bend\"",
+        ),
         (hinge(), "animation = 2\n", "0, 1 \"Jump\""),
         (hinge(), "animation = -1\n", "animation"),
         (hinge(), "animation = true\n", "animation"),
@@ -170,14 +196,20 @@ fn what_a_scene_asks_for_amiss_is_told_with_what_there_is() {
     }
     let text = "[camera]\nsource = \"webcam:0\"\n[[marker]]\nname = \"m\"\nid = 1\nsize_m = 0.04\n\
                 [[virtual]]\nname = \"it\"\nbox_m = [1, 1, 1]\nanimation = \"Walk\"\n";
-    let message = Scene::parse("scene.toml".as_ref(), text).unwrap_err().to_string();
+    let message = Scene::parse("scene.toml".as_ref(), text)
+        .unwrap_err()
+        .to_string();
     assert!(message.contains("it is of a glTF file"), "{message}");
 }
 
 #[test]
 fn check_tells_what_there_is_and_what_plays() {
     let told = |keys: &str| check::summary(&scene_of("virtual", &hinge(), keys).unwrap());
-    assert!(told("").contains("animations 0 1 s, 1 \"Jump\" 1 s"), "{}", told(""));
+    assert!(
+        told("").contains("animations 0 1 s, 1 \"Jump\" 1 s"),
+        "{}",
+        told("")
+    );
     let plays = told("animation = \"Jump\"\nanimation_speed = -2\nanimation_loop = false\n");
     let expected = "1 \"Jump\" 1 s (plays at -2 times its speed, once)";
     assert!(plays.contains(expected), "{plays}");
@@ -197,8 +229,16 @@ fn without_an_animation_a_file_is_in_its_rest_pose_and_its_animations_are_not_lo
 fn hostile_animations_are_errors_with_their_place() {
     type Spoil = fn(&mut Value);
     let spoiled: [(&str, Spoil, &str); 14] = [
-        ("joint", |j| j["skins"][0]["joints"] = json!([1]), "joint 1 of 1"),
-        ("binds", |j| j["accessors"][4]["count"] = json!(1), "skins[0]"),
+        (
+            "joint",
+            |j| j["skins"][0]["joints"] = json!([1]),
+            "joint 1 of 1",
+        ),
+        (
+            "binds",
+            |j| j["accessors"][4]["count"] = json!(1),
+            "skins[0]",
+        ),
         (
             "lengths",
             |j| j["accessors"][5]["count"] = json!(2),
@@ -213,8 +253,10 @@ fn hostile_animations_are_errors_with_their_place() {
         (
             "one time twice",
             // The times' numbers: what is read twice is no later.
-            |j| j["accessors"][5]["sparse"] = json!({"count": 1,
-                "indices": {"bufferView": 1, "componentType": 5121}, "values": {"bufferView": 5, "byteOffset": 8}}),
+            |j| {
+                j["accessors"][5]["sparse"] = json!({"count": 1,
+                "indices": {"bufferView": 1, "componentType": 5121}, "values": {"bufferView": 5, "byteOffset": 8}})
+            },
             "animations[0].samplers[0].input: key 1 is not later than the one before it",
         ),
         (
@@ -258,7 +300,11 @@ fn hostile_animations_are_errors_with_their_place() {
             },
             "animations[0].channels[1]: nodes[2] has two channels",
         ),
-        ("circle", |j| j["nodes"][2]["children"] = json!([1]), "its own ancestor"),
+        (
+            "circle",
+            |j| j["nodes"][2]["children"] = json!([1]),
+            "its own ancestor",
+        ),
     ];
     for (name, spoil, expected) in spoiled {
         let mut model = bar();
@@ -283,7 +329,9 @@ fn numbers_that_are_none_are_told() {
         let view = model["accessors"][accessor]["bufferView"].as_u64().unwrap() as usize;
         let offset = model["bufferViews"][view]["byteOffset"].as_u64().unwrap() as usize;
         let uri = model["buffers"][0]["uri"].as_str().unwrap().to_owned();
-        let mut data = STANDARD.decode(uri.strip_prefix("data:;base64,").unwrap()).unwrap();
+        let mut data = STANDARD
+            .decode(uri.strip_prefix("data:;base64,").unwrap())
+            .unwrap();
         let place = offset + 4 * number;
         data[place..place + 4].copy_from_slice(&f32::to_le_bytes(value));
         let uri = format!("data:;base64,{}", STANDARD.encode(&data));

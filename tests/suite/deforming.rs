@@ -195,7 +195,12 @@ fn hold_frames(name: &str, scene: &Scene, (frames, step_s): (usize, f64), is_fla
 #[test]
 fn what_bends_morphs_and_opens_shades_all_and_itself_as_rays_say() {
     let models = Models::new();
-    hold_frames("small models", &scene(&models.all(), lights()), (20, 0.0471), true);
+    hold_frames(
+        "small models",
+        &scene(&models.all(), lights()),
+        (20, 0.0471),
+        true,
+    );
     // One lamp alone is drawn in fewer passes.
     let lamp_alone = scene(&models.all(), vec![lights()[0]]);
     hold_frames("under a lamp", &lamp_alone, (4, 0.217), true);
@@ -220,7 +225,8 @@ fn a_fox_walks_with_the_shadow_that_rays_see() {
 #[cfg_attr(not(has_shared), ignore = "../shared is not here")]
 #[test]
 fn a_man_walks_with_the_shadow_that_rays_see() {
-    let keys = "fit_m = 0.15\nanimation = 0\nrotation_deg = [0, 0, 40]\nmaterial = { albedo = 0.6 }\n";
+    let keys =
+        "fit_m = 0.15\nanimation = 0\nrotation_deg = [0, 0, 40]\nmaterial = { albedo = 0.6 }\n";
     let man = thing("virtual", "man", &shared("CesiumMan.glb"), keys);
     hold_frames("CesiumMan", &scene(&man, lights()), (20, 0.1), false);
 }
@@ -266,9 +272,15 @@ fn hold_frozen(name: &str, scene: &Scene, times_s: &[f64], most_apart: usize) {
         let still = frozen(scene, time_s);
         let expected = draw(&mut renderer_of(&still), &still, camera(), time_s);
         let off = apart(&found, &expected);
-        assert!(off <= most_apart, "{name}, {time_s} s: {off} pixels are off");
+        assert!(
+            off <= most_apart,
+            "{name}, {time_s} s: {off} pixels are off"
+        );
         let moved = apart(&found, &first);
-        assert!(moved > 500, "{name}, {time_s} s: {moved} pixels have changed");
+        assert!(
+            moved > 500,
+            "{name}, {time_s} s: {moved} pixels have changed"
+        );
     }
     // And back.
     let again = draw(&mut renderer, scene, camera(), 0.0);
@@ -278,9 +290,10 @@ fn hold_frozen(name: &str, scene: &Scene, times_s: &[f64], most_apart: usize) {
 #[test]
 fn gathered_light_follows_the_shape() {
     let models = Models::new();
-    // A standing box gets what the phantom and the table reflect: it is gathered once, and what moves takes from it.
-    let ball = "[[virtual]]\nname = \"ball\"\nsphere_m = 0.02\nposition_m = [0.06, 0.05, 0]\nmaterial = { albedo = 0.8 }\n";
-    let mut scene = scene(&format!("{}{ball}", models.all()), lights());
+    // What stands gets what is around it: that is gathered once, and the bar takes from it where it bends over it.
+    let below = "[[virtual]]\nname = \"below\"\nbox_m = [0.05, 0.04, 0.03]\nposition_m = [-0.035, -0.02, 0]\n\
+                 smooth_deg = 0\nmaterial = { albedo = 0.8 }\n";
+    let mut scene = scene(&format!("{}{below}", models.all()), lights());
     scene.ambient_radiance = DVec3::splat(0.15);
     scene.shadows.ambient_samples = 64;
     scene.shadows.max_silhouette_error_px = 0.0;
@@ -324,7 +337,11 @@ fn shafts_of_a_room_follow_the_shape() {
 #[test]
 fn an_environment_follows_the_shape_by_rays_and_by_maps() {
     let models = Models::new();
-    for (name, method) in [("rays", "rays"), ("penumbrae", "penumbrae"), ("maps", "maps")] {
+    for (name, method) in [
+        ("rays", "rays"),
+        ("penumbrae", "penumbrae"),
+        ("maps", "maps"),
+    ] {
         let mut scene = in_a_recording("room", &models);
         scene.shadows.technique = gnomon::scene::Technique::Environment;
         scene.shadows.environment.method = gnomon::scene::EnvironmentMethod::BY_NAME
@@ -340,15 +357,23 @@ fn an_environment_follows_the_shape_by_rays_and_by_maps() {
 #[test]
 fn what_lets_light_through_follows_the_shape() {
     let models = Models::new();
-    let mut clear = bar();
-    clear["materials"] = serde_json::json!([{
-        "alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.3, 0.2, 0.5]}
-    }]);
-    clear["meshes"][0]["primitives"][0]["material"] = serde_json::json!(0);
-    let path = models.0.path().join("clear.gltf");
-    std::fs::write(&path, clear.to_string()).expect("a model");
-    let keys = "animation = \"Bend\"\nfit_m = 0.11\nsmooth_deg = 0\n";
-    let scene = scene(&thing("virtual", "clear", &path, keys), lights());
+    let clear = |name: &str, mut model: Value, color: [f32; 4], keys: &str| {
+        model["materials"] = serde_json::json!([{
+            "alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": color}
+        }]);
+        model["meshes"][0]["primitives"][0]["material"] = serde_json::json!(0);
+        let path = models.0.path().join(format!("clear {name}.gltf"));
+        std::fs::write(&path, model.to_string()).expect("a model");
+        thing("virtual", name, &path, &format!("{keys}smooth_deg = 0\n"))
+    };
+    // The bar bends towards the camera, past the middle of a pane that stands before it.
+    let bending = "animation = \"Bend\"\nfit_m = 0.11\nrotation_deg = [0, 0, 90]\n";
+    let pane = "fit_m = 0.06\nscale = [1, 0.05, 1]\nposition_m = [-0.03, -0.012, 0.0094]\n";
+    let things = [
+        clear("bar", bar(), [0.8, 0.3, 0.2, 0.5], bending),
+        clear("pane", morphing_box(), [0.1, 0.3, 0.9, 0.5], pane),
+    ];
+    let scene = scene(&things.concat(), lights());
     hold_frozen("clear", &scene, &[0.5, 1.0], 4);
 }
 

@@ -11,7 +11,9 @@ use super::family::Chart;
 use super::figure::{Axis, Figure, FigurePanel, Point, Series, power_law};
 use super::lab::Lab;
 use super::measured::rounded;
-use super::peers_table::{self, LIGHT_M, PeersStage, SIZE_PX, TORUS_CENTER_M, WARM_UP_FRAMES, torus};
+use super::peers_table::{
+    self, LIGHT_M, PeersStage, SIZE_PX, TORUS_CENTER_M, WARM_UP_FRAMES, torus,
+};
 use super::shots::{Shots, grey_frame};
 use crate::app::stages::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
@@ -97,7 +99,10 @@ fn walkers(samples: u32) -> Result<Stages> {
             );
             let place = std::env::current_dir().context("the current folder")?;
             let scene = Scene::parse(&place.join("walking.toml"), &text)?;
-            let triangles = scene.virtuals.iter().map(|thing| thing.mesh.triangles.len());
+            let triangles = scene
+                .virtuals
+                .iter()
+                .map(|thing| thing.mesh.triangles.len());
             let value = triangles.sum::<usize>() as f64;
             let nodes = scene.node_count();
             let setup = Setup {

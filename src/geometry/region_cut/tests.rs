@@ -102,7 +102,13 @@ fn a_disc_has_its_area_and_its_rim_alone() {
     let (positions, triangles, looks) = square(0);
     for fine in [0.05, 0.01] {
         let disc = Disc { radius: 0.4, fine };
-        let cut = cut((&positions, &[]), &triangles, &looks, |_| Some(&disc), 1_000_000);
+        let cut = cut(
+            (&positions, &[]),
+            &triangles,
+            &looks,
+            |_| Some(&disc),
+            1_000_000,
+        );
         assert!(!cut.is_coarse);
         // A chord of length s lies s² / 8r within the circle, so the polygon lacks that by two thirds along its rim.
         let most = 2.0 * PI * 0.4 * fine * fine / (8.0 * 0.4);

@@ -20,7 +20,9 @@ pub enum SamplerFault {
     #[error("no key; one or more are expected")]
     Empty,
     /// This key has a time that is no time.
-    #[error("key {0} has a time that is below 0 or not finite; times in seconds, 0 or more, are expected")]
+    #[error(
+        "key {0} has a time that is below 0 or not finite; times in seconds, 0 or more, are expected"
+    )]
     NoTime(usize),
     /// This key does not come after the one before it.
     #[error("key {0} is not later than the one before it; rising times are expected")]
@@ -172,7 +174,9 @@ impl Keyed for DQuat {
 impl Keyed for Vec<f64> {
     fn between(&self, other: &Self, part: f64) -> Self {
         let pairs = self.iter().zip(other);
-        pairs.map(|(one, other)| one + (other - one) * part).collect()
+        pairs
+            .map(|(one, other)| one + (other - one) * part)
+            .collect()
     }
 
     fn sum(terms: [(&Self, f64); 4]) -> Self {
@@ -264,7 +268,10 @@ mod tests {
         assert_eq!(line(vec![], 0), Some(SamplerFault::Empty));
         assert_eq!(line(vec![0.0, f64::NAN], 2), Some(SamplerFault::NoTime(1)));
         assert_eq!(line(vec![-1.0], 1), Some(SamplerFault::NoTime(0)));
-        assert_eq!(line(vec![0.0, 1.0, 1.0], 3), Some(SamplerFault::NotLater(2)));
+        assert_eq!(
+            line(vec![0.0, 1.0, 1.0], 3),
+            Some(SamplerFault::NotLater(2))
+        );
         let count = SamplerFault::Count {
             found: 3,
             expected: 2,
@@ -273,6 +280,9 @@ mod tests {
         assert_eq!(line(vec![0.0, 1.0], 3), Some(count));
         assert_eq!(line(vec![0.0, 1.0], 2), None);
         let splines = Sampler::new(vec![0.0], vec![DVec3::ZERO], Interpolation::CubicSpline);
-        assert!(matches!(splines, Err(SamplerFault::Count { expected: 3, .. })));
+        assert!(matches!(
+            splines,
+            Err(SamplerFault::Count { expected: 3, .. })
+        ));
     }
 }

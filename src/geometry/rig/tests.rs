@@ -57,7 +57,12 @@ fn bar() -> Rig {
         vec![(1, 0.25), (1, 0.75)],
         vec![],
     ];
-    let positions = vec![DVec3::ZERO, DVec3::new(1.5, 0.0, 0.0), DVec3::X * 2.0, DVec3::Z];
+    let positions = vec![
+        DVec3::ZERO,
+        DVec3::new(1.5, 0.0, 0.0),
+        DVec3::X * 2.0,
+        DVec3::Z,
+    ];
     let held = Joints {
         skin: 0,
         joints,
@@ -108,12 +113,19 @@ fn children_go_with_their_parents_in_any_order() {
     let clip = playing(vec![quarter_turn(0), quarter_turn(1)]);
     let pose = tree.pose(Some((&clip, 1.0)));
     let found = pose.scene_from_node[0].transform_point3(DVec3::X);
-    assert!(found.distance(DVec3::new(-1.0, 2.0, 0.0)) < 1e-12, "{found}");
+    assert!(
+        found.distance(DVec3::new(-1.0, 2.0, 0.0)) < 1e-12,
+        "{found}"
+    );
 }
 
 #[test]
 fn who_is_its_own_ancestor_is_told() {
-    let circle = vec![node(None, DVec3::X), node(Some(2), DVec3::X), node(Some(1), DVec3::X)];
+    let circle = vec![
+        node(None, DVec3::X),
+        node(Some(2), DVec3::X),
+        node(Some(1), DVec3::X),
+    ];
     assert_eq!(NodeTree::new(circle).err(), Some(1));
     assert_eq!(NodeTree::new(vec![node(Some(7), DVec3::X)]).err(), Some(0));
 }

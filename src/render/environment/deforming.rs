@@ -75,8 +75,7 @@ impl Environment {
         known.occlusions = self_occlusions_by(rays, &known.points, |_| {
             (&thing.caster, size_m * START_OFFSET)
         });
-        let visibility =
-            |corner: usize| known.occlusions[known.point_of_corner[corner]].visibility;
+        let visibility = |corner: usize| known.occlusions[known.point_of_corner[corner]].visibility;
         let contents = occlusion_corners(&corners.thing_of, visibility);
         let usage = wgpu::BufferUsages::VERTEX;
         let buffer = gpu.buffer("self-occlusion", &contents, usage);

@@ -152,11 +152,9 @@ impl Keys<'_> {
             let length = rotation.length();
             if length < 1e-6 {
                 let message = format!("element {number} is no rotation: all of it is 0");
-                return Err(self
-                    .file
-                    .error(&format!("{}.output", self.place), message));
+                return Err(self.file.error(&format!("{}.output", self.place), message));
             }
-            *rotation = *rotation / length;
+            *rotation /= length;
         }
         Ok(rotations)
     }
@@ -166,9 +164,7 @@ impl Keys<'_> {
         let found = self.output::<1>(Dimensions::Scalar)?;
         if found.len() % targets != 0 {
             let message = format!("{} weights for {targets} morph targets", found.len());
-            return Err(self
-                .file
-                .error(&format!("{}.output", self.place), message));
+            return Err(self.file.error(&format!("{}.output", self.place), message));
         }
         let weights = |of_key: &[[f32; 1]]| of_key.iter().map(|[it]| f64::from(*it)).collect();
         Ok(found.chunks(targets).map(weights).collect())

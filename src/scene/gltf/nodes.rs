@@ -77,7 +77,9 @@ fn rig_node(node: &Node<'_>, parents: &[Option<usize>]) -> RigNode {
     let (translation, rotation, scale) = transform.decomposed();
     let in_double = |vector: [f32; 3]| DVec3::from_array(vector.map(f64::from));
     let rotation = DQuat::from_array(rotation.map(f64::from));
-    let weights = node.weights().or(node.mesh().and_then(|mesh| mesh.weights()));
+    let weights = node
+        .weights()
+        .or(node.mesh().and_then(|mesh| mesh.weights()));
     RigNode {
         parent: parents[node.index()],
         parent_from_node: matrix.as_dmat4(),
@@ -93,7 +95,13 @@ fn rig_node(node: &Node<'_>, parents: &[Option<usize>]) -> RigNode {
         weights: weights
             .unwrap_or_default()
             .iter()
-            .map(|&weight| if weight.is_finite() { weight.into() } else { 0.0 })
+            .map(|&weight| {
+                if weight.is_finite() {
+                    weight.into()
+                } else {
+                    0.0
+                }
+            })
             .collect(),
     }
 }

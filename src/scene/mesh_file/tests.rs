@@ -4,7 +4,12 @@ use crate::geometry::cuboid::SIDES;
 const SMOOTH: Normals = Normals::GivenOrMade { crease_rad: 0.5 };
 
 fn read_text(path: &Path, text: &str, normals: Normals) -> Result<LoadedMesh, SceneError> {
-    read(path, text.into(), (MeshReading::plain(normals), None), &|_| ())
+    read(
+        path,
+        text.into(),
+        (MeshReading::plain(normals), None),
+        &|_| (),
+    )
 }
 
 fn failure(text: &str) -> String {

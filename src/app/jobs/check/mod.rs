@@ -252,7 +252,11 @@ fn object_row(object: &Object, anchors: &[Anchor], with_levels: bool) -> TableRo
     if object.anchor_from_object.matrix3.determinant() < 0.0 {
         notes.push("mirrored".to_owned());
     }
-    if object.motion.as_ref().is_some_and(|motion| !motion.is_none()) {
+    if object
+        .motion
+        .as_ref()
+        .is_some_and(|motion| !motion.is_none())
+    {
         notes.push("moves by itself".to_owned());
     }
     notes.extend(animations_note(object));
