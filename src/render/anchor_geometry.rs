@@ -30,7 +30,7 @@ pub(super) enum Role {
 /// A corner of a triangle, as `SurfaceCorner` in shading.wgsl reads it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct SurfaceCorner {
+pub(super) struct SurfaceCorner {
     position: Vec3,
     normal: Vec3,
     albedo: Vec3,
@@ -433,12 +433,16 @@ fn moved_by(mesh: &Mesh, number: usize) -> [u32; 7] {
 
 impl SurfaceBatch {
     /// Takes the shape that its thing has now, which has it for itself.
-    pub fn deform(&mut self, queue: &wgpu::Queue, object: &Object, first_material: u32) {
-        let deformed = corners(object, &object.mesh);
+    pub fn deform(
+        &mut self,
+        queue: &wgpu::Queue,
+        (object, deformed): (&Object, &[SurfaceCorner]),
+        first_material: u32,
+    ) {
         let (places, triangles) = &mut self.places.corners;
         let mut shared = vec![SurfaceCorner::zeroed(); places.len()];
         let indices = triangles.as_flattened();
-        for (&index, corner) in indices.iter().zip(&deformed) {
+        for (&index, corner) in indices.iter().zip(deformed) {
             shared[index as usize] = *corner;
             places[index as usize] = (corner.position, corner.normal);
         }
@@ -464,7 +468,7 @@ impl SurfaceBatch {
 
 impl AnchoredModel {
     /// Takes the shape that its object has now; it has one level of detail.
-    pub fn deform(&mut self, queue: &wgpu::Queue, object: &Object) {
+    pub fn deform(&mut self, queue: &wgpu::Queue, (object, deformed): (&Object, &[SurfaceCorner])) {
         let mesh = &object.mesh;
         let positions = object.positions_in_anchor(mesh);
         let place = |index: u32| positions[index as usize].as_dvec3();
@@ -479,7 +483,7 @@ impl AnchoredModel {
             .first_mut()
             .and_then(|level| level.caster.as_mut())
         {
-            caster.smooth_normals = smooth_normals(&corners(object, mesh));
+            caster.smooth_normals = smooth_normals(deformed);
             caster.caster.set_positions(positions);
             let vertices = caster.caster.volume_vertices();
             queue.write_buffer(&caster.vertices, 0, bytemuck::cast_slice(&vertices));
@@ -519,7 +523,7 @@ fn corner_of_material(
 }
 
 /// Three corners for each triangle.
-fn corners(object: &Object, mesh: &Mesh) -> Vec<SurfaceCorner> {
+pub(super) fn corners(object: &Object, mesh: &Mesh) -> Vec<SurfaceCorner> {
     let positions = object.positions_in_anchor(mesh);
     let normal_matrix = object.anchor_from_object.matrix3.inverse().transpose();
     mesh.triangles

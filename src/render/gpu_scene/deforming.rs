@@ -1,6 +1,6 @@
 //! Things that change their shape, on the GPU: each has a node, and with it a batch, to itself.
 
-use super::super::anchor_geometry::Role;
+use super::super::anchor_geometry::{Role, corners};
 use super::super::deforming::DeformingThing;
 use super::super::gpu::Gpu;
 use super::GpuScene;
@@ -23,8 +23,9 @@ impl GpuScene {
         let (Some((number, thing)), Some(batch)) = (thing, batch) else {
             return;
         };
-        thing.deform(&gpu.queue, object);
-        batch.deform(&gpu.queue, object, *first_material);
+        let deformed = corners(object, &object.mesh);
+        thing.deform(&gpu.queue, (object, &deformed));
+        batch.deform(&gpu.queue, (object, &deformed), *first_material);
         self.casters.forget(number);
         if let Some(indirect) = &mut self.indirect {
             indirect.deform(object);
