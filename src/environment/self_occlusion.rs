@@ -150,7 +150,12 @@ impl OwnSurface {
 
     /// Works out the self-occlusion of each point by rays, on all cores.
     pub fn self_occlusions(&self) -> Vec<SelfOcclusion> {
-        let rays: Vec<(DVec3, Vec<f64>)> = sphere(RAYS)
+        self.self_occlusions_by(RAYS)
+    }
+
+    /// The same by another number of rays from each point, half of them above its surface.
+    pub fn self_occlusions_by(&self, ray_count: usize) -> Vec<SelfOcclusion> {
+        let rays: Vec<(DVec3, Vec<f64>)> = sphere(ray_count)
             .map(|direction| (direction, basis(direction, TRANSFER_DEGREE)))
             .collect();
         let of_point = |&(place, normal): &(DVec3, DVec3)| {

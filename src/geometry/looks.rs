@@ -16,6 +16,50 @@ pub struct CornerLook {
     /// Unit direction in object space in which u of the normal map grows, and in w the side (±1) to which v does; 0 where
     /// there is none.
     pub tangent: Vec4,
+    /// What moves it, where its model has a rig.
+    pub held_by: RigPoint,
+}
+
+/// A place on a model's surface by the vertices of its rig that it lies between: one, or up to three of a triangle.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RigPoint {
+    /// Numbers of vertices of the rig.
+    pub vertices: [u32; 3],
+    /// How much of each; their sum is 1, or 0 where there is no rig.
+    pub weights: [f32; 3],
+}
+
+impl RigPoint {
+    /// A vertex itself.
+    pub fn at(vertex: u32) -> Self {
+        Self {
+            vertices: [vertex; 3],
+            weights: [1.0, 0.0, 0.0],
+        }
+    }
+
+    /// The vertices that count, with their weights.
+    pub fn parts(&self) -> impl Iterator<Item = (u32, f32)> {
+        let parts = self.vertices.into_iter().zip(self.weights);
+        parts.filter(|(_, weight)| *weight != 0.0)
+    }
+
+    /// A place between places of one triangle.
+    fn blended(points: [&Self; 3], weights: [f32; 3]) -> Self {
+        let mut blended = Self::default();
+        let mut count = 0;
+        for (point, share) in points.into_iter().zip(weights) {
+            for (vertex, weight) in point.parts().filter(|_| share != 0.0) {
+                let known = (0..count).find(|&slot| blended.vertices[slot] == vertex);
+                // (A triangle has no fourth vertex.)
+                let slot = known.unwrap_or(count.min(2));
+                count = count.max(slot + 1);
+                blended.vertices[slot] = vertex;
+                blended.weights[slot] += share * weight;
+            }
+        }
+        blended
+    }
 }
 
 impl Default for CornerLook {
@@ -25,6 +69,7 @@ impl Default for CornerLook {
             uv: [Vec2::ZERO; 2],
             color: Vec4::ONE,
             tangent: Vec4::ZERO,
+            held_by: RigPoint::default(),
         }
     }
 }
@@ -41,6 +86,7 @@ impl CornerLook {
             uv: [uv(0), uv(1)],
             color: pairs().map(|(look, weight)| look.color * weight).sum(),
             tangent: tangent.normalize_or_zero().extend(looks[0].tangent.w),
+            held_by: RigPoint::blended(looks.map(|look| &look.held_by), weights),
         }
     }
 }

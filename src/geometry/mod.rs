@@ -32,6 +32,7 @@ pub mod quarter_turns;
 pub mod ray_caster;
 pub mod reach;
 pub mod region_cut;
+pub mod rig;
 pub mod robust;
 pub mod shadow_outline;
 pub mod shadow_volume;

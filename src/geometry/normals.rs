@@ -32,72 +32,107 @@ pub fn face_normal(positions: &[Vec3], [a, b, c]: [u32; 3]) -> DVec3 {
 /// A unit normal for each corner: the mean over the faces around its vertex whose normals lie within `crease_rad` of
 /// its own face's, weighted by their angles there (Thürmer & Wüthrich 1998). 0 gives the face's own normal.
 pub fn made_normals(positions: &[Vec3], triangles: &[[u32; 3]], crease_rad: f64) -> Vec<[Vec3; 3]> {
-    let faces: Vec<DVec3> = triangles
-        .iter()
-        .map(|&corners| face_normal(positions, corners))
-        .collect();
-    let mut weighted_at: Vec<Vec<(DVec3, f64)>> = vec![Vec::new(); positions.len()];
-    for (&corners, &normal) in triangles.iter().zip(&faces) {
+    bent_normals(positions, positions, triangles, crease_rad)
+}
+
+/// [`made_normals`] of a surface that is bent: faces that look like one surface at rest go on doing so, wherever the crease
+/// angle comes to lie, so that no edge turns sharp in the middle of a movement.
+pub fn bent_normals(
+    at_rest: &[Vec3],
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    crease_rad: f64,
+) -> Vec<[Vec3; 3]> {
+    let faces_of = |positions: &[Vec3]| -> Vec<DVec3> {
+        let faces = triangles.iter();
+        faces
+            .map(|&corners| face_normal(positions, corners))
+            .collect()
+    };
+    let faces = faces_of(positions);
+    let faces_at_rest = match std::ptr::eq(at_rest, positions) {
+        true => faces.clone(),
+        false => faces_of(at_rest),
+    };
+    let mut faces_at: Vec<Vec<FaceAtCorner>> = vec![Vec::new(); positions.len()];
+    for (triangle, &corners) in triangles.iter().enumerate() {
         for corner in 0..3 {
-            weighted_at[corners[corner] as usize]
-                .push((normal, corner_angle_rad(positions, corners, corner)));
+            let angle_rad = corner_angle_rad(positions, corners, corner);
+            faces_at[corners[corner] as usize].push(FaceAtCorner {
+                at_rest: faces_at_rest[triangle],
+                weighted: faces[triangle] * angle_rad,
+            });
         }
     }
-    for around in &mut weighted_at {
+    for around in &mut faces_at {
         if around.len() > MOST_FACES_APART {
             *around = taken_together(around);
         }
     }
     let least_cosine = crease_rad.cos() - CREASE_SLACK;
-    triangles
-        .iter()
-        .zip(&faces)
-        .map(|(corners, &own)| {
-            corners.map(|vertex| {
-                let around = &weighted_at[vertex as usize];
-                let mean = |within: &dyn Fn(DVec3) -> bool| {
-                    around
-                        .iter()
-                        .filter(|(normal, _)| within(*normal))
-                        .map(|(normal, angle_rad)| normal * angle_rad)
-                        .sum::<DVec3>()
-                        .normalize_or_zero()
-                };
-                let made = match own {
-                    // A needle has no side of its own and takes its surroundings'.
-                    DVec3::ZERO => mean(&|_| true),
-                    _ if crease_rad == 0.0 => own,
-                    _ => mean(&|normal| normal.dot(own) >= least_cosine),
-                };
-                [made, own, DVec3::Z]
-                    .into_iter()
-                    .find(|normal| *normal != DVec3::ZERO)
-                    .unwrap_or(DVec3::Z)
-                    .as_vec3()
-            })
-        })
-        .collect()
+    let of_corner = |vertex: u32, own: DVec3, own_at_rest: DVec3| {
+        let around = faces_at[vertex as usize].iter();
+        let mean = |within: &dyn Fn(DVec3) -> bool| {
+            around
+                .clone()
+                .filter(|face| within(face.at_rest))
+                .map(|face| face.weighted)
+                .sum::<DVec3>()
+                .normalize_or_zero()
+        };
+        let made = match own_at_rest {
+            // A needle has no side of its own and takes its surroundings'.
+            DVec3::ZERO => mean(&|_| true),
+            _ if crease_rad == 0.0 => own,
+            _ => mean(&|normal| normal.dot(own_at_rest) >= least_cosine),
+        };
+        [made, own, DVec3::Z]
+            .into_iter()
+            .find(|normal| *normal != DVec3::ZERO)
+            .unwrap_or(DVec3::Z)
+            .as_vec3()
+    };
+    let of_triangle = |(corners, (&own, &at_rest)): (&[u32; 3], (&DVec3, &DVec3))| {
+        corners.map(|vertex| of_corner(vertex, own, at_rest))
+    };
+    let own = faces.iter().zip(&faces_at_rest);
+    triangles.iter().zip(own).map(of_triangle).collect()
 }
 
-/// Weighted normals with those that are nearly alike added up, so that a vertex with very many faces takes no time that
-/// grows with their square.
-fn taken_together(weighted: &[(DVec3, f64)]) -> Vec<(DVec3, f64)> {
-    let mut sums: HashMap<[i32; 3], DVec3> = HashMap::new();
+/// A face at one of its corners.
+#[derive(Debug, Clone, Copy)]
+struct FaceAtCorner {
+    /// Its unit normal at rest, by which it counts for a corner or not.
+    at_rest: DVec3,
+    /// Its unit normal times its angle there.
+    weighted: DVec3,
+}
+
+/// Faces with those added up that are nearly alike, so that a vertex with very many of them takes no time that grows with
+/// their square.
+fn taken_together(faces: &[FaceAtCorner]) -> Vec<FaceAtCorner> {
+    let mut sums: HashMap<[i32; 3], FaceAtCorner> = HashMap::new();
     let mut order = Vec::new();
-    for &(normal, weight) in weighted {
-        let key = (normal * ALIKE_STEPS)
+    for face in faces {
+        let key = (face.at_rest * ALIKE_STEPS)
             .round()
             .to_array()
             .map(|step| step as i32);
-        *sums.entry(key).or_insert_with(|| {
+        let sum = sums.entry(key).or_insert_with(|| {
             order.push(key);
-            DVec3::ZERO
-        }) += normal * weight;
+            FaceAtCorner {
+                at_rest: DVec3::ZERO,
+                weighted: DVec3::ZERO,
+            }
+        });
+        sum.at_rest += face.at_rest * face.weighted.length();
+        sum.weighted += face.weighted;
     }
-    order
-        .into_iter()
-        .map(|key| (sums[&key].normalize_or_zero(), sums[&key].length()))
-        .collect()
+    let together = order.into_iter().map(|key| FaceAtCorner {
+        at_rest: sums[&key].at_rest.normalize_or_zero(),
+        ..sums[&key]
+    });
+    together.collect()
 }
 
 fn corner_angle_rad(positions: &[Vec3], corners: [u32; 3], corner: usize) -> f64 {

@@ -14,18 +14,20 @@ impl Mesh {
         fn of<T: Copy>(all: &[T], triangles: &[usize]) -> Vec<T> {
             triangles.iter().map(|&triangle| all[triangle]).collect()
         }
-        let has_looks = !self.corner_looks.is_empty();
-        let corner_looks = match has_looks {
-            true => of(&self.corner_looks, triangles),
-            false => Vec::new(),
-        };
+        fn of_any<T: Copy>(all: &[T], triangles: &[usize]) -> Vec<T> {
+            match all.is_empty() {
+                true => Vec::new(),
+                false => of(all, triangles),
+            }
+        }
         Self {
             positions: self.positions.clone(),
             triangles: of(&self.triangles, triangles),
             corner_normals: of(&self.corner_normals, triangles),
             triangle_materials: of(&self.triangle_materials, triangles),
             looks: self.looks.clone(),
-            corner_looks,
+            corner_looks: of_any(&self.corner_looks, triangles),
+            held: of_any(&self.held, triangles),
         }
         .without_unused_positions()
     }

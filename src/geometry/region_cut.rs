@@ -54,18 +54,18 @@ pub struct CutTriangles {
 const FINEST: f64 = 1.0 / 1024.0;
 
 /// Cuts triangles to the region that their material has, if it has one (by its index); `most` pieces are made at most, but for
-/// what neighbours need.
+/// what neighbours need. Positions are one where they are in one place and, if `together` is not empty, have one number there.
 ///
 /// # Panics
 /// If a triangle names a position or a look that is not there, or has none.
 pub fn cut<'a>(
-    positions: &[Vec3],
+    (positions, together): (&[Vec3], &[u32]),
     triangles: &[RawTriangle],
     looks: &RawLooks,
     region_of: impl Fn(u32) -> Option<&'a dyn Region>,
     most: usize,
 ) -> CutTriangles {
-    let mut cutter = Cutter::new(positions, looks);
+    let mut cutter = Cutter::new(positions, together, looks);
     let pieces = cutter.pieces(triangles, looks);
     let (pieces, is_coarse) = cutter.refined(pieces, &region_of, most);
     let mut left = Vec::with_capacity(pieces.len());
@@ -158,14 +158,15 @@ struct Cutter {
 }
 
 impl Cutter {
-    fn new(positions: &[Vec3], looks: &RawLooks) -> Self {
+    fn new(positions: &[Vec3], together: &[u32], looks: &RawLooks) -> Self {
         let places: Vec<DVec3> = positions.iter().map(|place| place.as_dvec3()).collect();
         let mut first = HashMap::new();
         let same = (places.iter().zip(0..))
             // (A sum with 0 makes one of both zeros.)
             .map(|(place, index)| {
                 let bits = (*place + DVec3::ZERO).to_array().map(f64::to_bits);
-                *first.entry(bits).or_insert(index)
+                let number = together.get(index as usize).copied();
+                *first.entry((bits, number)).or_insert(index)
             })
             .collect();
         let size = Bounds::around(places.iter().copied())

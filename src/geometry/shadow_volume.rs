@@ -146,6 +146,13 @@ impl Caster {
         }
     }
 
+    /// Moves its vertices: the same triangles between other places.
+    pub fn set_positions(&mut self, positions: Vec<Vec3>) {
+        self.planes = planes(&positions, &self.triangles, &self.paired_edges);
+        self.bounds = Bounds::around(positions.iter().map(|position| position.as_dvec3()));
+        self.positions = positions;
+    }
+
     /// The box around it, metres; `None` without triangles.
     pub fn bounds(&self) -> Option<&Bounds> {
         self.bounds.as_ref()

@@ -66,6 +66,13 @@ impl Mover {
             caster: RayCaster::new(&corners),
         })
     }
+
+    /// Takes another shape: the same triangles elsewhere, which are of the same colour on the whole.
+    pub fn deform(&mut self, corners: &[[Vec3; 3]]) {
+        let points = corners.iter().flatten().map(|corner| corner.as_dvec3());
+        self.center = points.sum::<DVec3>() / (3 * corners.len().max(1)) as f64;
+        self.caster = RayCaster::new(corners);
+    }
 }
 
 /// The rays of many points, with what they met that stands still.

@@ -8,6 +8,7 @@ use crate::scene::Scene;
 use super::anchor_geometry::Role;
 use super::attachments::{depth_stencil, loaded};
 use super::background::Background;
+use super::deforming::DeformingThing;
 use super::final_gather::FinalGather;
 use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
@@ -197,6 +198,12 @@ impl TechniquePasses for Accumulated {
             final_gather.follow(scene);
         }
         true
+    }
+
+    fn deform(&mut self, _gpu: &Gpu, _gpu_scene: &mut GpuScene, things: &[&DeformingThing]) {
+        if let Some(final_gather) = &mut self.final_gather {
+            final_gather.deform(things);
+        }
     }
 
     fn prepare(

@@ -6,13 +6,13 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec4};
 use wgpu::util::DeviceExt as _;
 
 use crate::geometry::bounds::Bounds;
 use crate::geometry::coincidence::{IN_ONE_PLACE_M, may_coincide};
 use crate::geometry::levels::{Level, levels};
-use crate::geometry::mesh::{CornerLook, Mesh};
+use crate::geometry::mesh::{CornerLook, HeldCorner, HeldNormal, Mesh};
 use crate::geometry::outline_scale::largest_scale;
 use crate::geometry::shadow_volume::Caster;
 use crate::geometry::solid::holes;
@@ -30,7 +30,7 @@ pub(super) enum Role {
 /// A corner of a triangle, as `SurfaceCorner` in shading.wgsl reads it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct SurfaceCorner {
+pub(super) struct SurfaceCorner {
     position: Vec3,
     normal: Vec3,
     albedo: Vec3,
@@ -205,8 +205,10 @@ impl AnchorGeometry {
                     let ties = role == Role::Virtual && ties(scene, &surfaces, index);
                     let tie = ties.then_some(index);
                     let coarsest_px = scene.shadows.max_silhouette_error_px;
-                    let with_levels =
-                        coarsest_px > 0.0 && !scene.shadows.without.has(Shortcut::Levels);
+                    // (How far a level is off is measured in one shape.)
+                    let with_levels = coarsest_px > 0.0
+                        && object.animation.is_none()
+                        && !scene.shadows.without.has(Shortcut::Levels);
                     let coarser = match with_levels {
                         true => known.of(&object.mesh),
                         false => &[],
@@ -290,15 +292,17 @@ fn thing(
                     vertices: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
                         label: Some("shadow volume"),
                         contents: bytemuck::cast_slice(&caster.volume_vertices()),
-                        usage: wgpu::BufferUsages::VERTEX,
+                        usage: CHANGING,
                     }),
                     caster,
                     surface_triangles: shared.triangles[first..].to_vec(),
                     smooth_normals: smooth_normals(&corners),
                 }
             };
+            // (What changes its shape may pass through itself, now or then: its inside is reckoned with everywhere.)
+            let holes = object.animation.is_none().then(|| holes(mesh)).flatten();
             ModelLevel {
-                holes: holes(mesh).map(|holes| holes.into_iter().map(in_anchor).collect()),
+                holes: holes.map(|holes| holes.into_iter().map(in_anchor).collect()),
                 caster: object.casts.then(of_casting),
                 range: 3 * first as u32..3 * shared.triangles.len() as u32,
                 max_error_m,
@@ -319,13 +323,15 @@ fn thing(
     })
 }
 
+/// What corners are told apart by: thing, place, normal and material, what else a corner has, and what moves it.
+type CornerKey = (u32, [u32; 10], [u32; 13], [u32; 7]);
+
 /// Corners that triangles share, and the triangles.
 #[derive(Default)]
 struct SharedCorners {
     corners: Vec<SurfaceCorner>,
     triangles: Vec<[u32; 3]>,
-    /// By thing, place, normal and material, and by what else the corner has.
-    index_of: HashMap<(u32, [u32; 10], [u32; 13]), u32>,
+    index_of: HashMap<CornerKey, u32>,
     /// For each corner the number of its thing.
     thing_of: Vec<u32>,
     /// Number of the thing at hand, phantoms first.
@@ -347,14 +353,15 @@ impl SharedCorners {
         };
         let numbered = corners.iter().enumerate();
         let indices: Vec<u32> = numbered
-            .map(|(number, corner)| self.index(*corner, look(number)))
+            .map(|(number, corner)| self.index(*corner, look(number), moved_by(mesh, number)))
             .collect();
         self.triangles.extend(indices.as_chunks::<3>().0);
     }
 
-    fn index(&mut self, corner: SurfaceCorner, look: CornerOfMaterial) -> u32 {
+    fn index(&mut self, corner: SurfaceCorner, look: CornerOfMaterial, moved_by: [u32; 7]) -> u32 {
         let next = self.corners.len() as u32;
-        let key = (self.thing, bytemuck::cast(corner), bytemuck::cast(look));
+        let (corner_key, look_key) = (bytemuck::cast(corner), bytemuck::cast(look));
+        let key = (self.thing, corner_key, look_key, moved_by);
         let index = *self.index_of.entry(key).or_insert(next);
         if index == next {
             self.corners.push(corner);
@@ -391,22 +398,101 @@ impl SharedCorners {
             corners: buffer(
                 "surface corners",
                 bytemuck::cast_slice(&self.corners),
-                wgpu::BufferUsages::VERTEX,
+                CHANGING,
             ),
             indirect: buffer(
                 "indirect light",
                 bytemuck::cast_slice(&vec![ambient; self.corners.len()]),
-                wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+                CHANGING,
             ),
             looks: self.looks.as_ref().map(|looks| {
                 let contents = bytemuck::cast_slice(looks);
-                buffer("surface looks", contents, wgpu::BufferUsages::VERTEX)
+                buffer("surface looks", contents, CHANGING)
             }),
             indices: buffer(
                 "surface triangles",
                 bytemuck::cast_slice(&self.triangles),
                 wgpu::BufferUsages::INDEX,
             ),
+        }
+    }
+}
+
+/// Vertices that may be written again.
+const CHANGING: wgpu::BufferUsages = wgpu::BufferUsages::VERTEX.union(wgpu::BufferUsages::COPY_DST);
+
+/// What a corner of a mesh that changes its shape follows, so written that corners which may part have different ones.
+fn moved_by(mesh: &Mesh, number: usize) -> [u32; 7] {
+    let Some(held) = mesh.held.get(number / 3) else {
+        return [0; 7];
+    };
+    let HeldCorner { point, normal } = held[number % 3];
+    let [a, b, c] = point.vertices;
+    let [x, y, z] = point.weights.map(f32::to_bits);
+    // A normal of the faces around it is this triangle's alone.
+    let by_triangle = match normal {
+        HeldNormal::OfFaces => number as u32 + 1,
+        HeldNormal::OfRig | HeldNormal::OfRigTurned => 0,
+    };
+    [a, b, c, x, y, z, by_triangle]
+}
+
+impl SurfaceBatch {
+    /// Takes the shape that its thing has now, which has it for itself.
+    pub fn deform(
+        &mut self,
+        queue: &wgpu::Queue,
+        (object, deformed): (&Object, &[SurfaceCorner]),
+        first_material: u32,
+    ) {
+        let (places, triangles) = &mut self.places.corners;
+        let mut shared = vec![SurfaceCorner::zeroed(); places.len()];
+        let indices = triangles.as_flattened();
+        for (&index, corner) in indices.iter().zip(deformed) {
+            shared[index as usize] = *corner;
+            places[index as usize] = (corner.position, corner.normal);
+        }
+        queue.write_buffer(&self.corners, 0, bytemuck::cast_slice(&shared));
+        let has_tangents = || {
+            object
+                .mesh
+                .looks
+                .iter()
+                .any(|look| look.tangent != Vec4::ZERO)
+        };
+        if let Some(looks) = self.looks.as_ref().filter(|_| has_tangents()) {
+            let mut turned = vec![CornerOfMaterial::zeroed(); places.len()];
+            for (number, &index) in indices.iter().enumerate() {
+                let corner = (number / 3, number % 3);
+                turned[index as usize] =
+                    corner_of_material(object, &object.mesh, corner, first_material);
+            }
+            queue.write_buffer(looks, 0, bytemuck::cast_slice(&turned));
+        }
+    }
+}
+
+impl AnchoredModel {
+    /// Takes the shape that its object has now; it has one level of detail.
+    pub fn deform(&mut self, queue: &wgpu::Queue, (object, deformed): (&Object, &[SurfaceCorner])) {
+        let mesh = &object.mesh;
+        let positions = object.positions_in_anchor(mesh);
+        let place = |index: u32| positions[index as usize].as_dvec3();
+        self.receivers.clear();
+        let triangles = mesh.triangles.iter();
+        self.receivers
+            .extend(triangles.map(|triangle| triangle.map(place)));
+        let around = Bounds::around(positions.iter().map(|position| position.as_dvec3()));
+        self.bounds = around.unwrap_or(self.bounds);
+        if let Some(caster) = self
+            .levels
+            .first_mut()
+            .and_then(|level| level.caster.as_mut())
+        {
+            caster.smooth_normals = smooth_normals(deformed);
+            caster.caster.set_positions(positions);
+            let vertices = caster.caster.volume_vertices();
+            queue.write_buffer(&caster.vertices, 0, bytemuck::cast_slice(&vertices));
         }
     }
 }
@@ -443,7 +529,7 @@ fn corner_of_material(
 }
 
 /// Three corners for each triangle.
-fn corners(object: &Object, mesh: &Mesh) -> Vec<SurfaceCorner> {
+pub(super) fn corners(object: &Object, mesh: &Mesh) -> Vec<SurfaceCorner> {
     let positions = object.positions_in_anchor(mesh);
     let normal_matrix = object.anchor_from_object.matrix3.inverse().transpose();
     mesh.triangles

@@ -96,6 +96,18 @@ impl Casters {
         self.unseen = node;
     }
 
+    /// What a thing casts is to be made anew, by its number: it has another shape.
+    pub fn forget(&mut self, number: usize) {
+        let of_thing = self
+            .shadows
+            .iter_mut()
+            .filter_map(|of_slot| of_slot.get_mut(number));
+        for shadow in of_thing {
+            shadow.volume.forget();
+            shadow.lit_for = None;
+        }
+    }
+
     /// Makes room for the pieces of lights.
     pub fn reserve(&mut self, gpu: &Gpu, thing_count: usize, slot_count: usize) {
         while self.shadows.len() < slot_count {

@@ -7,6 +7,7 @@ use crate::scene::Scene;
 
 use super::accumulated::Accumulated;
 use super::attachments::{cleared, depth_stencil};
+use super::deforming::DeformingThing;
 use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
 use super::gpu_scene::GpuScene;
@@ -20,6 +21,9 @@ use super::volumes::set_scissor;
 pub(super) trait BroadLight: Send {
     /// Takes another state of its scene. False where that takes a new renderer.
     fn follow(&mut self, scene: &Scene) -> bool;
+
+    /// Takes note of things that have another shape now, which `gpu_scene` knows.
+    fn deform(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene, things: &[&DeformingThing]);
 
     /// So many sources at most get a shadow from now on; `None`: all.
     fn set_sources(&mut self, _sources: Option<u32>) {}
@@ -58,6 +62,10 @@ impl Combined {
 impl TechniquePasses for Combined {
     fn follow(&mut self, scene: &Scene) -> bool {
         self.broad.follow(scene)
+    }
+
+    fn deform(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene, things: &[&DeformingThing]) {
+        self.broad.deform(gpu, gpu_scene, things);
     }
 
     fn set_sources(&mut self, sources: Option<u32>) {

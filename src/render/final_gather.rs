@@ -23,6 +23,8 @@ use crate::geometry::subdivide::{Corner, subdivided};
 use crate::light::Light;
 use crate::scene::Scene;
 
+use super::anchor_geometry::Role;
+use super::deforming::DeformingThing;
 use super::gpu::Gpu;
 use super::gpu_scene::{DrawnModel, GpuScene};
 use super::pipelines::{PipelineDescription, overwritten};
@@ -192,6 +194,26 @@ impl FinalGather {
     fn forget_light(&mut self) {
         if let Some(gathered) = &mut self.gathered {
             // As for another scene, which moves.
+            gathered.world_from_anchor.clear();
+        }
+    }
+
+    /// Takes the shapes that things have now.
+    pub fn deform(&mut self, things: &[&DeformingThing]) {
+        for DeformingThing { role, object, .. } in things {
+            let is_real = *role == Role::Real;
+            let is_it =
+                |thing: &&mut Thing| (thing.is_real, thing.anchor) == (is_real, object.anchor);
+            let deformed = Thing::whole(&object.occluder(), is_real);
+            if let Some((thing, deformed)) = self.things.iter_mut().find(is_it).zip(deformed) {
+                *thing = deformed;
+            }
+            if is_real {
+                self.known.clear();
+            }
+        }
+        if let Some(gathered) = &mut self.gathered {
+            // As for things that are elsewhere.
             gathered.world_from_anchor.clear();
         }
     }

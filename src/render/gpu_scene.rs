@@ -1,5 +1,7 @@
 //! What stands where in a frame: the scene's surfaces, casters and lights on the GPU, and how passes draw them.
 
+mod deforming;
+
 use std::ops::Range;
 
 use glam::{DAffine3, Vec3};

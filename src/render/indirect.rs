@@ -82,6 +82,17 @@ impl Indirect {
         })
     }
 
+    /// Takes the shape that something which moves has now.
+    pub fn deform(&mut self, object: &Object) {
+        let mut movers = self.movers.iter_mut();
+        if let Some((_, mover)) = movers.find(|(anchor, _)| *anchor == object.anchor) {
+            let positions = object.positions_in_anchor(&object.mesh);
+            let triangles = object.mesh.triangles.iter();
+            let corners = triangles.map(|triangle| triangle.map(|it| positions[it as usize]));
+            mover.deform(&corners.collect::<Vec<_>>());
+        }
+    }
+
     /// Brings the batch's light up to what moves in this frame.
     pub fn update(
         &mut self,

@@ -7,7 +7,7 @@ use glam::DVec3;
 use crate::geometry::bounds::Bounds;
 use crate::light::Material;
 use crate::light::material::{Coverage, Encoding};
-use crate::scene::{Motion, Object, PathEnd, Scene};
+use crate::scene::{Motion, Object, Scene};
 
 /// Parts of a thing that hang together in no place are layers of their own, up to this number; with more, such as leaves,
 /// they are one.
@@ -88,25 +88,25 @@ impl<'a> LayeredScene<'a> {
         let layer = Object {
             mesh: thing.mesh.part(part),
             anchor: node,
-            motion: Some(Motion {
-                anchor: thing.stands_on(),
-                turn_rad_per_s: DVec3::ZERO,
-                path: Vec::new(),
-                path_end: PathEnd::Stay,
-            }),
+            motion: Some(Motion::none(thing.stands_on())),
             ..thing.clone()
         };
-        let positions = layer.positions_in_anchor(&layer.mesh);
-        let bounds = Bounds::around(positions.iter().map(|position| position.as_dvec3()));
         self.layers.push(TranslucentLayer {
             stands_on: thing.anchor,
             node,
             opacity,
-            middle: bounds.map_or(DVec3::ZERO, |bounds| 0.5 * (bounds.low + bounds.high)),
+            middle: middle(&layer),
             visible: thing.visible,
         });
         self.scene.to_mut().virtuals.push(layer);
     }
+}
+
+/// The middle of a thing in its node's space, metres.
+pub(super) fn middle(thing: &Object) -> DVec3 {
+    let positions = thing.positions_in_anchor(&thing.mesh);
+    let bounds = Bounds::around(positions.iter().map(|position| position.as_dvec3()));
+    bounds.map_or(DVec3::ZERO, |bounds| 0.5 * (bounds.low + bounds.high))
 }
 
 /// The mean opacity of some of a thing's triangles by their area; `None` where they are opaque.

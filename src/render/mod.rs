@@ -9,6 +9,7 @@ mod attachments;
 mod background;
 mod casters;
 mod combined;
+mod deforming;
 mod detail;
 mod direct;
 mod environment;

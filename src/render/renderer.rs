@@ -19,11 +19,12 @@ use crate::scene::{
 
 use super::attachments::texture;
 use super::background::{Background, PICTURE_FORMAT};
+use super::deforming::{DeformingThing, deforming};
 use super::fade::{self, Fade};
 use super::gpu::{Gpu, RenderError};
 use super::gpu_clock::{GpuClock, GpuTimes};
 use super::gpu_scene::GpuScene;
-use super::layered_scene::{LayeredScene, TranslucentLayer};
+use super::layered_scene::{LayeredScene, TranslucentLayer, middle};
 use super::layers::LayerPasses;
 use super::light_kind::LightKind;
 use super::passes::{Passes, RecordedPasses};
@@ -66,6 +67,9 @@ pub struct Renderer {
     pass_names: Vec<&'static str>,
     /// Where the picture is not that of the video.
     stale: PixelRect,
+    /// What changes its shape, and the time for which it has the shape that it has.
+    deforming: Vec<DeformingThing>,
+    time_s: f64,
     made_for: Shape,
 }
 
@@ -80,6 +84,8 @@ struct Shape {
     nodes: usize,
     /// Of each thing its name, its anchor, its mesh's triangles and whether it casts.
     things: Vec<(String, usize, usize, bool)>,
+    /// Of each thing which animation plays, how fast and whether again and again.
+    animations: Vec<Option<(usize, f64, bool)>>,
     materials: Vec<Material>,
     textures: Vec<Arc<Texture>>,
 }
@@ -102,6 +108,12 @@ impl Shape {
             ambient_radiance: scene.ambient_radiance,
             nodes: scene.node_count(),
             things: things().map(shape).collect(),
+            animations: things()
+                .map(|thing| {
+                    let animation = thing.animation.as_ref()?;
+                    Some((animation.number, animation.speed, animation.loops))
+                })
+                .collect(),
             materials: things().flat_map(|thing| thing.materials.clone()).collect(),
             textures: things().flat_map(|thing| thing.textures.clone()).collect(),
         }
@@ -140,7 +152,8 @@ impl Renderer {
             });
         }
         let background = Background::new(&gpu, &intrinsics);
-        let LayeredScene { scene, layers } = LayeredScene::new(scene);
+        let shaped = scene.shaped_at(0.0);
+        let LayeredScene { scene, layers } = LayeredScene::new(&shaped);
         let scene = scene.as_ref();
         let (technique, gpu_scene) =
             ChosenTechnique::new(&gpu, scene, intrinsics, &background, precomputation);
@@ -172,6 +185,8 @@ impl Renderer {
             bounds: None,
             pass_names: Vec::new(),
             stale: PixelRect::whole(size_px),
+            deforming: deforming(scene),
+            time_s: 0.0,
             made_for,
             size_px,
             without: scene.shadows.without,
@@ -185,7 +200,8 @@ impl Renderer {
     /// elsewhere, are shown or hidden. Light that surroundings reflect is not gathered anew. False where more has
     /// changed: that takes a new renderer.
     pub fn follow(&mut self, scene: &Scene) -> bool {
-        let LayeredScene { scene, layers } = LayeredScene::new(scene);
+        let shaped = scene.shaped_at(self.time_s);
+        let LayeredScene { scene, layers } = LayeredScene::new(&shaped);
         let scene = scene.as_ref();
         let lights = scene.outlined_lights();
         let follows =
@@ -193,9 +209,46 @@ impl Renderer {
         if follows {
             self.gpu_scene.follow(&self.gpu, scene, lights);
             self.layers = layers;
+            self.deforming = deforming(scene);
+            self.deform(|_| true);
             self.stale = PixelRect::whole(self.size_px);
         }
         follows
+    }
+
+    /// Gives the things that change it the shape that they have at a frame's time, seconds since the recording's first frame:
+    /// what is drawn from now on is drawn so. Before the first call it is that of time 0.
+    pub fn set_time(&mut self, time_s: f64) {
+        self.time_s = time_s;
+        self.deform(|thing| thing.object.take_shape(time_s));
+    }
+
+    /// Takes the shapes of those things of which `changes` says that they have another one.
+    fn deform(&mut self, mut changes: impl FnMut(&mut DeformingThing) -> bool) {
+        for thing in &mut self.deforming {
+            if !changes(thing) {
+                continue;
+            }
+            thing.is_news = true;
+            self.gpu_scene.deform(&self.gpu, thing);
+            let mut layers = self.layers.iter_mut();
+            if let Some(layer) = layers.find(|layer| layer.node == thing.object.anchor) {
+                layer.middle = middle(&thing.object);
+            }
+        }
+    }
+
+    /// Tells the technique of shapes that it does not know, as late as it can be: a frame that is passed over takes no more
+    /// than what the choice of levels needs.
+    fn tell_of_shapes(&mut self) {
+        let things = self.deforming.iter_mut();
+        let news: Vec<&DeformingThing> = things
+            .filter_map(|thing| std::mem::take(&mut thing.is_news).then_some(&*thing))
+            .collect();
+        if !news.is_empty() {
+            let technique = self.technique.passes_mut();
+            technique.deform(&self.gpu, &mut self.gpu_scene, &news);
+        }
     }
 
     /// Takes note of what the last frame took to draw, milliseconds: a scene with a frame budget is drawn with fewer
@@ -276,6 +329,7 @@ impl Renderer {
     /// Draws the uploaded picture with what stands on the nodes, layers too; one that is not there has no pose.
     fn draw_once(&mut self, camera_from_anchor: &[Option<DAffine3>], shown: Shown) {
         self.shown = shown;
+        self.tell_of_shapes();
         self.gpu_scene.place(&self.gpu, camera_from_anchor);
         let technique = self.technique.passes_mut();
         self.bounds = technique.prepare(&self.gpu, &mut self.gpu_scene, shown);

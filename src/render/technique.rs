@@ -1,6 +1,7 @@
 //! What all techniques have in common: the steps in which each draws its part of a frame.
 
 use super::background::Background;
+use super::deforming::DeformingThing;
 use super::gpu::Gpu;
 use super::gpu_scene::GpuScene;
 use super::passes::Passes;
@@ -25,6 +26,9 @@ pub(super) trait TechniquePasses {
     fn follow(&mut self, _scene: &Scene) -> bool {
         true
     }
+
+    /// Takes note of things that have another shape now, which `gpu_scene` knows.
+    fn deform(&mut self, _gpu: &Gpu, _gpu_scene: &mut GpuScene, _things: &[&DeformingThing]) {}
 
     /// So many sources of broad light at most get a shadow from now on; `None`: all.
     fn set_sources(&mut self, _sources: Option<u32>) {}

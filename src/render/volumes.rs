@@ -371,6 +371,11 @@ struct DrawnPart {
 }
 
 impl Volume {
+    /// Is to be made anew: its caster has another shape.
+    pub fn forget(&mut self) {
+        self.made_for = None;
+    }
+
     /// Makes anew what has changed.
     pub fn update(&mut self, gpu: &Gpu, caster: &Caster, made_for: MadeFor, counting: Counting) {
         let changed = self.made_for != Some(made_for);

@@ -6,6 +6,7 @@ pub use super::anchors::{
     ANCHOR_NAME, BOARD, BOARD_MARKER_SECTION, BOARD_SECTION, CENTER, MARKER, MARKER_SECTION,
     ON_BOARD, PRINTED,
 };
+pub use super::animation::{ANIMATION, AnimationKeys};
 pub use super::camera::{CAMERA, CAMERA_SECTION};
 pub use super::lights::{
     AIMED_LIGHT, AMBIENT, AMBIENT_SECTION, DIRECTIONAL_LIGHT, DIRECTIONAL_LIGHT_SECTION, LIGHT,

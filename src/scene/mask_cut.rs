@@ -17,6 +17,9 @@ use crate::light::texture::Texture;
 /// Pieces beyond the triangles that the file has.
 const MOST_PIECES: usize = 1_500_000;
 
+/// Positions that are made by cutting have numbers of their own from here on among those that move.
+const FIRST_OF_CUTS: u32 = 1 << 31;
+
 /// What has less opacity than this is left out of what lets light through: nobody sees it, and what is all clear beside leaves
 /// or letters would count for their shadow.
 const CLEAR: f64 = 0.02;
@@ -33,8 +36,9 @@ pub fn cut_masks(model: &mut RawModel, path: &Path) -> Result<(), SceneError> {
     give_looks(model);
     let region_of = |material: u32| masks.get(&material).map(|mask| mask as &dyn Region);
     let most = model.triangles.len() + MOST_PIECES;
+    let together = model.motion.as_ref().map(|motion| &motion.together[..]);
     let cut = cut(
-        &model.positions,
+        (&model.positions, together.unwrap_or_default()),
         &model.triangles,
         &model.looks,
         region_of,
@@ -55,6 +59,12 @@ pub fn cut_masks(model: &mut RawModel, path: &Path) -> Result<(), SceneError> {
         model.notes.add_of(path, message);
     }
     drop(masks);
+    if let Some(motion) = &mut model.motion {
+        // What was made is shared by its neighbours already.
+        let made = motion.together.len()..cut.positions.len();
+        let numbers = made.map(|index| FIRST_OF_CUTS + index as u32);
+        motion.together.extend(numbers);
+    }
     model.positions = cut.positions;
     model.triangles = cut.triangles;
     model.looks = cut.looks;

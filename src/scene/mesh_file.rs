@@ -4,18 +4,20 @@ use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DMat4, DVec3, Vec3};
 
+use super::animation::{Animation, WantedAnimation};
 use super::error::SceneError;
 use super::mask_cut::cut_masks;
 use super::named_files::FileKind;
 use super::obj::files::named_file;
 use super::plain_file::{self, MOST_MESH};
-use super::raw_model::RawModel;
+use super::raw_model::{ClipInfo, RawModel};
 use super::reader::Value;
 use super::{gltf, obj, ply, stl, texture_file};
 use crate::geometry::bounds::Bounds;
 use crate::geometry::mesh::{Mesh, MeshReport};
+use crate::geometry::rig::posed::MeshPoser;
 use crate::light::Material;
 use crate::light::material::{Coverage, Map};
 use crate::light::texture::Texture;
@@ -37,6 +39,10 @@ pub struct LoadedMesh {
     pub textures: Vec<Arc<Texture>>,
     /// What of the file is passed over or taken for something else, one sentence each.
     pub notes: Vec<String>,
+    /// The animations that its file has.
+    pub clips: Vec<ClipInfo>,
+    /// The one that plays.
+    pub animation: Option<Animation>,
 }
 
 /// Where a mesh's normals come from.
@@ -83,13 +89,19 @@ impl MeshReading {
     }
 }
 
-/// Reads the mesh that a scene's value names.
-pub fn load(value: &Value, kind: FileKind, reading: MeshReading) -> Result<LoadedMesh, SceneError> {
+/// Reads the mesh that a scene's value names, with what moves it where something is to play.
+pub fn load(
+    value: &Value,
+    kind: FileKind,
+    reading: MeshReading,
+    wanted: Option<&WantedAnimation>,
+) -> Result<LoadedMesh, SceneError> {
     let path = value.existing_path(kind)?;
     let Some(models) = value.models() else {
-        return read_named(value, &path, reading, &|file| value.note_consulted(file));
+        let note_read = |file: &Path| value.note_consulted(file);
+        return read_named(value, &path, (reading, wanted), &note_read);
     };
-    let how = format!("{reading:?}");
+    let how = format!("{reading:?} {:?}", wanted.map(WantedAnimation::in_words));
     if let Some((loaded, files)) = models.get::<LoadedMesh>(&path, &how) {
         files.iter().for_each(|file| value.note_consulted(file));
         return Ok((*loaded).clone());
@@ -100,7 +112,7 @@ pub fn load(value: &Value, kind: FileKind, reading: MeshReading) -> Result<Loade
             value.note_consulted(file);
             besides.borrow_mut().push(file.to_owned());
         };
-        let loaded = read_named(value, &path, reading, &note_read)?;
+        let loaded = read_named(value, &path, (reading, wanted), &note_read)?;
         Ok((loaded, besides.into_inner()))
     })?;
     Ok((*loaded).clone())
@@ -110,12 +122,12 @@ pub fn load(value: &Value, kind: FileKind, reading: MeshReading) -> Result<Loade
 fn read_named(
     value: &Value,
     path: &Path,
-    reading: MeshReading,
+    how: (MeshReading, Option<&WantedAnimation>),
     note_read: &dyn Fn(&Path),
 ) -> Result<LoadedMesh, SceneError> {
     let bytes = plain_file::read(path, MOST_MESH)
         .map_err(|error| value.error(format!("the mesh cannot be read: {error}")))?;
-    read(path, bytes, reading, note_read).map_err(|mut error| {
+    read(path, bytes, how, note_read).map_err(|mut error| {
         error.message += &format!(" (a mesh of {})", value.location());
         error
     })
@@ -125,12 +137,13 @@ fn read_named(
 fn read(
     path: &Path,
     bytes: Vec<u8>,
-    reading: MeshReading,
+    (reading, wanted): (MeshReading, Option<&WantedAnimation>),
     note_read: &dyn Fn(&Path),
 ) -> Result<LoadedMesh, SceneError> {
     let format = MeshFormat::of(path, &bytes);
+    let choose = |clips: &[ClipInfo]| wanted.map(|wanted| wanted.choose(clips)).transpose();
     let mut model = match format {
-        MeshFormat::Gltf => gltf::read(path, &bytes, note_read)?,
+        MeshFormat::Gltf => gltf::read(path, &bytes, note_read, &choose)?,
         MeshFormat::Obj => obj::read(path, &bytes, note_read)?,
         MeshFormat::Stl => stl::read(path, &bytes)?,
         MeshFormat::Ply => {
@@ -148,26 +161,41 @@ fn read(
     drop(bytes);
     cut_masks(&mut model, path)?;
     note_coverage(&mut model, path, reading.normals);
-    place(
-        &mut model,
-        path,
-        reading.up.unwrap_or(format.up()),
-        reading.fit_m,
-    )?;
-    welded(model, reading.normals)
-        .ok_or_else(|| SceneError::of_file(path, "no triangle has an area; a mesh is expected"))
+    let up = reading.up.unwrap_or(format.up());
+    let scale = place(&mut model, path, up, reading.fit_m)?;
+    let number = choose(&model.clips)?;
+    let motion = model.motion.take();
+    let clips = std::mem::take(&mut model.clips);
+    let together = motion.as_ref().map(|motion| &motion.together[..]);
+    let mut loaded = welded_as(model, reading.normals, together)
+        .ok_or_else(|| SceneError::of_file(path, "no triangle has an area; a mesh is expected"))?;
+    loaded.clips = clips;
+    if let Some(((wanted, number), motion)) = wanted.zip(number).zip(motion) {
+        let object_from_scene = DMat4::from_mat3(up.turn() * scale);
+        let crease_rad = reading.normals.crease_rad();
+        let rig = (motion.rig, motion.clip);
+        let poser = MeshPoser::new(rig, &loaded.mesh, object_from_scene, crease_rad);
+        loaded.animation = Some(wanted.playing(number, poser));
+    }
+    Ok(loaded)
 }
 
 /// A model's mesh; `None` where no triangle has an area.
-pub fn welded(mut model: RawModel, normals: Normals) -> Option<LoadedMesh> {
-    let crease_rad = match normals {
-        Normals::Flat => {
-            let triangles = model.triangles.iter_mut();
-            triangles.for_each(|triangle| triangle.normals = [None; 3]);
-            0.0
-        }
-        Normals::GivenOrMade { crease_rad } => crease_rad,
-    };
+pub fn welded(model: RawModel, normals: Normals) -> Option<LoadedMesh> {
+    welded_as(model, normals, None)
+}
+
+/// The same of a model that moves, given for each position the number of those that are one place, always.
+fn welded_as(
+    mut model: RawModel,
+    normals: Normals,
+    together: Option<&[u32]>,
+) -> Option<LoadedMesh> {
+    if normals == Normals::Flat {
+        let triangles = model.triangles.iter_mut();
+        triangles.for_each(|triangle| triangle.normals = [None; 3]);
+    }
+    let crease_rad = normals.crease_rad();
     // Corners need texture coordinates for pictures alone.
     let is_plain = model
         .materials
@@ -178,11 +206,24 @@ pub fn welded(mut model: RawModel, normals: Normals) -> Option<LoadedMesh> {
             .looks
             .iter()
             .all(|look| look.color == glam::Vec4::ONE);
-    if is_plain {
-        model.looks = Default::default();
-    }
-    let (mesh, report) =
-        Mesh::weld_with_looks(&model.positions, &model.triangles, &model.looks, crease_rad);
+    let (positions, triangles) = (&model.positions, &model.triangles);
+    let (mesh, report) = match together {
+        Some(together) => {
+            let looks = &model.looks;
+            let (mesh, report) =
+                Mesh::weld_moving(positions, triangles, looks, together, crease_rad);
+            match is_plain {
+                true => (mesh.without_looks(), report),
+                false => (mesh, report),
+            }
+        }
+        None => {
+            if is_plain {
+                model.looks = Default::default();
+            }
+            Mesh::weld_with_looks(positions, triangles, &model.looks, crease_rad)
+        }
+    };
     let notes = model.notes.told();
     let materials = || model.materials.iter();
     (!mesh.triangles.is_empty()).then(|| LoadedMesh {
@@ -193,6 +234,8 @@ pub fn welded(mut model: RawModel, normals: Normals) -> Option<LoadedMesh> {
         is_given: materials().map(|given| given.is_given).collect(),
         textures: model.textures,
         notes,
+        clips: Vec::new(),
+        animation: None,
     })
 }
 
@@ -263,8 +306,28 @@ fn note_coverage(model: &mut RawModel, path: &Path, normals: Normals) {
     }
 }
 
-/// Turns a model upright and scales it.
-fn place(model: &mut RawModel, path: &Path, up: Up, fit_m: Option<f64>) -> Result<(), SceneError> {
+impl Normals {
+    /// The largest angle between faces that look like one surface.
+    fn crease_rad(self) -> f64 {
+        match self {
+            Self::Flat => 0.0,
+            Self::GivenOrMade { crease_rad } => crease_rad,
+        }
+    }
+}
+
+impl Up {
+    /// From a file's axes to the mesh's.
+    fn turn(self) -> DMat3 {
+        match self {
+            Self::Y => DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y),
+            Self::Z => DMat3::IDENTITY,
+        }
+    }
+}
+
+/// Turns a model upright and scales it, by the factor that it returns.
+fn place(model: &mut RawModel, path: &Path, up: Up, fit_m: Option<f64>) -> Result<f64, SceneError> {
     let upright = |vector: Vec3| match up {
         Up::Y => Vec3::new(vector.x, -vector.z, vector.y),
         Up::Z => vector,
@@ -278,7 +341,7 @@ fn place(model: &mut RawModel, path: &Path, up: Up, fit_m: Option<f64>) -> Resul
     for look in &mut model.looks.looks {
         look.tangent = upright(look.tangent.truncate()).extend(look.tangent.w);
     }
-    let Some(fit_m) = fit_m else { return Ok(()) };
+    let Some(fit_m) = fit_m else { return Ok(1.0) };
     let vertices = (model.triangles.iter()).flat_map(|triangle| triangle.vertices);
     let corners = vertices.map(|vertex| model.positions[vertex as usize].as_dvec3());
     let size = Bounds::around(corners).map(|bounds| bounds.high - bounds.low);
@@ -291,7 +354,7 @@ fn place(model: &mut RawModel, path: &Path, up: Up, fit_m: Option<f64>) -> Resul
     for position in &mut model.positions {
         *position = (position.as_dvec3() * scale).as_vec3();
     }
-    Ok(())
+    Ok(scale)
 }
 
 /// The picture that a PLY file names for all of it.

@@ -16,6 +16,7 @@ pub use crate::shafts::difference::Difference;
 pub mod schema;
 
 mod anchors;
+mod animation;
 mod bundle;
 mod camera;
 mod compact;
@@ -59,6 +60,7 @@ mod transport;
 mod vertex_colors;
 pub mod yaml;
 
+pub use animation::Animation;
 pub use camera::{CameraSettings, PixelFormat, WantedFormat};
 pub use compact::{ProbeLight, ProbeLightKind, SplitLight};
 pub use dictionary::Dictionary;
@@ -74,6 +76,7 @@ pub use named_files::{FileKind, NamedFile};
 pub use placement::Placement;
 pub use quality::Quality;
 pub use ranges::{Digits, Numbers, Whole};
+pub use raw_model::ClipInfo;
 pub use reference::reference;
 pub use shadows::{
     EnvironmentMethod, EnvironmentSettings, ShadowChange, ShadowSettings, ShadowTechnique,
@@ -248,6 +251,10 @@ pub struct Object {
     pub textures: Vec<Arc<Texture>>,
     /// What of its file is passed over or taken for something else, one sentence each.
     pub notes: Vec<String>,
+    /// The animations that its file has.
+    pub clips: Vec<ClipInfo>,
+    /// The one that plays. What it makes of `mesh` at a time, [`Object::take_shape`] says.
+    pub animation: Option<Animation>,
     /// The node that it stands still on: an anchor, or, beyond the anchors, one that moves with it
     /// ([`Scene::camera_from_nodes`]).
     pub anchor: usize,

@@ -91,6 +91,21 @@ pub struct Station {
 }
 
 impl Motion {
+    /// That of what stays where it stands on an anchor: what changes its shape has a node to itself all the same.
+    pub fn none(anchor: usize) -> Self {
+        Self {
+            anchor,
+            turn_rad_per_s: DVec3::ZERO,
+            path: Vec::new(),
+            path_end: PathEnd::Stay,
+        }
+    }
+
+    /// Whether it stays where it stands.
+    pub fn is_none(&self) -> bool {
+        self.turn_rad_per_s == DVec3::ZERO && self.path.is_empty()
+    }
+
     /// How far a thing is from its own place at a time, metres, and how it is turned about its origin.
     pub fn at(&self, time_s: f64) -> (DVec3, DQuat) {
         let (offset_m, turn) = self.on_path(time_s);
@@ -186,14 +201,13 @@ pub fn motion(table: &Table, anchor: usize) -> Result<Option<Motion>, SceneError
         None => Vec::new(),
         Some(value) => stations(&value)?,
     };
-    let path_end = MOTION.path_end.read(table)?;
-    let moves = turn_rad_per_s != DVec3::ZERO || !path.is_empty();
-    Ok(moves.then_some(Motion {
+    let motion = Motion {
         anchor,
         turn_rad_per_s,
         path,
-        path_end,
-    }))
+        path_end: MOTION.path_end.read(table)?,
+    };
+    Ok((!motion.is_none()).then_some(motion))
 }
 
 fn stations(list: &Value) -> Result<Vec<Station>, SceneError> {

@@ -5,9 +5,10 @@ use std::collections::HashMap;
 use glam::{DAffine3, DVec3, Vec3};
 
 use super::anchors::unique_name;
+use super::animation::AnimationKeys;
 use super::error::{SceneError, suggestion};
 use super::mesh_file;
-use super::motion::{MotionKeys, motion};
+use super::motion::{Motion, MotionKeys, motion};
 use super::placement::{POSITION, PlacementKeys, placement};
 use super::ranges::Numbers;
 use super::raw_model::DEFAULT_ALBEDO;
@@ -115,7 +116,7 @@ const fn shown_of_thing(
     mesh: &'static str,
     [position_m, rotation_deg, scale]: [&'static str; 3],
     material: &'static str,
-) -> [(&'static str, Example); 18] {
+) -> [(&'static str, Example); 21] {
     [
         ("name", Example::Live(name)),
         ("mesh", Example::Live(mesh)),
@@ -143,6 +144,9 @@ const fn shown_of_thing(
             "path",
             Example::Aside("[{ time_s = 0 }, { time_s = 2, position_m = [0.1, 0, 0] }]"),
         ),
+        ("animation", Example::Aside("\"Walk\"")),
+        ("animation_speed", Example::Aside("0.5")),
+        ("animation_loop", Example::Aside("false")),
         ("material", Example::Live(material)),
     ]
 }
@@ -159,6 +163,7 @@ pub static PHANTOM_SECTION: Section = Section {
         StandingKeys::ALL,
         PlacementKeys::ALL,
         MotionKeys::ALL,
+        AnimationKeys::ALL,
         ThingKeys::ALL,
     ],
     shown: &shown_of_thing(
@@ -181,6 +186,7 @@ pub static VIRTUAL_SECTION: Section = Section {
         StandingKeys::ALL,
         PlacementKeys::ALL,
         MotionKeys::ALL,
+        AnimationKeys::ALL,
         ThingKeys::ALL,
         VirtualKeys::ALL,
     ],
@@ -224,7 +230,7 @@ pub fn objects(root: &Table, anchors: &[Anchor]) -> Result<(Vec<Object>, Vec<Obj
             &mut name_lines,
         )?);
     }
-    // Each moving thing has a node of its own, after the anchors.
+    // Each thing that moves, or changes its shape, has a node of its own, after the anchors.
     let moving = phantoms.iter_mut().chain(&mut virtuals);
     for (index, thing) in moving.filter(|thing| thing.motion.is_some()).enumerate() {
         thing.anchor = anchors.len() + index;
@@ -246,6 +252,8 @@ fn table_top(table: &Table) -> Result<Object, SceneError> {
         material_names: loaded.material_names,
         textures: Vec::new(),
         notes: Vec::new(),
+        clips: Vec::new(),
+        animation: None,
         anchor: 0,
         motion: None,
         anchor_from_object: DAffine3::from_translation(DVec3::Z * height_m),
@@ -276,6 +284,7 @@ fn object(
         },
     };
     let (shape, loaded) = shape(table, &name, normals)?;
+    let changes_shape = loaded.animation.is_some();
     let mut materials = loaded.materials;
     let mut mesh = loaded.mesh;
     if let Some(material) = MATERIAL_SECTION.table(table)? {
@@ -297,8 +306,10 @@ fn object(
         material_names: loaded.material_names,
         textures: loaded.textures,
         notes: loaded.notes,
+        clips: loaded.clips,
         anchor,
-        motion: motion(table, anchor)?,
+        motion: motion(table, anchor)?.or(changes_shape.then(|| Motion::none(anchor))),
+        animation: loaded.animation,
         anchor_from_object,
         casts,
         visible,

@@ -208,7 +208,12 @@ fn piece(table: &Table, name_lines: &mut HashMap<String, usize>) -> Result<RoomP
 }
 
 fn mesh_piece(value: &Value, albedo: Option<DVec3>) -> Result<RoomPiece, SceneError> {
-    let loaded = mesh_file::load(value, FileKind::RoomMesh, MeshReading::plain(Normals::Flat))?;
+    let loaded = mesh_file::load(
+        value,
+        FileKind::RoomMesh,
+        MeshReading::plain(Normals::Flat),
+        None,
+    )?;
     let mesh = loaded.mesh;
     let triangles = mesh.triangles.iter().zip(&mesh.triangle_materials);
     let triangles = triangles.map(|(triangle, &material)| {

@@ -6,6 +6,7 @@ use glam::{DVec3, Vec3};
 
 use super::notes::Notes;
 use crate::geometry::mesh::{RawLooks, RawTriangle};
+use crate::geometry::rig::{Clip, Rig};
 use crate::light::Material;
 use crate::light::texture::Texture;
 
@@ -29,6 +30,30 @@ pub struct RawModel {
     pub textures: Vec<Arc<Texture>>,
     /// What is passed over or taken for something else.
     pub notes: Notes,
+    /// The animations that its file has.
+    pub clips: Vec<ClipInfo>,
+    /// How it moves, where one of them plays.
+    pub motion: Option<RawMotion>,
+}
+
+/// What is known of an animation of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ClipInfo {
+    /// Its name; empty where it has none.
+    pub name: String,
+    /// Seconds.
+    pub duration_s: f64,
+}
+
+/// What moves a model, in the file's own units and axes.
+#[derive(Debug)]
+pub struct RawMotion {
+    /// What plays.
+    pub clip: Clip,
+    /// What holds the model's corners: their looks say where.
+    pub rig: Rig,
+    /// For each position a number; those that have one number are one place, always.
+    pub together: Vec<u32>,
 }
 
 /// A material with what the file says of it.

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use glam::{DVec2, DVec3};
 
+use super::animation::WantedAnimation;
 use super::error::SceneError;
 use super::mesh_file::{self, LoadedMesh, MeshReading, Normals, Up};
 use super::named_files::FileKind;
@@ -180,14 +181,22 @@ pub fn shape(
             kind.key()
         )));
     }
+    let wanted = WantedAnimation::read(table)?;
     if kind == ShapeKind::Mesh {
         let reading = MeshReading {
             normals,
             up: SHAPE.up.read(table)?,
             fit_m: SHAPE.fit_m.read(table)?,
         };
-        let loaded = mesh_file::load(&value, SHAPE.mesh.takes, reading)?;
+        let loaded = mesh_file::load(&value, SHAPE.mesh.takes, reading, wanted.as_ref())?;
         return Ok((kind, loaded));
+    }
+    if let Some(wanted) = wanted {
+        let message = format!(
+            "it is of a glTF file, and the thing has {}; allowed: turn_deg_per_s and path",
+            kind.key()
+        );
+        return Err(wanted.error(&message));
     }
     if let Some(of_mesh) = SHAPE.up.value(table).or_else(|| SHAPE.fit_m.value(table)) {
         return Err(of_mesh.error(format!(

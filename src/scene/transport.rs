@@ -37,7 +37,7 @@ impl Object {
     }
 
     /// It as it hides light.
-    fn occluder(&self) -> Occluder<'_> {
+    pub fn occluder(&self) -> Occluder<'_> {
         let albedos = self.mean_albedos();
         Occluder {
             mesh: &self.mesh,
@@ -46,6 +46,7 @@ impl Object {
             anchor_from_object: self.anchor_from_object,
             casts: self.casts,
             visible: self.visible,
+            deforms: self.animation.is_some(),
         }
     }
 

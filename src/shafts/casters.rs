@@ -43,11 +43,17 @@ pub struct Occluder<'a> {
     pub casts: bool,
     /// Whether it is there at all.
     pub visible: bool,
+    /// Whether it changes its shape.
+    pub deforms: bool,
 }
 
 impl Occluder<'_> {
-    /// Its triangles in its own space, simplified as far as nobody sees it in soft shadows, with their albedos.
+    /// Its triangles in its own space, simplified as far as nobody sees it in soft shadows, with their albedos. What changes
+    /// its shape has all of them: each frame would take as long to simplify as it takes to draw many.
     pub fn simplified(&self) -> Vec<([Vec3; 3], Vec3)> {
+        if self.deforms {
+            return self.with_albedos(self.mesh);
+        }
         let size = Aabb::around(self.mesh.positions.iter().copied()).diagonal();
         let shape = self.mesh.without_looks();
         let coarser = levels(&shape);
@@ -103,6 +109,7 @@ struct SimplifiedCaster {
 /// All virtual things.
 pub struct ShaftCasters {
     casters: Vec<SimplifiedCaster>,
+    surfels_of_each: usize,
 }
 
 /// The casters where they are in a frame, world space.
@@ -125,6 +132,7 @@ impl ShaftCasters {
     pub fn new(things: &[Occluder<'_>]) -> Self {
         let mut casters = Self {
             casters: things.iter().map(SimplifiedCaster::new).collect(),
+            surfels_of_each: 0,
         };
         casters.follow(things);
         casters
@@ -134,8 +142,17 @@ impl ShaftCasters {
     pub fn follow(&mut self, things: &[Occluder<'_>]) {
         let casts = |thing: &&Occluder<'_>| thing.visible && thing.casts;
         let shown = things.iter().filter(casts).count();
-        let surfel_count = (SURFELS / shown.max(1)).max(LEAST_SURFELS);
+        self.surfels_of_each = (SURFELS / shown.max(1)).max(LEAST_SURFELS);
         for (caster, thing) in self.casters.iter_mut().zip(things) {
+            caster.place(thing, self.surfels_of_each);
+        }
+    }
+
+    /// Takes the shape that a thing has now, by its number.
+    pub fn deform(&mut self, number: usize, thing: &Occluder<'_>) {
+        let surfel_count = self.surfels_of_each;
+        if let Some(caster) = self.casters.get_mut(number) {
+            caster.coarse = thing.simplified();
             caster.place(thing, surfel_count);
         }
     }

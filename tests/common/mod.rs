@@ -8,6 +8,7 @@ pub mod near_edges;
 pub mod photographs;
 pub mod prints;
 pub mod random;
+pub mod rigs;
 pub mod shapes;
 pub mod sheets;
 #[cfg(unix)]
@@ -101,6 +102,8 @@ pub fn object(name: &str, mesh: Mesh, albedo: DVec3, world_from_object: DAffine3
         notes: Vec::new(),
         anchor: 0,
         motion: None,
+        clips: Vec::new(),
+        animation: None,
         anchor_from_object: world_from_object,
         casts: true,
         visible: true,

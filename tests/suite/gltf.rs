@@ -204,7 +204,7 @@ fn textures_are_read_with_their_transforms() {
 #[test]
 fn hostile_files_are_errors_with_their_place() {
     type Spoiled = (&'static str, fn(&mut Value), &'static str);
-    let spoiled: [Spoiled; 14] = [
+    let spoiled: [Spoiled; 15] = [
         (
             "required",
             |j| j["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]),
@@ -248,6 +248,11 @@ fn hostile_files_are_errors_with_their_place() {
             "kind",
             |j| j["accessors"][0]["type"] = json!("MAT4"),
             "accessors[0]",
+        ),
+        (
+            "positions",
+            |j| j["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = json!(77),
+            "meshes[0].primitives[0].attributes.POSITION: accessors[77] of 4",
         ),
         (
             "circle",

@@ -8,12 +8,14 @@
 mod common;
 
 mod accuracy;
+mod animation;
 mod architecture;
 mod authoring;
 mod board;
 mod boards_in_space;
 mod calibrate;
 mod counting;
+mod deforming;
 mod detail;
 mod environment;
 mod figures;

@@ -383,6 +383,7 @@ fn pictures_and_colors_multiply_the_material() {
                 .cross(Vec3::new(0.3, 0.5, 0.8))
                 .normalize_or_zero()
                 .extend(1.0),
+            ..CornerLook::default()
         };
         sphere.mesh.looks = sphere.mesh.positions.iter().map(corner).collect();
         sphere.mesh.corner_looks.clone_from(&sphere.mesh.triangles);

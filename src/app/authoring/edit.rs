@@ -71,8 +71,24 @@ pub enum Edit {
         /// Of a GGX layer over it; `None`: matt, or as its file says.
         roughness: Option<f64>,
     },
+    /// What plays of a thing's model; how fast and how often go with what played before.
+    Animate {
+        /// Its name.
+        thing: String,
+        /// The animation's name, or its number where it has none; `None`: its rest pose.
+        animation: Option<AnimationName>,
+    },
     /// A phantom or a virtual thing less, by its name.
     RemoveThing(String),
+}
+
+/// How a scene names an animation of a model's file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum AnimationName {
+    /// By its name there.
+    Named(String),
+    /// By its number there, counted from 0.
+    Numbered(usize),
 }
 
 /// A phantom or a virtual thing that the scene does not have yet.
@@ -128,6 +144,7 @@ impl Edit {
             Self::Duplicate { thing, .. } => format!("duplicate \"{thing}\""),
             Self::Rename { thing, name } => format!("rename \"{thing}\" to \"{name}\""),
             Self::Material { thing, .. } => format!("paint \"{thing}\""),
+            Self::Animate { thing, .. } => format!("play \"{thing}\" otherwise"),
             Self::RemoveThing(name) => format!("remove \"{name}\""),
         }
     }
@@ -190,6 +207,7 @@ impl Edit {
             Self::RemoveLight(_)
             | Self::RemoveThing(_)
             | Self::AddThing(_)
+            | Self::Animate { .. }
             | Self::Duplicate { .. } => return false,
         }
         true

@@ -10,7 +10,7 @@ mod watch;
 mod written;
 
 pub use document::{EditError, SceneDocument};
-pub use edit::{Edit, NewForm, NewThing};
+pub use edit::{AnimationName, Edit, NewForm, NewThing};
 pub use light_from_picture::{
     FoundLight, LightNotFound, PickedVertex, PicturedThings, ShadowClick,
 };

@@ -3,16 +3,16 @@
 use glam::DVec3;
 use toml_edit::{Document, Item, Value};
 
-use super::edit::{Edit, NewForm, NewThing};
+use super::edit::{AnimationName, Edit, NewForm, NewThing};
 use super::numbers::{self, number_of};
 use super::spliced::{Body, Spliced, bodies, parsed};
 use crate::light::{Light, Shape};
 use crate::scene::format::{AIMED_LIGHT, RECT_LIGHT, SPHERE_LIGHT, SPOT_LIGHT};
 use crate::scene::format::{
-    AMBIENT, AMBIENT_SECTION, BOARD, BOARD_SECTION, CENTER, DIRECTIONAL_LIGHT, LIGHT,
-    LIGHT_SECTION, LightKind, MARKER, MARKER_SECTION, MATERIAL, ON_BOARD, PHANTOM_SECTION,
-    PLACEMENT, POINT_LIGHT, PlacementKeys, SHADOWS_SECTION, SHAPE, STANDING, ShapeKeys, TABLE,
-    TABLE_SECTION, THING, THING_NAME, VIRTUAL_SECTION,
+    AMBIENT, AMBIENT_SECTION, ANIMATION, AnimationKeys, BOARD, BOARD_SECTION, CENTER,
+    DIRECTIONAL_LIGHT, LIGHT, LIGHT_SECTION, LightKind, MARKER, MARKER_SECTION, MATERIAL, ON_BOARD,
+    PHANTOM_SECTION, PLACEMENT, POINT_LIGHT, PlacementKeys, SHADOWS_SECTION, SHAPE, STANDING,
+    ShapeKeys, TABLE, TABLE_SECTION, THING, THING_NAME, VIRTUAL_SECTION,
 };
 use crate::scene::schema::key::{Absent, Key};
 use crate::scene::schema::section::Section;
@@ -119,6 +119,10 @@ pub fn with_edit(text: &str, scene: &Scene, edit: &Edit) -> Result<String, Unfit
             let (siblings, index) = listed(&document, thing)?;
             set_material(&mut spliced, siblings[index], *albedo, *roughness);
         }
+        Edit::Animate { thing, animation } => {
+            let (siblings, index) = listed(&document, thing)?;
+            set_animation(&mut spliced, siblings[index], animation.as_ref());
+        }
         Edit::RemoveThing(name) => {
             let (siblings, index) = listed(&document, name)?;
             spliced.remove_table(&siblings, index);
@@ -157,6 +161,7 @@ pub fn touched_by(text: &str, edit: &Edit) -> Option<String> {
         Edit::RemoveThing(name) => thing(name, &VIRTUAL_SECTION.names()),
         Edit::Rename { thing: name, .. } => thing(name, &[THING_NAME.name.name]),
         Edit::Material { thing: name, .. } => thing(name, &[THING.material.name]),
+        Edit::Animate { thing: name, .. } => thing(name, &[ANIMATION.animation.name]),
         Edit::Shadows(change) => {
             let keys: Vec<&str> = change.keys().iter().map(|change| change.key).collect();
             Some(said(&tables(&document, &SHADOWS_SECTION), &keys))
@@ -265,6 +270,24 @@ fn listed<'a>(document: &'a Document<&str>, name: &str) -> Result<(Vec<Body<'a>>
             Some((siblings, index))
         })
         .ok_or_else(|| no_thing(name))
+}
+
+fn set_animation(spliced: &mut Spliced, thing: Body, animation: Option<&AnimationName>) {
+    let keys = &ANIMATION;
+    match animation {
+        Some(AnimationName::Named(name)) => {
+            spliced.set(thing, keys.animation.name, quoted(name));
+        }
+        Some(AnimationName::Numbered(number)) => {
+            spliced.set(thing, keys.animation.name, number.to_string());
+        }
+        None => {
+            // (How nothing plays is a mistake.)
+            for key in AnimationKeys::ALL {
+                spliced.remove_key(thing, key.name());
+            }
+        }
+    }
 }
 
 fn set_material(spliced: &mut Spliced, thing: Body, albedo: DVec3, roughness: Option<f64>) {

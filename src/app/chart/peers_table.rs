@@ -160,6 +160,8 @@ fn object(name: &str, mesh: Mesh, albedo: DVec3, anchor: usize, position_m: DVec
         notes: Vec::new(),
         anchor,
         motion: None,
+        clips: Vec::new(),
+        animation: None,
         anchor_from_object: DAffine3::from_translation(position_m),
         casts: true,
         visible: true,

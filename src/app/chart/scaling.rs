@@ -1,6 +1,6 @@
 //! Scaling: how what a frame costs grows with what there is. The values of one sweep are drawn in turn.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result};
@@ -11,7 +11,9 @@ use super::family::Chart;
 use super::figure::{Axis, Figure, FigurePanel, Point, Series, power_law};
 use super::lab::Lab;
 use super::measured::rounded;
-use super::peers_table::{LIGHT_M, PeersStage, SIZE_PX, TORUS_CENTER_M, WARM_UP_FRAMES, torus};
+use super::peers_table::{
+    self, LIGHT_M, PeersStage, SIZE_PX, TORUS_CENTER_M, WARM_UP_FRAMES, torus,
+};
 use super::shots::{Shots, grey_frame};
 use crate::app::stages::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
@@ -35,8 +37,26 @@ pub struct ScalingRow {
 
 /// Of the caster where its size is not varied.
 const TRIANGLES: usize = 2_500;
-const SWEEPS: [&str; 5] = ["triangles", "lights", "casters", "pixels", SOURCES];
+const UNITS: [&str; 6] = ["triangles", "lights", "casters", "pixels", SOURCES, MODELS];
+const SWEEPS: [&str; 7] = [
+    "triangles",
+    "lights",
+    "casters",
+    "pixels",
+    SOURCES,
+    STANDING,
+    WALKING,
+];
 const SOURCES: &str = "sources";
+/// Models that have an animation, of so many triangles: as they stand, and as they walk.
+const MODELS: &str = "models";
+const STANDING: &str = "triangles that stand";
+const WALKING: &str = "triangles that walk";
+/// Their files, which not everybody has, and what plays.
+const WALKERS: [(&str, &str); 2] = [("Fox.glb", "\"Walk\""), ("CesiumMan.glb", "0")];
+const MODELS_FOLDER: &str = "../shared/models/gltf";
+/// Frames a second of what walks.
+const FRAME_RATE: f64 = 30.0;
 /// Where shafts are drawn.
 const ROOM: &str = "room";
 const SOURCE_COUNTS: [u32; 7] = [1, 3, 10, 20, 50, 100, 200];
@@ -48,6 +68,52 @@ struct Setup {
     intrinsics: Intrinsics,
     /// By frame.
     poses: Box<dyn Fn(usize) -> Vec<Option<DAffine3>>>,
+}
+
+/// The stages of one unit: what is varied, its value, and what is drawn.
+type Stages = Vec<(&'static str, f64, Setup)>;
+
+/// Models that have an animation, over a table under one lamp, as they stand and as they walk; none where their files are not.
+fn walkers(samples: u32) -> Result<Stages> {
+    let mut stages = Vec::new();
+    for (file, clip) in WALKERS {
+        let path = Path::new(MODELS_FOLDER).join(file);
+        if !path.is_file() {
+            continue;
+        }
+        for (varied, animation) in [
+            (STANDING, String::new()),
+            (WALKING, format!("animation = {clip}")),
+        ] {
+            let text = format!(
+                "[camera]\nsource = \"webcam:0\"\n[[board]]\nname = \"table\"\n\
+                 markers = [{{ id = 0, size_m = 0.045, center_m = [0, 0] }}]\n\
+                 [table]\nrect_m = [-0.4, -0.4, 0.4, 0.4]\n\
+                 [[virtual]]\nname = \"it\"\nmesh = '{}'\nfit_m = 0.15\n{animation}\n\
+                 [[light]]\nkind = \"point\"\nposition_m = [{}, {}, {}]\nintensity = 0.7\n\
+                 [ambient]\nradiance = 0.05\n[shadows]\nsamples = {samples}\nambient_samples = 0\n",
+                path.display(),
+                LIGHT_M.x,
+                LIGHT_M.y,
+                LIGHT_M.z
+            );
+            let place = std::env::current_dir().context("the current folder")?;
+            let scene = Scene::parse(&place.join("walking.toml"), &text)?;
+            let triangles = scene
+                .virtuals
+                .iter()
+                .map(|thing| thing.mesh.triangles.len());
+            let value = triangles.sum::<usize>() as f64;
+            let nodes = scene.node_count();
+            let setup = Setup {
+                scene,
+                intrinsics: peers_table::intrinsics(SIZE_PX),
+                poses: Box::new(move |_| vec![Some(peers_table::camera_from_world()); nodes]),
+            };
+            stages.push((varied, value, setup));
+        }
+    }
+    Ok(stages)
 }
 
 impl From<PeersStage> for Setup {
@@ -129,6 +195,20 @@ fn sweep(lab: &Lab<'_>, varied: &str, samples: u32) -> Vec<(f64, PeersStage)> {
     sizes.map(stage).collect()
 }
 
+/// What a unit draws.
+fn stages(lab: &Lab<'_>, unit: &str, samples: u32) -> Result<Stages> {
+    let varied = SWEEPS.into_iter().find(|sweep| *sweep == unit);
+    Ok(match varied {
+        None => walkers(samples)?,
+        Some(SOURCES) => (rooms(lab, samples)?.into_iter())
+            .map(|(value, setup)| (SOURCES, value, setup))
+            .collect(),
+        Some(varied) => (sweep(lab, varied, samples).into_iter())
+            .map(|(value, stage)| (varied, value, stage.into()))
+            .collect(),
+    })
+}
+
 impl Chart for Scaling {
     const NAME: &'static str = "scaling";
     const FAMILY: &'static str = "scaling";
@@ -136,18 +216,24 @@ impl Chart for Scaling {
         lights, casters and pixels, one varied at a time: a torus of 2,500 triangles that turns over a table under one \
         lamp, 640 x 480 pixels (casters: smaller ones). Drawn and waited for, without video going up or a picture coming \
         back. Sources: soft shadows by shafts in the room that ships, where nothing \
-        moves but the camera. The number at a line is its slope, the exponent of growth over the upper half of its sizes. Memory is what \
+        moves but the camera. Triangles that stand and that walk: Khronos's Fox and CesiumMan without their animation, with \
+        volumes kept, and with it, where each frame poses the mesh and makes its volumes anew. The number at a line is its slope, the exponent of growth over the upper half of its sizes. Memory is what \
         the graphics driver has given to the program.";
     type Row = ScalingRow;
 
     fn inputs(&self, lab: &Lab<'_>) -> Result<Vec<PathBuf>> {
         let recordings = lab.recordings()?.into_iter();
         let rooms = recordings.filter(|recording| recording.name == ROOM);
-        Ok(rooms.flat_map(|room| [room.folder, room.scene]).collect())
+        let models = WALKERS.map(|(file, _)| Path::new(MODELS_FOLDER).join(file));
+        let models = models.into_iter().filter(|path| path.is_file());
+        Ok(rooms
+            .flat_map(|room| [room.folder, room.scene])
+            .chain(models)
+            .collect())
     }
 
     fn units(&self, _: &Lab<'_>) -> Result<Vec<String>> {
-        Ok(SWEEPS.map(str::to_owned).to_vec())
+        Ok(UNITS.map(str::to_owned).to_vec())
     }
 
     fn measure(&self, lab: &Lab<'_>, unit: &str) -> Result<Option<Vec<ScalingRow>>> {
@@ -159,34 +245,28 @@ impl Chart for Scaling {
         };
         let mut rows = Vec::new();
         for samples in [1, 4] {
-            let stages: Vec<(f64, Setup)> = match unit {
-                SOURCES => rooms(lab, samples)?,
-                _ => {
-                    let stages = sweep(lab, unit, samples).into_iter();
-                    stages.map(|(value, stage)| (value, stage.into())).collect()
-                }
-            };
+            let stages = stages(lab, unit, samples)?;
             let frames = if unit == SOURCES {
                 frames / 4 + 1
             } else {
                 frames
             };
-            let benches = stages.iter().map(|(_, stage)| Bench::new(&gpu, stage));
+            let benches = (stages.iter()).map(|(_, _, stage)| Bench::new(&gpu, stage));
             let mut benches = benches.collect::<Result<Vec<_>>>()?;
             for frame in 0..warm_up + frames {
                 if lab.is_stopped() {
                     return Ok(None);
                 }
-                for (bench, (_, stage)) in benches.iter_mut().zip(&stages) {
+                for (bench, (_, _, stage)) in benches.iter_mut().zip(&stages) {
                     let ms = bench.draw(stage, frame)?;
                     if frame >= warm_up {
                         bench.frames_ms.push(ms);
                     }
                 }
             }
-            for (bench, (value, _)) in benches.iter().zip(&stages) {
+            for (bench, (varied, value, _)) in benches.iter().zip(&stages) {
                 rows.push(ScalingRow {
-                    varied: unit.to_owned(),
+                    varied: (*varied).to_owned(),
                     value: *value,
                     samples,
                     frame_median_ms: rounded(quantile(&bench.frames_ms, 0.5)),
@@ -275,6 +355,7 @@ impl Bench {
     fn draw(&mut self, stage: &Setup, frame: usize) -> Result<f64> {
         let poses = (stage.poses)(frame);
         let (waited, ms) = Stopwatch::time(|| {
+            self.renderer.set_time(frame as f64 / FRAME_RATE);
             self.renderer.draw(&poses, Shown::Composite);
             self.renderer.wait()
         });

@@ -178,6 +178,7 @@ impl SceneCanvas {
             ViewMode::Bare => Shown::Bare,
             _ => Shown::Composite,
         };
+        renderer.set_time(picture.frame.time_secs);
         renderer.draw_fading(&placed, &visibility, shown);
         let size_px = picture.intrinsics.size_px;
         let replaced = match view {

@@ -1,5 +1,7 @@
 //! What lies over the picture: outlines, axes, lights, shadow edges and the handles of what is selected.
 
+use std::borrow::Cow;
+
 use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Shape, Stroke, Vec2};
 use glam::{DAffine3, DVec2, DVec3};
 
@@ -83,7 +85,11 @@ impl Overlays<'_> {
         let Some((thing, camera_from_anchor)) = placed else {
             return;
         };
-        for edge_m in outline.edges_m(thing, &camera_from_anchor) {
+        let mut thing = Cow::Borrowed(thing);
+        if thing.animation.is_some() {
+            thing.to_mut().take_shape(self.picture.frame.time_secs);
+        }
+        for edge_m in outline.edges_m(&thing, &camera_from_anchor) {
             if let [Some(a), Some(b)] = edge_m.map(|end| self.place(&camera_from_anchor, end)) {
                 self.painter.line_segment([a, b], Stroke::new(2.0, GRIP));
             }
@@ -205,7 +211,8 @@ impl Overlays<'_> {
             .iter()
             .map(|pose| pose.map(|camera_from_node| world_from_camera * camera_from_node))
             .collect();
-        for line in lines.lines(scene, &world_from_anchor) {
+        let scene = scene.shaped_at(self.picture.frame.time_secs);
+        for line in lines.lines(&scene, &world_from_anchor) {
             let Some(camera_from_anchor) = camera_from_node[line.anchor] else {
                 continue;
             };

@@ -29,10 +29,12 @@ impl SelectedOutline {
             anchor_from_object: thing.anchor_from_object,
             triangles: thing.mesh.triangles.len(),
         };
-        let is_prepared = self
-            .prepared
-            .as_ref()
-            .is_some_and(|(known, _)| *known == placed);
+        // (What plays is another in each frame.)
+        let is_prepared = thing.animation.is_none()
+            && self
+                .prepared
+                .as_ref()
+                .is_some_and(|(known, _)| *known == placed);
         if !is_prepared {
             self.prepared = Some((placed, caster_of(thing)));
         }

@@ -27,6 +27,7 @@ pub fn selected_at(
     let mut corners = Vec::new();
     let mut owners = Vec::new();
     let camera_from_node = picture.camera_from_nodes(scene);
+    let scene = scene.shaped_at(picture.frame.time_secs);
     for thing in scene.phantoms.iter().chain(&scene.virtuals) {
         let Some(camera_from_anchor) = camera_from_node[thing.anchor] else {
             continue;

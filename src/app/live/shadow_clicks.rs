@@ -23,7 +23,11 @@ impl ShadowClicks {
     pub fn begin(scene: &Scene, picture: &TrackedPicture) -> Option<Self> {
         let poses = picture.camera_from_nodes(scene);
         Some(Self {
-            things: PicturedThings::new(scene, picture.intrinsics, &poses)?,
+            things: PicturedThings::new(
+                &scene.shaped_at(picture.frame.time_secs),
+                picture.intrinsics,
+                &poses,
+            )?,
             vertex: None,
             pairs: Vec::new(),
         })

@@ -98,7 +98,8 @@ impl ShadowLines {
                 (thing.name.clone(), thing.anchor, place, casts)
             })
             .collect();
-        if standing == self.standing {
+        let deforms = things().any(|thing| thing.animation.is_some());
+        if standing == self.standing && !deforms {
             return;
         }
         let casting = things().enumerate().filter(|(_, t)| t.visible && t.casts);

@@ -102,7 +102,13 @@ fn a_disc_has_its_area_and_its_rim_alone() {
     let (positions, triangles, looks) = square(0);
     for fine in [0.05, 0.01] {
         let disc = Disc { radius: 0.4, fine };
-        let cut = cut(&positions, &triangles, &looks, |_| Some(&disc), 1_000_000);
+        let cut = cut(
+            (&positions, &[]),
+            &triangles,
+            &looks,
+            |_| Some(&disc),
+            1_000_000,
+        );
         assert!(!cut.is_coarse);
         // A chord of length s lies s² / 8r within the circle, so the polygon lacks that by two thirds along its rim.
         let most = 2.0 * PI * 0.4 * fine * fine / (8.0 * 0.4);
@@ -150,7 +156,7 @@ fn what_has_no_region_stays_and_closes_up_with_what_is_cut() {
         fine: 0.03,
     };
     let region = |material: u32| (material == 0).then_some(&disc as &dyn Region);
-    let cut = cut(&positions, &triangles, &looks, region, 1_000_000);
+    let cut = cut((&positions, &[]), &triangles, &looks, region, 1_000_000);
     let of_second = |triangle: &&RawTriangle| triangle.material == 1;
     let second = CutTriangles {
         triangles: cut.triangles.iter().filter(of_second).copied().collect(),
@@ -177,7 +183,7 @@ fn too_many_pieces_are_told_and_not_made() {
         radius: 0.4,
         fine: 0.001,
     };
-    let cut = cut(&positions, &triangles, &looks, |_| Some(&disc), 300);
+    let cut = cut((&positions, &[]), &triangles, &looks, |_| Some(&disc), 300);
     assert!(
         cut.is_coarse && cut.triangles.len() < 1500,
         "{}",

@@ -50,12 +50,27 @@ impl Casting {
             triangles: gpu.buffer(
                 "environment's casters",
                 bytemuck::cast_slice(&triangles),
-                wgpu::BufferUsages::VERTEX,
+                wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
             ),
             ranges,
             region_count,
             atlas: MapAtlas::new(gpu, tiling, "occlusion_maps.wgsl"),
             tiling,
+        }
+    }
+
+    /// Takes the shape that a thing has now, by its number.
+    pub fn deform(&self, gpu: &Gpu, number: usize, thing: &Thing) {
+        let caster = self.casters.iter().position(|&caster| caster == number);
+        let Some(range) = caster.and_then(|caster| self.ranges.get(caster)) else {
+            return;
+        };
+        let corners = thing.triangles.as_flattened();
+        // (Always as many: nothing is left out of what changes its shape.)
+        if corners.len() == range.len() {
+            let offset = u64::from(range.start) * size_of::<Vec3>() as u64;
+            gpu.queue
+                .write_buffer(&self.triangles, offset, bytemuck::cast_slice(corners));
         }
     }
 

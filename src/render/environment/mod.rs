@@ -23,6 +23,7 @@ use crate::scene::{EnvironmentMethod, EnvironmentSettings, Object, ProbeScene, S
 
 use super::anchor_geometry::Role;
 use super::combined::BroadLight;
+use super::deforming::DeformingThing;
 use super::final_gather::FinalGather;
 use super::gpu::Gpu;
 use super::gpu_scene::{DrawnLight, GpuScene};
@@ -274,6 +275,28 @@ impl BroadLight for Environment {
         self.casting = None;
         self.placed_for = None;
         true
+    }
+
+    fn deform(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene, things: &[&DeformingThing]) {
+        for deforming in things {
+            let object = &deforming.object;
+            let is_real = deforming.role == Role::Real;
+            let Some(thing) = Thing::new(&object.occluder(), is_real) else {
+                continue;
+            };
+            if let Some(casting) = &self.casting {
+                casting.deform(gpu, deforming.number, &thing);
+            }
+            self.own_light
+                .deform(gpu, gpu_scene, deforming.number, object);
+            if let Some(known) = self.things.get_mut(deforming.number) {
+                *known = Some(thing);
+            }
+            self.placed_for = None;
+        }
+        if let Some(final_gather) = &mut self.final_gather {
+            final_gather.deform(things);
+        }
     }
 
     fn update(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene) -> Option<PixelRect> {

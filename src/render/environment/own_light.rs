@@ -16,11 +16,16 @@ use crate::geometry::corner_points::corner_points;
 use crate::light::harmonics::Turn;
 use crate::scene::Object;
 
-use super::super::anchor_geometry::BatchCorners;
+use super::super::anchor_geometry::{BatchCorners, Role};
 use super::super::gpu::Gpu;
 use super::super::gpu_scene::GpuScene;
 use super::super::precomputation::Precomputation;
 use super::data::occlusion_corners;
+
+/// Rays from all points of a thing that changes its shape in one frame, about, ...
+const RAYS_OF_A_FRAME: usize = 150_000;
+/// ... and from each of them at least, and at most.
+const RAYS_OF_A_POINT: [usize; 2] = [48, 256];
 
 /// What a thing hides from itself, wherever it stands.
 struct OwnOcclusion {
@@ -138,31 +143,73 @@ impl OwnLight {
         if std::mem::replace(&mut self.is_placed, true) {
             return;
         }
-        let mut buffers = Vec::new();
-        for (batch, (_, anchor, corners)) in gpu_scene.corners().enumerate() {
-            let mut visibilities = vec![[0.0; VISIBILITIES]; corners.thing_of.len()];
-            let mut is_any = false;
-            for (number, thing) in self.things.iter_mut().enumerate() {
-                let Some(thing) = thing else {
-                    continue;
-                };
-                let Some(placed) = PlacedCorners::new((batch, anchor), corners, number, &thing.own)
-                else {
-                    continue;
-                };
-                for &(corner, point) in &placed.corners {
-                    let occlusion = placed.occlusion_of_point[point];
-                    visibilities[corner] = thing.own.occlusions[occlusion].visibility;
-                }
-                is_any = true;
-                thing.corners = Some(placed);
-            }
-            buffers.push(is_any.then(|| {
-                let contents = occlusion_corners(&corners.thing_of, &visibilities);
-                gpu.buffer("self-occlusion", &contents, wgpu::BufferUsages::VERTEX)
-            }));
-        }
+        let batches = gpu_scene.corners().enumerate();
+        let buffers: Vec<Option<wgpu::Buffer>> = batches
+            .map(|(batch, (_, anchor, corners))| self.place_in(gpu, (batch, anchor), corners))
+            .collect();
         gpu_scene.set_occlusion(buffers.into_iter());
+    }
+
+    /// Finds the things' corners in a batch (number and anchor), which gets the self-occlusion that it returns.
+    fn place_in(
+        &mut self,
+        gpu: &Gpu,
+        (batch, anchor): (usize, usize),
+        corners: &BatchCorners,
+    ) -> Option<wgpu::Buffer> {
+        let mut visibilities = vec![[0.0; VISIBILITIES]; corners.thing_of.len()];
+        let mut is_any = false;
+        for (number, thing) in self.things.iter_mut().enumerate() {
+            let Some(thing) = thing else {
+                continue;
+            };
+            let Some(placed) = PlacedCorners::new((batch, anchor), corners, number, &thing.own)
+            else {
+                continue;
+            };
+            for &(corner, point) in &placed.corners {
+                let occlusion = placed.occlusion_of_point[point];
+                visibilities[corner] = thing.own.occlusions[occlusion].visibility;
+            }
+            is_any = true;
+            thing.corners = Some(placed);
+        }
+        is_any.then(|| {
+            let contents = occlusion_corners(&corners.thing_of, &visibilities);
+            gpu.buffer("self-occlusion", &contents, wgpu::BufferUsages::VERTEX)
+        })
+    }
+
+    /// Takes the shape that a thing has now: what it hides from itself, by as many rays as there is time for.
+    pub fn deform(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene, number: usize, object: &Object) {
+        let Some(thing) = self.things.get_mut(number).and_then(Option::as_mut) else {
+            return;
+        };
+        let space = OwnSpace::new(&object.anchor_from_object);
+        let surface = OwnSurface::new(&object.mesh, std::iter::empty(), &space);
+        let [fewest, most] = RAYS_OF_A_POINT;
+        let rays = (RAYS_OF_A_FRAME / surface.point_count().max(1)).clamp(fewest, most);
+        thing.own = Arc::new(OwnOcclusion {
+            key: surface.key,
+            occlusions: surface.self_occlusions_by(rays),
+            point_of_corner: surface.point_of_corner,
+        });
+        if !self.is_placed {
+            return;
+        }
+        let batches = gpu_scene.corners().enumerate();
+        let of_thing = |(_, (_, _, corners)): &(usize, (Role, usize, &BatchCorners))| {
+            corners.thing_of.contains(&(number as u32))
+        };
+        let found = batches
+            .filter(of_thing)
+            .find_map(|(batch, (role, anchor, corners))| {
+                let buffer = self.place_in(gpu, (batch, anchor), corners)?;
+                Some(((role, anchor), buffer))
+            });
+        if let Some((batch, buffer)) = found {
+            gpu_scene.set_occlusion_of(batch, buffer);
+        }
     }
 
     /// Writes the irradiance of all corners: on virtual things of all broad light that they do not hide from themselves, on

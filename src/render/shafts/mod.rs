@@ -24,6 +24,7 @@ use super::anchor_geometry::Role;
 use super::attachments::{cleared, depth_stencil};
 use super::background::Background;
 use super::combined::BroadLight;
+use super::deforming::DeformingThing;
 use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
 use super::gpu_scene::{DrawnLight, GpuScene};
@@ -333,6 +334,15 @@ impl BroadLight for Shafts {
         true
     }
 
+    fn deform(&mut self, _gpu: &Gpu, _gpu_scene: &mut GpuScene, things: &[&DeformingThing]) {
+        // (Of real things only light from afar on what stands still is known; what moves is drawn as it is.)
+        let is_virtual = |thing: &&&DeformingThing| thing.role == Role::Virtual;
+        for DeformingThing { index, object, .. } in things.iter().filter(is_virtual) {
+            self.casters.deform(*index, &object.occluder());
+        }
+        self.world_from_anchor.clear();
+    }
+
     fn set_sources(&mut self, sources: Option<u32>) {
         self.settings.sources = sources;
         self.world_from_anchor.clear();
@@ -383,6 +393,10 @@ impl ShaftsAlone {
 impl TechniquePasses for ShaftsAlone {
     fn follow(&mut self, scene: &Scene) -> bool {
         self.shafts.follow(scene)
+    }
+
+    fn deform(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene, things: &[&DeformingThing]) {
+        self.shafts.deform(gpu, gpu_scene, things);
     }
 
     fn set_sources(&mut self, sources: Option<u32>) {

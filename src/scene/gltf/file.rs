@@ -37,7 +37,7 @@ impl<'a> GltfFile<'a> {
         extensions::check(&root, &mut notes).map_err(failed)?;
         // They were checked; the crate knows fewer of them.
         root.extensions_required.clear();
-        give_bounds(&mut root);
+        give_bounds(&mut root).map_err(failed)?;
         let document = Document::from_json(root)
             .map_err(|error| failed(format!("not a valid glTF file: {error}")))?;
         let mut file = Self {
@@ -176,26 +176,34 @@ fn parsed(path: &Path, text: &[u8]) -> Result<Root, SceneError> {
 }
 
 /// Gives positions bounds where exporters have left them out: nothing here reads them.
-fn give_bounds(root: &mut Root) {
-    let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
-    let positions: Vec<usize> = primitives
-        .flat_map(|primitive| &primitive.attributes)
-        .filter(|(semantic, _)| {
-            matches!(
-                semantic,
-                json::validation::Checked::Valid(gltf::Semantic::Positions)
-            )
-        })
-        .map(|(_, accessor)| accessor.value())
-        .collect();
-    for index in positions {
-        if let Some(accessor) = root.accessors.get_mut(index) {
-            let zero = || json::serialize::to_value([0.0; 3]).ok();
-            if accessor.min.is_none() || accessor.max.is_none() {
-                (accessor.min, accessor.max) = (zero(), zero());
+///
+/// # Errors
+/// Positions that are not there, at which the crate would stop.
+fn give_bounds(root: &mut Root) -> Result<(), String> {
+    let is_position = |semantic: &json::validation::Checked<gltf::Semantic>| {
+        let json::validation::Checked::Valid(semantic) = semantic else {
+            return false;
+        };
+        *semantic == gltf::Semantic::Positions
+    };
+    for (mesh, primitives) in root.meshes.iter().enumerate() {
+        for (primitive, given) in primitives.primitives.iter().enumerate() {
+            let attributes = given.attributes.iter();
+            for (_, index) in attributes.filter(|(semantic, _)| is_position(semantic)) {
+                let (index, count) = (index.value(), root.accessors.len());
+                let Some(accessor) = root.accessors.get_mut(index) else {
+                    return Err(format!(
+                        "meshes[{mesh}].primitives[{primitive}].attributes.POSITION: accessors[{index}] of {count}"
+                    ));
+                };
+                let zero = || json::serialize::to_value([0.0; 3]).ok();
+                if accessor.min.is_none() || accessor.max.is_none() {
+                    (accessor.min, accessor.max) = (zero(), zero());
+                }
             }
         }
     }
+    Ok(())
 }
 
 fn from_data_uri(data: &str) -> Result<Vec<u8>, String> {

@@ -1,7 +1,8 @@
 //! Reads glTF 2.0 (`.glb`, `.gltf`) as one mesh in its rest pose: node trees, skins and morph weights are applied, cameras
-//! and lights are passed over. <https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html>
+//! and lights are passed over. Where an animation is to play, what moves the mesh is read as well. <https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html>
 
 mod accessors;
+mod animations;
 pub mod copies;
 mod extensions;
 mod file;
@@ -15,15 +16,24 @@ mod textures;
 use std::path::Path;
 
 use super::error::SceneError;
-use super::raw_model::RawModel;
+use super::raw_model::{ClipInfo, RawModel, RawMotion};
+use crate::geometry::rig::Rig;
 use file::GltfFile;
 use primitives::Builder;
+
+/// Chooses the animation that plays among those that there are; `None`: none.
+pub type ChooseClip<'a> = &'a dyn Fn(&[ClipInfo]) -> Result<Option<usize>, SceneError>;
 
 /// Reads a file's default scene, its own axes and units; `note_read` is told of every file that is looked for besides.
 ///
 /// # Errors
-/// What the file lacks or has wrong, with the place in it.
-pub fn read(path: &Path, bytes: &[u8], note_read: &dyn Fn(&Path)) -> Result<RawModel, SceneError> {
+/// What the file lacks or has wrong, with the place in it; what `choose` says.
+pub fn read(
+    path: &Path,
+    bytes: &[u8],
+    note_read: &dyn Fn(&Path),
+    choose: ChooseClip<'_>,
+) -> Result<RawModel, SceneError> {
     if bytes.is_empty() {
         return Err(SceneError::of_file(
             path,
@@ -32,11 +42,15 @@ pub fn read(path: &Path, bytes: &[u8], note_read: &dyn Fn(&Path)) -> Result<RawM
     }
     let mut file = GltfFile::read(path, bytes, note_read)?;
     let document = file.document.clone();
+    let clips = animations::clips(&document);
+    let played = choose(&clips)?;
+    let clip = played.map(|number| animations::clip(&file, &document, number));
+    let clip = clip.transpose()?;
     let nodes = nodes::placed(&file, &document)?;
-    let mut builder = Builder::default();
-    for placed in &nodes.of_scene {
-        if let Some(mesh) = placed.mesh() {
-            builder.add(&mut file, &nodes, placed, &mesh, note_read)?;
+    let mut builder = Builder::new(clip.is_some());
+    for node in &nodes.of_scene {
+        if let Some(mesh) = node.mesh() {
+            builder.add(&mut file, &nodes, node, &mesh, note_read)?;
         }
     }
     builder.note_passed_over(&mut file);
@@ -52,6 +66,15 @@ pub fn read(path: &Path, bytes: &[u8], note_read: &dyn Fn(&Path)) -> Result<RawM
         looks: builder.looks,
         materials: builder.materials,
         textures: builder.textures.kept,
+        motion: clip.zip(builder.moving).map(|(clip, moving)| RawMotion {
+            clip,
+            rig: Rig {
+                tree: nodes.tree,
+                surfaces: moving.surfaces,
+            },
+            together: moving.together,
+        }),
+        clips,
         ..RawModel::default()
     };
     for note in file.notes {

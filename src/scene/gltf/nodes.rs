@@ -1,29 +1,20 @@
 //! The node tree: where each node of the scene stands.
 
-use glam::{DMat4, Mat4};
+use glam::{DQuat, DVec3, Mat4};
 use gltf::{Document, Node};
 
 use super::file::GltfFile;
+use crate::geometry::rig::{NodeParts, NodePose, NodeTree, RigNode};
 use crate::scene::error::SceneError;
 
-/// All nodes' places, and those of the scene.
+/// All nodes, and those of the scene.
 pub(super) struct Nodes<'a> {
-    /// For each node of the file.
-    pub scene_from_node: Vec<DMat4>,
+    /// Of the file.
+    pub tree: NodeTree,
+    /// Where they are at rest.
+    pub at_rest: NodePose,
     /// The nodes of the scene, parents first.
-    pub of_scene: Vec<PlacedNode<'a>>,
-}
-
-/// A node of the scene.
-pub(super) struct PlacedNode<'a> {
-    pub node: Node<'a>,
-    pub scene_from_node: DMat4,
-}
-
-impl<'a> PlacedNode<'a> {
-    pub fn mesh(&self) -> Option<gltf::Mesh<'a>> {
-        self.node.mesh()
-    }
+    pub of_scene: Vec<Node<'a>>,
 }
 
 /// Walks the trees; a node has one parent at most and is not its own ancestor.
@@ -32,40 +23,30 @@ pub(super) fn placed<'a>(
     document: &'a Document,
 ) -> Result<Nodes<'a>, SceneError> {
     let nodes: Vec<Node<'_>> = document.nodes().collect();
-    let mut has_parent = vec![false; nodes.len()];
+    let mut parents: Vec<Option<usize>> = vec![None; nodes.len()];
     for node in &nodes {
         for child in node.children() {
-            if std::mem::replace(&mut has_parent[child.index()], true) {
+            if parents[child.index()].replace(node.index()).is_some() {
                 let place = format!("nodes[{}]", child.index());
                 return Err(file.error(&place, "it is the child of two nodes"));
             }
         }
     }
-    let mut scene_from_node: Vec<Option<DMat4>> = vec![None; nodes.len()];
-    let is_root = |node: &&Node<'_>| !has_parent[node.index()];
-    let mut open: Vec<(usize, DMat4)> = nodes
-        .iter()
-        .filter(is_root)
-        .map(|node| (node.index(), DMat4::IDENTITY))
-        .collect();
-    while let Some((index, scene_from_parent)) = open.pop() {
-        let parent_from_node = Mat4::from_cols_array_2d(&nodes[index].transform().matrix());
-        let placed = scene_from_parent * parent_from_node.as_dmat4();
-        if !placed.is_finite() {
-            return Err(file.error(&format!("nodes[{index}]"), "its place is not finite"));
-        }
-        scene_from_node[index] = Some(placed);
-        open.extend(nodes[index].children().map(|child| (child.index(), placed)));
+    let rig_nodes = nodes.iter().map(|node| rig_node(node, &parents)).collect();
+    let tree = NodeTree::new(rig_nodes).map_err(|number| {
+        let place = format!("nodes[{number}]");
+        file.error(&place, "it is its own ancestor")
+    })?;
+    let at_rest = tree.pose(None);
+    let mut places = at_rest.scene_from_node.iter();
+    if let Some(number) = places.position(|place| !place.is_finite()) {
+        return Err(file.error(&format!("nodes[{number}]"), "its place is not finite"));
     }
-    // Whoever is not reached from a root is in a circle.
-    if let Some(index) = scene_from_node.iter().position(Option::is_none) {
-        return Err(file.error(&format!("nodes[{index}]"), "it is its own ancestor"));
-    }
-    let scene_from_node: Vec<DMat4> = scene_from_node.into_iter().flatten().collect();
 
     let scene = document
         .default_scene()
         .or_else(|| document.scenes().next());
+    let is_root = |node: &&Node<'_>| parents[node.index()].is_none();
     let mut open: Vec<usize> = match scene {
         Some(scene) => scene.nodes().map(|node| node.index()).collect(),
         None => nodes.iter().filter(is_root).map(Node::index).collect(),
@@ -81,13 +62,46 @@ pub(super) fn placed<'a>(
         let node = nodes[index].clone();
         let children: Vec<usize> = node.children().map(|child| child.index()).collect();
         open.extend(children.into_iter().rev());
-        of_scene.push(PlacedNode {
-            scene_from_node: scene_from_node[index],
-            node,
-        });
+        of_scene.push(node);
     }
     Ok(Nodes {
-        scene_from_node,
+        tree,
+        at_rest,
         of_scene,
     })
+}
+
+fn rig_node(node: &Node<'_>, parents: &[Option<usize>]) -> RigNode {
+    let transform = node.transform();
+    let matrix = Mat4::from_cols_array_2d(&transform.clone().matrix());
+    let (translation, rotation, scale) = transform.decomposed();
+    let in_double = |vector: [f32; 3]| DVec3::from_array(vector.map(f64::from));
+    let rotation = DQuat::from_array(rotation.map(f64::from));
+    let weights = node
+        .weights()
+        .or(node.mesh().and_then(|mesh| mesh.weights()));
+    RigNode {
+        parent: parents[node.index()],
+        parent_from_node: matrix.as_dmat4(),
+        parts: NodeParts {
+            translation: in_double(translation),
+            rotation: match rotation.length_squared() > 0.0 {
+                true => rotation.normalize(),
+                false => DQuat::IDENTITY,
+            },
+            scale: in_double(scale),
+        },
+        // (A weight that is no number counts for nothing.)
+        weights: weights
+            .unwrap_or_default()
+            .iter()
+            .map(|&weight| {
+                if weight.is_finite() {
+                    weight.into()
+                } else {
+                    0.0
+                }
+            })
+            .collect(),
+    }
 }

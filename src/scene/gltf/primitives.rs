@@ -3,18 +3,20 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use glam::{DMat3, DMat4, DVec3, Vec2, Vec3, Vec4};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 use gltf::accessor::Dimensions;
 use gltf::mesh::Mode;
 use gltf::{Primitive, Semantic};
 
 use super::file::GltfFile;
 use super::materials::material;
-use super::nodes::{Nodes, PlacedNode};
-use super::skins::{morph, scene_from_vertices, turned_tangent};
+use super::nodes::Nodes;
+use super::skins::{joints, morph_targets, turned_tangent};
 use super::tangents::made_tangents;
 use super::textures::Textures;
-use crate::geometry::mesh::{CornerLook, RawLooks, RawTriangle};
+use crate::geometry::mesh::{CornerLook, RawLooks, RawTriangle, RigPoint};
+use crate::geometry::rig::RigVertices;
+use crate::geometry::rig::surface::{AlwaysTogether, Holding, MorphTarget, RigSurface};
 use crate::scene::error::SceneError;
 use crate::scene::raw_model::GivenMaterial;
 
@@ -33,6 +35,18 @@ pub(super) struct Builder {
     index_of_material: HashMap<(Option<usize>, bool), u32>,
     /// Primitives of points or lines.
     without_surface: usize,
+    /// Where the model is to move.
+    pub moving: Option<Moving>,
+}
+
+/// What moves, and for each position which others it always goes with.
+#[derive(Default)]
+pub(super) struct Moving {
+    pub surfaces: Vec<RigSurface>,
+    pub together: Vec<u32>,
+    /// Vertices of all surfaces.
+    vertex_count: u32,
+    numbers: AlwaysTogether,
 }
 
 /// What the vertices of a primitive have, in the mesh's space.
@@ -45,16 +59,23 @@ struct Vertices {
 }
 
 impl Builder {
+    /// Without triangles; `moves` tells whether they are to move.
+    pub fn new(moves: bool) -> Self {
+        Self {
+            moving: moves.then(Moving::default),
+            ..Self::default()
+        }
+    }
+
     /// Adds a mesh where its node or its skin has it.
     pub fn add(
         &mut self,
         file: &mut GltfFile<'_>,
         nodes: &Nodes<'_>,
-        placed: &PlacedNode<'_>,
+        node: &gltf::Node<'_>,
         mesh: &gltf::Mesh<'_>,
         note_read: &dyn Fn(&Path),
     ) -> Result<(), SceneError> {
-        let weights = placed.node.weights().or(mesh.weights()).unwrap_or_default();
         for primitive in mesh.primitives() {
             let place = format!("meshes[{}].primitives[{}]", mesh.index(), primitive.index());
             if matches!(
@@ -64,13 +85,7 @@ impl Builder {
                 self.without_surface += 1;
                 continue;
             }
-            let mut vertices = vertices(file, &place, &primitive)?;
-            morph(
-                file,
-                (&place, &primitive, weights),
-                &mut vertices.positions,
-                &mut vertices.normals,
-            )?;
+            let vertices = vertices(file, &place, &primitive)?;
             let triangles = triangles(file, &place, &primitive, vertices.positions.len())?;
             let corners = self.positions.len()
                 + vertices.positions.len()
@@ -79,24 +94,42 @@ impl Builder {
                 return Err(file.error(&place, format!("more than {MOST_CORNERS} corners in all")));
             }
             let material = self.material(file, &primitive, vertices.has_colors, note_read)?;
-            let scene_from_vertex = match placed.node.skin() {
-                Some(skin) if primitive.get(&Semantic::Joints(0)).is_some() => scene_from_vertices(
-                    file,
-                    nodes,
-                    &skin,
-                    (&place, &primitive, vertices.positions.len()),
-                )?,
-                _ => vec![placed.scene_from_node; vertices.positions.len()],
+            let held = (&place[..], &primitive, vertices.positions.len());
+            let surface = RigSurface {
+                holding: match node.skin() {
+                    Some(skin) if primitive.get(&Semantic::Joints(0)).is_some() => {
+                        Holding::Joints(joints(file, &skin, held)?)
+                    }
+                    _ => Holding::Node,
+                },
+                targets: self.morph_targets(file, (&place, &primitive), nodes, node.index())?,
+                node: node.index(),
+                positions: vertices.positions,
+                normals: vertices.normals,
             };
-            self.put(
-                file,
-                &place,
-                (vertices, &scene_from_vertex),
-                triangles,
-                material,
-            )?;
+            let placed = surface.placed(&nodes.at_rest);
+            let looks = (vertices.looks, vertices.has_tangents);
+            self.put(file, &place, (placed, looks), triangles, material)?;
+            if let Some(moving) = &mut self.moving {
+                moving.add(surface, self.positions.len());
+            }
         }
         Ok(())
+    }
+
+    /// All of them where the model is to move, else those that count at rest.
+    fn morph_targets(
+        &self,
+        file: &GltfFile<'_>,
+        primitive: (&str, &Primitive<'_>),
+        nodes: &Nodes<'_>,
+        node: usize,
+    ) -> Result<Vec<MorphTarget>, SceneError> {
+        let weights = &nodes.at_rest.weights[node];
+        morph_targets(file, primitive, |number| {
+            let counts = weights.get(number).is_some_and(|weight| *weight != 0.0);
+            counts || self.moving.is_some()
+        })
     }
 
     /// Tells what has no surface.
@@ -133,33 +166,28 @@ impl Builder {
         &mut self,
         file: &GltfFile<'_>,
         place: &str,
-        (vertices, scene_from_vertex): (Vertices, &[DMat4]),
+        (placed, (looks, has_tangents)): (RigVertices, (Vec<CornerLook>, bool)),
         triangles: Vec<[u32; 3]>,
         material: u32,
     ) -> Result<(), SceneError> {
         let first = self.positions.len() as u32;
-        let mut normals: Vec<Option<Vec3>> = Vec::with_capacity(vertices.normals.len());
         let normal_map = self.materials[material as usize].material.maps.normal;
-        for (index, scene_from_mesh) in scene_from_vertex.iter().enumerate() {
-            let position = scene_from_mesh
-                .transform_point3(vertices.positions[index])
-                .as_vec3();
+        let held_from = self.moving.as_ref().map(|moving| moving.vertex_count);
+        for (index, mut look) in looks.into_iter().enumerate() {
+            let position = placed.positions[index].as_vec3();
             if !position.is_finite() {
                 return Err(file.error(place, format!("POSITION {index} is placed at infinity")));
             }
             self.positions.push(position);
-            let cofactors = normal_from_mesh(scene_from_mesh);
-            normals.push(
-                vertices.normals[index]
-                    .map(|normal| (cofactors * normal).normalize_or_zero().as_vec3()),
-            );
-            let mut look = vertices.looks[index];
-            look.tangent = turned_tangent(scene_from_mesh, look.tangent);
+            look.tangent = turned_tangent(&placed.scene_from_mesh[index], look.tangent);
+            if let Some(first) = held_from {
+                look.held_by = RigPoint::at(first + index as u32);
+            }
             self.looks.looks.push(look);
         }
         // What a mirror turns is turned back.
         let is_mirrored =
-            |corners: &[u32; 3]| scene_from_vertex[corners[0] as usize].determinant() < 0.0;
+            |corners: &[u32; 3]| placed.scene_from_mesh[corners[0] as usize].determinant() < 0.0;
         let triangles: Vec<[u32; 3]> = triangles
             .into_iter()
             .map(|[a, b, c]| {
@@ -170,7 +198,7 @@ impl Builder {
                 }
             })
             .collect();
-        let given = |vertex: u32| normals[vertex as usize];
+        let given = |vertex: u32| placed.normals[vertex as usize].map(|normal| normal.as_vec3());
         let start = self.triangles.len();
         self.triangles
             .extend(triangles.iter().map(|corners| RawTriangle {
@@ -183,7 +211,7 @@ impl Builder {
                 .iter()
                 .map(|corners| corners.map(|corner| first + corner)),
         );
-        if let Some(map) = normal_map.filter(|_| !vertices.has_tangents) {
+        if let Some(map) = normal_map.filter(|_| !has_tangents) {
             self.make_tangents(first as usize, start, &triangles, map.uv_set as usize);
         }
         Ok(())
@@ -227,17 +255,14 @@ impl Builder {
     }
 }
 
-/// Cofactors: normals keep standing on their surface whatever the scale, and on its outside in a mirror.
-fn normal_from_mesh(scene_from_mesh: &DMat4) -> DMat3 {
-    let linear = DMat3::from_mat4(*scene_from_mesh);
-    let cofactors = DMat3::from_cols(
-        linear.y_axis.cross(linear.z_axis),
-        linear.z_axis.cross(linear.x_axis),
-        linear.x_axis.cross(linear.y_axis),
-    );
-    match linear.determinant() < 0.0 {
-        true => cofactors * -1.0,
-        false => cofactors,
+impl Moving {
+    /// Adds a surface whose positions were put; with those that tangents need there are `position_count` of them.
+    fn add(&mut self, surface: RigSurface, position_count: usize) {
+        self.together.extend(self.numbers.numbers(&surface));
+        // (No triangle has the rest as its corner.)
+        self.together.resize(position_count, u32::MAX);
+        self.vertex_count += surface.positions.len() as u32;
+        self.surfaces.push(surface);
     }
 }
 

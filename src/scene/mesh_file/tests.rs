@@ -4,7 +4,12 @@ use crate::geometry::cuboid::SIDES;
 const SMOOTH: Normals = Normals::GivenOrMade { crease_rad: 0.5 };
 
 fn read_text(path: &Path, text: &str, normals: Normals) -> Result<LoadedMesh, SceneError> {
-    read(path, text.into(), MeshReading::plain(normals), &|_| ())
+    read(
+        path,
+        text.into(),
+        (MeshReading::plain(normals), None),
+        &|_| (),
+    )
 }
 
 fn failure(text: &str) -> String {
@@ -114,7 +119,7 @@ fn models_are_turned_upright_and_fitted() {
             fit_m,
             ..MeshReading::plain(SMOOTH)
         };
-        read(Path::new("a.obj"), text.into(), reading, &|_| ())
+        read(Path::new("a.obj"), text.into(), (reading, None), &|_| ())
             .unwrap()
             .mesh
     };

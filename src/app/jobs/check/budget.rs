@@ -63,6 +63,7 @@ fn measured(scene: &Scene) -> Result<String> {
     while frames_ms.len() < DRAWS && watch.elapsed_ms() < LONGEST_MS {
         let (drawn, ms) = Stopwatch::time(|| {
             renderer.upload(&frame)?;
+            renderer.set_time(frame.time_secs);
             renderer.draw(&poses, Shown::Composite);
             renderer.wait()
         });

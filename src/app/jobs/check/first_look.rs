@@ -112,7 +112,8 @@ impl<'a> Look<'a> {
         self.sightings
             .watch(frame, poses.iter().map(Option::is_some))?;
         let nodes = self.scene.camera_from_nodes(&poses, frame.time_secs);
-        for (in_view, thing) in self.in_view.iter_mut().zip(&self.scene.virtuals) {
+        let scene = self.scene.shaped_at(frame.time_secs);
+        for (in_view, thing) in self.in_view.iter_mut().zip(&scene.virtuals) {
             let camera_from_node = nodes.get(thing.anchor).copied().flatten();
             *in_view |= camera_from_node.is_some_and(|node| {
                 may_show(thing, node * thing.anchor_from_object, &self.intrinsics)

@@ -11,14 +11,14 @@ use glam::{DVec3, Vec3, Vec4};
 use crate::app::scene_warnings::sizes::{length, sides_m};
 use crate::app::scene_warnings::warnings;
 use crate::geometry::levels::{Level, levels};
-use crate::geometry::mesh::{CornerLook, MeshReport};
+use crate::geometry::mesh::{CornerLook, HeldCorner, MeshReport};
 use crate::geometry::outline_scale::largest_scale;
 use crate::light::{Light, Shape};
 use crate::scene::SceneLight;
 use crate::scene::format::LightKind;
 use crate::scene::format::{SHADOWS, SHADOWS_SECTION};
 use crate::scene::{
-    Anchor, DetectorKind, Face, Marker, Object, Quality, Scene, ShadowSettings, ShapeKind,
+    Anchor, ClipInfo, DetectorKind, Face, Marker, Object, Quality, Scene, ShadowSettings, ShapeKind,
 };
 use budget::budget_line;
 use room::room_lines;
@@ -246,15 +246,20 @@ fn object_row(object: &Object, anchors: &[Anchor], with_levels: bool) -> TableRo
         .map_or("nothing", |anchor| &anchor.name);
     let mut notes = vec![material_note(object)];
     notes.extend(mesh_notes(&object.mesh_report));
-    if with_levels {
+    if with_levels && object.animation.is_none() {
         notes.extend(levels_note(object));
     }
     if object.anchor_from_object.matrix3.determinant() < 0.0 {
         notes.push("mirrored".to_owned());
     }
-    if object.motion.is_some() {
+    if object
+        .motion
+        .as_ref()
+        .is_some_and(|motion| !motion.is_none())
+    {
         notes.push("moves by itself".to_owned());
     }
+    notes.extend(animations_note(object));
     if !object.visible {
         notes.push("hidden".to_owned());
     }
@@ -325,6 +330,7 @@ fn material_note(object: &Object) -> String {
         + mesh.triangles.len() * size_of::<([u32; 3], [Vec3; 3], u32)>()
         + mesh.looks.len() * size_of::<CornerLook>()
         + mesh.corner_looks.len() * size_of::<[u32; 3]>()
+        + mesh.held.len() * size_of::<[HeldCorner; 3]>()
         + object
             .textures
             .iter()
@@ -378,6 +384,34 @@ fn levels_note(object: &Object) -> Option<String> {
     }
     let list = shown.join(", ");
     (!levels.is_empty()).then(|| format!("from afar at largest/mean error in mm: {list}"))
+}
+
+/// The animations of a thing's file, and which of them plays.
+fn animations_note(object: &Object) -> Option<String> {
+    /// So many say enough.
+    const SHOWN: usize = 12;
+    let playing = object.animation.as_ref();
+    let told = |(number, clip): (usize, &ClipInfo)| {
+        let name = match &clip.name[..] {
+            "" => String::new(),
+            name => format!(" \"{name}\""),
+        };
+        let plays = playing.filter(|playing| playing.number == number);
+        let plays = plays.map_or(String::new(), |playing| {
+            let once = if playing.loops { "" } else { ", once" };
+            format!(" (plays at {} times its speed{once})", short(playing.speed))
+        });
+        format!("{number}{name} {} s{plays}", short(clip.duration_s))
+    };
+    let clips = object.clips.iter().enumerate();
+    let is_shown = |(number, _): &(usize, &ClipInfo)| {
+        *number < SHOWN || playing.is_some_and(|playing| playing.number == *number)
+    };
+    let mut shown: Vec<String> = clips.filter(is_shown).map(told).collect();
+    if object.clips.len() > shown.len() {
+        shown.push(format!("{} more", object.clips.len() - shown.len()));
+    }
+    (!shown.is_empty()).then(|| format!("animations {}", shown.join(", ")))
 }
 
 /// What was found in a mesh and done to it.

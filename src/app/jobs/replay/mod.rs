@@ -311,6 +311,7 @@ impl ReplayRun<'_> {
         let mut render_ms = None;
         if let (Some(renderer), false) = (&mut renderer, wanted) {
             // `--frames 25` shows what the whole replay shows in frame 25.
+            renderer.set_time(frame.time_secs);
             renderer.pass_over(&self.camera_from_nodes(&frame, &poses));
         }
         if let (Some(renderer), true) = (renderer, wanted) {
@@ -353,6 +354,7 @@ impl ReplayRun<'_> {
         let whole = Stopwatch::start();
         let (uploaded, upload_ms) = Stopwatch::time(|| renderer.upload(frame));
         uploaded?;
+        renderer.set_time(frame.time_secs);
         let visibility: Vec<_> = poses.iter().map(|pose| pose.visibility).collect();
         let visibility = self.scene.of_nodes(&visibility);
         let ((), submit_ms) = Stopwatch::time(|| renderer.draw_fading(&placed, &visibility, shown));

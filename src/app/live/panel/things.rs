@@ -1,11 +1,11 @@
 //! Phantoms and virtual things: what is there, and where.
 
-use eframe::egui::{TextEdit, Ui};
+use eframe::egui::{ComboBox, TextEdit, Ui};
 use glam::DVec3;
 
 use super::Placements;
 use super::editing::{Editing, number, vector};
-use crate::app::authoring::Edit;
+use crate::app::authoring::{AnimationName, Edit};
 use crate::app::live::command::{Commands, SceneCommand, Selected, WindowCommand};
 use crate::app::live::window_state::WindowState;
 use crate::scene::format::{MATERIAL, PLACEMENT};
@@ -43,6 +43,7 @@ pub fn show(
                     actions(ui, thing, renaming, commands);
                     fields(ui, scene, thing, placement, editing, commands);
                     material(ui, thing, editing, commands);
+                    animation(ui, thing, commands);
                 }
             });
         }
@@ -92,6 +93,42 @@ fn actions(ui: &mut Ui, thing: &Object, renaming: &mut Renaming, commands: &mut 
             commands.push(SceneCommand::RemoveSelected);
         }
     });
+}
+
+/// What plays of its model.
+fn animation(ui: &mut Ui, thing: &Object, commands: &mut Commands) {
+    if thing.clips.is_empty() {
+        return;
+    }
+    let told = |number: Option<usize>| match number.map(|number| (number, &thing.clips[number])) {
+        None => "rest pose".to_owned(),
+        Some((number, clip)) if clip.name.is_empty() => number.to_string(),
+        Some((_, clip)) => clip.name.clone(),
+    };
+    let playing = thing.animation.as_ref().map(|animation| animation.number);
+    let mut chosen = playing;
+    ComboBox::from_label("plays")
+        .selected_text(told(playing))
+        .show_ui(ui, |ui| {
+            let numbers = (0..thing.clips.len()).map(Some);
+            for number in std::iter::once(None).chain(numbers) {
+                ui.selectable_value(&mut chosen, number, told(number));
+            }
+        });
+    if chosen != playing {
+        commands.push(SceneCommand::Commit(Edit::Animate {
+            thing: thing.name.clone(),
+            animation: chosen.map(|number| match told(Some(number)) {
+                name if first_of_name(thing, &name) == Some(number) => AnimationName::Named(name),
+                _ => AnimationName::Numbered(number),
+            }),
+        }));
+    }
+}
+
+/// The number of the first animation of a name.
+fn first_of_name(thing: &Object, name: &str) -> Option<usize> {
+    thing.clips.iter().position(|clip| clip.name == name)
 }
 
 /// What it is made of: of several materials the first, in place of all.
