@@ -1,9 +1,17 @@
-//! What all targets share: bytes as files that a scene names, in a folder that each process has to itself.
+//! What all targets share: a limit on memory, and bytes as files that a scene names, in a folder that each process has to itself.
 
+use std::alloc::System;
 use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
 
+use cap::Cap;
 use gnomon::scene::Scene;
+
+/// What may be taken beyond what there was before, bytes, for an input of less than a megabyte.
+const MOST_MEMORY: usize = 256 << 20;
+
+#[global_allocator]
+static MEMORY: Cap<System> = Cap::new(System, usize::MAX);
 
 thread_local! {
     static FOLDER: OnceCell<tempfile::TempDir> = const { OnceCell::new() };
@@ -11,11 +19,32 @@ thread_local! {
 
 const WORLD: &str = "[[marker]]\nname = \"card\"\nid = 0\nsize_m = 0.05\n";
 
+/// A target that ends where an input takes more memory than it may.
+#[macro_export]
+macro_rules! target {
+    (|$input:ident: $kind:ty| $body:expr) => {
+        libfuzzer_sys::fuzz_target!(|$input: $kind| {
+            $crate::limit_memory();
+            let _ = $body;
+        });
+    };
+}
+
+/// From now on [`MOST_MEMORY`] more may be taken; who asks for more ends the process. What OpenCV takes is not counted.
+pub fn limit_memory() {
+    // Raised first: the limit must never lie below what is taken.
+    let _ = MEMORY.set_limit(usize::MAX);
+    let _ = MEMORY.set_limit(MEMORY.allocated() + MOST_MEMORY);
+}
+
 /// A file of some bytes; the last one of the same name is gone.
 pub fn file(name: &str, bytes: &[u8]) -> PathBuf {
     FOLDER.with(|folder| {
         let folder = folder.get_or_init(|| tempfile::tempdir().expect("a folder"));
         let path = folder.path().join(name);
+        if let Some(parent) = path.parent() {
+            std::fs::create_dir_all(parent).expect("a folder");
+        }
         std::fs::write(&path, bytes).expect("a file");
         path
     })
@@ -35,7 +64,19 @@ pub fn probe(name: &str, bytes: &[u8]) {
     scene(&path.with_file_name("scene.toml"), &probe);
 }
 
+/// Reads a scene that is this text beside a file of these bytes.
+pub fn beside(name: &str, bytes: &[u8], text: &str) {
+    let path = file(name, bytes);
+    scene(&path.with_file_name("scene.toml"), text);
+}
+
 /// Reads a scene.
 pub fn scene(path: &Path, text: &str) {
     let _ = Scene::parse(path, text);
+}
+
+/// The first byte, a digit in the seeds, as a choice of so many, and the rest.
+pub fn choice(input: &[u8], of: usize) -> Option<(usize, &[u8])> {
+    let (first, rest) = input.split_first()?;
+    Some((usize::from(first.wrapping_sub(b'0')) % of, rest))
 }

@@ -75,6 +75,11 @@ fn read(path: &Path, compact: &[Light]) -> Option<RoomTransport> {
     if sum != checksum(room) {
         return None;
     }
+    of_bytes(room, compact)
+}
+
+/// A room's transport from what was kept of it, without the checksum; `None` where that is none, or of another version.
+pub fn of_bytes(room: &[u8], compact: &[Light]) -> Option<RoomTransport> {
     let (version, transport): (u32, RoomTransport) = postcard::from_bytes(room).ok()?;
     (version == VERSION).then(|| transport.with_caster(compact))
 }

@@ -11,7 +11,7 @@ pub mod linear;
 pub mod live;
 mod pixels;
 mod times;
-mod video;
+pub mod video;
 
 use std::path::{Path, PathBuf};
 

@@ -7,7 +7,6 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
-use wgpu::util::DeviceExt as _;
 
 use crate::geometry::bounds::Bounds;
 use crate::geometry::coincidence::{IN_ONE_PLACE_M, may_coincide};
@@ -18,6 +17,7 @@ use crate::geometry::shadow_volume::Caster;
 use crate::geometry::solid::holes;
 use crate::scene::{Object, Scene, Shortcut};
 
+use super::gpu::Gpu;
 use super::materials::needs_looks;
 
 /// The kind of model that a surface belongs to.
@@ -173,7 +173,7 @@ impl KnownLevels {
 }
 
 impl AnchorGeometry {
-    pub fn new(device: &wgpu::Device, scene: &Scene, known: &mut KnownLevels) -> Self {
+    pub fn new(gpu: &Gpu, scene: &Scene, known: &mut KnownLevels) -> Self {
         let ambient = (PI * scene.ambient_radiance).as_vec3();
         let mut geometry = Self {
             batches: Vec::new(),
@@ -212,7 +212,7 @@ impl AnchorGeometry {
                         Role::Real => index,
                         Role::Virtual => scene.phantoms.len() + index,
                     } as u32;
-                    let thing = thing(device, (role, tie), object, coarser, &mut shared);
+                    let thing = thing(gpu, (role, tie), object, coarser, &mut shared);
                     geometry.things.extend(thing);
                 }
                 if shared.triangles.is_empty() {
@@ -220,7 +220,7 @@ impl AnchorGeometry {
                 }
                 geometry
                     .batches
-                    .push(shared.batch(device, role, anchor, ambient));
+                    .push(shared.batch(gpu, role, anchor, ambient));
             }
         }
         geometry
@@ -252,7 +252,7 @@ fn triangles_in_anchor(object: &Object) -> Vec<[DVec3; 3]> {
 
 /// Puts an object's levels among its batch's corners; `None` without triangles.
 fn thing(
-    device: &wgpu::Device,
+    gpu: &Gpu,
     (role, tie): (Role, Option<usize>),
     object: &Object,
     coarser: &[Level],
@@ -281,11 +281,11 @@ fn thing(
             let of_casting = || {
                 let caster = Caster::new(positions, mesh.triangles.clone());
                 LevelCaster {
-                    vertices: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                        label: Some("shadow volume"),
-                        contents: bytemuck::cast_slice(&caster.volume_vertices()),
-                        usage: wgpu::BufferUsages::VERTEX,
-                    }),
+                    vertices: gpu.buffer(
+                        "shadow volume",
+                        bytemuck::cast_slice(&caster.volume_vertices()),
+                        wgpu::BufferUsages::VERTEX,
+                    ),
                     caster,
                     surface_triangles: shared.triangles[first..].to_vec(),
                     smooth_normals: smooth_normals(&corners),
@@ -358,20 +358,8 @@ impl SharedCorners {
         index
     }
 
-    fn batch(
-        self,
-        device: &wgpu::Device,
-        role: Role,
-        anchor: usize,
-        ambient: Vec3,
-    ) -> SurfaceBatch {
-        let buffer = |label, contents: &[u8], usage| {
-            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some(label),
-                contents,
-                usage,
-            })
-        };
+    fn batch(self, gpu: &Gpu, role: Role, anchor: usize, ambient: Vec3) -> SurfaceBatch {
+        let buffer = |label, contents: &[u8], usage| gpu.buffer(label, contents, usage);
         let places = self.corners.iter();
         let places = places.map(|corner| (corner.position, corner.normal));
         SurfaceBatch {
@@ -390,7 +378,7 @@ impl SharedCorners {
             indirect: buffer(
                 "indirect light",
                 bytemuck::cast_slice(&vec![ambient; self.corners.len()]),
-                wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+                wgpu::BufferUsages::VERTEX,
             ),
             looks: self.looks.as_ref().map(|looks| {
                 let contents = bytemuck::cast_slice(looks);

@@ -14,7 +14,7 @@ use crate::scene::PixelFormat;
 
 /// How much of a JPEG may be broken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Tolerance {
+pub enum Tolerance {
     /// Nothing.
     Strict,
     /// What does not keep the rest from being decoded: some cameras break the rules in every picture.
@@ -23,8 +23,10 @@ pub(super) enum Tolerance {
 
 /// A picture as a driver hands it out.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct RawPicture<'a> {
+pub struct RawPicture<'a> {
+    /// As they came.
     pub bytes: &'a [u8],
+    /// What they are.
     pub pixels: PixelFormat,
     /// The camera's format; a JPEG says its own.
     pub size_px: [u32; 2],
@@ -33,10 +35,7 @@ pub(super) struct RawPicture<'a> {
 }
 
 /// The picture's size and its RGBA; `None` where the bytes are no such picture.
-pub(super) fn rgba_of(
-    picture: RawPicture<'_>,
-    tolerance: Tolerance,
-) -> Option<([u32; 2], Vec<u8>)> {
+pub fn rgba_of(picture: RawPicture<'_>, tolerance: Tolerance) -> Option<([u32; 2], Vec<u8>)> {
     let RawPicture {
         bytes,
         pixels,
@@ -129,7 +128,7 @@ fn convert(
 }
 
 /// RGBA of a JPEG and its size.
-pub(super) fn rgba_of_jpeg(bytes: &[u8], tolerance: Tolerance) -> Option<([u32; 2], Vec<u8>)> {
+pub fn rgba_of_jpeg(bytes: &[u8], tolerance: Tolerance) -> Option<([u32; 2], Vec<u8>)> {
     // Zeros in place of a lost end are codes like any other; the mark of the end tells.
     if tolerance == Tolerance::Strict && !bytes.windows(2).any(|pair| pair == [0xff, 0xd9]) {
         return None;

@@ -2,9 +2,9 @@
 //! stream says, its picture as it is meant to be held. A decoder that crashes or hangs does not take gnomon with it.
 
 mod colours;
-mod log;
+pub mod log;
 mod planes;
-mod probe;
+pub mod probe;
 mod process;
 pub(super) mod stream;
 

@@ -11,7 +11,7 @@ use super::log::ratio;
 
 /// What a container says of its first video.
 #[derive(Debug, Default)]
-pub(super) struct Header {
+pub struct Header {
     /// Frames, where the container counts them.
     pub counted_frames: Option<u32>,
     /// How long it lasts, seconds.
@@ -85,33 +85,38 @@ impl Probe {
 
     /// Waits for what it says of the header.
     pub(super) fn header(self) -> Option<Header> {
-        let answer = self.answer()?;
-        let stream = answer.streams.into_iter().next()?;
-        let rate = |text: &Option<String>| {
-            let rate = text.as_deref().and_then(ratio);
-            rate.filter(|fps| (0.1..=1000.0).contains(fps))
-        };
-        let container = answer.format;
-        let secs = |text: Option<&String>| text.and_then(|text| text.parse().ok());
-        let whole = container
-            .as_ref()
-            .and_then(|format| format.duration.as_ref());
-        Some(Header {
-            counted_frames: stream.nb_frames.and_then(|count| count.parse().ok()),
-            duration_secs: secs(stream.duration.as_ref()).or_else(|| secs(whole)),
-            fps: nominal_fps(rate(&stream.avg_frame_rate), rate(&stream.r_frame_rate)),
-            lines: stream.height,
-            container: container
-                .and_then(|format| format.format_name)
-                .unwrap_or_default(),
-        })
+        header_of(&self.answer()?)
     }
 
-    fn answer(mut self) -> Option<Answer> {
+    fn answer(mut self) -> Option<String> {
         let mut text = String::new();
         self.child.stdout.take()?.read_to_string(&mut text).ok()?;
-        serde_json::from_str(&text).ok()
+        Some(text)
     }
+}
+
+/// What an answer of ffprobe says of the header; `None` where it is none.
+pub fn header_of(answer: &str) -> Option<Header> {
+    let answer: Answer = serde_json::from_str(answer).ok()?;
+    let stream = answer.streams.into_iter().next()?;
+    let rate = |text: &Option<String>| {
+        let rate = text.as_deref().and_then(ratio);
+        rate.filter(|fps| (0.1..=1000.0).contains(fps))
+    };
+    let container = answer.format;
+    let secs = |text: Option<&String>| text.and_then(|text| text.parse().ok());
+    let whole = container
+        .as_ref()
+        .and_then(|format| format.duration.as_ref());
+    Some(Header {
+        counted_frames: stream.nb_frames.and_then(|count| count.parse().ok()),
+        duration_secs: secs(stream.duration.as_ref()).or_else(|| secs(whole)),
+        fps: nominal_fps(rate(&stream.avg_frame_rate), rate(&stream.r_frame_rate)),
+        lines: stream.height,
+        container: container
+            .and_then(|format| format.format_name)
+            .unwrap_or_default(),
+    })
 }
 
 impl Drop for Probe {
@@ -131,7 +136,7 @@ fn nominal_fps(average: Option<f64>, by_steps: Option<f64>) -> Option<f64> {
 }
 
 /// The packets of a video's first stream that hold something to be shown.
-pub(super) struct Packets {
+pub struct Packets {
     /// Their time stamps, microseconds.
     stamps: BTreeSet<i64>,
 }
@@ -140,7 +145,12 @@ impl Packets {
     /// Reads the whole file without decoding it.
     pub(super) fn of(input_options: &[&str], input: &OsString) -> Option<Self> {
         let entries = "packet=pts_time,dts_time,flags";
-        let answer = Probe::ask(input_options, input, entries)?.answer()?;
+        Self::of_answer(&Probe::ask(input_options, input, entries)?.answer()?)
+    }
+
+    /// Those of an answer of ffprobe; `None` where it is none.
+    pub fn of_answer(answer: &str) -> Option<Self> {
+        let answer: Answer = serde_json::from_str(answer).ok()?;
         let micros = |text: &String| text.parse().ok().map(micros_of);
         let stamps = answer
             .packets
@@ -154,7 +164,7 @@ impl Packets {
     }
 
     /// How many there are between two frames, or before or after one.
-    pub(super) fn between(&self, after_secs: Option<f64>, before_secs: Option<f64>) -> u32 {
+    pub fn between(&self, after_secs: Option<f64>, before_secs: Option<f64>) -> u32 {
         use std::ops::Bound::{Excluded, Unbounded};
         // The stamps are written with six places.
         let slack = 1;
