@@ -4,6 +4,7 @@
 mod alignment;
 pub mod ball;
 pub mod calibration;
+pub mod children;
 mod error;
 pub mod exposures;
 mod images;

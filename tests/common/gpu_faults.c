@@ -1,5 +1,6 @@
 // A Vulkan layer that lets a device fail. GNOMON_TEST_GPU_FAULT is `submit N` (the N-th submission loses its device), `wait N`
-// (the N-th wait does) or `memory N` (its device has no memory from its N-th buffer or picture on). Other devices go on, so that a program
+// (the N-th wait does), `memory N` (its device has no memory from its N-th buffer or picture on) or `file PATH` (a submission
+// that finds the file takes it away and loses its device). Other devices go on, so that a program
 // that opens a new one can work. Only tests load it. The loader's side is as its document LoaderLayerInterface.md has it.
 #include <stdatomic.h>
 #include <stdint.h>
@@ -69,6 +70,8 @@ static int is_lost(struct Device *device, const char *kind, atomic_long *counter
 
 static Result queue_submit(void *queue, uint32_t count, const void *submits, uint64_t fence) {
     struct Device *device = device_of(queue);
+    const char *fault = getenv("GNOMON_TEST_GPU_FAULT");
+    if (fault && !strncmp(fault, "file ", 5) && !remove(fault + 5)) device->is_lost = 1;
     return is_lost(device, "submit", &submissions) ? DEVICE_LOST : device->submit(queue, count, submits, fence);
 }
 

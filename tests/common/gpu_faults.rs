@@ -33,7 +33,7 @@ fn folder() -> &'static Path {
     })
 }
 
-/// Lets the GPU of a program fail: `submit 3`, `wait 3` or `memory 3`.
+/// Lets the GPU of a program fail: `submit 3`, `wait 3`, `memory 3`, or `file PATH`, once that is there.
 pub fn let_fail<'a>(command: &'a mut Command, fault: &str) -> &'a mut Command {
     command
         .env("VK_ADD_LAYER_PATH", folder())

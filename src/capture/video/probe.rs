@@ -3,11 +3,20 @@
 use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};
 use std::io::Read;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
+use std::sync::mpsc::channel;
+use std::time::Duration;
 
 use serde::Deserialize;
 
 use super::log::ratio;
+use crate::capture::children::RunningChild;
+
+/// A header that takes longer does not come, nor do the packets of a whole file.
+const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE_WITH_PACKETS: Duration = Duration::from_secs(1800);
+/// Bytes of an answer at most: the packets of a day of video.
+const MOST_ANSWER: u64 = 256 << 20;
 
 /// What a container says of its first video.
 #[derive(Debug, Default)]
@@ -58,7 +67,7 @@ struct Packet {
 
 /// An ffprobe process. Dropped, it is ended.
 pub(super) struct Probe {
-    child: Child,
+    running: RunningChild,
 }
 
 impl Probe {
@@ -78,20 +87,28 @@ impl Probe {
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::null());
-        #[cfg(unix)]
-        std::os::unix::process::CommandExt::process_group(&mut command, 0);
-        command.spawn().ok().map(|child| Self { child })
+        let running = RunningChild::start(&mut command).ok()?;
+        Some(Self { running })
     }
 
     /// Waits for what it says of the header.
     pub(super) fn header(self) -> Option<Header> {
-        header_of(&self.answer()?)
+        header_of(&self.answer(PATIENCE)?)
     }
 
-    fn answer(mut self) -> Option<String> {
-        let mut text = String::new();
-        self.child.stdout.take()?.read_to_string(&mut text).ok()?;
-        Some(text)
+    /// All that it says; `None` where it says too much, or nothing for too long.
+    fn answer(mut self, patience: Duration) -> Option<String> {
+        let stdout = self.running.child.stdout.take()?;
+        let (to_asker, answer) = channel();
+        std::thread::spawn(move || {
+            let mut bytes = Vec::new();
+            let read = stdout.take(MOST_ANSWER + 1).read_to_end(&mut bytes);
+            // The asker may have lost patience.
+            _ = to_asker.send(read.map(|_| bytes));
+        });
+        let bytes = answer.recv_timeout(patience).ok()?.ok()?;
+        let fits = bytes.len() as u64 <= MOST_ANSWER;
+        fits.then(|| String::from_utf8(bytes).ok()).flatten()
     }
 }
 
@@ -119,14 +136,6 @@ pub fn header_of(answer: &str) -> Option<Header> {
     })
 }
 
-impl Drop for Probe {
-    fn drop(&mut self) {
-        // Both fail only where it has ended already.
-        _ = self.child.kill();
-        _ = self.child.wait();
-    }
-}
-
 /// The average, but where it counts what is no frame (AVI with reordered frames): no more than the steps of the time stamps.
 fn nominal_fps(average: Option<f64>, by_steps: Option<f64>) -> Option<f64> {
     match (average, by_steps) {
@@ -145,7 +154,7 @@ impl Packets {
     /// Reads the whole file without decoding it.
     pub(super) fn of(input_options: &[&str], input: &OsString) -> Option<Self> {
         let entries = "packet=pts_time,dts_time,flags";
-        Self::of_answer(&Probe::ask(input_options, input, entries)?.answer()?)
+        Self::of_answer(&Probe::ask(input_options, input, entries)?.answer(PATIENCE_WITH_PACKETS)?)
     }
 
     /// Those of an answer of ffprobe; `None` where it is none.
