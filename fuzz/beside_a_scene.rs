@@ -17,7 +17,10 @@ thread_local! {
     static FOLDER: OnceCell<tempfile::TempDir> = const { OnceCell::new() };
 }
 
-const WORLD: &str = "[[marker]]\nname = \"card\"\nid = 0\nsize_m = 0.05\n";
+/// What each scene begins with.
+pub const CAMERA: &str = "[camera]\nsource = \"webcam:0\"\n";
+const MARKER: &str = "[[marker]]\nname = \"card\"\nid = 0\nsize_m = 0.05\n";
+const MESH: &[u8] = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
 /// A target that ends where an input takes more memory than it may.
 #[macro_export]
@@ -40,7 +43,14 @@ pub fn limit_memory() {
 /// A file of some bytes; the last one of the same name is gone.
 pub fn file(name: &str, bytes: &[u8]) -> PathBuf {
     FOLDER.with(|folder| {
-        let folder = folder.get_or_init(|| tempfile::tempdir().expect("a folder"));
+        let folder = folder.get_or_init(|| {
+            let folder = tempfile::tempdir().expect("a folder");
+            // A scene that is refused for what it is would leave all files unread.
+            std::fs::write(folder.path().join("good.obj"), MESH).expect("a file");
+            let scene = Scene::parse(&folder.path().join("good.toml"), &scene_with_mesh("good.obj"));
+            assert!(scene.is_ok(), "{}", scene.err().map_or(String::new(), |error| error.to_string()));
+            folder
+        });
         let path = folder.path().join(name);
         if let Some(parent) = path.parent() {
             std::fs::create_dir_all(parent).expect("a folder");
@@ -53,21 +63,24 @@ pub fn file(name: &str, bytes: &[u8]) -> PathBuf {
 /// Reads a scene that has a virtual thing of these bytes; it may be refused, and must not panic.
 pub fn mesh(name: &str, bytes: &[u8]) {
     let path = file(name, bytes);
-    let thing = format!("{WORLD}[[virtual]]\nname = \"thing\"\nmesh = \"{name}\"\nfit_m = 0.1\n");
-    scene(&path.with_file_name("scene.toml"), &thing);
+    scene(&path.with_file_name("scene.toml"), &scene_with_mesh(name));
+}
+
+fn scene_with_mesh(name: &str) -> String {
+    format!("{CAMERA}{MARKER}[[virtual]]\nname = \"thing\"\nmesh = \"{name}\"\nfit_m = 0.1\n")
 }
 
 /// Reads a scene that has a probe of these bytes.
 pub fn probe(name: &str, bytes: &[u8]) {
     let path = file(name, bytes);
-    let probe = format!("{WORLD}[probe]\nimage = \"{name}\"\nkind = \"panorama\"\nposition_m = [0, 0, 0.1]\n");
+    let probe = format!("{CAMERA}{MARKER}[probe]\nimage = \"{name}\"\nkind = \"panorama\"\nposition_m = [0, 0, 0.1]\n");
     scene(&path.with_file_name("scene.toml"), &probe);
 }
 
-/// Reads a scene that is this text beside a file of these bytes.
+/// Reads a scene that is this text, after its camera, beside a file of these bytes.
 pub fn beside(name: &str, bytes: &[u8], text: &str) {
     let path = file(name, bytes);
-    scene(&path.with_file_name("scene.toml"), text);
+    scene(&path.with_file_name("scene.toml"), &format!("{CAMERA}{text}"));
 }
 
 /// Reads a scene.

@@ -10,6 +10,7 @@ minutes=${1:-60}
 targets=${*:-$(sed -n '/^\[\[bin\]\]/,/^path/s/^name = "\(.*\)"/\1/p' fuzz/Cargo.toml)}
 count=$(echo "$targets" | wc -w)
 seconds=$((minutes * 60 / count))
+[ "$seconds" -gt 0 ] || seconds=1
 host=$(rustc -vV | sed -n 's/^host: //p')
 
 coverage="-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 -Cllvm-args=-sanitizer-coverage-inline-8bit-counters \
@@ -35,14 +36,15 @@ for target in $targets; do
     before=$(ls "$kept" | wc -l)
     begun=$(date +%s)
     # The heap is limited to 256 MB by the targets themselves; the rest is the program, OpenCV and what the fuzzer keeps.
-    "fuzz/target/$host/release/$target" -max_total_time=$seconds -timeout=20 -rss_limit_mb=768 -max_len=65536 \
+    # A broken heap may keep it from ending.
+    timeout -k 5 $((seconds + 60)) "fuzz/target/$host/release/$target" -max_total_time=$seconds -timeout=20 -rss_limit_mb=768 -max_len=65536 \
         -print_final_stats=1 -verbosity=1 -artifact_prefix="$kept/" "$corpus" "fuzz/seeds/$target" >"$kept.log" 2>&1 || failed="$failed $target"
     ended=$(date +%s)
     last=$(grep -a '^#[0-9].* cov: ' "$kept.log" | tail -1 | tr '\t' ' ')
-    of() { echo "$last" | sed -n "s/.* $1: *\([0-9]*\).*/\1/p"; }
+    of() { echo "$last" | LC_ALL=C grep -a -o "$1[0-9]*" | head -1 | tr -dc 0-9; }
     stat() { sed -n "s/^stat::$1: *//p" "$kept.log"; }
     runs=$(stat number_of_executed_units)
-    echo "$target,$((ended - begun)),${runs:-$(echo "$last" | sed -n 's/^#\([0-9]*\).*/\1/p')},$(of cov),$(of ft),$(of corp),$(stat peak_rss_mb),$(($(ls "$kept" | wc -l) - before))" |
+    echo "$target,$((ended - begun)),${runs:-$(of '^#')},$(of 'cov: '),$(of 'ft: '),$(of 'corp: '),$(stat peak_rss_mb),$(($(ls "$kept" | wc -l) - before))" |
         tee -a $figures
 done
 if [ -n "$failed" ]; then

@@ -18,6 +18,7 @@ use std::path::{Path, PathBuf};
 
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::quarter_turns::QuarterTurns;
+use crate::scene::plain_file;
 
 pub use calibration::{
     CalibrationError, calibration_text, check_frame_size, load_calibration, load_calibration_for,
@@ -101,6 +102,10 @@ impl FrameSource {
             },
             _ => io_error(error),
         })?;
+        // A pipe would be waited for.
+        if !metadata.is_dir() && !metadata.is_file() {
+            return Err(io_error(plain_file::not_plain()));
+        }
         if metadata.is_dir() {
             let files = files_of(path).map_err(io_error)?;
             Self::open_folder(path, files)

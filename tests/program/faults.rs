@@ -551,3 +551,42 @@ fn a_gpu_that_fails_ends_a_job_in_a_message() {
         }
     }
 }
+
+/// A pipe that nobody writes to, named as anything that is read.
+#[test]
+fn pipes_are_not_waited_for() {
+    let place = Place::new();
+    let pipe = |name: &str| {
+        let made = Command::new("mkfifo").arg(place.at(name)).status();
+        assert!(made.unwrap().success());
+    };
+    for name in ["pipe.mp4", "pipe.png", "pipe.toml", "pipe.obj"] {
+        pipe(name);
+    }
+    let scene = fs::read_to_string(place.at("short/scene.toml")).unwrap();
+    let of_pipe = scene.replace("\"recording\"", "\"pipe.mp4\"");
+    assert_ne!(of_pipe, scene);
+    fs::write(place.at("of_pipe.toml"), of_pipe).unwrap();
+    for arguments in [
+        "check of_pipe.toml",
+        "check pipe.toml",
+        "track pipe.mp4 --size-mm 30 --poses out/p.csv",
+        "track pipe.png --size-mm 30 --poses out/p.csv",
+        "board --from pipe.mp4 --size-mm 30 --out out/b.toml",
+        "calibrate pipe.mp4 --chessboard 8x5 --square-mm 25 --out out/c.toml",
+        "calibrate pipe.png --chessboard 8x5 --square-mm 25 --out out/c.toml",
+        "probe pipe.png --kind panorama --out out/p.hdr",
+        "record pipe.mp4 --out out/s",
+        "replay of_pipe.toml --poses out/p.csv",
+    ] {
+        let job = job(arguments, &[]);
+        let output = ended(place.command(job, AS_IT_IS).spawn().unwrap(), arguments);
+        place.judge(job, "a pipe", &output);
+        assert_eq!(files(&place.at("out")), BTreeSet::new(), "{arguments}");
+        let is_check = arguments.starts_with("check of");
+        assert!(
+            is_check || !output.status.success(),
+            "{arguments}: {output:?}"
+        );
+    }
+}

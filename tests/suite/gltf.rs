@@ -204,7 +204,7 @@ fn textures_are_read_with_their_transforms() {
 #[test]
 fn hostile_files_are_errors_with_their_place() {
     type Spoiled = (&'static str, fn(&mut Value), &'static str);
-    let spoiled: [Spoiled; 14] = [
+    let spoiled: [Spoiled; 15] = [
         (
             "required",
             |j| j["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]),
@@ -248,6 +248,11 @@ fn hostile_files_are_errors_with_their_place() {
             "kind",
             |j| j["accessors"][0]["type"] = json!("MAT4"),
             "accessors[0]",
+        ),
+        (
+            "positions",
+            |j| j["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = json!(99),
+            "POSITION names accessors[99]",
         ),
         (
             "circle",
@@ -323,6 +328,21 @@ fn a_spoiled_binary_file_never_panics() {
         read_file(&path, "virtual")
     };
     assert_eq!(written(&whole).unwrap().mesh.triangles.len(), 2);
+    // Lengths that are less than the head's own, found by fuzzing.
+    for length in [0, 11_u32] {
+        let mut bytes = whole.clone();
+        bytes[8..12].copy_from_slice(&length.to_le_bytes());
+        let message = written(&bytes).unwrap_err();
+        assert!(
+            message.contains(&format!("its length is {length}")),
+            "{message}"
+        );
+    }
+    assert!(
+        written(&whole[..9])
+            .unwrap_err()
+            .contains("ends in its head")
+    );
     let mut random = fastrand::Rng::with_seed(7);
     for _ in 0..300 {
         let mut bytes = whole.clone();

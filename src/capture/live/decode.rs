@@ -68,6 +68,14 @@ pub fn rgba_of(picture: RawPicture<'_>, tolerance: Tolerance) -> Option<([u32; 2
         PixelFormat::Rgb => (3, rows, imgproc::COLOR_RGB2RGBA),
         PixelFormat::Bgr => (3, rows, imgproc::COLOR_BGR2RGBA),
     };
+    // Two pixels share their colour: OpenCV would write the last pair of an odd row beyond its end.
+    let pairs = matches!(
+        pixels,
+        PixelFormat::Yuyv | PixelFormat::Yvyu | PixelFormat::Uyvy
+    );
+    if pairs && size_px[0] % 2 != 0 {
+        return None;
+    }
     let packed = without_padding(picture)?;
     let rgba = convert(&packed, channels, rows, size_px, conversion);
     // OpenCV refuses what it has no conversion for: odd sides of pictures whose colour comes at half the resolution.
@@ -238,6 +246,18 @@ mod tests {
             .flat_map(|&g| [g, g, g, 255])
             .collect();
         assert_eq!(grey, Some(([1, 4], expected)));
+    }
+
+    /// Found by fuzzing: OpenCV wrote beyond the picture.
+    #[test]
+    fn half_a_pair_of_pixels_is_no_picture() {
+        for pixels in [PixelFormat::Yuyv, PixelFormat::Yvyu, PixelFormat::Uyvy] {
+            for width in [1, 7] {
+                let bytes = vec![9; 4 * width as usize];
+                let found = rgba_of(&bytes, pixels, [width, 2], Tolerance::Lenient);
+                assert_eq!(found, None, "{pixels:?}, {width}");
+            }
+        }
     }
 
     #[test]

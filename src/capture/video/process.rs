@@ -158,11 +158,33 @@ impl Decoder {
                         }
                     }
                 }
-                Err(RecvTimeoutError::Disconnected) => self.ended = true,
+                Err(RecvTimeoutError::Disconnected) => {
+                    self.ended = true;
+                    if let Some(words) = self.failure() {
+                        return Next::Complaint(words);
+                    }
+                }
                 Err(RecvTimeoutError::Timeout) => return self.silent(),
             }
         }
         Next::End
+    }
+
+    /// What its status says, where it has ended otherwise than well: one that is killed complains of nothing.
+    fn failure(&mut self) -> Option<String> {
+        const NAP: Duration = Duration::from_millis(2);
+        let mut waited = Duration::ZERO;
+        while waited < self.patience {
+            match self.running.try_wait() {
+                Ok(Some(status)) if status.success() => return None,
+                Ok(Some(status)) => return Some(format!("the decoder failed: {status}")),
+                Ok(None) => std::thread::sleep(NAP),
+                Err(_) => return None,
+            }
+            waited += NAP;
+        }
+        self.running.end();
+        Some("the decoder does not end".to_owned())
     }
 
     fn silent(&mut self) -> Next {
@@ -276,8 +298,12 @@ mod tests {
         let mut decoder = script(&format!("printf %b \"$1\" >&2; {pixels}"));
         assert!(matches!(decoder.next(), Next::Frame(_)));
         assert!(matches!(decoder.next(), Next::End));
-        // One that dies in the middle of a frame.
+        // One that dies in the middle of a frame, and one that is killed after it.
         let mut decoder = script("printf %b \"$1\" >&2; printf 123");
+        assert!(matches!(decoder.next(), Next::End));
+        let mut decoder = script(&format!("printf %b \"$1\" >&2; {pixels}; kill -9 $$"));
+        assert!(matches!(decoder.next(), Next::Frame(_)));
+        assert!(matches!(decoder.next(), Next::Complaint(words) if words.contains("signal: 9")));
         assert!(matches!(decoder.next(), Next::End));
     }
 

@@ -37,7 +37,7 @@ impl<'a> GltfFile<'a> {
         extensions::check(&root, &mut notes).map_err(failed)?;
         // They were checked; the crate knows fewer of them.
         root.extensions_required.clear();
-        give_bounds(&mut root);
+        give_bounds(&mut root).map_err(failed)?;
         let document = Document::from_json(root)
             .map_err(|error| failed(format!("not a valid glTF file: {error}")))?;
         let mut file = Self {
@@ -147,6 +147,14 @@ fn parts(bytes: &[u8]) -> Result<Parts<'_>, String> {
     if !bytes.starts_with(b"glTF") {
         return Ok((Cow::Borrowed(bytes), None));
     }
+    // The crate takes it from the length without looking.
+    let head = size_of::<[u32; 3]>();
+    let length = bytes.get(8..head).and_then(|length| length.try_into().ok());
+    match length.map(u32::from_le_bytes) {
+        Some(length) if length as usize >= head => {}
+        Some(length) => return Err(format!("not a whole .glb file: its length is {length}")),
+        None => return Err("not a whole .glb file: it ends in its head".to_owned()),
+    }
     let glb = Glb::from_slice(bytes).map_err(|error| match error {
         gltf::Error::Binary(gltf::binary::Error::Version(version)) => {
             format!("glTF of version {version}; version 2 is read")
@@ -176,7 +184,10 @@ fn parsed(path: &Path, text: &[u8]) -> Result<Root, SceneError> {
 }
 
 /// Gives positions bounds where exporters have left them out: nothing here reads them.
-fn give_bounds(root: &mut Root) {
+///
+/// # Errors
+/// Positions that are not there, on which the crate would panic.
+fn give_bounds(root: &mut Root) -> Result<(), String> {
     let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
     let positions: Vec<usize> = primitives
         .flat_map(|primitive| &primitive.attributes)
@@ -189,13 +200,16 @@ fn give_bounds(root: &mut Root) {
         .map(|(_, accessor)| accessor.value())
         .collect();
     for index in positions {
-        if let Some(accessor) = root.accessors.get_mut(index) {
-            let zero = || json::serialize::to_value([0.0; 3]).ok();
-            if accessor.min.is_none() || accessor.max.is_none() {
-                (accessor.min, accessor.max) = (zero(), zero());
-            }
+        let count = root.accessors.len();
+        let accessor = root.accessors.get_mut(index).ok_or_else(|| {
+            format!("POSITION names accessors[{index}], of which there are {count}")
+        })?;
+        let zero = || json::serialize::to_value([0.0; 3]).ok();
+        if accessor.min.is_none() || accessor.max.is_none() {
+            (accessor.min, accessor.max) = (zero(), zero());
         }
     }
+    Ok(())
 }
 
 fn from_data_uri(data: &str) -> Result<Vec<u8>, String> {
