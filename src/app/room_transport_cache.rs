@@ -81,7 +81,7 @@ fn read(path: &Path, compact: &[Light]) -> Option<RoomTransport> {
 /// A room's transport from what was kept of it, without the checksum; `None` where that is none, or of another version.
 pub fn of_bytes(room: &[u8], compact: &[Light]) -> Option<RoomTransport> {
     let (version, transport): (u32, RoomTransport) = postcard::from_bytes(room).ok()?;
-    (version == VERSION).then(|| transport.with_caster(compact))
+    (version == VERSION && transport.is_consistent()).then(|| transport.with_caster(compact))
 }
 
 fn checksum(bytes: &[u8]) -> [u8; 8] {
@@ -150,6 +150,11 @@ mod tests {
         fs::write(&path, &whole[..whole.len() / 2]).unwrap();
         assert_eq!(ready_from(&scene).read_from, None);
         assert!(fs::read(&path).unwrap() == whole);
+
+        // A checksum says that it is as it was written, not that it is a room.
+        let mut odd = first.transport;
+        odd.patches.vertices.truncate(5);
+        assert!(of_bytes(&postcard::to_stdvec(&(VERSION, &odd)).unwrap(), &[]).is_none());
 
         // What the room depends on makes it another one.
         scene.probe.as_mut().unwrap().exposure *= 1.5;
