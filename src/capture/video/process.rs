@@ -154,20 +154,26 @@ impl Decoder {
                             Err(error) if error.kind() == ErrorKind::TimedOut => {
                                 return self.silent();
                             }
-                            Err(_) => self.ended = true,
+                            Err(error) if error.kind() == ErrorKind::UnexpectedEof => {
+                                return self.after_the_last();
+                            }
+                            Err(_) => {
+                                self.ended = true;
+                                self.running.end();
+                            }
                         }
                     }
                 }
-                Err(RecvTimeoutError::Disconnected) => {
-                    self.ended = true;
-                    if let Some(words) = self.failure() {
-                        return Next::Complaint(words);
-                    }
-                }
+                Err(RecvTimeoutError::Disconnected) => return self.after_the_last(),
                 Err(RecvTimeoutError::Timeout) => return self.silent(),
             }
         }
         Next::End
+    }
+
+    fn after_the_last(&mut self) -> Next {
+        self.ended = true;
+        self.failure().map_or(Next::End, Next::Complaint)
     }
 
     /// What its status says, where it has ended otherwise than well: one that is killed complains of nothing.
@@ -301,6 +307,8 @@ mod tests {
         // One that dies in the middle of a frame, and one that is killed after it.
         let mut decoder = script("printf %b \"$1\" >&2; printf 123");
         assert!(matches!(decoder.next(), Next::End));
+        let mut decoder = script("printf %b \"$1\" >&2; printf 123; kill -9 $$");
+        assert!(matches!(decoder.next(), Next::Complaint(_)));
         let mut decoder = script(&format!("printf %b \"$1\" >&2; {pixels}; kill -9 $$"));
         assert!(matches!(decoder.next(), Next::Frame(_)));
         assert!(matches!(decoder.next(), Next::Complaint(words) if words.contains("signal: 9")));
