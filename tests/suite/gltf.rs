@@ -397,3 +397,30 @@ fn khronos_samples_are_read() {
         }
     }
 }
+
+/// What fuzzing began with and what it found, of all kinds of meshes: read or refused, and counted right.
+#[test]
+fn what_fuzzing_found_is_read_or_refused() {
+    let mut seen = 0;
+    for kind in ["obj", "ply", "stl", "gltf", "glb"] {
+        let folder = crate::common::project_file("fuzz/seeds").join(kind);
+        for entry in std::fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            seen += 1;
+            if let Ok(thing) = read_file(&path, "virtual") {
+                let report = thing.mesh_report;
+                let few = [
+                    report.dropped_without_area,
+                    report.dropped_duplicates,
+                    report.splits,
+                ];
+                assert!(
+                    few.iter().all(|&count| count < 1000),
+                    "{}: {report:?}",
+                    path.display()
+                );
+            }
+        }
+    }
+    assert!(seen > 8, "{seen}");
+}
