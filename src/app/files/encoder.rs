@@ -239,7 +239,7 @@ mod tests {
         let (_, finished) = fed(script("cat >/dev/null; kill -9 $$"));
         assert!(finished.unwrap_err().contains("signal: 9"));
         let (_, finished) = fed(script(
-            "cat >/dev/null; echo av_interleaved_write_frame(): No space left on device >&2",
+            "cat >/dev/null; echo 'av_interleaved_write_frame: No space left on device' >&2",
         ));
         assert!(finished.unwrap_err().contains("No space left"));
     }
