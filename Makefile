@@ -3,7 +3,7 @@
 # Mesa's layer that asks the desktop for its favourite card complains on machines without a desktop; gnomon chooses itself.
 export NODEVICE_SELECT = 1
 
-.PHONY: demo install uninstall test test-camera soak fuzz charts reference bench bench-volumes bench-tracking setup setup-tests
+.PHONY: demo install uninstall test test-deep test-camera soak fuzz charts reference bench bench-volumes bench-tracking setup setup-tests setup-deep
 
 demo: setup
 	cargo build --release
@@ -47,6 +47,10 @@ test: setup-tests
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps
 	cargo test --release
 
+# All that is drawn under Vulkan's validation layer, and the C shim under Valgrind (an hour; not in CI).
+test-deep: setup-deep
+	tools/test_deep.sh
+
 # On a real camera device in a small emulated machine (minutes; as root; not in CI), where ../shared/virtual-camera is.
 test-camera: setup
 	cargo build --release
@@ -61,8 +65,8 @@ charts: setup
 	cargo build --release
 	target/release/gnomon chart
 
-# All readers, for an hour: what crashes, hangs or fills memory is kept in fuzz/artifacts (a nightly compiler and cargo-fuzz).
-fuzz:
+# All readers, for an hour: what crashes, hangs or fills memory is kept in fuzz/artifacts. Any Rust that builds gnomon will do.
+fuzz: setup
 	tools/fuzz.sh 60
 
 # What a camera would have seen of a scene of your own, path-traced: make reference SCENE=config/lamp.toml ARGS="--frames 30".
@@ -90,3 +94,6 @@ setup:
 
 setup-tests:
 	@scripts/setup tests
+
+setup-deep:
+	@scripts/setup deep

@@ -1,21 +1,60 @@
-//! What all targets share: bytes as files that a scene names, in a folder that each process has to itself.
+//! What all targets share: a limit on memory, and bytes as files that a scene names, in a folder that each process has to itself.
 
+use std::alloc::System;
 use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
 
+use cap::Cap;
 use gnomon::scene::Scene;
+
+/// What may be taken beyond what there was before, bytes, for an input of less than a megabyte.
+const MOST_MEMORY: usize = 256 << 20;
+
+#[global_allocator]
+static MEMORY: Cap<System> = Cap::new(System, usize::MAX);
 
 thread_local! {
     static FOLDER: OnceCell<tempfile::TempDir> = const { OnceCell::new() };
 }
 
-const WORLD: &str = "[[marker]]\nname = \"card\"\nid = 0\nsize_m = 0.05\n";
+/// What each scene begins with.
+pub const CAMERA: &str = "[camera]\nsource = \"webcam:0\"\n";
+const MARKER: &str = "[[marker]]\nname = \"card\"\nid = 0\nsize_m = 0.05\n";
+const MESH: &[u8] = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+/// A target that ends where an input takes more memory than it may.
+#[macro_export]
+macro_rules! target {
+    (|$input:ident: $kind:ty| $body:expr) => {
+        libfuzzer_sys::fuzz_target!(|$input: $kind| {
+            $crate::limit_memory();
+            let _ = $body;
+        });
+    };
+}
+
+/// From now on [`MOST_MEMORY`] more may be taken; who asks for more ends the process. What OpenCV takes is not counted.
+pub fn limit_memory() {
+    // Raised first: the limit must never lie below what is taken.
+    let _ = MEMORY.set_limit(usize::MAX);
+    let _ = MEMORY.set_limit(MEMORY.allocated() + MOST_MEMORY);
+}
 
 /// A file of some bytes; the last one of the same name is gone.
 pub fn file(name: &str, bytes: &[u8]) -> PathBuf {
     FOLDER.with(|folder| {
-        let folder = folder.get_or_init(|| tempfile::tempdir().expect("a folder"));
+        let folder = folder.get_or_init(|| {
+            let folder = tempfile::tempdir().expect("a folder");
+            // A scene that is refused for what it is would leave all files unread.
+            std::fs::write(folder.path().join("good.obj"), MESH).expect("a file");
+            let scene = Scene::parse(&folder.path().join("good.toml"), &scene_with_mesh("good.obj"));
+            assert!(scene.is_ok(), "{}", scene.err().map_or(String::new(), |error| error.to_string()));
+            folder
+        });
         let path = folder.path().join(name);
+        if let Some(parent) = path.parent() {
+            std::fs::create_dir_all(parent).expect("a folder");
+        }
         std::fs::write(&path, bytes).expect("a file");
         path
     })
@@ -24,18 +63,33 @@ pub fn file(name: &str, bytes: &[u8]) -> PathBuf {
 /// Reads a scene that has a virtual thing of these bytes; it may be refused, and must not panic.
 pub fn mesh(name: &str, bytes: &[u8]) {
     let path = file(name, bytes);
-    let thing = format!("{WORLD}[[virtual]]\nname = \"thing\"\nmesh = \"{name}\"\nfit_m = 0.1\n");
-    scene(&path.with_file_name("scene.toml"), &thing);
+    scene(&path.with_file_name("scene.toml"), &scene_with_mesh(name));
+}
+
+fn scene_with_mesh(name: &str) -> String {
+    format!("{CAMERA}{MARKER}[[virtual]]\nname = \"thing\"\nmesh = \"{name}\"\nfit_m = 0.1\n")
 }
 
 /// Reads a scene that has a probe of these bytes.
 pub fn probe(name: &str, bytes: &[u8]) {
     let path = file(name, bytes);
-    let probe = format!("{WORLD}[probe]\nimage = \"{name}\"\nkind = \"panorama\"\nposition_m = [0, 0, 0.1]\n");
+    let probe = format!("{CAMERA}{MARKER}[probe]\nimage = \"{name}\"\nkind = \"panorama\"\nposition_m = [0, 0, 0.1]\n");
     scene(&path.with_file_name("scene.toml"), &probe);
+}
+
+/// Reads a scene that is this text, after its camera, beside a file of these bytes.
+pub fn beside(name: &str, bytes: &[u8], text: &str) {
+    let path = file(name, bytes);
+    scene(&path.with_file_name("scene.toml"), &format!("{CAMERA}{text}"));
 }
 
 /// Reads a scene.
 pub fn scene(path: &Path, text: &str) {
     let _ = Scene::parse(path, text);
+}
+
+/// The first byte, a digit in the seeds, as a choice of so many, and the rest.
+pub fn choice(input: &[u8], of: usize) -> Option<(usize, &[u8])> {
+    let (first, rest) = input.split_first()?;
+    Some((usize::from(first.wrapping_sub(b'0')) % of, rest))
 }

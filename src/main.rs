@@ -26,6 +26,7 @@ use gnomon::app::jobs::track::{self, is_scene, track};
 use gnomon::app::live;
 use gnomon::app::stages::report::Report;
 use gnomon::app::talk;
+use gnomon::capture::children::end_all;
 use gnomon::capture::live::is_live;
 use gnomon::scene::format::MARKER;
 use gnomon::scene::{CameraSettings, Scene};
@@ -42,7 +43,9 @@ const INTERRUPTED: i32 = 130;
 fn main() -> ExitCode {
     #[cfg(target_os = "linux")]
     leave_out_device_selection();
-    match run(Cli::parse()) {
+    let done = run(Cli::parse());
+    end_all();
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             talk::say(format_args!("gnomon: {error:#}"));

@@ -1,23 +1,51 @@
 #!/bin/sh
 # Fuzzes all readers, in turn, for so many minutes together (60 by default): tools/fuzz.sh [MINUTES] [TARGET...]
-# It wants a nightly compiler and cargo-fuzz (cargo install cargo-fuzz). Inputs that crash, hang for 20 s or ask for more than
-# 256 MB at once are kept in fuzz/artifacts, and the exit status says so; what was learned stays in fuzz/corpus.
+# Coverage comes from the compiler's own passes, as cargo-fuzz has them, and any Rust that builds gnomon has those: nothing needs
+# to be installed. Inputs that crash, take longer than 20 s or more than 256 MB are kept in fuzz/artifacts, and the exit status
+# says so; what was learned stays in fuzz/corpus. A line for each target, and its figures in fuzz/artifacts/figures.csv.
 set -u
 cd "$(dirname "$0")/.."
 minutes=${1:-60}
 [ $# -gt 0 ] && shift
-targets=${*:-$(cargo +nightly fuzz list)}
+targets=${*:-$(sed -n '/^\[\[bin\]\]/,/^path/s/^name = "\(.*\)"/\1/p' fuzz/Cargo.toml)}
 count=$(echo "$targets" | wc -w)
-cargo +nightly fuzz build --sanitizer none || exit
+seconds=$((minutes * 60 / count))
+[ "$seconds" -gt 0 ] || seconds=1
+host=$(rustc -vV | sed -n 's/^host: //p')
+
+coverage="-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 -Cllvm-args=-sanitizer-coverage-inline-8bit-counters \
+-Cllvm-args=-sanitizer-coverage-pc-table -Cllvm-args=-sanitizer-coverage-trace-compares \
+-Cllvm-args=-simplifycfg-branch-fold-threshold=0 -Ccodegen-units=1 --cfg fuzzing"
+# Only what is built for a named host gets the flags: programs that run while building must not.
+RUSTFLAGS="$coverage" cargo build --release --manifest-path fuzz/Cargo.toml --target "$host" || exit
+
+# Files in memory, gone afterwards.
+TMPDIR=$(mktemp -d -p "$([ -w /dev/shm ] && echo /dev/shm || echo /tmp)") || exit
+export TMPDIR
+trap 'rm -rf "$TMPDIR"' EXIT
+trap 'exit 130' INT TERM
+
+mkdir -p fuzz/artifacts
+figures=fuzz/artifacts/figures.csv
+[ -f $figures ] || echo "target,seconds,runs,edges,features,corpus_files,peak_mb,findings" >$figures
 failed=
 for target in $targets; do
-    mkdir -p "fuzz/corpus/$target" "fuzz/artifacts/$target"
-    # Temporary files in memory.
-    TMPDIR=$([ -w /dev/shm ] && echo /dev/shm || echo /tmp) cargo +nightly fuzz run --sanitizer none "$target" \
-        "fuzz/corpus/$target" "fuzz/seeds/$target" -- -max_total_time=$((minutes * 60 / count)) -timeout=20 \
-        -malloc_limit_mb=256 -rss_limit_mb=2048 -max_len=65536 -print_final_stats=1 \
-        >"fuzz/artifacts/$target.log" 2>&1 || failed="$failed $target"
-    echo "$target: $(grep -E '^#[0-9]+' "fuzz/artifacts/$target.log" | tail -1 | tr -s '\t ' ' ')"
+    corpus=fuzz/corpus/$target
+    kept=fuzz/artifacts/$target
+    mkdir -p "$corpus" "$kept"
+    before=$(ls "$kept" | wc -l)
+    begun=$(date +%s)
+    # The heap is limited to 256 MB by the targets themselves; the rest is the program, OpenCV and what the fuzzer keeps.
+    # A broken heap may keep it from ending.
+    timeout -k 5 $((seconds + 60)) "fuzz/target/$host/release/$target" -max_total_time=$seconds -timeout=20 -rss_limit_mb=768 -max_len=65536 \
+        -print_final_stats=1 -verbosity=1 -artifact_prefix="$kept/" "$corpus" "fuzz/seeds/$target" >"$kept.log" 2>&1 || failed="$failed $target"
+    ended=$(date +%s)
+    last=$(grep -a '^#[0-9].* cov: ' "$kept.log" | tail -1 | tr '\t' ' ')
+    of() { echo "$last" | LC_ALL=C grep -a -o "$1[0-9]*" | head -1 | tr -dc 0-9; }
+    stat() { sed -n "s/^stat::$1: *//p" "$kept.log"; }
+    runs=$(stat number_of_executed_units)
+    echo "$target,$((ended - begun)),${runs:-$(of '^#')},$(of 'cov: '),$(of 'ft: '),$(of 'corp: '),$(stat peak_rss_mb),$(($(ls "$kept" | wc -l) - before))" |
+        tee -a $figures
 done
 if [ -n "$failed" ]; then
     echo "failed:$failed (see fuzz/artifacts)" >&2

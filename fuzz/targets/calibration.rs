@@ -5,11 +5,8 @@ use gnomon::capture::load_calibration;
 
 const NAMES: [&str; 5] = ["a.toml", "a.yaml", "a.json", "a.xml", "cameras.txt"];
 
-// The first byte, a digit in the seeds, says which name the rest gets.
-libfuzzer_sys::fuzz_target!(|input: &[u8]| {
-    let Some((kind, bytes)) = input.split_first() else {
-        return;
-    };
-    let name = NAMES[usize::from(kind.wrapping_sub(b'0')) % NAMES.len()];
-    let _ = load_calibration(&gnomon_fuzz::file(name, bytes));
+// The choice says which name the bytes get.
+gnomon_fuzz::target!(|input: &[u8]| {
+    gnomon_fuzz::choice(input, NAMES.len())
+        .map(|(name, bytes)| load_calibration(&gnomon_fuzz::file(NAMES[name], bytes)))
 });

@@ -1,4 +1,4 @@
 //! Meshes: .glb.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| gnomon_fuzz::mesh("a.glb", bytes));
+gnomon_fuzz::target!(|bytes: &[u8]| gnomon_fuzz::mesh("a.glb", bytes));

@@ -1,4 +1,4 @@
 //! Meshes: .gltf.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| gnomon_fuzz::mesh("a.gltf", bytes));
+gnomon_fuzz::target!(|bytes: &[u8]| gnomon_fuzz::mesh("a.gltf", bytes));

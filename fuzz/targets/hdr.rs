@@ -1,4 +1,4 @@
 //! Light probes: .hdr.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| gnomon_fuzz::probe("a.hdr", bytes));
+gnomon_fuzz::target!(|bytes: &[u8]| gnomon_fuzz::probe("a.hdr", bytes));

@@ -1,4 +1,4 @@
 //! Meshes: .obj.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| gnomon_fuzz::mesh("a.obj", bytes));
+gnomon_fuzz::target!(|bytes: &[u8]| gnomon_fuzz::mesh("a.obj", bytes));

@@ -1,4 +1,4 @@
 //! Meshes: .ply.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| gnomon_fuzz::mesh("a.ply", bytes));
+gnomon_fuzz::target!(|bytes: &[u8]| gnomon_fuzz::mesh("a.ply", bytes));

@@ -3,9 +3,10 @@
 
 use gnomon::app::truth::TruePoses;
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+gnomon_fuzz::target!(|bytes: &[u8]| {
     let path = gnomon_fuzz::file("truth.json", bytes);
-    if let Some(folder) = path.parent() {
-        let _ = TruePoses::read(folder);
+    let poses = path.parent().map(TruePoses::read);
+    if let Some(Ok(poses)) = poses {
+        let _ = poses.camera_from_anchors(0, &[]);
     }
 });

@@ -3,6 +3,6 @@
 
 use std::path::Path;
 
-libfuzzer_sys::fuzz_target!(|text: &str| {
+gnomon_fuzz::target!(|text: &str| {
     gnomon_fuzz::scene(Path::new("/nowhere/scene.toml"), text);
 });

@@ -3,7 +3,7 @@
 
 const MESH: &[u8] = b"mtllib pictured.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n";
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+gnomon_fuzz::target!(|bytes: &[u8]| {
     let name = match bytes {
         [0xff, ..] => "a.jpg",
         [b'R', ..] => "a.webp",

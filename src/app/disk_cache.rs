@@ -40,6 +40,11 @@ impl DiskCache {
         if sum != checksum(contents) {
             return None;
         }
+        self.decoded(contents)
+    }
+
+    /// A value of a file's contents behind their checksum; `None` where they are none, or of another version.
+    pub fn decoded<T: DeserializeOwned>(&self, contents: &[u8]) -> Option<T> {
         let (version, value): (u32, T) = postcard::from_bytes(contents).ok()?;
         (version == self.version).then_some(value)
     }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crate::environment::self_occlusion::{OwnSurface, SelfOcclusion};
 use crate::geometry::camera::Intrinsics;
+use crate::light::Light;
 use crate::render::{Gpu, Precomputation, RenderError, Renderer};
 use crate::scene::Scene;
 use crate::shafts::room::Room;
@@ -81,9 +82,10 @@ pub fn ready_room(room: &Room<'_>) -> ReadyRoom {
 
 fn ready(room: &Room<'_>, rooms: &DiskCache) -> ReadyRoom {
     let key = room.key();
-    if let Some(transport) = rooms.read::<RoomTransport>(key) {
+    let known: Option<RoomTransport> = rooms.read(key);
+    if let Some(transport) = known.and_then(|it| consistent(it, &room.compact)) {
         return ReadyRoom {
-            transport: transport.with_caster(&room.compact),
+            transport,
             read_from: rooms.path(key),
         };
     }
@@ -93,6 +95,18 @@ fn ready(room: &Room<'_>, rooms: &DiskCache) -> ReadyRoom {
         transport,
         read_from: None,
     }
+}
+
+/// A room's transport from what was kept of it, without the checksum; `None` where that is none, or of another version.
+pub fn room_of_bytes(contents: &[u8], compact: &[Light]) -> Option<RoomTransport> {
+    consistent(rooms(None).decoded(contents)?, compact)
+}
+
+/// A checksum says that it is as it was written, not that it is a room.
+fn consistent(transport: RoomTransport, compact: &[Light]) -> Option<RoomTransport> {
+    transport
+        .is_consistent()
+        .then(|| transport.with_caster(compact))
 }
 
 fn occlusions(surface: &OwnSurface, cache: &DiskCache) -> Vec<SelfOcclusion> {
@@ -171,6 +185,12 @@ mod tests {
         fs::write(&path, &whole[..whole.len() / 2]).unwrap();
         assert_eq!(ready_from(&scene).read_from, None);
         assert!(fs::read(&path).unwrap() == whole);
+
+        // A checksum says that it is as it was written, not that it is a room.
+        let mut odd = first.transport;
+        odd.patches.vertices.truncate(5);
+        let version = rooms(None).version;
+        assert!(room_of_bytes(&postcard::to_stdvec(&(version, &odd)).unwrap(), &[]).is_none());
 
         // What the room depends on makes it another one.
         scene.probe.as_mut().unwrap().exposure *= 1.5;

@@ -1,6 +1,5 @@
 //! Bracketed pictures: read, moved on to each other, and the camera's response from them (OpenCV's `photo`).
 
-use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
@@ -12,6 +11,7 @@ use opencv::photo::CalibrateCRFTrait;
 use super::alignment::shift_px;
 use super::pixels;
 use crate::light::response::Response;
+use crate::scene::plain_file;
 
 /// The curve is solved for from so many places a side: a square of them, for its matrix grows with their number.
 const PLACES_A_SIDE: usize = 11;
@@ -274,7 +274,7 @@ impl Bracket {
 /// How much light a photograph let in, from its EXIF: time, times sensitivity over ISO 100, over the f-number squared;
 /// what it does not tell counts as 1. `None` without an exposure time.
 pub fn exif_exposure(path: &Path) -> Option<f64> {
-    let file = File::open(path).ok()?;
+    let file = plain_file::open(path).ok()?;
     let exif = exif::Reader::new()
         .read_from_container(&mut BufReader::new(file))
         .ok()?;

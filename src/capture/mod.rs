@@ -4,6 +4,7 @@
 mod alignment;
 pub mod ball;
 pub mod calibration;
+pub mod children;
 mod error;
 pub mod exposures;
 mod images;
@@ -11,12 +12,13 @@ pub mod linear;
 pub mod live;
 mod pixels;
 mod times;
-mod video;
+pub mod video;
 
 use std::path::{Path, PathBuf};
 
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::quarter_turns::QuarterTurns;
+use crate::scene::plain_file;
 
 pub use calibration::{
     CalibrationError, calibration_text, check_frame_size, load_calibration, load_calibration_for,
@@ -100,6 +102,10 @@ impl FrameSource {
             },
             _ => io_error(error),
         })?;
+        // A pipe would be waited for.
+        if !metadata.is_dir() && !metadata.is_file() {
+            return Err(io_error(plain_file::not_plain()));
+        }
         if metadata.is_dir() {
             let files = files_of(path).map_err(io_error)?;
             Self::open_folder(path, files)

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
+use image::{ImageFormat, ImageReader};
 use opencv::core::{Mat, MatTraitConst, Vec4b};
 use opencv::{imgcodecs, imgproc};
 
@@ -12,7 +13,16 @@ use crate::geometry::quarter_turns::QuarterTurns;
 /// No file is too small for a picture of so many pixels.
 const SMALL_PIXELS: u64 = 32 << 20;
 /// What a byte of a larger one holds at most: in photographs it is about one.
-const MOST_PIXELS_PER_BYTE: u64 = 64;
+const MOST_PIXELS_PER_BYTE: u64 = 32;
+/// What is given to OpenCV, told by its content: of others it would take the size on their word.
+const FORMATS: [ImageFormat; 6] = [
+    ImageFormat::Png,
+    ImageFormat::Jpeg,
+    ImageFormat::Bmp,
+    ImageFormat::Tiff,
+    ImageFormat::WebP,
+    ImageFormat::Pnm,
+];
 
 /// The colours of a picture file, 8-bit BGR; `None` where OpenCV cannot decode it (it has no better word for it), or its
 /// header asks for more pixels than a file of its size has.
@@ -51,11 +61,12 @@ fn read(path: &Path, flags: i32) -> Option<Mat> {
     let file = std::fs::metadata(path)
         .ok()
         .filter(std::fs::Metadata::is_file)?;
-    if let Ok((width, height)) = image::image_dimensions(path) {
-        let most = SMALL_PIXELS.max(file.len().saturating_mul(MOST_PIXELS_PER_BYTE));
-        if u64::from(width) * u64::from(height) > most {
-            return None;
-        }
+    let reader = ImageReader::open(path).ok()?.with_guessed_format().ok()?;
+    reader.format().filter(|format| FORMATS.contains(format))?;
+    let (width, height) = reader.into_dimensions().ok()?;
+    let most = SMALL_PIXELS.max(file.len().saturating_mul(MOST_PIXELS_PER_BYTE));
+    if u64::from(width) * u64::from(height) > most {
+        return None;
     }
     imgcodecs::imread(path, flags)
         .ok()
@@ -99,6 +110,43 @@ mod tests {
         assert_eq!(image::image_dimensions(&path).unwrap(), (30_000, 30_000));
         assert!(read_picture(&path).is_none());
         assert!(read_picture(folder.path()).is_none());
+    }
+
+    /// A picture is what its content is, whatever its name.
+    #[test]
+    fn sizes_are_looked_at_whatever_the_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        std::fs::write(&path, b"P6 2 1 255\n123456").unwrap();
+        assert_eq!(read_picture(&path).map(|it| size_of(&it)), Some([2, 1]));
+        std::fs::write(&path, b"P6 30000 30000 255\n123456").unwrap();
+        assert!(read_picture(&path).is_none());
+        // Sun's raster files, which OpenCV knows.
+        let head = [0x59a6_6a95_u32, 4, 1, 24, 12, 1, 0, 0];
+        let mut bytes = head.map(u32::to_be_bytes).concat();
+        bytes.extend([9; 12]);
+        std::fs::write(&path, &bytes).unwrap();
+        assert!(read_picture(&path).is_none());
+        // TIFF: width, height, 8 bits, not compressed, one strip.
+        let mut bytes = b"II*\0\x08\0\0\0\x08\0".to_vec();
+        let entries = [
+            (256, 60_000),
+            (257, 60_000),
+            (258, 8),
+            (259, 1),
+            (262, 1),
+            (273, 8),
+            (278, 60_000),
+            (279, 9),
+        ];
+        for (tag, value) in entries {
+            bytes.extend(u16::to_le_bytes(tag));
+            bytes.extend([4, 0, 1, 0, 0, 0]);
+            bytes.extend(u32::to_le_bytes(value));
+        }
+        bytes.extend([0; 4]);
+        std::fs::write(&path, &bytes).unwrap();
+        assert!(read_picture(&path).is_none());
     }
 
     /// CRC-32 as PNG has it (ISO 3309).

@@ -132,10 +132,13 @@ impl Mesh {
             corner_looks,
             ..Self::from_faces(positions, &faces, crease_rad)
         };
-        let dropped_duplicates = duplicates - restored;
+        // A back that was cut with its front comes again once for each piece.
+        let splits = splits + restored.saturating_sub(duplicates);
+        let dropped_duplicates = duplicates.saturating_sub(restored);
         let report = MeshReport {
             merged_vertices: exactly_merged + merged_vertices,
-            dropped_without_area: raw.len() + splits - dropped_duplicates - mesh.triangles.len(),
+            dropped_without_area: (raw.len() + splits)
+                .saturating_sub(dropped_duplicates + mesh.triangles.len()),
             dropped_duplicates,
             splits,
             turned_triangles,

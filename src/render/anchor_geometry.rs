@@ -7,7 +7,6 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3, Vec4};
-use wgpu::util::DeviceExt as _;
 
 use crate::geometry::bounds::Bounds;
 use crate::geometry::coincidence::{IN_ONE_PLACE_M, may_coincide};
@@ -18,6 +17,7 @@ use crate::geometry::shadow_volume::Caster;
 use crate::geometry::solid::holes;
 use crate::scene::{Object, Scene, Shortcut};
 
+use super::gpu::Gpu;
 use super::materials::needs_looks;
 
 /// The kind of model that a surface belongs to.
@@ -179,7 +179,7 @@ impl KnownLevels {
 }
 
 impl AnchorGeometry {
-    pub fn new(device: &wgpu::Device, scene: &Scene, known: &mut KnownLevels) -> Self {
+    pub fn new(gpu: &Gpu, scene: &Scene, known: &mut KnownLevels) -> Self {
         let ambient = (PI * scene.ambient_radiance).as_vec3();
         let mut geometry = Self {
             batches: Vec::new(),
@@ -220,7 +220,7 @@ impl AnchorGeometry {
                         Role::Real => index,
                         Role::Virtual => scene.phantoms.len() + index,
                     } as u32;
-                    let thing = thing(device, (role, tie), object, coarser, &mut shared);
+                    let thing = thing(gpu, (role, tie), object, coarser, &mut shared);
                     geometry.things.extend(thing);
                 }
                 if shared.triangles.is_empty() {
@@ -228,7 +228,7 @@ impl AnchorGeometry {
                 }
                 geometry
                     .batches
-                    .push(shared.batch(device, role, anchor, ambient));
+                    .push(shared.batch(gpu, role, anchor, ambient));
             }
         }
         geometry
@@ -260,7 +260,7 @@ fn triangles_in_anchor(object: &Object) -> Vec<[DVec3; 3]> {
 
 /// Puts an object's levels among its batch's corners; `None` without triangles.
 fn thing(
-    device: &wgpu::Device,
+    gpu: &Gpu,
     (role, tie): (Role, Option<usize>),
     object: &Object,
     coarser: &[Level],
@@ -289,11 +289,11 @@ fn thing(
             let of_casting = || {
                 let caster = Caster::new(positions, mesh.triangles.clone());
                 LevelCaster {
-                    vertices: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                        label: Some("shadow volume"),
-                        contents: bytemuck::cast_slice(&caster.volume_vertices()),
-                        usage: CHANGING,
-                    }),
+                    vertices: gpu.buffer(
+                        "shadow volume",
+                        bytemuck::cast_slice(&caster.volume_vertices()),
+                        CHANGING,
+                    ),
                     caster,
                     surface_triangles: shared.triangles[first..].to_vec(),
                     smooth_normals: smooth_normals(&corners),
@@ -371,20 +371,8 @@ impl SharedCorners {
         index
     }
 
-    fn batch(
-        self,
-        device: &wgpu::Device,
-        role: Role,
-        anchor: usize,
-        ambient: Vec3,
-    ) -> SurfaceBatch {
-        let buffer = |label, contents: &[u8], usage| {
-            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some(label),
-                contents,
-                usage,
-            })
-        };
+    fn batch(self, gpu: &Gpu, role: Role, anchor: usize, ambient: Vec3) -> SurfaceBatch {
+        let buffer = |label, contents: &[u8], usage| gpu.buffer(label, contents, usage);
         let places = self.corners.iter();
         let places = places.map(|corner| (corner.position, corner.normal));
         SurfaceBatch {

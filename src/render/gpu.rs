@@ -1,13 +1,12 @@
 //! The device that draws: chosen by name, else the best there is.
 
-use std::sync::{Arc, Mutex};
+use std::borrow::Cow;
 
-use wgpu::util::DeviceExt as _;
-
+use super::device_failure::{DeviceFailure, without_a_panic};
 use super::pipelines::{GroupLayout, PipelineCache, PipelineDescription};
 
 /// A failure on the way to a drawn frame.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Clone, thiserror::Error)]
 pub enum RenderError {
     /// There is no adapter at all.
     #[error("no graphics adapter found; install a Vulkan driver (Debian: mesa-vulkan-drivers)")]
@@ -46,9 +45,22 @@ pub enum RenderError {
         /// Those of the calibration.
         expected: [u32; 2],
     },
+    /// The device is gone, as when a driver is reset or a card unplugged.
+    #[error("the GPU was lost: {0}")]
+    Lost(String),
+    /// The device has no memory left.
+    #[error("the GPU has no memory left")]
+    OutOfMemory,
     /// What the device itself reported.
     #[error("the GPU failed: {0}")]
     Failed(String),
+}
+
+impl RenderError {
+    /// Whether a new device may do what this one no longer can.
+    pub fn ends_a_device(&self) -> bool {
+        matches!(self, Self::Lost(_) | Self::OutOfMemory)
+    }
 }
 
 /// An opened adapter.
@@ -64,7 +76,7 @@ pub struct Gpu {
     pub(super) timestamp_period_ns: Option<f32>,
     pipelines: PipelineCache,
     description: String,
-    failure: Arc<Mutex<Option<String>>>,
+    failure: DeviceFailure,
 }
 
 /// Handles on an opened adapter, for a window that shows what is drawn there.
@@ -132,31 +144,17 @@ impl Gpu {
             adapter: info.name.clone(),
             reason,
         };
-        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+        let descriptor = wgpu::DeviceDescriptor {
             label: Some("gnomon"),
             required_features: features,
             required_limits: adapter.limits(),
             ..Default::default()
-        }))
-        .map_err(|error| unusable(error.to_string()))?;
-
-        // wgpu's own answer to an uncaught error is a panic; ours is a message when the frame is read.
-        let failure = Arc::new(Mutex::new(None));
-        let note = |failure: &Arc<Mutex<Option<String>>>, message: String| {
-            if let Ok(mut first) = failure.lock() {
-                first.get_or_insert(message);
-            }
         };
-        let uncaptured = Arc::clone(&failure);
-        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            note(&uncaptured, error.to_string());
-        }));
-        let lost = Arc::clone(&failure);
-        device.set_device_lost_callback(move |reason, message| {
-            if reason != wgpu::DeviceLostReason::Destroyed {
-                note(&lost, format!("device lost: {message}"));
-            }
-        });
+        // Half-made, a device that has no memory panics when it is dropped.
+        let requested = without_a_panic(|| pollster::block_on(adapter.request_device(&descriptor)));
+        let (device, queue) = requested
+            .map_err(|panic| unusable(format!("it gives no device: {}", panic.words)))?
+            .map_err(|error| unusable(error.to_string()))?;
 
         Ok(Self {
             // Floating depth spends its precision evenly over reversed depth; 24 bits are the fallback.
@@ -173,9 +171,9 @@ impl Gpu {
             pipelines: PipelineCache::default(),
             instance: instance.clone(),
             adapter: adapter.clone(),
+            failure: DeviceFailure::of(&device),
             device,
             queue,
-            failure,
         })
     }
 
@@ -218,17 +216,23 @@ impl Gpu {
         contents: &[u8],
         usage: wgpu::BufferUsages,
     ) -> wgpu::Buffer {
-        let contents = match contents.is_empty() {
-            true => &[0; 256],
-            false => contents,
+        let size = match contents.len() {
+            0 => 256,
+            bytes => bytes.next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT as usize),
         };
-        let label = Some(label);
-        self.device
-            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label,
-                contents,
-                usage,
-            })
+        let mut padded = Cow::Borrowed(contents);
+        if size > contents.len() {
+            padded.to_mut().resize(size, 0);
+        }
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size: size as u64,
+            usage: usage | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        // A buffer that is mapped when it is made panics where there is no memory for it.
+        self.queue.write_buffer(&buffer, 0, &padded);
+        buffer
     }
 
     /// What a window needs to show pictures of this device without a detour.
@@ -247,14 +251,18 @@ impl Gpu {
         Some(report.total_allocated_bytes)
     }
 
-    /// The first failure that the device reported, if any.
-    pub(super) fn check(&self) -> Result<(), RenderError> {
-        let failure = self
-            .failure
-            .lock()
-            .map(|first| first.clone())
-            .unwrap_or_default();
-        failure.map_or(Ok(()), |message| Err(RenderError::Failed(message)))
+    /// # Errors
+    /// What the device reported, if it failed.
+    pub fn check(&self) -> Result<(), RenderError> {
+        self.failure.check()
+    }
+
+    /// Waits until the device has done all that it was given.
+    ///
+    /// # Errors
+    /// The device has failed since it was opened.
+    pub(super) fn wait(&self) -> Result<(), RenderError> {
+        self.failure.wait(&self.device)
     }
 }
 

@@ -116,8 +116,7 @@ impl GpuScene {
         let view_count = scene.node_count() + scene.virtuals.len();
         let views = UniformRow::new::<AnchorView>(device, "views", view_count);
         let mut known_levels = KnownLevels::default();
-        let AnchorGeometry { batches, things } =
-            AnchorGeometry::new(device, scene, &mut known_levels);
+        let AnchorGeometry { batches, things } = AnchorGeometry::new(gpu, scene, &mut known_levels);
         let looks = scene.virtuals.iter().any(needs_looks);
         let light_kinds = lights.iter().map(|light| LightKind::of(&light.light));
         let light_kinds = light_kinds.collect();
@@ -165,7 +164,7 @@ impl GpuScene {
             return;
         }
         let AnchorGeometry { batches, things } =
-            AnchorGeometry::new(&gpu.device, scene, &mut self.known_levels);
+            AnchorGeometry::new(gpu, scene, &mut self.known_levels);
         self.casters = Casters::new(gpu, things.len(), &scene.shadows);
         self.indirect = self
             .indirect

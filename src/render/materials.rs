@@ -5,7 +5,6 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::DVec4;
-use wgpu::util::DeviceExt as _;
 
 use super::gpu::Gpu;
 use super::pipelines::{GroupLayout, filtered_array, sampler, storage};
@@ -86,13 +85,11 @@ pub(super) fn materials_group(gpu: &Gpu, scene: &Scene) -> wgpu::BindGroup {
     if materials.is_empty() {
         materials.push(MaterialOnGpu::zeroed());
     }
-    let buffer = gpu
-        .device
-        .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some("materials"),
-            contents: bytemuck::cast_slice(&materials),
-            usage: wgpu::BufferUsages::STORAGE,
-        });
+    let buffer = gpu.buffer(
+        "materials",
+        bytemuck::cast_slice(&materials),
+        wgpu::BufferUsages::STORAGE,
+    );
     let samplers = [wgpu::AddressMode::Repeat, wgpu::AddressMode::ClampToEdge].map(|mode| {
         gpu.device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("pictures"),

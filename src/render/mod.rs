@@ -11,6 +11,7 @@ mod casters;
 mod combined;
 mod deforming;
 mod detail;
+mod device_failure;
 mod direct;
 mod environment;
 mod fade;
@@ -47,6 +48,7 @@ mod translucent;
 mod uniforms;
 mod volumes;
 
+pub(crate) use device_failure::{CaughtPanic, without_a_panic};
 pub use gpu::{Gpu, RenderError, SharedDevice};
 pub use gpu_clock::GpuTimes;
 pub use layers::{Layers, REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};

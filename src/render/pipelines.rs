@@ -308,7 +308,7 @@ impl Built {
                 cull_mode: description.cull_mode,
                 ..Default::default()
             },
-            depth_stencil: description.depth_stencil.clone(),
+            depth_stencil: description.depth_stencil.clone().map(with_reference),
             multisample: wgpu::MultisampleState {
                 count: description.samples,
                 ..Default::default()
@@ -326,4 +326,23 @@ impl Built {
             cache: None,
         })
     }
+}
+
+/// Vulkan wants a reference value for all that tests the stencil, and wgpu sets one for what compares alone. So what passes
+/// always compares no bits, which are always equal.
+fn with_reference(mut state: wgpu::DepthStencilState) -> wgpu::DepthStencilState {
+    let stencil = &mut state.stencil;
+    if stencil.is_enabled() && !stencil.needs_ref_value() {
+        let compare = |face: wgpu::StencilFaceState| wgpu::StencilFaceState {
+            compare: match face.compare {
+                wgpu::CompareFunction::Always => wgpu::CompareFunction::Equal,
+                other => other,
+            },
+            ..face
+        };
+        stencil.front = compare(stencil.front);
+        stencil.back = compare(stencil.back);
+        stencil.read_mask = 0;
+    }
+    state
 }

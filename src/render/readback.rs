@@ -72,10 +72,7 @@ pub(super) fn map_for_reading(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<(), Re
             // The receiver lives until the wait below is over.
             let _ = sender.send(result);
         });
-    gpu.device
-        .poll(wgpu::PollType::wait_indefinitely())
-        .map_err(|error| RenderError::Failed(error.to_string()))?;
-    gpu.check()?;
+    gpu.wait()?;
     // Another thread's wait may have taken our call-back along and be about to make it.
     match receiver.recv() {
         Ok(Ok(())) => Ok(()),

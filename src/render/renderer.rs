@@ -390,11 +390,7 @@ impl Renderer {
     /// # Errors
     /// The device failed since it was opened.
     pub fn wait(&self) -> Result<(), RenderError> {
-        self.gpu
-            .device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|error| RenderError::Failed(error.to_string()))?;
-        self.gpu.check()
+        self.gpu.wait()
     }
 
     /// Waits for the drawn picture: sRGB-encoded RGBA, rows from the top.

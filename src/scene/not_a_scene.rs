@@ -1,8 +1,10 @@
 //! What is given as a scene and is something else: told by what it is, as the text of a video says nothing.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::Read as _;
 use std::path::Path;
+
+use super::plain_file;
 
 /// What to say of a folder, a video, a picture or a model; `None` for all else, which is read as a scene.
 pub fn what_else(path: &Path) -> Option<String> {
@@ -46,7 +48,7 @@ enum Kind {
 
 fn first_bytes(path: &Path) -> Vec<u8> {
     let mut bytes = Vec::new();
-    if let Ok(file) = File::open(path) {
+    if let Ok(file) = plain_file::open(path) {
         // What cannot be read is told of by who reads all of it.
         let _ = file.take(16).read_to_end(&mut bytes);
     }

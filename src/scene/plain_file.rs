@@ -17,22 +17,33 @@ pub const MOST_PICTURE: u64 = 1 << 30;
 /// What opening and reading say; a device, a pipe or a folder (which is not opened, for a pipe waits for somebody who
 /// writes); a file that is larger.
 pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
-    let refused = |what: String| Err(io::Error::new(ErrorKind::InvalidData, what));
-    if !std::fs::metadata(path)?.is_file() {
-        return refused("not a plain file".to_owned());
-    }
-    let file = File::open(path)?;
+    let file = open(path)?;
     let length = file.metadata()?.len();
     let mut bytes = Vec::new();
     // One more, for a file may grow.
     file.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > most {
-        return refused(format!(
-            "{} bytes are too many; at most {most}",
-            length.max(bytes.len() as u64)
-        ));
+        let length = length.max(bytes.len() as u64);
+        let message = format!("{length} bytes are too many; at most {most}");
+        return Err(io::Error::new(ErrorKind::InvalidData, message));
     }
     Ok(bytes)
+}
+
+/// Opens a plain file.
+///
+/// # Errors
+/// As [`read`] has them.
+pub fn open(path: &Path) -> io::Result<File> {
+    match std::fs::metadata(path)?.is_file() {
+        true => File::open(path),
+        false => Err(not_plain()),
+    }
+}
+
+/// The error of what is no plain file.
+pub fn not_plain() -> io::Error {
+    io::Error::new(ErrorKind::InvalidData, "not a plain file")
 }
 
 /// The same of UTF-8 text, of no more than [`MOST_TEXT`] bytes.

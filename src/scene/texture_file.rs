@@ -13,6 +13,10 @@ use crate::light::texture::Texture;
 const MOST_SIDE_PX: u32 = 16384;
 /// Longest side of a picture that is kept; a larger one is scaled down.
 const KEPT_SIDE_PX: u32 = 4096;
+/// Pixels that a picture of any size in bytes may have, and those that it may have for each byte: a file of a megabyte must not
+/// cost hundreds.
+const SMALL_PIXELS: u64 = 4096 * 4096;
+const MOST_PIXELS_PER_BYTE: u64 = 16;
 /// Memory that decoding may take, bytes.
 const MOST_BYTES: u64 = 1 << 30;
 
@@ -37,12 +41,23 @@ pub fn decode(name: String, bytes: &[u8], format: Option<ImageFormat>) -> Result
         return Err(message.to_owned());
     }
     let failed = |error: &dyn std::fmt::Display| format!("cannot be read: {error}");
-    let mut reader = ImageReader::new(Cursor::new(bytes))
-        .with_guessed_format()
-        .map_err(|error| failed(&error))?;
-    if let (None, Some(format)) = (reader.format(), format) {
-        reader.set_format(format);
+    let reader = || {
+        let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
+        if let (None, Some(format)) = (reader.format(), format) {
+            reader.set_format(format);
+        }
+        Ok::<_, std::io::Error>(reader)
+    };
+    let sized = reader().map_err(|error| failed(&error))?;
+    let (width, height) = sized.into_dimensions().map_err(|error| failed(&error))?;
+    let most = SMALL_PIXELS.max(bytes.len() as u64 * MOST_PIXELS_PER_BYTE);
+    if u64::from(width) * u64::from(height) > most {
+        return Err(format!(
+            "cannot be read: it says that it has {width} x {height} pixels, in {} bytes; at most {most} are read in so few",
+            bytes.len()
+        ));
     }
+    let mut reader = reader().map_err(|error| failed(&error))?;
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(MOST_SIDE_PX);
     limits.max_image_height = Some(MOST_SIDE_PX);
@@ -86,6 +101,20 @@ mod tests {
         let read = decode("b".to_owned(), &jpeg, None).unwrap();
         assert_eq!(read.size_px, [5, 4]);
         assert!(read.rgba[0].abs_diff(99) < 3 && read.rgba[3] == 255);
+    }
+
+    /// The head of a lossless WebP (14 bits for each side less one), as fuzzing found one.
+    #[test]
+    fn a_small_file_that_says_it_is_huge_is_refused() {
+        let side = 16_000_u32;
+        let mut bytes = b"RIFF\x4c\0\0\0WEBPVP8L\x3f\0\0\0\x2f".to_vec();
+        bytes.extend(((side - 1) | (side - 1) << 14).to_le_bytes());
+        bytes.extend([0; 64]);
+        let error = decode("a.webp".to_owned(), &bytes, None).unwrap_err();
+        assert!(
+            error.contains("16000 x 16000 pixels, in 89 bytes"),
+            "{error}"
+        );
     }
 
     #[test]

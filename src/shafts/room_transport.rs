@@ -160,6 +160,18 @@ impl RoomTransport {
         }
     }
 
+    /// Whether what is in it is of one room: a file may say anything.
+    pub fn is_consistent(&self) -> bool {
+        let vertices = self.patches.vertices.len();
+        let patches = self.patches.patches.len();
+        let of_patches = [self.light.len(), self.sender_of_patch.len()];
+        let mut corners = self.patches.patches.iter().flat_map(|patch| patch.vertices);
+        of_patches == [patches; 2]
+            && self.irradiance.len() == vertices
+            && self.source_radiance.len() <= patches
+            && corners.all(|vertex| (vertex as usize) < vertices)
+    }
+
     /// Ready for rays again, after it was read.
     pub fn with_caster(self, compact: &[Light]) -> Self {
         let patches = self.patches.patches.iter();

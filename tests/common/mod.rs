@@ -3,6 +3,8 @@
 
 pub mod composite;
 pub mod degenerate;
+#[cfg(target_os = "linux")]
+pub mod gpu_faults;
 pub mod judge;
 pub mod near_edges;
 pub mod photographs;

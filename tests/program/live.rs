@@ -29,7 +29,7 @@ use gnomon::capture::{Frame, FrameSource};
 use gnomon::geometry::light_placing::{LightFreedom, PosedCamera};
 use gnomon::geometry::pose::rotation_between;
 use gnomon::light::{Light, Shape};
-use gnomon::render::{Renderer, Shown};
+use gnomon::render::{Gpu, RenderError, Renderer, Shown};
 use gnomon::scene::{CameraSettings, Placement, Scene};
 use gnomon::tracking::Status;
 
@@ -577,6 +577,56 @@ fn what_is_recorded_is_what_came() {
         (1.0..4.1).contains(&seconds),
         "as long as it was recorded: {seconds}"
     );
+}
+
+/// The device is destroyed under the session, as a driver that is reset takes it away.
+#[test]
+fn a_device_that_is_lost_is_replaced_and_recordings_go_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = lamp_in(folder.path());
+    let out = folder.path().join("recorded");
+    let gpu = || Arc::new(Gpu::open(None).unwrap());
+    let (first, now) = (gpu(), Arc::new(Stopwatch::clock()));
+    let opening = Opening::scene(&path).unwrap();
+    let timing = (now as _, Arc::new(|| ()) as _);
+    let mut session = LiveSession::open(opening, Arc::clone(&first), &out, true, timing);
+    let state = WindowState::new();
+    let is_shown = |session: &LiveSession| session.picture().is_some() && session.is_settled();
+    run_until(&mut session, &state, "a picture", is_shown);
+    session.record(RecordingCommand::ToggleSession);
+    session.record(RecordingCommand::ToggleVideo);
+    first.shared().device.destroy();
+    let began = Instant::now();
+    let error = loop {
+        assert!(began.elapsed() < SOON, "nobody notices");
+        let shown = session.was_shown(session.now_secs());
+        if let Err(error) = shown.and_then(|()| session.step(&state).map(drop)) {
+            break error;
+        }
+    };
+    let failed = error.downcast_ref::<RenderError>();
+    assert!(failed.is_some_and(RenderError::ends_a_device), "{error:#}");
+    assert_eq!(session.records(), [true, true]);
+    session.renew(gpu());
+    let lost_at = session.picture().map_or(0, |picture| picture.frame.index);
+    run_until(&mut session, &state, "many pictures more", |session| {
+        let index = session.picture().map(|picture| picture.frame.index);
+        session.is_settled() && index > Some(lost_at + 90)
+    });
+    let scene = session.scene().unwrap().clone();
+    let exact = drawn_afresh(&session, &scene);
+    assert!(count_off(&shown(&session), &exact) < 20);
+    for said in session.finish() {
+        said.unwrap();
+    }
+    for recorded in ["session-001", "composite-001.mkv"] {
+        let recorded = out.join(recorded);
+        let mut frames = FrameSource::open(recorded.to_str().unwrap()).unwrap();
+        while frames.next_frame().unwrap().is_some() {}
+        assert_eq!(frames.notices(), [], "{}", recorded.display());
+        let count = frames.good_frames();
+        assert!(count > 20, "{count} frames in {}", recorded.display());
+    }
 }
 
 #[test]

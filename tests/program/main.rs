@@ -10,6 +10,7 @@ mod common;
 mod chart;
 mod cli;
 mod cubes;
+mod faults;
 mod job_files;
 mod live;
 mod live_panel;

@@ -8,6 +8,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use crate::common::gpu_faults;
 use crate::common::prints::{BENT_CAMERA, CHESSBOARD, Photographer, Print, good_poses};
 use crate::common::signals::{self, Signal};
 use gnomon::app::files::video_writer::{Codec, Naming, Pace, VideoWriter};
@@ -39,15 +40,19 @@ impl Display {
     }
 
     fn gnomon(&self, arguments: &[&str]) -> Child {
-        Command::new(env!("CARGO_BIN_EXE_gnomon"))
+        self.command(arguments).spawn().unwrap()
+    }
+
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_gnomon"));
+        command
             .args(arguments)
             .current_dir(env!("CARGO_MANIFEST_DIR"))
             .env("DISPLAY", &self.name)
             .env_remove("WAYLAND_DISPLAY")
             .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap()
+            .stderr(Stdio::piped());
+        command
     }
 
     fn xdotool(&self, arguments: &[&str]) -> Output {
@@ -155,6 +160,66 @@ fn keys_record_and_an_interrupt_leaves_whole_files() {
     assert!(frames_of(&written("composite-001.mkv")) > 10);
     let picture = image::open(written("picture-001.png")).unwrap();
     assert_eq!((picture.width(), picture.height()), (640, 480));
+}
+
+#[test]
+#[cfg_attr(not(has_xvfb), ignore = "needs Xvfb and xdotool")]
+fn a_gpu_that_is_lost_is_replaced_and_what_is_recorded_goes_on() {
+    let display = Display::open();
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let loss = folder.path().join("loss");
+    let mut command = display.command(&["live", "config/lamp.toml", "--out"]);
+    let fault = format!("file {}", loss.display());
+    let window = gpu_faults::let_fail(command.arg(&out), &fault)
+        .spawn()
+        .unwrap();
+    let written = |name: &str| -> PathBuf { out.join(name) };
+    let press = |key: &str| {
+        display.xdotool(&["windowfocus", &display.window(), "key", key]);
+        thread::sleep(Duration::from_millis(400));
+    };
+    let saves = |name: &str| {
+        wait_for("a picture", || {
+            press("s");
+            written(name).is_file()
+        });
+    };
+    saves("picture-001.png");
+    press("v");
+    press("r");
+    wait_for("a video", || written("composite-001.mkv").is_file());
+    wait_for("a session", || written("session-001/video.mkv").is_file());
+    // Twice, for the second device is as good as the first.
+    for _ in 0..2 {
+        thread::sleep(Duration::from_secs(1));
+        std::fs::write(&loss, "").unwrap();
+        wait_for("the loss", || !loss.exists());
+        let before = std::fs::read_dir(&out).unwrap().count();
+        wait_for("a picture on the new device", || {
+            press("s");
+            std::fs::read_dir(&out).unwrap().count() > before
+        });
+    }
+    let frames_before = std::fs::metadata(written("composite-001.mkv"))
+        .unwrap()
+        .len();
+    wait_for("more frames", || {
+        std::fs::metadata(written("composite-001.mkv"))
+            .unwrap()
+            .len()
+            > frames_before
+    });
+    interrupt(&window);
+    let output = ended(window);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        output.status.success() && !said.contains("panicked"),
+        "{said}"
+    );
+    assert_eq!(said.matches("a new device is opened").count(), 2, "{said}");
+    assert!(frames_of(&written("session-001")) > 10, "{said}");
+    assert!(frames_of(&written("composite-001.mkv")) > 10, "{said}");
 }
 
 /// A film of a target that is held still here and there.

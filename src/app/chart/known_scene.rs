@@ -13,7 +13,7 @@ use crate::app::truth::ray_cast::{Triangle, View, World};
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::light::{Light, Shape};
 use crate::render::{REAL, VIRTUAL};
-use crate::scene::{Object, Scene};
+use crate::scene::{Object, Scene, plain_file};
 
 /// A scene and its exact mask.
 pub struct KnownScene {
@@ -78,7 +78,7 @@ impl KnownScene {
     /// One of them is not there or not what it should be.
     pub fn read(folder: &Path, name: &str) -> Result<Self> {
         let path = folder.join(format!("{name}.json"));
-        let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+        let text = plain_file::read_text(&path).with_context(|| path.display().to_string())?;
         let file: File = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
         let place = |thing: &ThingEntry| {
             let transform = thing.transform.as_ref();

@@ -11,6 +11,7 @@ use tempfile::NamedTempFile;
 
 use super::file_identity::{is_at, is_open_file, real_place};
 use super::output_error::OutputError;
+use crate::capture::children::end_all;
 
 /// What names of unfinished files begin with.
 const PREFIX: &str = ".gnomon-";
@@ -205,7 +206,7 @@ fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes what is unfinished, and ends the program with this status: for an interrupt of a job that has no better way to
+/// Removes what is unfinished, ends what runs for this program, and ends the program with this status: for an interrupt of a job that has no better way to
 /// end.
 pub fn exit_without_traces(status: i32) -> ! {
     // Held to the end, so that no other file is begun.
@@ -214,6 +215,7 @@ pub fn exit_without_traces(status: i32) -> ! {
         // Nobody is left to be told of a failure.
         _ = fs::remove_file(path);
     }
+    end_all();
     std::process::exit(status)
 }
 

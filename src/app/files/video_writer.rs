@@ -201,6 +201,10 @@ impl VideoWriter {
         // An encoder that misses its file says less.
         self.check_that_it_is_there()?;
         closed?;
+        let file = self.file.as_ref().map(|file| file.working_path(&self.path));
+        if file.is_some_and(|file| std::fs::metadata(file).is_ok_and(|file| file.len() == 0)) {
+            return Err(self.failed("it has written nothing"));
+        }
         match self.file.take() {
             Some(VideoFile::Unfinished(file)) => file.finish(),
             Some(VideoFile::Named(file)) => file.sync_all().map_err(|error| OutputError::Io {
@@ -355,7 +359,8 @@ impl Drop for VideoWriter {
         if let Some(VideoFile::Named(file)) = self.file.take() {
             // Closing fails where the encoder has failed; what it wrote until then stays.
             _ = self.encoder.is_some().then(|| self.close());
-            if self.frames == 0 && is_at(&self.path, &file) {
+            let is_empty = file.metadata().is_ok_and(|file| file.len() == 0);
+            if (self.frames == 0 || is_empty) && is_at(&self.path, &file) {
                 _ = std::fs::remove_file(&self.path);
             }
         }

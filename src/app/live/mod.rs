@@ -10,7 +10,6 @@ mod canvas;
 pub mod command;
 mod composite_video;
 mod demonstration;
-mod event_loop;
 mod false_colour;
 mod frame_tracker;
 mod gizmo;
@@ -32,19 +31,18 @@ pub mod window_state;
 pub use frame_tracker::{TrackedPicture, TrackingPlan};
 
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, PoisonError};
 
 use anyhow::Result;
 
 use crate::app::stopwatch::Stopwatch;
-use crate::app::window::opening;
-use crate::app::window::screen::Screen;
+use crate::app::window::ContextWaker;
+use crate::app::window::event_loop::PassEnd;
+use crate::app::window::lasting::LastingWindow;
 use crate::capture::live::Now;
-use crate::render::Gpu;
 use crate::scene::CameraSettings;
 use beginning::Opening;
-use event_loop::{PassEnd, Timed};
 use session::LiveSession;
 use window::{Failure, LiveWindow, WindowShared};
 
@@ -79,41 +77,28 @@ pub fn live(request: &LiveRequest, stop: &Arc<AtomicBool>) -> Result<()> {
         LiveStart::Camera(camera) => Opening::camera(camera.clone())?,
     };
     opening.files(&request.out).check()?;
-    let gpu = Arc::new(Gpu::open(request.adapter.as_deref())?);
-    let options = opening::options(&gpu);
     let failure: Failure = Arc::default();
-    let is_open = Arc::new(AtomicBool::new(false));
     let now: Now = Arc::new(Stopwatch::clock());
     let pass_end = PassEnd::default();
     let title = format!("{} – gnomon", opening.title());
-    let event_loop = opening::event_loop()?;
     let shared = WindowShared {
         stop: Arc::clone(stop),
         failure: Arc::clone(&failure),
         pass_end: pass_end.clone(),
+        waker: ContextWaker::default(),
     };
-    let (opened, clock, out) = (Arc::clone(&is_open), Arc::clone(&now), request.out.clone());
-    let application = eframe::create_native(
-        &title,
-        options,
-        Box::new(move |creation| {
-            let context = creation.egui_ctx.clone();
-            let wake = Arc::new(move || context.request_repaint());
-            let state = creation.wgpu_render_state.as_ref();
-            let screen = Screen::new(state.ok_or("the window does not draw with wgpu")?);
-            let adapter = gpu.description().to_owned();
-            let session = LiveSession::open(opening, gpu, &out, true, (clock, wake));
-            opened.store(true, Ordering::Relaxed);
-            Ok(Box::new(LiveWindow::new(session, screen, adapter, shared)))
-        }),
-        &event_loop,
-    );
-    event_loop.run_app(&mut Timed {
-        application,
+    let (clock, out) = (Arc::clone(&now), request.out.clone());
+    let window = LastingWindow {
+        title: &title,
+        adapter: request.adapter.as_deref(),
         now,
         pass_end,
+    };
+    window.show(move |gpu, creation| {
+        let timing = (clock, shared.waker.wake());
+        let session = LiveSession::open(opening, Arc::clone(gpu), &out, true, timing);
+        LiveWindow::new(session, shared, gpu, creation)
     })?;
-    opening::assure(&is_open)?;
     let failed = failure
         .lock()
         .unwrap_or_else(PoisonError::into_inner)

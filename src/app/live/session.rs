@@ -271,6 +271,18 @@ impl LiveSession {
         session
     }
 
+    /// Draws on another device from now on; what is tracked and recorded goes on.
+    pub fn renew(&mut self, gpu: Arc<Gpu>) {
+        let scene = Arc::new(self.scene().cloned().unwrap_or_default());
+        self.canvas = SceneCanvas::new(gpu, scene, Arc::clone(&self.wake));
+        self.picture.draw_again();
+        self.renderers += 1;
+        self.tell(
+            Weight::Trouble,
+            "The GPU was lost; a new device draws from here on.",
+        );
+    }
+
     /// Takes what has come, and draws it as `state` wants it. Tells whether the picture is another than before.
     ///
     /// # Errors

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use anyhow::Result;
 use eframe::egui::{
     Align2, Area, CentralPanel, Color32, Context, FontId, Frame, Grid, Id, PointerButton, Pos2,
     Rect, Response, RichText, Sense, Ui, Vec2, ViewportCommand,
@@ -13,7 +14,6 @@ use glam::DAffine3;
 use super::command::{
     Clicks, Commands, LiveCommand, Overlay, SceneCommand, Selected, WindowCommand,
 };
-use super::event_loop::PassEnd;
 use super::gizmo::{Drag, Gizmo, GizmoTarget};
 use super::keys::bindings;
 use super::overlays::Overlays;
@@ -24,10 +24,14 @@ use super::session::LiveSession;
 use super::shadow_lines::ShadowLines;
 use super::window_state::WindowState;
 use crate::app::talk;
+use crate::app::window::ContextWaker;
+use crate::app::window::event_loop::PassEnd;
 use crate::app::window::fit::PictureFit;
+use crate::app::window::lasting::Content;
 use crate::app::window::notices::{CameraState, Weight};
 use crate::app::window::screen::Screen;
 use crate::geometry::light_placing::PosedCamera;
+use crate::render::{Gpu, RenderError};
 use crate::scene::SceneLight;
 
 /// The window looks at the world at least this often, even when no frame comes.
@@ -47,6 +51,8 @@ pub struct WindowShared {
     pub failure: Failure,
     /// When the last pass ended.
     pub pass_end: PassEnd,
+    /// Wakes the window.
+    pub waker: ContextWaker,
 }
 
 /// The state of the live window.
@@ -65,16 +71,20 @@ pub struct LiveWindow {
 
 impl LiveWindow {
     /// A window on a live session.
+    ///
+    /// # Errors
+    /// It does not draw on the session's device.
     pub fn new(
         session: LiveSession,
-        screen: Screen,
-        adapter: String,
         shared: WindowShared,
-    ) -> Self {
-        Self {
+        gpu: &Gpu,
+        creation: &eframe::CreationContext<'_>,
+    ) -> Result<Self> {
+        shared.waker.set(&creation.egui_ctx);
+        Ok(Self {
             session,
-            screen,
-            adapter,
+            screen: Screen::new(creation)?,
+            adapter: gpu.description().to_owned(),
             shared,
             state: WindowState::new(),
             panel: Panel::default(),
@@ -82,7 +92,7 @@ impl LiveWindow {
             outline: SelectedOutline::default(),
             drag: None,
             full_screen: false,
-        }
+        })
     }
 
     fn run(&mut self, ctx: &Context, commands: Commands) {
@@ -384,20 +394,35 @@ fn pressed(ctx: &Context) -> Commands {
     commands
 }
 
-impl eframe::App for LiveWindow {
-    fn logic(&mut self, ctx: &Context, _: &mut eframe::Frame) {
+impl Content for LiveWindow {
+    fn renew(&mut self, gpu: &Arc<Gpu>, creation: &eframe::CreationContext<'_>) -> Result<()> {
+        self.screen = Screen::new(creation)?;
+        gpu.description().clone_into(&mut self.adapter);
+        self.full_screen = false;
+        self.drag = None;
+        self.shared.waker.set(&creation.egui_ctx);
+        self.session.renew(Arc::clone(gpu));
+        Ok(())
+    }
+
+    fn logic(&mut self, ctx: &Context) {
         ctx.request_repaint_after(PULSE);
         if self.shared.stop.load(Ordering::Relaxed) {
             ctx.send_viewport_cmd(ViewportCommand::Close);
         }
         let shown = self.session.was_shown(self.shared.pass_end.secs());
         if let Err(error) = shown.and_then(|()| self.session.step(&self.state)) {
+            let failed: Option<&RenderError> = error.downcast_ref();
+            if failed.is_some_and(RenderError::ends_a_device) {
+                // It is renewed.
+                return;
+            }
             self.shared.fail(error);
             ctx.send_viewport_cmd(ViewportCommand::Close);
         }
     }
 
-    fn ui(&mut self, ui: &mut Ui, _: &mut eframe::Frame) {
+    fn ui(&mut self, ui: &mut Ui) {
         let ctx = ui.ctx().clone();
         let mut commands = pressed(&ctx);
         if self.state.panel {
@@ -420,11 +445,7 @@ impl eframe::App for LiveWindow {
         self.run(&ctx, commands);
     }
 
-    fn clear_color(&self, _: &eframe::egui::Visuals) -> [f32; 4] {
-        Color32::BLACK.to_normalized_gamma_f32()
-    }
-
-    fn on_exit(&mut self) {
+    fn close(&mut self) {
         for said in self.session.finish() {
             match said {
                 Ok(text) => talk::say(text),

@@ -13,9 +13,11 @@ use crate::app::files::job_files::Replacing;
 use crate::app::files::lock;
 use crate::app::files::output_error::OutputError;
 
+/// A session's video.
+pub(super) const VIDEO_NAME: &str = "video.mkv";
 /// Files of a session.
 const FILES: [&str; 5] = [
-    "video.mkv",
+    VIDEO_NAME,
     "times.csv",
     "poses.csv",
     "camera.toml",

@@ -7,7 +7,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::scene_copy::copy_scene;
-use super::session_folder::SessionFolder;
+use super::session_folder::{SessionFolder, VIDEO_NAME};
 use crate::app::files::is_at;
 use crate::app::files::job_files::Replacing;
 use crate::app::files::new_file::{sync_folder, vanished};
@@ -171,7 +171,7 @@ impl SessionWriter {
             check_frame_size(calibration, size_px, "the camera")
                 .map_err(|error| self.refuse(error.to_string()))?;
         }
-        let path = self.folder.path().join("video.mkv");
+        let path = self.folder.path().join(VIDEO_NAME);
         let fps = self.head.fps.unwrap_or(ASSUMED_FPS);
         // Each frame's own time is in times.csv.
         let pace = Pace::Even { fps };
@@ -189,7 +189,8 @@ impl SessionWriter {
 impl Drop for SessionWriter {
     fn drop(&mut self) {
         drop(self.video.take());
-        if self.frames > 0 {
+        // An encoder that fails at once has frames and no video.
+        if self.frames > 0 && self.folder.path().join(VIDEO_NAME).exists() {
             self.folder.keep();
         }
     }

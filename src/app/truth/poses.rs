@@ -6,7 +6,7 @@ use anyhow::{Context as _, Result, bail};
 use glam::{DAffine3, DMat3, DMat4};
 use serde_json::Value;
 
-use crate::scene::Anchor;
+use crate::scene::{Anchor, plain_file};
 
 /// The places of camera and markers in each frame.
 pub struct TruePoses {
@@ -21,7 +21,7 @@ impl TruePoses {
     /// It is not there, or is not what a session's is.
     pub fn read(folder: &Path) -> Result<Self> {
         let path = folder.join("truth.json");
-        let text = std::fs::read_to_string(&path)
+        let text = plain_file::read_text(&path)
             .with_context(|| format!("{} cannot be read", path.display()))?;
         let mut truth: Value = serde_json::from_str(&text)
             .with_context(|| format!("{} is not JSON", path.display()))?;

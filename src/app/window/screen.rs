@@ -1,5 +1,7 @@
 //! The renderer's picture in the window, on the same device: nothing is read back on the way.
 
+use anyhow::{Context as _, Result};
+use eframe::CreationContext;
 use eframe::egui::TextureId;
 use eframe::egui_wgpu::{
     RenderState, SurfaceConfig, WgpuConfiguration, WgpuSetup, WgpuSetupExisting,
@@ -36,11 +38,15 @@ pub struct Screen {
 
 impl Screen {
     /// In a window that draws on the device of the pictures.
-    pub fn new(state: &RenderState) -> Self {
-        Self {
-            state: state.clone(),
+    ///
+    /// # Errors
+    /// It draws with something else.
+    pub fn new(creation: &CreationContext<'_>) -> Result<Self> {
+        let state = creation.wgpu_render_state.clone();
+        Ok(Self {
+            state: state.context("the window does not draw with wgpu")?,
             shown: None,
-        }
+        })
     }
 
     /// The texture of a renderer's picture; `number` changes with the renderer.

@@ -14,7 +14,7 @@ use crate::scene::PixelFormat;
 
 /// How much of a JPEG may be broken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Tolerance {
+pub enum Tolerance {
     /// Nothing.
     Strict,
     /// What does not keep the rest from being decoded: some cameras break the rules in every picture.
@@ -23,8 +23,10 @@ pub(super) enum Tolerance {
 
 /// A picture as a driver hands it out.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct RawPicture<'a> {
+pub struct RawPicture<'a> {
+    /// As they came.
     pub bytes: &'a [u8],
+    /// What they are.
     pub pixels: PixelFormat,
     /// The camera's format; a JPEG says its own.
     pub size_px: [u32; 2],
@@ -33,10 +35,7 @@ pub(super) struct RawPicture<'a> {
 }
 
 /// The picture's size and its RGBA; `None` where the bytes are no such picture.
-pub(super) fn rgba_of(
-    picture: RawPicture<'_>,
-    tolerance: Tolerance,
-) -> Option<([u32; 2], Vec<u8>)> {
+pub fn rgba_of(picture: RawPicture<'_>, tolerance: Tolerance) -> Option<([u32; 2], Vec<u8>)> {
     let RawPicture {
         bytes,
         pixels,
@@ -69,6 +68,14 @@ pub(super) fn rgba_of(
         PixelFormat::Rgb => (3, rows, imgproc::COLOR_RGB2RGBA),
         PixelFormat::Bgr => (3, rows, imgproc::COLOR_BGR2RGBA),
     };
+    // Two pixels share their colour: OpenCV would write the last pair of an odd row beyond its end.
+    let pairs = matches!(
+        pixels,
+        PixelFormat::Yuyv | PixelFormat::Yvyu | PixelFormat::Uyvy
+    );
+    if pairs && size_px[0] % 2 != 0 {
+        return None;
+    }
     let packed = without_padding(picture)?;
     let rgba = convert(&packed, channels, rows, size_px, conversion);
     // OpenCV refuses what it has no conversion for: odd sides of pictures whose colour comes at half the resolution.
@@ -129,7 +136,7 @@ fn convert(
 }
 
 /// RGBA of a JPEG and its size.
-pub(super) fn rgba_of_jpeg(bytes: &[u8], tolerance: Tolerance) -> Option<([u32; 2], Vec<u8>)> {
+pub fn rgba_of_jpeg(bytes: &[u8], tolerance: Tolerance) -> Option<([u32; 2], Vec<u8>)> {
     // Zeros in place of a lost end are codes like any other; the mark of the end tells.
     if tolerance == Tolerance::Strict && !bytes.windows(2).any(|pair| pair == [0xff, 0xd9]) {
         return None;
@@ -239,6 +246,18 @@ mod tests {
             .flat_map(|&g| [g, g, g, 255])
             .collect();
         assert_eq!(grey, Some(([1, 4], expected)));
+    }
+
+    /// Found by fuzzing: OpenCV wrote beyond the picture.
+    #[test]
+    fn half_a_pair_of_pixels_is_no_picture() {
+        for pixels in [PixelFormat::Yuyv, PixelFormat::Yvyu, PixelFormat::Uyvy] {
+            for width in [1, 7] {
+                let bytes = vec![9; 4 * width as usize];
+                let found = rgba_of(&bytes, pixels, [width, 2], Tolerance::Lenient);
+                assert_eq!(found, None, "{pixels:?}, {width}");
+            }
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! A source that was open once is never given up: when it is lost, that is an event, and it is taken up again as soon as
 //! it is back.
 
-mod decode;
+pub mod decode;
 mod device;
 mod error;
 mod feed;

@@ -5,7 +5,7 @@
 
 /// A line that means something.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Said {
+pub enum Said {
     /// The file was opened.
     Input,
     /// A video was found in it, and is decoded.
@@ -31,25 +31,30 @@ pub(super) enum Said {
 
 /// What a frame is.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct FrameHead {
+pub struct FrameHead {
     /// Its time stamp in ticks; some streams have none.
     pub stamp: Option<i64>,
     /// FFmpeg's name of its pixel format.
     pub pixels: String,
+    /// Width and height, pixels.
     pub size_px: [u32; 2],
 }
 
 /// FFmpeg's names of a frame's colours; `unknown` where the stream says nothing.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub(super) struct ColourTags {
+pub struct ColourTags {
+    /// Which levels are used: `tv` or `pc`.
     pub range: String,
+    /// From luma and chroma to RGB.
     pub matrix: String,
+    /// The colours of R, G and B.
     pub primaries: String,
+    /// From levels to light.
     pub transfer: String,
 }
 
 /// What a line means; `None` where it does not matter. The lines are those of `-loglevel repeat+level+info`.
-pub(super) fn meaning(line: &str) -> Option<Said> {
+pub fn meaning(line: &str) -> Option<Said> {
     if line.starts_with("[Parsed_showinfo") {
         let (_, said) = line.split_once("[info] ")?;
         return of_showinfo(said);
@@ -110,7 +115,7 @@ fn value_of<'a>(line: &'a str, key: &str) -> Option<&'a str> {
 }
 
 /// A fraction as FFmpeg writes it (`30000/1001`), as a number; `None` where it is none (`0/0`).
-pub(super) fn ratio(text: &str) -> Option<f64> {
+pub fn ratio(text: &str) -> Option<f64> {
     let (above, below) = text.trim().split_once('/')?;
     let (above, below): (f64, f64) = (above.parse().ok()?, below.parse().ok()?);
     Some(above / below).filter(|ratio| ratio.is_finite() && *ratio > 0.0)

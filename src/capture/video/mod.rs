@@ -2,9 +2,9 @@
 //! stream says, its picture as it is meant to be held. A decoder that crashes or hangs does not take gnomon with it.
 
 mod colours;
-mod log;
+pub mod log;
 mod planes;
-mod probe;
+pub mod probe;
 mod process;
 pub(super) mod stream;
 
@@ -16,12 +16,17 @@ use super::error::{CaptureError, Notice};
 use colours::{Colours, ToSrgb};
 use planes::{rgba8, rgba16};
 use probe::{Header, Packets, Probe};
-use process::{Decoder, Next, NoDecoder, RawFrame};
+use process::{Decoder, MOST_PIXELS_OPTION, Next, NoDecoder, RawFrame};
 
 /// For videos that do not know their own.
 const ASSUMED_FPS: f64 = 30.0;
-/// A playlist from a stranger must not reach into the net, and no header asks for more pixels than a file has.
-const INPUT_OPTIONS: [&str; 4] = ["-protocol_whitelist", "file", "-max_pixels", "134217728"];
+/// A playlist from a stranger must not reach into the net, and no header asks for more pixels than a camera has.
+const INPUT_OPTIONS: [&str; 4] = [
+    "-protocol_whitelist",
+    "file",
+    MOST_PIXELS_OPTION[0],
+    MOST_PIXELS_OPTION[1],
+];
 const PROBE_OPTIONS: [&str; 2] = ["-protocol_whitelist", "file"];
 
 /// A frame's place in the recording.

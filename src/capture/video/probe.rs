@@ -3,15 +3,24 @@
 use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};
 use std::io::Read;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
+use std::sync::mpsc::channel;
+use std::time::Duration;
 
 use serde::Deserialize;
 
 use super::log::ratio;
+use crate::capture::children::RunningChild;
+
+/// A header that takes longer does not come, nor do the packets of a whole file.
+const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE_WITH_PACKETS: Duration = Duration::from_secs(1800);
+/// Bytes of an answer at most: the packets of a day of video.
+const MOST_ANSWER: u64 = 256 << 20;
 
 /// What a container says of its first video.
 #[derive(Debug, Default)]
-pub(super) struct Header {
+pub struct Header {
     /// Frames, where the container counts them.
     pub counted_frames: Option<u32>,
     /// How long it lasts, seconds.
@@ -58,7 +67,7 @@ struct Packet {
 
 /// An ffprobe process. Dropped, it is ended.
 pub(super) struct Probe {
-    child: Child,
+    running: RunningChild,
 }
 
 impl Probe {
@@ -78,48 +87,53 @@ impl Probe {
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::null());
-        #[cfg(unix)]
-        std::os::unix::process::CommandExt::process_group(&mut command, 0);
-        command.spawn().ok().map(|child| Self { child })
+        let running = RunningChild::start(&mut command).ok()?;
+        Some(Self { running })
     }
 
     /// Waits for what it says of the header.
     pub(super) fn header(self) -> Option<Header> {
-        let answer = self.answer()?;
-        let stream = answer.streams.into_iter().next()?;
-        let rate = |text: &Option<String>| {
-            let rate = text.as_deref().and_then(ratio);
-            rate.filter(|fps| (0.1..=1000.0).contains(fps))
-        };
-        let container = answer.format;
-        let secs = |text: Option<&String>| text.and_then(|text| text.parse().ok());
-        let whole = container
-            .as_ref()
-            .and_then(|format| format.duration.as_ref());
-        Some(Header {
-            counted_frames: stream.nb_frames.and_then(|count| count.parse().ok()),
-            duration_secs: secs(stream.duration.as_ref()).or_else(|| secs(whole)),
-            fps: nominal_fps(rate(&stream.avg_frame_rate), rate(&stream.r_frame_rate)),
-            lines: stream.height,
-            container: container
-                .and_then(|format| format.format_name)
-                .unwrap_or_default(),
-        })
+        header_of(&self.answer(PATIENCE)?)
     }
 
-    fn answer(mut self) -> Option<Answer> {
-        let mut text = String::new();
-        self.child.stdout.take()?.read_to_string(&mut text).ok()?;
-        serde_json::from_str(&text).ok()
+    /// All that it says; `None` where it says too much, or nothing for too long.
+    fn answer(mut self, patience: Duration) -> Option<String> {
+        let stdout = self.running.child.stdout.take()?;
+        let (to_asker, answer) = channel();
+        std::thread::spawn(move || {
+            let mut bytes = Vec::new();
+            let read = stdout.take(MOST_ANSWER + 1).read_to_end(&mut bytes);
+            // The asker may have lost patience.
+            _ = to_asker.send(read.map(|_| bytes));
+        });
+        let bytes = answer.recv_timeout(patience).ok()?.ok()?;
+        let fits = bytes.len() as u64 <= MOST_ANSWER;
+        fits.then(|| String::from_utf8(bytes).ok()).flatten()
     }
 }
 
-impl Drop for Probe {
-    fn drop(&mut self) {
-        // Both fail only where it has ended already.
-        _ = self.child.kill();
-        _ = self.child.wait();
-    }
+/// What an answer of ffprobe says of the header; `None` where it is none.
+pub fn header_of(answer: &str) -> Option<Header> {
+    let answer: Answer = serde_json::from_str(answer).ok()?;
+    let stream = answer.streams.into_iter().next()?;
+    let rate = |text: &Option<String>| {
+        let rate = text.as_deref().and_then(ratio);
+        rate.filter(|fps| (0.1..=1000.0).contains(fps))
+    };
+    let container = answer.format;
+    let secs = |text: Option<&String>| text.and_then(|text| text.parse().ok());
+    let whole = container
+        .as_ref()
+        .and_then(|format| format.duration.as_ref());
+    Some(Header {
+        counted_frames: stream.nb_frames.and_then(|count| count.parse().ok()),
+        duration_secs: secs(stream.duration.as_ref()).or_else(|| secs(whole)),
+        fps: nominal_fps(rate(&stream.avg_frame_rate), rate(&stream.r_frame_rate)),
+        lines: stream.height,
+        container: container
+            .and_then(|format| format.format_name)
+            .unwrap_or_default(),
+    })
 }
 
 /// The average, but where it counts what is no frame (AVI with reordered frames): no more than the steps of the time stamps.
@@ -131,7 +145,7 @@ fn nominal_fps(average: Option<f64>, by_steps: Option<f64>) -> Option<f64> {
 }
 
 /// The packets of a video's first stream that hold something to be shown.
-pub(super) struct Packets {
+pub struct Packets {
     /// Their time stamps, microseconds.
     stamps: BTreeSet<i64>,
 }
@@ -140,7 +154,12 @@ impl Packets {
     /// Reads the whole file without decoding it.
     pub(super) fn of(input_options: &[&str], input: &OsString) -> Option<Self> {
         let entries = "packet=pts_time,dts_time,flags";
-        let answer = Probe::ask(input_options, input, entries)?.answer()?;
+        Self::of_answer(&Probe::ask(input_options, input, entries)?.answer(PATIENCE_WITH_PACKETS)?)
+    }
+
+    /// Those of an answer of ffprobe; `None` where it is none.
+    pub fn of_answer(answer: &str) -> Option<Self> {
+        let answer: Answer = serde_json::from_str(answer).ok()?;
         let micros = |text: &String| text.parse().ok().map(micros_of);
         let stamps = answer
             .packets
@@ -154,7 +173,7 @@ impl Packets {
     }
 
     /// How many there are between two frames, or before or after one.
-    pub(super) fn between(&self, after_secs: Option<f64>, before_secs: Option<f64>) -> u32 {
+    pub fn between(&self, after_secs: Option<f64>, before_secs: Option<f64>) -> u32 {
         use std::ops::Bound::{Excluded, Unbounded};
         // The stamps are written with six places.
         let slack = 1;

@@ -1,14 +1,19 @@
 //! An ffmpeg process that decodes a video, a frame after the other: pixels on its stdout, what they are on its stderr.
 
 use std::ffi::OsString;
-use std::io::{BufRead, BufReader, Read};
-use std::process::{Child, ChildStdout, Command, Stdio};
+use std::io::{self, BufRead, BufReader, ErrorKind, Read};
+use std::process::{ChildStdout, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
 use super::log::{ColourTags, FrameHead, Said, meaning};
 use super::planes::PixelLayout;
+use crate::capture::children::RunningChild;
 
+/// Pixels of a frame at most, those of 8K video: a small file may say that it has more.
+pub(super) const MOST_PIXELS: u64 = 33_554_432;
+/// The same for ffmpeg.
+pub(super) const MOST_PIXELS_OPTION: [&str; 2] = ["-max_pixels", "33554432"];
 /// A decoder that says nothing for so long is stuck. Files that take longer for a frame are not videos of a camera.
 const PATIENCE: Duration = Duration::from_secs(60);
 /// A line that is longer is not read on: some frames carry data that ffmpeg prints.
@@ -47,7 +52,7 @@ pub(super) enum NoDecoder {
 
 /// A running decoder. Dropped, it is ended.
 pub(super) struct Decoder {
-    child: Child,
+    running: RunningChild,
     frames_out: ChildStdout,
     said: Receiver<Said>,
     tick_secs: f64,
@@ -59,6 +64,7 @@ pub(super) struct Decoder {
     /// The layout of all frames: the first one's.
     layout: Option<(PixelLayout, [u32; 2])>,
     pixels: Vec<u8>,
+    patience: Duration,
     /// Whether the file was opened, and there is a video in it.
     pub opened: bool,
     pub has_video: bool,
@@ -80,16 +86,20 @@ impl Decoder {
             .arg("-i")
             .arg(input)
             .args(["-map", "0:V:0", "-fps_mode", "passthrough", "-vf", &filter])
-            .args(["-f", "rawvideo", "pipe:1"])
+            .args(["-f", "rawvideo", "pipe:1"]);
+        Self::of(command, PATIENCE)
+    }
+
+    /// Starts a program that decodes. Nothing may happen for so long.
+    fn of(mut command: Command, patience: Duration) -> Result<Self, NoDecoder> {
+        command
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped());
         // Ctrl-C is for gnomon, which finishes what it has begun before it ends its decoder.
-        #[cfg(unix)]
-        std::os::unix::process::CommandExt::process_group(&mut command, 0);
-        let mut child = command.spawn().map_err(NoDecoder::Missing)?;
+        let mut running = RunningChild::start(&mut command).map_err(NoDecoder::Missing)?;
+        let child = &mut running.child;
         let (Some(frames_out), Some(stderr)) = (child.stdout.take(), child.stderr.take()) else {
-            end(&mut child);
             return Err(NoDecoder::NoPipe);
         };
         #[cfg(target_os = "linux")]
@@ -109,7 +119,7 @@ impl Decoder {
             }
         });
         Ok(Self {
-            child,
+            running,
             frames_out,
             said,
             tick_secs: 0.0,
@@ -118,6 +128,7 @@ impl Decoder {
             corrupt: false,
             layout: None,
             pixels: Vec::new(),
+            patience,
             opened: false,
             has_video: false,
             ended: false,
@@ -127,7 +138,7 @@ impl Decoder {
     /// Waits for the next frame, or for what is told before it.
     pub(super) fn next(&mut self) -> Next {
         while !self.ended {
-            match self.said.recv_timeout(PATIENCE) {
+            match self.said.recv_timeout(self.patience) {
                 Ok(Said::Input) => self.opened = true,
                 Ok(Said::Decoding) => self.has_video = true,
                 Ok(Said::TimeBase { tick_secs, fps }) => {
@@ -139,21 +150,54 @@ impl Decoder {
                 Ok(Said::Colours(colours)) => {
                     if let Some(head) = self.head.take() {
                         match self.take(&head, colours) {
-                            Some(frame) => return Next::Frame(frame),
-                            None => self.ended = true,
+                            Ok(frame) => return Next::Frame(frame),
+                            Err(error) if error.kind() == ErrorKind::TimedOut => {
+                                return self.silent();
+                            }
+                            Err(error) if error.kind() == ErrorKind::UnexpectedEof => {
+                                return self.after_the_last();
+                            }
+                            Err(_) => {
+                                self.ended = true;
+                                self.running.end();
+                            }
                         }
                     }
                 }
-                Err(RecvTimeoutError::Disconnected) => self.ended = true,
-                Err(RecvTimeoutError::Timeout) => {
-                    self.ended = true;
-                    end(&mut self.child);
-                    let secs = PATIENCE.as_secs();
-                    return Next::Complaint(format!("the decoder said nothing for {secs} s"));
-                }
+                Err(RecvTimeoutError::Disconnected) => return self.after_the_last(),
+                Err(RecvTimeoutError::Timeout) => return self.silent(),
             }
         }
         Next::End
+    }
+
+    fn after_the_last(&mut self) -> Next {
+        self.ended = true;
+        self.failure().map_or(Next::End, Next::Complaint)
+    }
+
+    /// What its status says, where it has ended otherwise than well: one that is killed complains of nothing.
+    fn failure(&mut self) -> Option<String> {
+        const NAP: Duration = Duration::from_millis(2);
+        let mut waited = Duration::ZERO;
+        while waited < self.patience {
+            match self.running.try_wait() {
+                Ok(Some(status)) if status.success() => return None,
+                Ok(Some(status)) => return Some(format!("the decoder failed: {status}")),
+                Ok(None) => std::thread::sleep(NAP),
+                Err(_) => return None,
+            }
+            waited += NAP;
+        }
+        self.running.end();
+        Some("the decoder does not end".to_owned())
+    }
+
+    fn silent(&mut self) -> Next {
+        self.ended = true;
+        self.running.end();
+        let secs = self.patience.as_secs();
+        Next::Complaint(format!("the decoder said nothing for {secs} s"))
     }
 
     /// The pixels of the frame that came last, their layout and their size.
@@ -162,16 +206,28 @@ impl Decoder {
         Some((&self.pixels, layout, size_px))
     }
 
-    /// Reads a frame's pixels; `None` where they do not come any more.
-    fn take(&mut self, head: &FrameHead, colours: ColourTags) -> Option<RawFrame> {
+    /// Reads a frame's pixels.
+    ///
+    /// # Errors
+    /// They do not come any more, or for longer than there is patience.
+    fn take(&mut self, head: &FrameHead, colours: ColourTags) -> io::Result<RawFrame> {
         // ffmpeg keeps to the first frame's size and format.
         if self.layout.is_none() {
-            let layout = PixelLayout::by_ffmpeg_name(&head.pixels)?;
+            let layout = PixelLayout::by_ffmpeg_name(&head.pixels);
+            let layout = layout.ok_or(ErrorKind::InvalidData)?;
+            let [width, height] = head.size_px.map(u64::from);
+            if width * height > MOST_PIXELS {
+                return Err(ErrorKind::InvalidData.into());
+            }
             self.layout = Some((layout, head.size_px));
             self.pixels = vec![0; layout.bytes(head.size_px)];
         }
-        self.frames_out.read_exact(&mut self.pixels).ok()?;
-        Some(RawFrame {
+        let mut patient = Patient {
+            pipe: &mut self.frames_out,
+            patience: self.patience,
+        };
+        patient.read_exact(&mut self.pixels)?;
+        Ok(RawFrame {
             stamp_secs: head.stamp.map(|stamp| stamp as f64 * self.tick_secs),
             size_px: head.size_px,
             colours,
@@ -180,14 +236,89 @@ impl Decoder {
     }
 }
 
-impl Drop for Decoder {
-    fn drop(&mut self) {
-        end(&mut self.child);
+/// A pipe that is not waited for longer than there is patience.
+struct Patient<'a> {
+    pipe: &'a mut ChildStdout,
+    patience: Duration,
+}
+
+impl Read for Patient<'_> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        #[cfg(unix)]
+        wait_for_bytes(self.pipe, self.patience)?;
+        self.pipe.read(bytes)
     }
 }
 
-/// Both fail only where it has ended already.
-fn end(child: &mut Child) {
-    _ = child.kill();
-    _ = child.wait();
+/// Waits until a pipe has something to give, or has ended.
+#[cfg(unix)]
+fn wait_for_bytes(pipe: &ChildStdout, patience: Duration) -> io::Result<()> {
+    use rustix::event::{PollFd, PollFlags, Timespec, poll};
+    let limit = Timespec {
+        tv_sec: patience.as_secs().cast_signed(),
+        tv_nsec: patience.subsec_nanos().into(),
+    };
+    let mut pipes = [PollFd::new(pipe, PollFlags::IN)];
+    match poll(&mut pipes, Some(&limit))? {
+        0 => Err(ErrorKind::TimedOut.into()),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+#[cfg(unix)]
+mod tests {
+    use super::*;
+
+    const HEAD: &str =
+        "[Parsed_showinfo_1 @ 0x1] [info] n:   0 pts:   0 pts_time:0 fmt:rgba sar:0/1 s:4x2 i:P";
+    const COLOURS: &str = "[Parsed_showinfo_1 @ 0x1] [info] color_range:pc color_space:gbr color_primaries:bt709 color_trc:bt709";
+
+    /// A script in place of ffmpeg, which is given what is said of a frame.
+    fn script(text: &str) -> Decoder {
+        let mut command = Command::new("sh");
+        let said = format!("{HEAD}\n{COLOURS}\n");
+        command.args(["-c", text, "sh", &said]);
+        let decoder = Decoder::of(command, Duration::from_millis(500));
+        decoder.unwrap_or_else(|_| panic!("no script"))
+    }
+
+    #[test]
+    fn a_decoder_that_hangs_is_ended() {
+        for text in [
+            "exec sleep 1000",
+            "printf %b \"$1\" >&2; exec sleep 1000",
+            "printf %b \"$1\" >&2; printf 123; exec sleep 1000",
+        ] {
+            let mut decoder = script(text);
+            let next = decoder.next();
+            let is_told = matches!(&next, Next::Complaint(words) if words.contains("said nothing"));
+            assert!(is_told, "{text}");
+            assert!(matches!(decoder.next(), Next::End), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_it_says_and_gives_is_a_frame() {
+        let pixels = "printf 12345678123456781234567812345678";
+        let mut decoder = script(&format!("printf %b \"$1\" >&2; {pixels}"));
+        assert!(matches!(decoder.next(), Next::Frame(_)));
+        assert!(matches!(decoder.next(), Next::End));
+        // One that dies in the middle of a frame, and one that is killed after it.
+        let mut decoder = script("printf %b \"$1\" >&2; printf 123");
+        assert!(matches!(decoder.next(), Next::End));
+        let mut decoder = script("printf %b \"$1\" >&2; printf 123; kill -9 $$");
+        assert!(matches!(decoder.next(), Next::Complaint(_)));
+        let mut decoder = script(&format!("printf %b \"$1\" >&2; {pixels}; kill -9 $$"));
+        assert!(matches!(decoder.next(), Next::Frame(_)));
+        assert!(matches!(decoder.next(), Next::Complaint(words) if words.contains("signal: 9")));
+        assert!(matches!(decoder.next(), Next::End));
+    }
+
+    #[test]
+    fn memory_for_a_frame_is_not_taken_on_its_word() {
+        let mut decoder =
+            script("printf %b \"$1\" | sed 's/4x2/400000x400000/' >&2; exec sleep 1000");
+        assert!(matches!(decoder.next(), Next::End));
+    }
 }

@@ -4,7 +4,7 @@
 use std::ffi::OsString;
 
 use super::Conversion;
-use super::process::{Decoder, Next, RawFrame};
+use super::process::{Decoder, MOST_PIXELS_OPTION, Next, RawFrame};
 
 /// A stream that gives pictures.
 pub(in crate::capture) struct VideoStream {
@@ -51,15 +51,8 @@ impl VideoStream {
             _ => Vec::new(),
         };
         // No frame is held back for others that are decoded beside it.
-        let prompt = [
-            "-fflags",
-            "nobuffer",
-            "-thread_type",
-            "slice",
-            "-max_pixels",
-            "134217728",
-        ];
-        let options = [&limit, forced, &prompt[..]].concat();
+        let prompt = ["-fflags", "nobuffer", "-thread_type", "slice"];
+        let options = [&limit, forced, &prompt[..], &MOST_PIXELS_OPTION].concat();
         let mut decoder = Decoder::start(&options, &OsString::from(address)).ok()?;
         loop {
             match decoder.next() {

@@ -147,6 +147,14 @@ fn parts(bytes: &[u8]) -> Result<Parts<'_>, String> {
     if !bytes.starts_with(b"glTF") {
         return Ok((Cow::Borrowed(bytes), None));
     }
+    // The crate takes it from the length without looking.
+    let head = size_of::<[u32; 3]>();
+    let length = bytes.get(8..head).and_then(|length| length.try_into().ok());
+    match length.map(u32::from_le_bytes) {
+        Some(length) if length as usize >= head => {}
+        Some(length) => return Err(format!("not a whole .glb file: its length is {length}")),
+        None => return Err("not a whole .glb file: it ends in its head".to_owned()),
+    }
     let glb = Glb::from_slice(bytes).map_err(|error| match error {
         gltf::Error::Binary(gltf::binary::Error::Version(version)) => {
             format!("glTF of version {version}; version 2 is read")

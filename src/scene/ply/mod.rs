@@ -86,7 +86,9 @@ pub fn with_picture_named<E>(
 
 fn line_text(bytes: &[u8], line: usize) -> String {
     let lines = bytes.split(|byte| matches!(byte, b'\n' | b'\r'));
-    let written = lines.filter(|line| !line.is_empty()).nth(line - 1);
+    let written = lines
+        .filter(|line| !line.is_empty())
+        .nth(line.saturating_sub(1));
     let written = written.unwrap_or_default();
     String::from_utf8_lossy(&written[..written.len().min(160)]).into_owned()
 }

@@ -5,18 +5,19 @@ mod advice;
 mod watcher;
 mod window;
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{Result, bail};
 
 use crate::app::stopwatch::Stopwatch;
-use crate::app::window::opening;
+use crate::app::window::ContextWaker;
+use crate::app::window::event_loop::PassEnd;
+use crate::app::window::lasting::LastingWindow;
 use crate::calibration::{Taker, Target, Views};
 use crate::capture::live::{LiveOptions, Now};
-use crate::render::Gpu;
 use watcher::Watcher;
-use window::{CalibrationWindow, Ending};
+use window::{CalibrationWindow, Ending, Shown};
 
 /// Views of a target that somebody held to the camera.
 pub struct Held {
@@ -38,28 +39,28 @@ pub fn views(
     stop: &Arc<AtomicBool>,
 ) -> Result<Held> {
     let taker = Taker::new(target)?;
-    let gpu = Gpu::open(adapter)?;
-    let event_loop = opening::event_loop()?;
-    let is_open = Arc::new(AtomicBool::new(false));
     let ending: Arc<Mutex<Option<Ending>>> = Arc::default();
     let now: Now = Arc::new(Stopwatch::clock());
-    let begin = {
-        let (opened, ending, stop) = (Arc::clone(&is_open), Arc::clone(&ending), Arc::clone(stop));
-        let (source, options) = (source.to_owned(), options.clone());
-        move |creation: &eframe::CreationContext| {
-            let context = creation.egui_ctx.clone();
-            let wake = Arc::new(move || context.request_repaint());
-            let watcher = Watcher::start(&source, &options, taker, &now, wake);
-            opened.store(true, Ordering::Relaxed);
-            let window = CalibrationWindow::new(watcher, target, now, stop, ending);
-            Ok(Box::new(window) as Box<dyn eframe::App>)
-        }
-    };
     let title = format!("{source} – gnomon calibrate");
-    let mut application =
-        eframe::create_native(&title, opening::options(&gpu), Box::new(begin), &event_loop);
-    event_loop.run_app(&mut application)?;
-    opening::assure(&is_open)?;
+    let window = LastingWindow {
+        title: &title,
+        adapter,
+        now: Arc::clone(&now),
+        pass_end: PassEnd::default(),
+    };
+    let (left, stop) = (Arc::clone(&ending), Arc::clone(stop));
+    let (source, options) = (source.to_owned(), options.clone());
+    window.show(move |_, creation| {
+        let waker = ContextWaker::default();
+        waker.set(&creation.egui_ctx);
+        let watcher = Watcher::start(&source, &options, taker, &now, waker.wake());
+        let shown = Shown {
+            stop,
+            ending: left,
+            waker,
+        };
+        Ok(CalibrationWindow::new(watcher, target, now, shown))
+    })?;
     let mut ending = ending.lock().unwrap_or_else(PoisonError::into_inner);
     match ending.take() {
         Some(Ending::Enough(held)) => Ok(*held),

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use anyhow::anyhow;
+use anyhow::{Result, anyhow};
 use eframe::egui::{
     Align2, CentralPanel, Color32, ColorImage, Context, FontId, Frame, Key, Painter, Pos2, Rect,
     Shape, Stroke, TextureHandle, TextureOptions, Ui, Vec2, ViewportCommand,
@@ -13,10 +13,13 @@ use eframe::egui::{
 use super::Held;
 use super::advice::{advice, balance, refusal};
 use super::watcher::{ViewsStanding, Watcher, WatcherOrder};
+use crate::app::window::ContextWaker;
 use crate::app::window::fit::PictureFit;
+use crate::app::window::lasting::Content;
 use crate::app::window::notices::{CameraState, Notices, Weight};
 use crate::calibration::{Coverage, Moment, Target};
 use crate::capture::live::Now;
+use crate::render::Gpu;
 
 /// The window looks at the world at least this often, even when no picture comes.
 const PULSE: Duration = Duration::from_millis(200);
@@ -49,19 +52,22 @@ pub struct CalibrationWindow {
     standing: Option<ViewsStanding>,
     notices: Notices,
     now: Now,
-    stop: Arc<AtomicBool>,
-    ending: Arc<Mutex<Option<Ending>>>,
+    shared: Shown,
+}
+
+/// What the window and whoever opened it share.
+pub struct Shown {
+    /// Closes the window.
+    pub stop: Arc<AtomicBool>,
+    /// How it ended.
+    pub ending: Arc<Mutex<Option<Ending>>>,
+    /// Wakes the window.
+    pub waker: ContextWaker,
 }
 
 impl CalibrationWindow {
-    /// A window on a camera; how it ended is left in `ending`.
-    pub fn new(
-        watcher: Watcher,
-        target: Target,
-        now: Now,
-        stop: Arc<AtomicBool>,
-        ending: Arc<Mutex<Option<Ending>>>,
-    ) -> Self {
+    /// A window on a camera.
+    pub fn new(watcher: Watcher, target: Target, now: Now, shared: Shown) -> Self {
         Self {
             watcher: Some(watcher),
             target,
@@ -69,13 +75,15 @@ impl CalibrationWindow {
             standing: None,
             notices: Notices::new(),
             now,
-            stop,
-            ending,
+            shared,
         }
     }
 
     fn end(&mut self, ctx: &Context, ending: Ending) {
-        let mut place = self.ending.lock().unwrap_or_else(PoisonError::into_inner);
+        let ending_of_window = &self.shared.ending;
+        let mut place = ending_of_window
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         place.get_or_insert(ending);
         ctx.send_viewport_cmd(ViewportCommand::Close);
     }
@@ -243,23 +251,26 @@ fn outline(painter: &Painter, fit: &PictureFit, standing: &ViewsStanding) {
     }
 }
 
-impl eframe::App for CalibrationWindow {
-    fn logic(&mut self, ctx: &Context, _: &mut eframe::Frame) {
+impl Content for CalibrationWindow {
+    fn renew(&mut self, _: &Arc<Gpu>, creation: &eframe::CreationContext<'_>) -> Result<()> {
+        // Its texture is gone with the device.
+        self.picture = None;
+        self.shared.waker.set(&creation.egui_ctx);
+        Ok(())
+    }
+
+    fn logic(&mut self, ctx: &Context) {
         ctx.request_repaint_after(PULSE);
-        if self.stop.load(Ordering::Relaxed) {
+        if self.shared.stop.load(Ordering::Relaxed) {
             self.end(ctx, Ending::GivenUp);
         }
         self.step(ctx);
     }
 
-    fn ui(&mut self, ui: &mut Ui, _: &mut eframe::Frame) {
+    fn ui(&mut self, ui: &mut Ui) {
         self.keys(&ui.ctx().clone());
         CentralPanel::default()
             .frame(Frame::NONE)
             .show(ui, |ui| self.show(ui));
-    }
-
-    fn clear_color(&self, _: &eframe::egui::Visuals) -> [f32; 4] {
-        Color32::BLACK.to_normalized_gamma_f32()
     }
 }

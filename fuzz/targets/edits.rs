@@ -1,0 +1,55 @@
+//! Edits that are written into scenes of any look.
+#![no_main]
+
+use glam::DVec3;
+use gnomon::app::authoring::{Edit, NewVirtual, SceneDocument};
+use gnomon::light::Light;
+use gnomon::scene::{Placement, Scene};
+
+const MESH: &[u8] = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+fn edits(scene: &Scene) -> Vec<Edit> {
+    let things = scene.phantoms.iter().chain(&scene.virtuals);
+    let thing = things.last().map_or(String::new(), |thing| thing.name.clone());
+    let anchor = scene.anchors.last().map_or(String::new(), |anchor| anchor.name.clone());
+    let light = Light::point(DVec3::new(0.1, -0.2, 0.3), DVec3::splat(0.5));
+    let placement = Placement {
+        position_m: DVec3::new(0.1, 0.0, -0.25),
+        rotation_deg: DVec3::new(0.0, 12.5, 0.0),
+        scale: DVec3::new(1.0, 2.0, 1.0),
+    };
+    vec![
+        Edit::Place { thing: thing.clone(), placement },
+        Edit::Show { thing: thing.clone(), visible: false },
+        Edit::Light { index: 0, light },
+        Edit::AddLight(light),
+        Edit::RemoveLight(0),
+        Edit::Ambient(DVec3::new(0.2, 0.1, 0.3)),
+        Edit::AnchorSize { anchor: anchor.clone(), size_m: 0.0625 },
+        Edit::AddVirtual(NewVirtual {
+            name: "new".to_owned(),
+            mesh: "a.obj".to_owned(),
+            on: anchor,
+            placement,
+        }),
+        Edit::RemoveVirtual(thing),
+    ]
+}
+
+gnomon_fuzz::target!(|text: &str| {
+    gnomon_fuzz::file("a.obj", MESH);
+    let path = gnomon_fuzz::file("edited.toml", text.as_bytes());
+    if let Ok(mut document) = SceneDocument::open(&path) {
+        for edit in edits(document.scene()) {
+            let before = document.text().to_owned();
+            if document.commit(&edit).is_ok() {
+                // What was written is what is shown, and can be taken back.
+                assert!(Scene::load(&path).is_ok(), "{edit:?}");
+                if document.text() != before {
+                    document.undo().expect("a step back");
+                }
+                assert_eq!(document.text(), before);
+            }
+        }
+    }
+});
