@@ -1,6 +1,8 @@
 //! The live program without its window: scene, camera, tracking, drawing and recording, moved on frame by frame by
 //! whoever shows the picture.
 
+mod edits;
+mod states;
 mod things;
 
 use std::path::Path;
@@ -9,18 +11,16 @@ use std::time::Duration;
 
 use anyhow::{Context as _, Result};
 
-use super::beginning::{Opening, plan_of, same_camera};
+use super::beginning::{Opening, plan_of};
 use super::canvas::SceneCanvas;
-use super::command::{Clicks, Overlay, RecordingCommand, SceneCommand, Selected};
-use super::demonstration::{self, Demonstration};
+use super::command::{Overlay, RecordingCommand, Selected};
 use super::frame_tracker::TrackedPicture;
 use super::meters::{Meters, Sample};
 use super::pipeline::{Pipeline, PipelineInput};
 use super::recorders::Recorders;
-use super::shadow_clicks::{self, ShadowClicks};
-use super::views::ViewMode;
+use super::shadow_clicks::ShadowClicks;
 use super::window_state::WindowState;
-use crate::app::authoring::{Edit, EditError, SceneDocument, SceneNews, SceneWatch};
+use crate::app::authoring::{Edit, SceneDocument};
 use crate::app::files::job_files::Replacing;
 use crate::app::files::output_error::OutputError;
 use crate::app::input::live_capture::CaptureEvent;
@@ -33,69 +33,12 @@ use crate::capture::live::Now;
 use crate::geometry::camera::Intrinsics;
 use crate::render::{Gpu, Renderer};
 use crate::scene::{CameraSettings, Placement, Scene};
-use things::ReadAhead;
+use states::{DrawnPicture, Origin, Pending, PictureState, SceneState};
 
 /// For composites of sources that do not say their rate.
 const ASSUMED_FPS: f64 = 30.0;
 /// A wait that is no shorter was one, milliseconds.
 const INSTANT_MS: f64 = 0.5;
-
-/// The scene, as far as there is one.
-enum SceneState {
-    /// First use: nobody has said what stands on the table.
-    Absent,
-    /// A scene is shown and edited.
-    Open(Box<OpenScene>),
-}
-
-/// A scene that is shown and edited.
-struct OpenScene {
-    document: SceneDocument,
-    /// Tells what becomes of its files.
-    watch: SceneWatch,
-    origin: Origin,
-    /// What is shown while it lasts.
-    previewed: Option<Edit>,
-    /// Models that are on their way into it.
-    reading: Vec<ReadAhead>,
-}
-
-/// The place of a scene's file.
-enum Origin {
-    /// Where a person keeps it.
-    Saved,
-    /// In a folder that is gone with the program, until somebody saves it.
-    Unsaved {
-        #[expect(dead_code, reason = "it keeps the folder")]
-        folder: Demonstration,
-    },
-}
-
-/// The picture, as far as there is one.
-enum PictureState {
-    /// None has come yet.
-    Awaited,
-    /// The newest, until a newer one comes.
-    Following(Box<DrawnPicture>),
-    /// One that is held, while a light is found in it by clicks.
-    FindingLight(Box<DrawnPicture>, Box<ShadowClicks>),
-}
-
-/// The frame that was drawn last.
-struct DrawnPicture {
-    tracked: TrackedPicture,
-    /// The view that it was drawn in, while nothing has changed since.
-    drawn: Option<ViewMode>,
-    /// Its times, until its display is told of.
-    pending: Option<Pending>,
-}
-
-/// A frame that was drawn, and not yet seen to be on the screen.
-struct Pending {
-    begun_secs: f64,
-    arrived_secs: f64,
-    sample: Sample,
-}
 
 /// The live program without its window.
 pub struct LiveSession {
@@ -119,103 +62,6 @@ pub struct LiveSession {
     renderers: u64,
     /// What has just come into the scene.
     newly_selected: Option<Selected>,
-}
-
-impl SceneState {
-    fn of(document: Option<SceneDocument>, wake: &Wake) -> Self {
-        document.map_or(Self::Absent, |document| {
-            Self::opened(document, Origin::Saved, wake)
-        })
-    }
-
-    fn opened(document: SceneDocument, origin: Origin, wake: &Wake) -> Self {
-        Self::Open(Box::new(OpenScene {
-            watch: watch(&document, wake),
-            document,
-            origin,
-            previewed: None,
-            reading: Vec::new(),
-        }))
-    }
-
-    fn open(&self) -> Option<&OpenScene> {
-        match self {
-            Self::Absent => None,
-            Self::Open(scene) => Some(scene),
-        }
-    }
-
-    fn open_mut(&mut self) -> Option<&mut OpenScene> {
-        match self {
-            Self::Absent => None,
-            Self::Open(scene) => Some(scene),
-        }
-    }
-}
-
-fn watch(document: &SceneDocument, wake: &Wake) -> SceneWatch {
-    let wake = Arc::clone(wake);
-    document.watch(move || wake())
-}
-
-impl PictureState {
-    fn drawn(&self) -> Option<&DrawnPicture> {
-        match self {
-            Self::Awaited => None,
-            Self::Following(picture) | Self::FindingLight(picture, _) => Some(picture.as_ref()),
-        }
-    }
-
-    fn drawn_mut(&mut self) -> Option<&mut DrawnPicture> {
-        match self {
-            Self::Awaited => None,
-            Self::Following(picture) | Self::FindingLight(picture, _) => Some(picture.as_mut()),
-        }
-    }
-
-    /// Whether it stays although a newer one has come.
-    fn is_held(&self, state: &WindowState) -> bool {
-        match self {
-            Self::Awaited => false,
-            Self::Following(_) => state.holds,
-            Self::FindingLight(..) => true,
-        }
-    }
-
-    /// What is shown of it: virtual things would hide the shadows that are to be clicked.
-    fn view(&self, state: &WindowState) -> ViewMode {
-        match self {
-            Self::FindingLight(..) => ViewMode::Bare,
-            Self::Awaited | Self::Following(_) => state.view,
-        }
-    }
-
-    fn clicks(&self) -> Option<&ShadowClicks> {
-        match self {
-            Self::FindingLight(_, clicks) => Some(clicks.as_ref()),
-            Self::Awaited | Self::Following(_) => None,
-        }
-    }
-
-    /// With clicks a light is found in it from now on, without them no longer.
-    fn set_clicks(&mut self, clicks: Option<ShadowClicks>) {
-        *self = match (std::mem::replace(self, Self::Awaited), clicks) {
-            (Self::Awaited, _) => Self::Awaited,
-            (Self::Following(picture) | Self::FindingLight(picture, _), None) => {
-                Self::Following(picture)
-            }
-            (Self::Following(picture) | Self::FindingLight(picture, _), Some(clicks)) => {
-                Self::FindingLight(picture, Box::new(clicks))
-            }
-        };
-    }
-
-    /// Something has changed: it has to be drawn again.
-    fn draw_again(&mut self) {
-        if let Some(picture) = self.drawn_mut() {
-            picture.drawn = None;
-        }
-    }
 }
 
 impl LiveSession {
@@ -481,49 +327,6 @@ impl LiveSession {
         ]
     }
 
-    /// Does what is asked of the scene, of which `state` says what is selected. What goes wrong is told as a notice.
-    pub fn edit_scene(&mut self, command: SceneCommand, state: &WindowState) {
-        match command {
-            SceneCommand::Preview(edit) => self.preview(&edit),
-            SceneCommand::Commit(edit) => self.commit(&edit),
-            SceneCommand::EndPreview => {
-                if let Some(scene) = self.scene.open_mut() {
-                    scene.previewed = None;
-                    scene.document.end_preview();
-                    self.scene_changed(true);
-                }
-            }
-            SceneCommand::Undo => self.edit(SceneDocument::undo),
-            SceneCommand::Redo => self.edit(SceneDocument::redo),
-            SceneCommand::Clicks(clicks) => self.take_clicks(clicks, state),
-            SceneCommand::Demonstrate { id, size_m } => self.demonstrate(id, size_m),
-            SceneCommand::Save(path) => self.save(&path),
-            SceneCommand::ToggleSelected => {
-                if let (Some(Selected::Thing(thing)), Some(scene)) = (&state.selected, self.scene())
-                {
-                    let mut things = scene.phantoms.iter().chain(&scene.virtuals);
-                    let found = things.find(|found| found.name == *thing);
-                    if let Some(visible) = found.map(|found| !found.visible) {
-                        let thing = thing.clone();
-                        self.commit(&Edit::Show { thing, visible });
-                    }
-                }
-            }
-            SceneCommand::RemoveSelected => match &state.selected {
-                Some(Selected::Thing(name)) => self.commit(&Edit::RemoveThing(name.clone())),
-                Some(Selected::Light(index)) => self.commit(&Edit::RemoveLight(*index)),
-                None => {}
-            },
-            SceneCommand::Add(wanted) => self.add(&wanted),
-            SceneCommand::DuplicateSelected => {
-                if let Some(Selected::Thing(name)) = &state.selected {
-                    self.duplicate(name);
-                }
-            }
-            SceneCommand::Rename { thing, name } => self.rename(&thing, &name),
-        }
-    }
-
     /// Does what is asked of the recorders. What goes wrong is told as a notice.
     pub fn record(&mut self, command: RecordingCommand) {
         match command {
@@ -558,114 +361,6 @@ impl LiveSession {
         }
     }
 
-    fn preview(&mut self, edit: &Edit) {
-        if let Some(scene) = self.scene.open_mut()
-            && scene.document.preview(edit)
-        {
-            scene.previewed = Some(edit.clone());
-            self.scene_changed(false);
-        }
-    }
-
-    fn commit(&mut self, edit: &Edit) {
-        self.edit(|document| document.commit(edit));
-    }
-
-    fn edit(&mut self, change: impl FnOnce(&mut SceneDocument) -> Result<(), EditError>) {
-        let Some(scene) = self.scene.open_mut() else {
-            return;
-        };
-        scene.previewed = None;
-        if let Err(error) = change(&mut scene.document) {
-            self.tell(Weight::Trouble, error.to_string());
-        }
-        self.scene_changed(true);
-    }
-
-    /// The scene is another: what depends on it follows.
-    fn scene_changed(&mut self, lasting: bool) {
-        let Some(document) = self.document() else {
-            return;
-        };
-        let scene = Arc::new(document.scene().clone());
-        self.pipeline.set_plan(plan_of(Some(document)));
-        self.canvas.set_scene(scene, lasting);
-        self.picture.draw_again();
-    }
-
-    fn take_scene_news(&mut self) {
-        while let Some(scene) = self.scene.open_mut() {
-            match scene.watch.next() {
-                None => return,
-                Some(SceneNews::Mistaken(error)) => self.notices.scene = Some(error.to_string()),
-                Some(SceneNews::Changed(change)) => {
-                    if !scene.document.take(*change) {
-                        continue;
-                    }
-                    scene.watch = watch(&scene.document, &self.wake);
-                    let is_same_camera = same_camera(&scene.document.scene().camera, &self.camera);
-                    self.notices.scene = None;
-                    self.scene_changed(true);
-                    if !is_same_camera {
-                        self.tell(
-                            Weight::Trouble,
-                            "The scene's [camera] was changed: start again to take it.",
-                        );
-                    }
-                }
-            }
-        }
-    }
-
-    fn take_clicks(&mut self, step: Clicks, state: &WindowState) {
-        let (Some(document), Some(tracked)) = (self.document(), self.picture()) else {
-            return self.tell(Weight::Trouble, "There is no picture of the scene yet.");
-        };
-        match step {
-            Clicks::Begin => {
-                let clicks = ShadowClicks::begin(document.scene(), tracked);
-                let sees_world = clicks.is_some();
-                self.picture.set_clicks(clicks);
-                if !sees_world {
-                    self.tell(Weight::Trouble, "The world's markers are not seen.");
-                }
-            }
-            Clicks::Cancel => self.picture.set_clicks(None),
-            Clicks::Find(freedom) => {
-                let clicks = self.clicks();
-                match clicks.map(|clicks| clicks.find(tracked, freedom)) {
-                    None => {}
-                    Some(Err(reason)) => self.tell(Weight::Trouble, reason),
-                    Some(Ok(found)) => {
-                        let index = match state.selected {
-                            Some(Selected::Light(index)) => index,
-                            _ => 0,
-                        };
-                        let edits = shadow_clicks::edits(document.scene(), index, &found);
-                        self.picture.set_clicks(None);
-                        for edit in edits {
-                            self.commit(&edit);
-                        }
-                        self.tell(Weight::Done, shadow_clicks::in_words(&found));
-                    }
-                }
-            }
-            Clicks::At(_) | Clicks::TakeBack => {
-                let PictureState::FindingLight(_, clicks) = &mut self.picture else {
-                    return;
-                };
-                match step {
-                    Clicks::At(pixel) => {
-                        if let Err(reason) = clicks.click(pixel) {
-                            self.tell(Weight::Trouble, reason);
-                        }
-                    }
-                    _ => clicks.take_back(),
-                }
-            }
-        }
-    }
-
     fn screenshot(&mut self) {
         let read = self
             .canvas
@@ -693,37 +388,6 @@ impl LiveSession {
         };
         let said = self.recorders.toggle_session(&self.pipeline, head);
         self.say(said);
-    }
-
-    fn demonstrate(&mut self, id: u32, size_m: f64) {
-        let made = Demonstration::make(&self.camera, id, size_m)
-            .map_err(anyhow::Error::from)
-            .and_then(|made| Ok((SceneDocument::open(&made.path())?, made)));
-        match made {
-            Ok((document, made)) => {
-                let origin = Origin::Unsaved { folder: made };
-                self.scene = SceneState::opened(document, origin, &self.wake);
-                self.scene_changed(true);
-            }
-            Err(error) => self.tell(Weight::Trouble, format!("{error:#}")),
-        }
-    }
-
-    fn save(&mut self, path: &Path) {
-        let Some(document) = self.document() else {
-            return;
-        };
-        let saved = demonstration::save(document.text(), path)
-            .map_err(anyhow::Error::from)
-            .and_then(|()| Ok(SceneDocument::open(path)?));
-        match saved {
-            Ok(document) => {
-                self.scene = SceneState::opened(document, Origin::Saved, &self.wake);
-                self.scene_changed(true);
-                self.tell(Weight::Done, format!("{} saved", path.display()));
-            }
-            Err(error) => self.tell(Weight::Trouble, format!("{error:#}")),
-        }
     }
 
     /// Whether pictures still come, or may come again.
