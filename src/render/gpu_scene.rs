@@ -1,6 +1,8 @@
 //! What stands where in a frame: the scene's surfaces, casters and lights on the GPU, and how passes draw them.
 
 mod deforming;
+mod drawing;
+mod spaces;
 
 use std::ops::Range;
 
@@ -18,7 +20,7 @@ use super::anchor_geometry::{
     AnchorGeometry, AnchoredModel, BatchCorners, Corners, KnownLevels, ModelLevel, Role,
     SurfaceBatch,
 };
-use super::casters::{Casters, LitSides};
+use super::casters::Casters;
 use super::detail::{chosen_levels, widest_penumbra_px};
 use super::gpu::Gpu;
 use super::indirect::Indirect;
@@ -29,10 +31,8 @@ use super::lights::Lights;
 use super::materials::{materials_group, needs_looks};
 use super::screen_bounds::{ScreenBounds, screen_bounds};
 use super::shown::Shown;
-use super::stencil::REAL_HIDES;
-use super::surfaces::{Sided, SurfaceKinds};
+use super::surfaces::SurfaceKinds;
 use super::uniforms::{AnchorView, UniformRow, VIEW_GROUP};
-use super::volumes::{Among, Volumes, set_scissor};
 
 /// The light in group 1 while surfaces are drawn.
 #[derive(Debug, Clone, Copy)]
@@ -357,92 +357,9 @@ impl GpuScene {
         })
     }
 
-    /// What passes draw from here on stands on an anchor.
-    pub fn set_anchor(&self, pass: &mut wgpu::RenderPass<'_>, anchor: usize) {
-        pass.set_bind_group(0, &self.view_group, &[self.views.offset(anchor)]);
-    }
-
-    /// What passes draw from here on stands in the world.
-    pub fn set_world(&self, pass: &mut wgpu::RenderPass<'_>) {
-        self.set_anchor(pass, 0);
-        self.lights.set_whole(pass, 0);
-    }
-
-    /// Draws the real surfaces of all anchors but the world.
-    pub fn draw_moving_real(
-        &self,
-        pass: &mut wgpu::RenderPass<'_>,
-        pipelines: &Sided,
-        within: PixelRect,
-    ) {
-        pass.set_stencil_reference(0);
-        self.lights.set_whole(pass, 0);
-        for batch in self.placed(Role::Real).filter(|batch| batch.anchor != 0) {
-            for (number, thing) in self.of_batch(batch) {
-                self.set_thing(pass, batch, thing);
-                self.draw_whole(pass, pipelines, number, thing, within);
-            }
-        }
-    }
-
     /// The camera.
     pub fn intrinsics(&self) -> &Intrinsics {
         &self.intrinsics
-    }
-
-    /// Where the anchors are.
-    pub fn camera_from_anchor(&self) -> &[Option<DAffine3>] {
-        &self.camera_from_anchor
-    }
-
-    /// Where the anchors are in the world, which stands still to itself; `None` where the world has no pose.
-    pub fn world_from_anchor(&self) -> Option<Vec<Option<DAffine3>>> {
-        let world_from_camera = (*self.camera_from_anchor.first()?)?.inverse();
-        let anchors = self.camera_from_anchor.iter();
-        let mut placed: Vec<Option<DAffine3>> = anchors
-            .map(|pose| pose.map(|camera_from_anchor| world_from_camera * camera_from_anchor))
-            .collect();
-        placed[0] = Some(DAffine3::IDENTITY);
-        Some(placed)
-    }
-
-    /// The turn of the space that light from afar is known in, from the world; `None` where what it turns with is not there.
-    fn light_from_world(&self) -> Option<DAffine3> {
-        let world_from_light = self.world_from_anchor()?[self.light_anchor]?;
-        Some(DAffine3::from_mat3(world_from_light.matrix3.transpose()))
-    }
-
-    /// Where the anchors are in the space that light from afar is known in; `None` where that or the world has no pose.
-    pub fn light_from_anchor(&self) -> Option<Vec<Option<DAffine3>>> {
-        let light_from_world = self.light_from_world()?;
-        let anchors = self.world_from_anchor()?.into_iter();
-        Some(match self.light_anchor {
-            0 => anchors.collect(),
-            _ => anchors
-                .map(|pose| pose.map(|world_from_anchor| light_from_world * world_from_anchor))
-                .collect(),
-        })
-    }
-
-    /// The camera in that space.
-    pub fn camera_from_light(&self) -> Option<DAffine3> {
-        let camera_from_world = (*self.camera_from_anchor.first()?)?;
-        match self.light_anchor {
-            0 => Some(camera_from_world),
-            _ => Some(camera_from_world * self.light_from_world()?.inverse()),
-        }
-    }
-
-    /// The lights that cast shadow volumes and shine, in that space.
-    pub fn shining_in_light(&self) -> Vec<Light> {
-        let shining = self.lights.shining();
-        match self.light_from_world() {
-            Some(light_from_world) if self.light_anchor != 0 => {
-                let lights = shining.iter();
-                lights.map(|light| light.moved(&light_from_world)).collect()
-            }
-            _ => shining,
-        }
     }
 
     /// Makes the shadow volumes that the picture shows. Returns where the placed things and their shadows can be; `None`
@@ -481,32 +398,6 @@ impl GpuScene {
         );
     }
 
-    /// Draws all surfaces of a role, with a light in group 1 if the pipeline wants one.
-    pub fn draw_surfaces(
-        &self,
-        pass: &mut wgpu::RenderPass<'_>,
-        pipelines: &Sided,
-        role: Role,
-        light: DrawnLight,
-        within: PixelRect,
-    ) {
-        pass.set_stencil_reference(0);
-        match light {
-            DrawnLight::Whole(light) => self.lights.set_whole(pass, light),
-            DrawnLight::Piece(piece) => self.lights.set_piece(pass, piece),
-            DrawnLight::HiddenPiece(piece) => {
-                self.lights.set_piece(pass, piece);
-                pass.set_stencil_reference(REAL_HIDES);
-            }
-        }
-        for batch in self.placed(role) {
-            for (number, thing) in self.of_batch(batch) {
-                self.set_thing(pass, batch, thing);
-                self.draw_whole(pass, pipelines, number, thing, within);
-            }
-        }
-    }
-
     /// What a light is that is drawn.
     pub fn light_kind(&self, light: DrawnLight) -> LightKind {
         match light {
@@ -515,123 +406,6 @@ impl GpuScene {
                 self.lights.kind_of_piece(piece)
             }
         }
-    }
-
-    /// Draws virtual surfaces by what a light can give them: in the open, at the terminator, and turned away.
-    pub fn draw_virtuals(
-        &self,
-        pass: &mut wgpu::RenderPass<'_>,
-        [open, terminator, back_facing]: [&Sided; 3],
-        piece: usize,
-        within: PixelRect,
-    ) {
-        self.set_piece(pass, piece);
-        for batch in self.placed(Role::Virtual) {
-            for (number, thing) in self.of_batch(batch) {
-                self.set_thing(pass, batch, thing);
-                let Some(surface) = self.casters.lit(number, self.slot(piece)) else {
-                    self.draw_whole(pass, open, number, thing, within);
-                    continue;
-                };
-                for (pipelines, sides) in [
-                    (open, &surface.facing),
-                    (terminator, &surface.terminator),
-                    (back_facing, &surface.back_facing),
-                ] {
-                    self.draw_sides(pass, pipelines, number, sides, within);
-                }
-            }
-        }
-    }
-
-    /// Draws the virtual surfaces that a light may reach: with the stencil's reference 0, and with 1 those that lie in one
-    /// volume, which is then their own, and that smooth shading lights all the same. Otherwise the facets would draw a
-    /// jagged line where the light ends.
-    pub fn draw_virtuals_facing(
-        &self,
-        pass: &mut wgpu::RenderPass<'_>,
-        pipelines: &Sided,
-        piece: usize,
-        within: PixelRect,
-    ) {
-        self.set_piece(pass, piece);
-        for batch in self.placed(Role::Virtual) {
-            for (number, thing) in self.of_batch(batch) {
-                self.set_thing(pass, batch, thing);
-                match self.casters.lit(number, self.slot(piece)) {
-                    Some(surface) => {
-                        self.draw_sides(pass, pipelines, number, &surface.facing, within);
-                        pass.set_stencil_reference(1);
-                        self.draw_sides(pass, pipelines, number, &surface.terminator, within);
-                        pass.set_stencil_reference(0);
-                    }
-                    None if thing.casts => {}
-                    None => self.draw_whole(pass, pipelines, number, thing, within),
-                }
-            }
-        }
-    }
-
-    /// Draws a thing's triangles from the sides that can be seen.
-    fn draw_whole(
-        &self,
-        pass: &mut wgpu::RenderPass<'_>,
-        pipelines: &Sided,
-        number: usize,
-        thing: &AnchoredModel,
-        within: PixelRect,
-    ) {
-        let range = || thing.levels[self.levels[number]].range.clone();
-        let insides = self.insides[number];
-        pass.set_pipeline(match insides {
-            Insides::Anywhere => &pipelines.both,
-            Insides::Unseen | Insides::Within(_) => &pipelines.outside,
-        });
-        pass.draw_indexed(range(), 0, 0..1);
-        scissored(pass, insides, within, |pass| {
-            pass.set_pipeline(&pipelines.inside);
-            pass.draw_indexed(range(), 0, 0..1);
-        });
-    }
-
-    /// Draws some of a thing's triangles, sorted by the sides that can be seen.
-    fn draw_sides(
-        &self,
-        pass: &mut wgpu::RenderPass<'_>,
-        pipelines: &Sided,
-        number: usize,
-        sides: &LitSides,
-        within: PixelRect,
-    ) {
-        let insides = self.insides[number];
-        pass.set_pipeline(match insides {
-            Insides::Unseen => &pipelines.outside,
-            Insides::Anywhere | Insides::Within(_) => &pipelines.both,
-        });
-        sides.draw_outer(pass);
-        if insides == Insides::Anywhere {
-            sides.draw_inner(pass);
-        }
-        scissored(pass, insides, within, |pass| sides.draw_inner(pass));
-    }
-
-    /// Counts a role's shadow volumes. Returns whether there are any.
-    pub fn count_volumes(
-        &self,
-        pass: &mut wgpu::RenderPass<'_>,
-        volumes: &Volumes,
-        among: Among,
-        role: Role,
-        piece: usize,
-        within: PixelRect,
-    ) -> bool {
-        let groups = [&self.view_group, self.casters.light_group()];
-        let (things, insides) = (&self.things, &self.insides);
-        let slot = self.slot(piece);
-        let counted = self.casters.counted(things, role, slot, insides, |thing| {
-            [thing.anchor, self.view_of(thing)].map(|view| self.views.offset(view))
-        });
-        volumes.count(pass, among, role, groups, within, counted)
     }
 
     /// The batches of a role whose anchor has a pose, in a world that has one.
@@ -655,11 +429,6 @@ impl GpuScene {
         things.filter(move |(_, thing)| (thing.role, thing.anchor) == kind)
     }
 
-    fn set_piece(&self, pass: &mut wgpu::RenderPass<'_>, piece: usize) {
-        pass.set_stencil_reference(0);
-        self.lights.set_piece(pass, piece);
-    }
-
     /// The slot of a piece.
     fn slot(&self, piece: usize) -> usize {
         self.lights
@@ -675,33 +444,6 @@ impl GpuScene {
             Some(tie) => self.camera_from_anchor.len() + tie,
         }
     }
-
-    fn set_thing(
-        &self,
-        pass: &mut wgpu::RenderPass<'_>,
-        batch: &SurfaceBatch,
-        thing: &AnchoredModel,
-    ) {
-        let view = self.views.offset(self.view_of(thing));
-        pass.set_bind_group(0, &self.view_group, &[view]);
-        pass.set_vertex_buffer(0, batch.corners.slice(..));
-        pass.set_vertex_buffer(1, batch.indirect.slice(..));
-        if let Some(looks) = &batch.looks {
-            pass.set_vertex_buffer(2, looks.slice(..));
-        }
-        if let Some(occlusion) = &batch.occlusion {
-            let slot = 2 + u32::from(batch.looks.is_some());
-            pass.set_vertex_buffer(slot, occlusion.slice(..));
-        }
-        if let Some(materials) = self
-            .materials
-            .as_ref()
-            .filter(|_| batch.role == Role::Virtual)
-        {
-            pass.set_bind_group(3, materials, &[]);
-        }
-        pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
-    }
 }
 
 /// The corners of the virtual things that stand in the world.
@@ -716,21 +458,4 @@ fn standing(scene: &Scene) -> Vec<(DAffine3, bool)> {
     let things = scene.phantoms.iter().chain(&scene.virtuals);
     let standing = things.map(|thing| (thing.anchor_from_object, thing.visible));
     standing.collect()
-}
-
-/// Draws only where an inside can be seen through holes.
-fn scissored(
-    pass: &mut wgpu::RenderPass<'_>,
-    insides: Insides,
-    within: PixelRect,
-    draw: impl FnOnce(&mut wgpu::RenderPass<'_>),
-) {
-    if let Insides::Within(pixels) = insides {
-        let pixels = pixels.intersection(within);
-        if !pixels.is_empty() {
-            set_scissor(pass, pixels);
-            draw(pass);
-            set_scissor(pass, within);
-        }
-    }
 }

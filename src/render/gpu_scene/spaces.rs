@@ -1,0 +1,62 @@
+//! Where the anchors are: in the camera, in the world, and in the space that light from afar is known in.
+
+use super::GpuScene;
+use crate::light::Light;
+use glam::DAffine3;
+
+impl GpuScene {
+    /// Where the anchors are.
+    pub fn camera_from_anchor(&self) -> &[Option<DAffine3>] {
+        &self.camera_from_anchor
+    }
+
+    /// Where the anchors are in the world, which stands still to itself; `None` where the world has no pose.
+    pub fn world_from_anchor(&self) -> Option<Vec<Option<DAffine3>>> {
+        let world_from_camera = (*self.camera_from_anchor.first()?)?.inverse();
+        let anchors = self.camera_from_anchor.iter();
+        let mut placed: Vec<Option<DAffine3>> = anchors
+            .map(|pose| pose.map(|camera_from_anchor| world_from_camera * camera_from_anchor))
+            .collect();
+        placed[0] = Some(DAffine3::IDENTITY);
+        Some(placed)
+    }
+
+    /// The turn of the space that light from afar is known in, from the world; `None` where what it turns with is not there.
+    fn light_from_world(&self) -> Option<DAffine3> {
+        let world_from_light = self.world_from_anchor()?[self.light_anchor]?;
+        Some(DAffine3::from_mat3(world_from_light.matrix3.transpose()))
+    }
+
+    /// Where the anchors are in the space that light from afar is known in; `None` where that or the world has no pose.
+    pub fn light_from_anchor(&self) -> Option<Vec<Option<DAffine3>>> {
+        let light_from_world = self.light_from_world()?;
+        let anchors = self.world_from_anchor()?.into_iter();
+        Some(match self.light_anchor {
+            0 => anchors.collect(),
+            _ => anchors
+                .map(|pose| pose.map(|world_from_anchor| light_from_world * world_from_anchor))
+                .collect(),
+        })
+    }
+
+    /// The camera in that space.
+    pub fn camera_from_light(&self) -> Option<DAffine3> {
+        let camera_from_world = (*self.camera_from_anchor.first()?)?;
+        match self.light_anchor {
+            0 => Some(camera_from_world),
+            _ => Some(camera_from_world * self.light_from_world()?.inverse()),
+        }
+    }
+
+    /// The lights that cast shadow volumes and shine, in that space.
+    pub fn shining_in_light(&self) -> Vec<Light> {
+        let shining = self.lights.shining();
+        match self.light_from_world() {
+            Some(light_from_world) if self.light_anchor != 0 => {
+                let lights = shining.iter();
+                lights.map(|light| light.moved(&light_from_world)).collect()
+            }
+            _ => shining,
+        }
+    }
+}
