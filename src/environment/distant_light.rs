@@ -36,12 +36,9 @@ impl DistantLight {
 
 /// The integral of radiance times each harmonic.
 fn harmonics(probe: &Probe, exposure: f64) -> Vec<DVec3> {
-    let [width, _] = probe.size_px();
     let mut sums = vec![DVec3::ZERO; count(TRANSFER_DEGREE)];
-    for (index, pixel) in probe.pixels().iter().enumerate() {
-        let (column, row) = ((index % width) as f64 + 0.5, index / width);
-        let light = pixel.as_dvec3() * (exposure * probe.pixel_solid_angle(row));
-        let direction = probe.direction(column, row as f64 + 0.5);
+    for (direction, radiance, solid_angle) in probe.rays() {
+        let light = radiance.as_dvec3() * (exposure * solid_angle);
         for (sum, value) in sums.iter_mut().zip(basis(direction, TRANSFER_DEGREE)) {
             *sum += light * value;
         }

@@ -27,11 +27,8 @@ impl Sky {
         for source in &mut sources {
             source.irradiance *= exposure;
         }
-        let [width, _] = probe.size_px();
-        for (index, pixel) in probe.pixels().iter().enumerate() {
-            let (column, row) = ((index % width) as f64 + 0.5, index / width);
-            let light = pixel.as_dvec3() * (exposure * probe.pixel_solid_angle(row));
-            let direction = probe.direction(column, row as f64 + 0.5);
+        for (direction, radiance, solid_angle) in probe.rays() {
+            let light = radiance.as_dvec3() * (exposure * solid_angle);
             harmonics.add(direction.as_vec3(), light.as_vec3());
         }
         Self {

@@ -29,6 +29,17 @@ impl Probe {
         &self.radiance
     }
 
+    /// Each pixel, row by row, as what it sends: the unit direction of its middle, its radiance, its solid angle in steradians.
+    pub fn rays(&self) -> impl Iterator<Item = (DVec3, Vec3, f64)> {
+        let [width, _] = self.size_px;
+        let pixels = self.radiance.iter().enumerate();
+        pixels.map(move |(index, &radiance)| {
+            let (column, row) = (index % width, index / width);
+            let direction = self.direction(column as f64 + 0.5, row as f64 + 0.5);
+            (direction, radiance, self.pixel_solid_angle(row))
+        })
+    }
+
     /// Puts another radiance into a pixel.
     pub(super) fn set_pixel(&mut self, index: usize, radiance: Vec3) {
         self.radiance[index] = radiance;

@@ -48,17 +48,12 @@ struct Pixel {
 /// middle, along the line on which it lies widest, and all middles move to where their light comes from, so that the same light
 /// is cut alike however the probe is turned.
 pub fn regions(probe: &Probe, count: usize) -> Vec<Region> {
-    let [width, _] = probe.size_px();
     let pixels: Vec<Pixel> = probe
-        .pixels()
-        .iter()
-        .enumerate()
-        .map(|(index, pixel)| {
-            let (column, row) = (index % width, index / width);
-            let solid_angle = probe.pixel_solid_angle(row);
-            let radiance = pixel.as_dvec3();
+        .rays()
+        .map(|(direction, radiance, solid_angle)| {
+            let radiance = radiance.as_dvec3();
             Pixel {
-                direction: probe.direction(column as f64 + 0.5, row as f64 + 0.5),
+                direction,
                 solid_angle,
                 power: radiance.dot(REC_709) * solid_angle,
                 radiance,
