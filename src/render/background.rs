@@ -6,7 +6,8 @@ use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
 
 use super::attachments::{loaded, texture};
-use super::gpu::{Gpu, RenderError};
+use super::error::RenderError;
+use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
 use super::passes::Passes;
 use super::pipelines::{GroupLayout, PipelineDescription, overwritten, texels, uniform};

@@ -4,7 +4,7 @@ use std::cell::{Cell, RefCell};
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 use std::sync::{Arc, Mutex, Once, PoisonError};
 
-use super::gpu::RenderError;
+use super::error::RenderError;
 
 /// The failure of a device, if there was one.
 #[derive(Debug, Clone, Default)]

@@ -1,6 +1,7 @@
 //! What the frame's passes take on the GPU, by its own timestamps.
 
-use super::gpu::{Gpu, RenderError};
+use super::error::RenderError;
+use super::gpu::Gpu;
 use super::readback::map_for_reading;
 
 /// The last frame's time on the GPU, milliseconds; `None` where nothing was drawn or the adapter has no timestamps.

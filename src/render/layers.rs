@@ -3,7 +3,8 @@
 
 use super::anchor_geometry::{CORNER_LAYOUT, Role};
 use super::attachments::{cleared, loaded, target, texture};
-use super::gpu::{Gpu, RenderError};
+use super::error::RenderError;
+use super::gpu::Gpu;
 use super::passes::Passes;
 use super::pipelines::{PipelineDescription, added, overwritten};
 use super::readback::Readback;

@@ -14,6 +14,7 @@ mod detail;
 mod device_failure;
 mod direct;
 mod environment;
+mod error;
 mod fade;
 mod final_gather;
 mod gpu;
@@ -49,7 +50,8 @@ mod uniforms;
 mod volumes;
 
 pub(crate) use device_failure::{CaughtPanic, without_a_panic};
-pub use gpu::{Gpu, RenderError, SharedDevice};
+pub use error::RenderError;
+pub use gpu::{Gpu, SharedDevice};
 pub use gpu_clock::GpuTimes;
 pub use layers::{Layers, REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};
 pub use precomputation::{Afresh, Precomputation};

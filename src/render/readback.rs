@@ -1,6 +1,7 @@
 //! Brings a texture's texels back to the processor.
 
-use super::gpu::{Gpu, RenderError};
+use super::error::RenderError;
+use super::gpu::Gpu;
 
 /// A buffer that a texture is copied into and read from.
 pub(super) struct Readback {

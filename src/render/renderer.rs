@@ -20,8 +20,9 @@ use crate::scene::{
 use super::attachments::texture;
 use super::background::{Background, PICTURE_FORMAT};
 use super::deforming::{DeformingThing, deforming};
+use super::error::RenderError;
 use super::fade::{self, Fade};
-use super::gpu::{Gpu, RenderError};
+use super::gpu::Gpu;
 use super::gpu_clock::{GpuClock, GpuTimes};
 use super::gpu_scene::GpuScene;
 use super::layered_scene::{LayeredScene, TranslucentLayer, middle};

@@ -167,7 +167,7 @@ fn a_dragged_field_is_shown_while_it_is_held_and_made_when_it_is_let_go() {
     let mut harness = desk(Some(lamp()), Some(Selected::Light(0)));
     harness.run();
     // The first number of the light's place.
-    let field = harness.get_by_value("-0.260").rect().center();
+    let field = harness.get_by_value("x -0.260").rect().center();
     harness.drag_at(field);
     harness.step();
     for moved in 1..=4 {

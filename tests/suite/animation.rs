@@ -348,7 +348,7 @@ fn a_spoiled_animation_never_panics() {
     let path = folder.path().join("scene.toml");
     let mut random = fastrand::Rng::with_seed(11);
     let mut read = 0;
-    for round in 0..600 {
+    for round in 0..900 {
         let model = match round % 3 {
             0 => bar(),
             1 => morphing_box(),

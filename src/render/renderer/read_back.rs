@@ -4,7 +4,7 @@
 
 use super::super::anchor_geometry::Role;
 use super::super::attachments::{loaded, texture};
-use super::super::gpu::RenderError;
+use super::super::error::RenderError;
 use super::super::gpu_scene::DrawnLight;
 use super::super::layers::{LayerPasses, Layers};
 use super::super::light_sums::GAIN_FORMAT;
