@@ -136,7 +136,7 @@ settings! {
         => ByQuality { fast: 2.0, balanced: 0.5, accurate: 0.0 };
     /// Lights in a probe are compact, with outlines in their shadows, where the camera would see these blurred over less than
     /// this; 0: none is. Others are a part of the broad light.
-    compact_penumbra_px: f64, Numbers::between(0.0, 1e4).unit("px") => Is(8.0);
+    compact_penumbra_px: f64, Numbers::between(0.0, 1e4).unit("px") => Is(12.0);
     /// What drawing a frame may take: as many sources (volumes: as fine outlines) as fit, up to what the other keys say.
     /// What is drawn then depends on the machine.
     frame_budget_ms: Option<f64>, Numbers::above(0.0, 1e6).unit("ms") => Means(None, "no limit");

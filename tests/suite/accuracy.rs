@@ -114,6 +114,20 @@ fn window() {
     hold_soft("window", 0.08, 0.05);
 }
 
+/// Several large lamps in a probe. What is left of the error is light that goes from the table to the ring and back.
+#[test]
+fn studio() {
+    let folder = project_file("recordings/studio");
+    let errors = errors_of(&folder, &scene_of("studio"), "studio");
+    let mean = |of: fn(&Errors) -> f64| errors.iter().map(of).sum::<f64>() / errors.len() as f64;
+    let (change, shading) = (mean(|e| e.change_real), mean(|e| e.residual_virtual));
+    assert!(change <= 0.15 && shading <= 0.12, "{change} {shading}");
+    for e in &errors {
+        assert!(e.role_pct <= 0.5 && e.factor <= 0.012, "{e:?}");
+        assert!(e.untouched_wrong == 0, "{e:?}");
+    }
+}
+
 #[test]
 fn sky() {
     hold_soft("sky", 0.1, 0.1);

@@ -324,7 +324,7 @@ mod edits {
         );
         let painted = |thing: &str, roughness| Edit::Material {
             thing: thing.to_owned(),
-            albedo: DVec3::new(0.5, 0.25, 0.125),
+            albedo: Some(DVec3::new(0.5, 0.25, 0.125)),
             roughness,
         };
         changed_to(
@@ -627,7 +627,8 @@ mod edits {
                     },
                     false => Edit::Material {
                         thing,
-                        albedo: vector(random, 1.0).abs().min(DVec3::ONE),
+                        albedo: (random.chance(0.7))
+                            .then(|| vector(random, 1.0).abs().min(DVec3::ONE)),
                         roughness: random.chance(0.5).then(|| random.between(0.1, 1.0)),
                     },
                 }

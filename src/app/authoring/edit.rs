@@ -66,9 +66,9 @@ pub enum Edit {
     Material {
         /// Its name.
         thing: String,
-        /// Diffuse reflectance, linear RGB, 0 to 1.
-        albedo: DVec3,
-        /// Of a GGX layer over it; `None`: matt, or as its file says.
+        /// Diffuse reflectance, linear RGB, 0 to 1; `None`: as it is.
+        albedo: Option<DVec3>,
+        /// Of a GGX layer over it; `None`: as it is.
         roughness: Option<f64>,
     },
     /// What plays of a thing's model; how fast and how often go with what played before.
@@ -198,7 +198,7 @@ impl Edit {
             } => match thing_of(scene, thing) {
                 Some(object) => {
                     for material in &mut object.materials {
-                        material.albedo = *albedo;
+                        material.albedo = albedo.unwrap_or(material.albedo);
                         material.roughness = roughness.or(material.roughness);
                     }
                 }

@@ -290,25 +290,23 @@ fn set_animation(spliced: &mut Spliced, thing: Body, animation: Option<&Animatio
     }
 }
 
-fn set_material(spliced: &mut Spliced, thing: Body, albedo: DVec3, roughness: Option<f64>) {
+fn set_material(spliced: &mut Spliced, thing: Body, albedo: Option<DVec3>, roughness: Option<f64>) {
     let key = THING.material.name;
     match bodies(thing.item(key)).first() {
         Some(&body) => {
-            let key = &MATERIAL.albedo;
-            spliced.set_numbers(
-                body,
-                key.name,
-                &albedo.to_array(),
-                key.takes.numbers.digits,
-                None,
-            );
+            if let Some(albedo) = albedo {
+                let (key, digits) = (&MATERIAL.albedo, MATERIAL.albedo.takes.numbers.digits);
+                spliced.set_numbers(body, key.name, &albedo.to_array(), digits, None);
+            }
             if let Some(roughness) = roughness {
                 let (key, text) = new_key(&MATERIAL.roughness, &Some(roughness));
                 spliced.set(body, key, text);
             }
         }
+        None if albedo.is_none() && roughness.is_none() => {}
         None => {
-            let mut keys = vec![new_key(&MATERIAL.albedo, &Some(albedo))];
+            let albedo = albedo.map(|albedo| new_key(&MATERIAL.albedo, &Some(albedo)));
+            let mut keys: Vec<NewKey> = albedo.into_iter().collect();
             keys.extend(roughness.map(|it| new_key(&MATERIAL.roughness, &Some(it))));
             let pairs: Vec<String> = keys
                 .iter()

@@ -70,8 +70,8 @@ impl WantedShape {
 }
 
 impl WantedThing {
-    /// What is added to a scene in a folder.
-    pub fn in_scene(&self, scene: &Scene, folder: &Path) -> NewThing {
+    /// What is added to a scene in a folder, under a name that is not `taken` either.
+    pub fn in_scene(&self, scene: &Scene, folder: &Path, taken: impl Fn(&str) -> bool) -> NewThing {
         let on = self.on.clone().unwrap_or_else(|| {
             let world = scene.anchors.first();
             world.map_or_else(String::new, |world| world.name.clone())
@@ -79,7 +79,7 @@ impl WantedThing {
         let anchor = scene.anchors.iter().position(|anchor| anchor.name == on);
         NewThing {
             is_real: self.is_real,
-            name: free_name(scene, &self.shape.name()),
+            name: free_name(scene, &self.shape.name(), taken),
             form: self.shape.form(folder),
             placement: Placement {
                 position_m: free_place(scene, anchor.unwrap_or(0), DVec3::ZERO),
@@ -95,9 +95,9 @@ fn things(scene: &Scene) -> impl Iterator<Item = &Object> {
     scene.phantoms.iter().chain(&scene.virtuals)
 }
 
-/// A name that a scene does not have yet: the wanted one, or with a number behind it.
-pub fn free_name(scene: &Scene, wanted: &str) -> String {
-    let is_free = |name: &str| things(scene).all(|thing| thing.name != name);
+/// A name that a scene does not have yet and that is not `taken`: the wanted one, or with a number behind it.
+pub fn free_name(scene: &Scene, wanted: &str, taken: impl Fn(&str) -> bool) -> String {
+    let is_free = |name: &str| things(scene).all(|thing| thing.name != name) && !taken(name);
     let numbered = (2..).map(|number| format!("{wanted} {number}"));
     let mut names = std::iter::once(wanted.to_owned()).chain(numbered);
     names.find(|name| is_free(name)).unwrap_or_default()
@@ -180,8 +180,11 @@ mod tests {
             shape: WantedShape::Box,
             on: None,
         };
-        let new = wanted.in_scene(&scene, Path::new("/somewhere"));
+        let new = wanted.in_scene(&scene, Path::new("/somewhere"), |_| false);
         assert_eq!((new.name.as_str(), new.on.as_str()), ("box 3", "m"));
+        let taken = |name: &str| name == "box 3";
+        let other = wanted.in_scene(&scene, Path::new("/somewhere"), taken);
+        assert_eq!(other.name, "box 4");
         assert!(new.placement.position_m.distance(DVec3::X * 0.18) < 1e-9);
         assert_eq!(allowed_name(" a,\"b\"; "), "a__b__");
         assert_eq!(allowed_name(" "), "thing");

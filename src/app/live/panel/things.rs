@@ -155,8 +155,8 @@ fn material(ui: &mut Ui, thing: &Object, editing: &mut Editing, commands: &mut C
     if colour_changed || roughness_changed {
         let edit = Edit::Material {
             thing: thing.name.clone(),
-            albedo: DVec3::from_array(albedo.map(f64::from)),
-            roughness: roughness_changed.then_some(roughness).or(first.roughness),
+            albedo: colour_changed.then(|| DVec3::from_array(albedo.map(f64::from))),
+            roughness: roughness_changed.then_some(roughness),
         };
         editing.changed(ui, edit, commands);
     }

@@ -31,15 +31,9 @@ impl LiveSession {
         };
         let document = &scene.document;
         let folder = document.path().parent().unwrap_or(Path::new(""));
-        let mut thing = wanted.in_scene(document.scene(), folder);
         // (What is being read has its name already.)
-        while scene
-            .reading
-            .iter()
-            .any(|other| other.thing.name == thing.name)
-        {
-            thing.name += "'";
-        }
+        let is_read = |name: &str| scene.reading.iter().any(|other| other.thing.name == name);
+        let thing = wanted.in_scene(document.scene(), folder, is_read);
         if !matches!(thing.form, NewForm::Mesh { .. }) {
             return self.add_thing(thing);
         }
@@ -88,11 +82,25 @@ impl LiveSession {
                         );
                         self.tell(Weight::Trouble, text);
                     }
+                    self.place_again(&mut thing);
                     self.add_thing(thing);
                 }
                 Err(error) => self.tell(Weight::Trouble, error.to_string()),
             }
         }
+    }
+
+    /// Gives a thing a place that is free by now.
+    fn place_again(&self, thing: &mut NewThing) {
+        let Some(scene) = self.scene() else {
+            return;
+        };
+        let anchor = scene
+            .anchors
+            .iter()
+            .position(|anchor| anchor.name == thing.on);
+        let place = &mut thing.placement.position_m;
+        *place = free_place(scene, anchor.unwrap_or(0), *place);
     }
 
     fn add_thing(&mut self, thing: NewThing) {
@@ -112,7 +120,7 @@ impl LiveSession {
         else {
             return;
         };
-        let name = free_name(scene, thing);
+        let name = free_name(scene, thing, |_| false);
         let edit = Edit::Duplicate {
             thing: thing.to_owned(),
             name: name.clone(),
@@ -123,6 +131,9 @@ impl LiveSession {
 
     /// Gives a thing another name.
     pub(super) fn rename(&mut self, thing: &str, name: &str) {
+        if name.trim().is_empty() {
+            return self.tell(Weight::Trouble, "A thing has a name.");
+        }
         let name = allowed_name(name);
         if name != thing {
             let edit = Edit::Rename {
