@@ -2,7 +2,7 @@
 #![no_main]
 
 use glam::DVec3;
-use gnomon::app::authoring::{Edit, NewVirtual, SceneDocument};
+use gnomon::app::authoring::{Edit, NewForm, NewThing, SceneDocument};
 use gnomon::light::Light;
 use gnomon::scene::{Placement, Scene};
 
@@ -26,13 +26,22 @@ fn edits(scene: &Scene) -> Vec<Edit> {
         Edit::RemoveLight(0),
         Edit::Ambient(DVec3::new(0.2, 0.1, 0.3)),
         Edit::AnchorSize { anchor: anchor.clone(), size_m: 0.0625 },
-        Edit::AddVirtual(NewVirtual {
+        Edit::AddThing(NewThing {
+            is_real: true,
             name: "new".to_owned(),
-            mesh: "a.obj".to_owned(),
+            form: NewForm::Mesh { file: "a.obj".to_owned(), fit_m: Some(0.1) },
             on: anchor,
             placement,
         }),
-        Edit::RemoveVirtual(thing),
+        Edit::Duplicate {
+            thing: thing.clone(),
+            name: "new".to_owned(),
+            position_m: DVec3::new(0.1, 0.2, 0.0),
+        },
+        Edit::Rename { thing: thing.clone(), name: "new".to_owned() },
+        Edit::Material { thing: thing.clone(), albedo: Some(DVec3::splat(0.25)), roughness: Some(0.5) },
+        Edit::Animate { thing: thing.clone(), animation: None },
+        Edit::RemoveThing(thing),
     ]
 }
 

@@ -124,7 +124,7 @@ fn work(soup: &Soup) {
     let cornered = corners.iter().map(|t| t.map(|place| (place, Vec3::Z))).collect();
     let _ = subdivided(cornered, |_, _| 0.5, MOST_PIECES);
     let region_of = |_| Some(&Ring as &dyn Region);
-    let cut = cut(&soup.positions, &raw, &soup.looks(), region_of, MOST_PIECES);
+    let cut = cut((&soup.positions, &[]), &raw, &soup.looks(), region_of, MOST_PIECES);
     let (cut_mesh, _) = Mesh::weld_with_looks(&cut.positions, &cut.triangles, &cut.looks, 0.5);
     assert_eq!(cut_mesh.corner_looks.len(), cut_mesh.triangles.len());
 }
