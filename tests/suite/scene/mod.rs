@@ -140,7 +140,7 @@ fn a_small_scene_has_the_defaults() {
             ambient_samples: 256,
             counting: VolumeCounting::Auto,
             max_silhouette_error_px: 0.5,
-            compact_penumbra_px: 8.0,
+            compact_penumbra_px: 12.0,
             frame_budget_ms: None,
             shafts: Default::default(),
         }
@@ -308,7 +308,7 @@ frame_budget_ms = 16
             ambient_samples: 512,
             counting: VolumeCounting::DepthFail,
             max_silhouette_error_px: 0.0,
-            compact_penumbra_px: 8.0,
+            compact_penumbra_px: 12.0,
             frame_budget_ms: Some(16.0),
             // All of them: what this quality means.
             shafts: ShaftSettings {
