@@ -110,7 +110,7 @@ fn consistent(transport: RoomTransport, compact: &[Light]) -> Option<RoomTranspo
 }
 
 fn occlusions(surface: &OwnSurface, cache: &DiskCache) -> Vec<SelfOcclusion> {
-    let known: Option<Vec<f32>> = cache.read(surface.key);
+    let known: Option<Vec<f32>> = cache.read(surface.kept_as());
     let known = known.and_then(|numbers| {
         let occlusions = bytemuck::try_cast_slice(&numbers).ok()?.to_vec();
         (occlusions.len() == surface.point_count()).then_some(occlusions)
@@ -118,7 +118,7 @@ fn occlusions(surface: &OwnSurface, cache: &DiskCache) -> Vec<SelfOcclusion> {
     known.unwrap_or_else(|| {
         let occlusions = surface.self_occlusions();
         let numbers: &[f32] = bytemuck::cast_slice(&occlusions);
-        cache.keep(surface.key, &numbers);
+        cache.keep(surface.kept_as(), &numbers);
         occlusions
     })
 }
@@ -148,7 +148,7 @@ mod tests {
             (surface(glam::DVec3::ONE, 0.0).point_count(), 1)
         );
         let turned = surface(glam::DVec3::splat(2.0), 1.3);
-        let path = cache.path(turned.key).unwrap();
+        let path = cache.path(turned.kept_as()).unwrap();
         let as_kept = fs::read(&path).unwrap();
         assert!(occlusions(&turned, &cache) == first && kept() == 1);
         assert!(turned.self_occlusions() == first);

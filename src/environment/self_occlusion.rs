@@ -143,6 +143,11 @@ impl OwnSurface {
         }
     }
 
+    /// What its self-occlusion is kept under: with coarser levels it has other points.
+    pub fn kept_as(&self) -> u64 {
+        self.key ^ (self.points.len() as u64).rotate_left(32)
+    }
+
     /// How many points there are.
     pub fn point_count(&self) -> usize {
         self.points.len()

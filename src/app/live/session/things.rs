@@ -2,7 +2,7 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use glam::DVec3;
 
@@ -58,13 +58,19 @@ impl LiveSession {
         let Some(scene) = self.scene.open_mut() else {
             return;
         };
-        let mut ready = Vec::new();
+        let (mut ready, mut unread) = (Vec::new(), Vec::new());
         let mut index = 0;
         while let Some(waiting) = scene.reading.get(index) {
             match waiting.given.try_recv() {
                 Ok(read) => ready.push((scene.reading.remove(index).thing, read)),
-                Err(_) => index += 1,
+                Err(TryRecvError::Empty) => index += 1,
+                // (Its thread has panicked, which was told where it happened.)
+                Err(TryRecvError::Disconnected) => unread.push(scene.reading.remove(index).thing),
             }
+        }
+        for thing in unread {
+            let text = format!("\"{}\" could not be read.", thing.name);
+            self.tell(Weight::Trouble, text);
         }
         for (mut thing, read) in ready {
             match read {
