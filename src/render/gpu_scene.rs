@@ -341,10 +341,8 @@ impl GpuScene {
 
     /// The real things as the frame has them.
     pub fn drawn_real(&self) -> impl Iterator<Item = DrawnModel<'_>> {
-        let batches = self.placed(Role::Real);
-        batches.flat_map(|batch| {
-            let things = self.of_batch(batch);
-            things.map(|(number, thing)| {
+        self.placed_things(Role::Real)
+            .map(|(batch, number, thing)| {
                 let level = self.levels[number];
                 DrawnModel {
                     number,
@@ -354,7 +352,6 @@ impl GpuScene {
                     batch: &batch.places.corners,
                 }
             })
-        })
     }
 
     /// The camera.
@@ -420,6 +417,17 @@ impl GpuScene {
     fn batch(&self, role: Role, anchor: usize) -> Option<&SurfaceBatch> {
         let mut batches = self.batches.iter();
         batches.find(|batch| (batch.role, batch.anchor) == (role, anchor))
+    }
+
+    /// The things of a role that are placed, each with its batch and its number.
+    fn placed_things(
+        &self,
+        role: Role,
+    ) -> impl Iterator<Item = (&SurfaceBatch, usize, &AnchoredModel)> {
+        self.placed(role).flat_map(|batch| {
+            let things = self.of_batch(batch);
+            things.map(move |(number, thing)| (batch, number, thing))
+        })
     }
 
     /// The things of a batch, with their numbers.

@@ -2,6 +2,7 @@
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use gnomon::geometry::cuboid::SIDES;
 use serde_json::{Value, json};
 
 /// A glTF file that is being written.
@@ -173,14 +174,7 @@ fn cuboid([x, y, z]: [f32; 3]) -> (Vec<[f32; 3]>, Vec<[u16; 1]>) {
         };
         [bit(0, x), bit(1, y), bit(2, z)]
     });
-    let sides = [
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-    ];
+    let sides = SIDES.map(|side| side.map(|corner| corner as u16));
     (positions.collect(), quads(&sides))
 }
 

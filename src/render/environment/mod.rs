@@ -103,9 +103,7 @@ impl Environment {
             anchor: probe.anchor,
             things: things(scene),
             own_light: OwnLight::new(
-                &objects(scene),
-                scene.phantoms.len(),
-                final_gather.is_some(),
+                &lit_by_corners(scene, final_gather.is_some()),
                 gpu_scene,
                 precomputation,
             ),
@@ -226,9 +224,13 @@ impl Environment {
     }
 }
 
-/// A scene's objects by their numbers.
-fn objects(scene: &Scene) -> Vec<&Object> {
-    scene.phantoms.iter().chain(&scene.virtuals).collect()
+/// A scene's objects by their numbers; `None` where one is not there, or is real and gets its light by rays.
+fn lit_by_corners(scene: &Scene, is_real_gathered: bool) -> Vec<Option<&Object>> {
+    let real = scene.phantoms.iter();
+    let real = real.map(|object| Some(object).filter(|it| it.visible && !is_real_gathered));
+    let virtuals = scene.virtuals.iter();
+    let virtuals = virtuals.map(|object| Some(object).filter(|it| it.visible));
+    real.chain(virtuals).collect()
 }
 
 /// They as light from afar meets them.
@@ -249,12 +251,8 @@ impl BroadLight for Environment {
         if probe.anchor != self.anchor {
             return false;
         }
-        let is_real_gathered = self.final_gather.is_some();
-        let (objects, real_count) = (objects(scene), scene.phantoms.len());
-        if !self
-            .own_light
-            .follow(&objects, real_count, is_real_gathered)
-        {
+        let objects = lit_by_corners(scene, self.final_gather.is_some());
+        if !self.own_light.follow(&objects) {
             return false;
         }
         let rest = scene.split_light(probe).rest;

@@ -69,18 +69,14 @@ pub(super) struct OwnLight {
 }
 
 impl OwnLight {
-    /// Of objects by their numbers, of which the first ones are real; `is_real_gathered`: those get their light otherwise.
+    /// Of objects by their numbers; `None` where one is not there, or its light is gathered otherwise.
     pub fn new(
-        objects: &[&Object],
-        real_count: usize,
-        is_real_gathered: bool,
+        objects: &[Option<&Object>],
         gpu_scene: &GpuScene,
         precomputation: &dyn Precomputation,
     ) -> Self {
-        let of_thing = |(number, object): (usize, &&Object)| {
-            if !object.visible || (is_real_gathered && number < real_count) {
-                return None;
-            }
+        let of_thing = |object: &Option<&Object>| {
+            let object = (*object)?;
             let space = OwnSpace::new(&object.anchor_from_object);
             let coarser = gpu_scene.coarser_meshes(&object.mesh);
             let surface = OwnSurface::new(&object.mesh, coarser, &space);
@@ -94,7 +90,7 @@ impl OwnLight {
                 corners: None,
             })
         };
-        let things: Vec<Option<OwnLitThing>> = objects.iter().enumerate().map(of_thing).collect();
+        let things: Vec<Option<OwnLitThing>> = objects.iter().map(of_thing).collect();
         let own = |thing: &Option<OwnLitThing>| Some(Arc::clone(&thing.as_ref()?.own));
         Self {
             known: things.iter().map(own).collect(),
@@ -104,21 +100,20 @@ impl OwnLight {
     }
 
     /// Takes the same objects as they are now. False where not all of what they hide from themselves is known.
-    pub fn follow(
-        &mut self,
-        objects: &[&Object],
-        real_count: usize,
-        is_real_gathered: bool,
-    ) -> bool {
+    pub fn follow(&mut self, objects: &[Option<&Object>]) -> bool {
         let mut followed = Vec::new();
         for (number, object) in objects.iter().enumerate() {
-            if !object.visible || (is_real_gathered && number < real_count) {
+            let Some(object) = object else {
                 followed.push(None);
                 continue;
-            }
+            };
             let space = OwnSpace::new(&object.anchor_from_object);
             let known = self.known.get(number).and_then(Option::as_ref);
-            let Some(known) = known.filter(|known| known.key == space.key(&object.mesh)) else {
+            // (What plays is another in each frame, and gets its own before the next: see `deform`.)
+            let is_same = |known: &&Arc<OwnOcclusion>| {
+                object.animation.is_some() || known.key == space.key(&object.mesh)
+            };
+            let Some(known) = known.filter(is_same) else {
                 return false;
             };
             followed.push(Some(OwnLitThing {

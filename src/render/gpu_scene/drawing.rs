@@ -30,11 +30,10 @@ impl GpuScene {
     ) {
         pass.set_stencil_reference(0);
         self.lights.set_whole(pass, 0);
-        for batch in self.placed(Role::Real).filter(|batch| batch.anchor != 0) {
-            for (number, thing) in self.of_batch(batch) {
-                self.set_thing(pass, batch, thing);
-                self.draw_whole(pass, pipelines, number, thing, within);
-            }
+        let real = self.placed_things(Role::Real);
+        for (batch, number, thing) in real.filter(|(batch, ..)| batch.anchor != 0) {
+            self.set_thing(pass, batch, thing);
+            self.draw_whole(pass, pipelines, number, thing, within);
         }
     }
 
@@ -56,11 +55,9 @@ impl GpuScene {
                 pass.set_stencil_reference(REAL_HIDES);
             }
         }
-        for batch in self.placed(role) {
-            for (number, thing) in self.of_batch(batch) {
-                self.set_thing(pass, batch, thing);
-                self.draw_whole(pass, pipelines, number, thing, within);
-            }
+        for (batch, number, thing) in self.placed_things(role) {
+            self.set_thing(pass, batch, thing);
+            self.draw_whole(pass, pipelines, number, thing, within);
         }
     }
 
@@ -73,20 +70,18 @@ impl GpuScene {
         within: PixelRect,
     ) {
         self.set_piece(pass, piece);
-        for batch in self.placed(Role::Virtual) {
-            for (number, thing) in self.of_batch(batch) {
-                self.set_thing(pass, batch, thing);
-                let Some(surface) = self.casters.lit(number, self.slot(piece)) else {
-                    self.draw_whole(pass, open, number, thing, within);
-                    continue;
-                };
-                for (pipelines, sides) in [
-                    (open, &surface.facing),
-                    (terminator, &surface.terminator),
-                    (back_facing, &surface.back_facing),
-                ] {
-                    self.draw_sides(pass, pipelines, number, sides, within);
-                }
+        for (batch, number, thing) in self.placed_things(Role::Virtual) {
+            self.set_thing(pass, batch, thing);
+            let Some(surface) = self.casters.lit(number, self.slot(piece)) else {
+                self.draw_whole(pass, open, number, thing, within);
+                continue;
+            };
+            for (pipelines, sides) in [
+                (open, &surface.facing),
+                (terminator, &surface.terminator),
+                (back_facing, &surface.back_facing),
+            ] {
+                self.draw_sides(pass, pipelines, number, sides, within);
             }
         }
     }
@@ -102,19 +97,17 @@ impl GpuScene {
         within: PixelRect,
     ) {
         self.set_piece(pass, piece);
-        for batch in self.placed(Role::Virtual) {
-            for (number, thing) in self.of_batch(batch) {
-                self.set_thing(pass, batch, thing);
-                match self.casters.lit(number, self.slot(piece)) {
-                    Some(surface) => {
-                        self.draw_sides(pass, pipelines, number, &surface.facing, within);
-                        pass.set_stencil_reference(1);
-                        self.draw_sides(pass, pipelines, number, &surface.terminator, within);
-                        pass.set_stencil_reference(0);
-                    }
-                    None if thing.casts => {}
-                    None => self.draw_whole(pass, pipelines, number, thing, within),
+        for (batch, number, thing) in self.placed_things(Role::Virtual) {
+            self.set_thing(pass, batch, thing);
+            match self.casters.lit(number, self.slot(piece)) {
+                Some(surface) => {
+                    self.draw_sides(pass, pipelines, number, &surface.facing, within);
+                    pass.set_stencil_reference(1);
+                    self.draw_sides(pass, pipelines, number, &surface.terminator, within);
+                    pass.set_stencil_reference(0);
                 }
+                None if thing.casts => {}
+                None => self.draw_whole(pass, pipelines, number, thing, within),
             }
         }
     }
