@@ -32,7 +32,7 @@ fn rooms(folder: Option<PathBuf>) -> DiskCache {
     DiskCache {
         folder,
         extension: "room",
-        version: 3,
+        version: 4,
         most_bytes: 1 << 30,
         most_files: 16,
     }

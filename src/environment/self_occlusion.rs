@@ -12,7 +12,7 @@ use crate::geometry::bounds::Bounds;
 use crate::geometry::corner_points::corner_points;
 use crate::geometry::mesh::Mesh;
 use crate::geometry::ray_caster::RayCaster;
-use crate::light::harmonics::{basis, count, sphere};
+use crate::light::harmonics::{basis, cosine_lobe, count, sphere};
 
 /// Degree of the harmonics of what arrives: 36 of them, as in the paper's section 7.
 pub const TRANSFER_DEGREE: usize = 5;
@@ -24,11 +24,6 @@ pub const TRANSFERS: usize = count(TRANSFER_DEGREE);
 pub const VISIBILITIES: usize = count(VISIBILITY_DEGREE);
 /// Rays from a corner, half of them above its surface.
 const RAYS: usize = 512;
-
-/// What harmonics of even surroundings with radiance 1 a diffuse surface turns into irradiance, degree by degree (Ramamoorthi &
-/// Hanrahan 2001, equation 8).
-const COSINE_LOBE: [f64; TRANSFER_DEGREE + 1] =
-    [PI, 2.0 * PI / 3.0, PI / 4.0, 0.0, -PI / 24.0, 0.0];
 
 /// Rays start this part of a thing's size off its surface.
 const START_OFFSET: f64 = 1e-4;
@@ -180,11 +175,11 @@ fn occlusion(
 ) -> SelfOcclusion {
     let mut transfer = [0.0; TRANSFERS];
     let mut visibility = [0.0; VISIBILITIES];
-    for (l, lobe) in COSINE_LOBE.into_iter().enumerate() {
+    let values = basis(normal, TRANSFER_DEGREE);
+    for l in 0..=TRANSFER_DEGREE {
         let band = l * l..(l + 1) * (l + 1);
-        let values = basis(normal, TRANSFER_DEGREE);
         for (sum, value) in transfer[band.clone()].iter_mut().zip(&values[band]) {
-            *sum = lobe * value;
+            *sum = cosine_lobe(l) * value;
         }
     }
     // The harmonic of degree 0 of a constant 1.

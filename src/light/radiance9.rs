@@ -37,13 +37,6 @@ impl Radiance9 {
         }
     }
 
-    /// Adds a part of others.
-    pub fn add_scaled(&mut self, other: &Self, scale: f32) {
-        for (coefficient, other) in self.0.iter_mut().zip(other.0) {
-            *coefficient += other * scale;
-        }
-    }
-
     /// Irradiance of a surface with a unit normal; never negative.
     pub fn irradiance(&self, normal: Vec3) -> Vec3 {
         let degree = [0, 1, 1, 1, 2, 2, 2, 2, 2];
@@ -55,25 +48,17 @@ impl Radiance9 {
     }
 }
 
-/// Unit directions spread evenly over the sphere (a golden-angle spiral): the same each time.
-pub fn sphere(count: usize) -> impl Iterator<Item = Vec3> {
-    (0..count).map(move |index| {
-        let z = 1.0 - (2.0 * index as f32 + 1.0) / count as f32;
-        let angle = index as f32 * 2.399_963_2;
-        let radius = (1.0 - z * z).max(0.0).sqrt();
-        Vec3::new(radius * angle.cos(), radius * angle.sin(), z)
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::light::harmonics::sphere;
 
     fn of(radiance: impl Fn(Vec3) -> f32) -> Radiance9 {
         let mut sum = Radiance9::default();
         let count = 20_000;
         for direction in sphere(count) {
             let share = 4.0 * PI / count as f32;
+            let direction = direction.as_vec3();
             sum.add(direction, Vec3::splat(radiance(direction) * share));
         }
         sum

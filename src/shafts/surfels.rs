@@ -247,7 +247,7 @@ pub fn from_disc(place: Vec3, normal: Vec3, surfel: &Surfel) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::light::radiance9::sphere;
+    use crate::light::harmonics::sphere;
     use std::f32::consts::TAU;
 
     #[test]
@@ -256,7 +256,7 @@ mod tests {
             assert!(is_open(1 << cell, middle * 3.0), "{cell}");
             assert!(!is_open(!(1 << cell), middle), "{cell}");
         }
-        for direction in sphere(2000) {
+        for direction in sphere(2000).map(|direction| direction.as_vec3()) {
             let cells = cell_directions().enumerate();
             let found = cells.filter(|(cell, _)| is_open(1 << cell, direction));
             let found: Vec<Vec3> = found.map(|(_, middle)| middle).collect();
