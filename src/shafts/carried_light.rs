@@ -32,7 +32,10 @@ pub struct Carried {
 }
 
 /// A ray and what it carries.
+#[derive(Clone, Copy)]
 struct Parcel {
+    /// Of the probe, the block's first one where it is for several.
+    pixel: usize,
     direction: Vec3,
     radiance_solid_angle: DVec3,
     solid_angle_sr: f64,
@@ -64,18 +67,69 @@ pub fn carried_light(
             parcels.into_iter().filter_map(met).collect()
         })
         .collect();
+    let pixels: Vec<&[(usize, Parcel)]> = hits
+        .iter()
+        .flat_map(|row| row.chunk_by(|(_, one), (_, next)| one.pixel == next.pixel))
+        .collect();
+    let unmixed = unmixed(&pixels, patches);
     let mut carried = vec![Carried::default(); patches.patches.len()];
-    for (patch, parcel) in hits.into_iter().flatten() {
-        let Carried {
-            radiance_solid_angle,
-            solid_angle_sr,
-            rays,
-        } = &mut carried[patch];
-        *radiance_solid_angle += parcel.radiance_solid_angle * f64::from(placed.exposure);
-        *solid_angle_sr += parcel.solid_angle_sr;
-        *rays += 1;
+    for (&(patch, parcel), part) in pixels.into_iter().flatten().zip(unmixed) {
+        let light = parcel.radiance_solid_angle * part * f64::from(placed.exposure);
+        carried[patch].add(light, parcel.solid_angle_sr);
     }
     carried
+}
+
+/// For each ray how much of what its pixel gives to each of its rays is its own, 1 on the average of a pixel's. A pixel on the
+/// edge of a lamp is a mean of lamp and wall: it is parted as the pixels beside it, which show only the one or the other, say.
+/// (Else the lamp was dimmer than it is, and the wall around it shone.)
+fn unmixed(pixels: &[&[(usize, Parcel)]], patches: &RoomPatches) -> Vec<f64> {
+    let piece = |patch: usize| patches.patches[patch].piece as usize;
+    let shows_one = |rays: &[(usize, Parcel)]| {
+        let first = piece(rays[0].0);
+        rays.iter().all(|&(patch, _)| piece(patch) == first)
+    };
+    let piece_count = patches.patches.iter().map(|patch| patch.piece as usize + 1);
+    let mut of_pieces = vec![Carried::default(); piece_count.max().unwrap_or(0)];
+    let mut of_patches = vec![Carried::default(); patches.patches.len()];
+    for &(patch, parcel) in pixels
+        .iter()
+        .filter(|rays| shows_one(rays))
+        .copied()
+        .flatten()
+    {
+        for of in [&mut of_pieces[piece(patch)], &mut of_patches[patch]] {
+            of.add(parcel.radiance_solid_angle, parcel.solid_angle_sr);
+        }
+    }
+    let radiance = |patch: usize| {
+        let of = match of_patches[patch].rays {
+            0 => &of_pieces[piece(patch)],
+            _ => &of_patches[patch],
+        };
+        let sum = luminance(of.radiance_solid_angle.as_vec3());
+        f64::from(sum) / of.solid_angle_sr.max(1e-30)
+    };
+    let parts = |rays: &&[(usize, Parcel)]| -> Vec<f64> {
+        if shows_one(rays) {
+            return vec![1.0; rays.len()];
+        }
+        let expected: Vec<f64> = rays.iter().map(|&(patch, _)| radiance(patch)).collect();
+        let mean = expected.iter().sum::<f64>() / rays.len() as f64;
+        match mean > 0.0 {
+            true => expected.into_iter().map(|of| of / mean).collect(),
+            false => vec![1.0; rays.len()],
+        }
+    };
+    pixels.iter().flat_map(parts).collect()
+}
+
+impl Carried {
+    fn add(&mut self, radiance_solid_angle: DVec3, solid_angle_sr: f64) {
+        self.radiance_solid_angle += radiance_solid_angle;
+        self.solid_angle_sr += solid_angle_sr;
+        self.rays += 1;
+    }
 }
 
 fn whole_power(probe: &Probe) -> f64 {
@@ -119,6 +173,7 @@ fn row_of_parcels(probe: &Probe, row: usize, block: usize, most: f64) -> Vec<Par
                 (rows.start + rows.end) as f64 / 2.0,
             ];
             parcels.push(Parcel {
+                pixel: rows.start * width + columns.start,
                 direction: probe.direction(middle[0], middle[1]).as_vec3(),
                 radiance_solid_angle,
                 solid_angle_sr,
@@ -146,8 +201,10 @@ fn cut_pixel(probe: &Probe, [column, row]: [usize; 2], most: f64, parcels: &mut 
         let height_of_band = cosine(place(0.0)) - cosine(place(1.0));
         let solid_angle_sr = TAU / width as f64 / count as f64 * height_of_band;
         for across in 0..count {
+            let pixel_column = column;
             let column = column as f64 + (across as f64 + 0.5) / count as f64;
             parcels.push(Parcel {
+                pixel: row * width + pixel_column,
                 direction: probe.direction(column, place(0.5)).as_vec3(),
                 radiance_solid_angle: radiance * solid_angle_sr,
                 solid_angle_sr,

@@ -242,7 +242,7 @@ impl PlacedCasters {
         &self,
         room: &RoomTransport,
         sources: &[(Representative, Vec3)],
-        left: &[Option<f32>],
+        left: &[Option<Vec3>],
     ) -> GroupedSurfels {
         let caster = &self.caster;
         let hides = |start, direction| caster.is_hidden(start, direction, f32::INFINITY);

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::bounding::Aabb;
 use super::casters::PlacedCasters;
 use super::difference::{Difference, Given};
-use super::patches::PatchVertex;
+use super::patches::{PatchVertex, RoomPatch};
 use super::receiver_patches::{ReceiverInputs, ReceiverPatches};
 use super::room_transport::RoomTransport;
 use super::selection::{LEAST_WEIGHT, Representative, WeighedSource, representatives};
@@ -20,6 +20,9 @@ const REACH: f32 = 4.0;
 const SOURCES_OF_BOUNCE: usize = 96;
 /// Sources nearer to the casters' middle than so many of their radii are among them.
 const NEAREST_SOURCE: f32 = 3.0;
+
+/// What casters reflect makes a patch brighter by this factor at most.
+const MOST_ADDED: f32 = 4.0;
 
 /// The number of shadows that there may be, and the way to take them out of the video.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -202,19 +205,37 @@ fn reflected(
     let among_m = NEAREST_SOURCE * placed.ball.radius;
     let left = room.left_by(&placed.caster, center, among_m);
     let surfels = placed.lit_surfels(room, &detailed, &left);
-    let refilled: Vec<Option<f32>> = left
-        .iter()
-        .zip(&room.patches.patches)
-        .map(|(left, patch)| {
-            let (place, normal) = (room.patches.center(patch), room.patches.normal(patch));
-            let before = room.irradiance[patch.vertices[0] as usize].element_sum();
-            let seen = || surfels.seen_from(Aabb::around([place]));
-            let back = || reflected_irradiance(place, normal, seen()).element_sum();
-            left.map(|left| (left + back() / before.max(f32::MIN_POSITIVE)).min(1.0))
-        })
-        .collect();
-    let lost_nearby = lost_nearby(room, &affected.vertices, &surfels, &refilled);
+    let of_surfels = |patch: &RoomPatch| {
+        let (place, normal) = (room.patches.center(patch), room.patches.normal(patch));
+        reflected_irradiance(place, normal, surfels.seen_from(Aabb::around([place])))
+    };
+    let lit_once = with_added(room, &left, of_surfels);
+    // What these send to each other then differs too.
+    let lost = |patch: &RoomPatch| {
+        let lost = patch.vertices.map(|vertex| room.lost_at(vertex, &lit_once));
+        lost.into_iter().sum::<Vec3>() / 3.0
+    };
+    let lit_twice = with_added(room, &left, |patch| of_surfels(patch) - lost(patch));
+    let lost_nearby = lost_nearby(room, &affected.vertices, &surfels, &lit_twice);
     (surfels, lost_nearby)
+}
+
+/// The parts that patches have left of their light, with irradiance that is added to it.
+fn with_added(
+    room: &RoomTransport,
+    left: &[Option<Vec3>],
+    added: impl Fn(&RoomPatch) -> Vec3 + Sync,
+) -> Vec<Option<Vec3>> {
+    let patches = left.par_iter().zip(&room.patches.patches);
+    let part = |(left, patch): (&Option<Vec3>, &RoomPatch)| {
+        let at_corners = patch
+            .vertices
+            .map(|vertex| room.irradiance[vertex as usize]);
+        let before = at_corners.into_iter().sum::<Vec3>() / 3.0;
+        let all = (*left)? + added(patch) / before.max(Vec3::splat(f32::MIN_POSITIVE));
+        Some(all.clamp(Vec3::ZERO, Vec3::splat(MOST_ADDED)))
+    };
+    patches.map(part).collect()
 }
 
 /// For each vertex the irradiance that it loses from patches among the casters: what the casters' surfels cover, and what
@@ -223,7 +244,7 @@ fn lost_nearby(
     room: &RoomTransport,
     vertices: &[u32],
     surfels: &GroupedSurfels,
-    left: &[Option<f32>],
+    left: &[Option<Vec3>],
 ) -> Vec<Vec3> {
     let hidden = |&vertex: &u32| {
         let PatchVertex { position, normal } = room.patches.vertices[vertex as usize];

@@ -246,7 +246,7 @@ impl RoomTransport {
         place: Vec3,
         normal: Vec3,
         surfels: impl IntoIterator<Item = &'a LitSurfel>,
-        left: &[Option<f32>],
+        left: &[Option<Vec3>],
     ) -> Vec3 {
         let start = place + normal * SURFEL_OFFSET_M;
         let covered = |surfel: &LitSurfel| {
@@ -255,7 +255,7 @@ impl RoomTransport {
                 return Vec3::ZERO;
             }
             match self.radiance_along(start, (surfel.surfel.position - start).normalize()) {
-                Some((radiance, patch, _)) => radiance * (part * left[patch].unwrap_or(0.0)),
+                Some((radiance, patch, _)) => radiance * part * left[patch].unwrap_or(Vec3::ZERO),
                 None => Vec3::ZERO,
             }
         };
@@ -263,10 +263,11 @@ impl RoomTransport {
     }
 
     /// For patches with their middle in a ball the part of their light that `caster` leaves them, `None` for others.
-    pub fn left_by(&self, caster: &RayCaster, center: Vec3, radius: f32) -> Vec<Option<f32>> {
+    pub fn left_by(&self, caster: &RayCaster, center: Vec3, radius: f32) -> Vec<Option<Vec3>> {
         let middle = |patch: usize| self.patches.center(&self.patches.patches[patch]);
         let left = |patch: usize| {
-            (middle(patch).distance(center) < radius).then(|| self.left_on(patch, caster))
+            let is_near = middle(patch).distance(center) < radius;
+            is_near.then(|| Vec3::splat(self.left_on(patch, caster)))
         };
         let patches = (0..self.patches.patches.len()).into_par_iter();
         patches.map(left).collect()
@@ -314,11 +315,11 @@ impl RoomTransport {
     }
 
     /// Irradiance that a vertex loses with the light that patches lose.
-    pub fn lost_at(&self, vertex: u32, left: &[Option<f32>]) -> Vec3 {
+    pub fn lost_at(&self, vertex: u32, left: &[Option<Vec3>]) -> Vec3 {
         let row = self.transfers.row(vertex as usize);
-        let lost = |(patch, left): (usize, &Option<f32>)| {
+        let lost = |(patch, left): (usize, &Option<Vec3>)| {
             let part = 1.0 - (*left)?;
-            Some(self.light[patch].radiance * (row[self.sender_of_patch[patch] as usize] * part))
+            Some(self.light[patch].radiance * part * row[self.sender_of_patch[patch] as usize])
         };
         left.iter().enumerate().filter_map(lost).sum::<Vec3>() * PI
     }
@@ -366,40 +367,50 @@ impl RoomTransport {
 }
 
 impl RoomTransport {
-    /// Irradiance of a surfel past what `caster` and the room hide: from representatives of sources, with their radiant
-    /// intensities, and by `rays` from the patches of which `left` knows which part of their light the casters' shadows
-    /// leave.
+    /// Irradiance of a surfel past what `caster` and the room hide: the room's light there, and of it the part that is left of
+    /// what representatives of sources give, with their radiant intensities, and of what `rays` meet of the patches of which
+    /// `left` knows which part of their light the casters' shadows leave. (A ratio estimator, as that of Heitz, Hill & McGuire
+    /// 2018: sources that are too weak to be told one by one are not lost.)
     pub fn light_on_surfel(
         &self,
         surfel: &Surfel,
         rays: usize,
         caster: &RayCaster,
         sources: &[(Representative, Vec3)],
-        left: &[Option<f32>],
+        left: &[Option<Vec3>],
     ) -> Vec3 {
         let start = surfel.position + surfel.normal * SURFEL_OFFSET_M;
-        let from_source = |(source, intensity): &(Representative, Vec3)| {
+        // What of it there is at all comes from all of the room; sources and rays tell the part that the casters leave.
+        let [mut whole, mut left_of_it] = [Vec3::ZERO; 2];
+        let mut add = |light: Vec3, part: Vec3, way: Vec3, reach: f32| {
+            whole += light;
+            if !caster.is_hidden(start, way, reach) {
+                left_of_it += light * part;
+            }
+        };
+        for (source, intensity) in sources {
             let way = source.position - start;
             let facing = surfel.normal.dot(way);
-            let is_hidden = |caster: &RayCaster| caster.is_hidden(start, way, 0.99);
-            if facing <= 0.0 || is_hidden(caster) || is_hidden(&self.caster) {
-                return Vec3::ZERO;
+            if facing > 0.0 && !self.caster.is_hidden(start, way, 0.99) {
+                // Seen from among its sources, a representative is no point.
+                let squared = way.length_squared() + source.spread_trace();
+                let light = *intensity * (facing / (squared * way.length()));
+                add(light, Vec3::ONE, way, 0.99);
             }
-            // Seen from among its sources, a representative is no point.
-            let squared = way.length_squared() + source.spread_trace();
-            *intensity * (facing / (squared * way.length()))
-        };
-        let from_near = |direction: Vec3| {
-            let (radiance, patch, distance) = self.radiance_along(start, direction)?;
-            let left = left[patch]?;
-            (!caster.is_hidden(start, direction, distance)).then_some(radiance * left)
-        };
-        let near: Vec3 = hemisphere(surfel.normal, rays).filter_map(from_near).sum();
+        }
+        for direction in hemisphere(surfel.normal, rays) {
+            let near = self.radiance_along(start, direction);
+            if let Some((radiance, patch, distance)) = near
+                && let Some(part) = left[patch]
+            {
+                add(radiance * (PI / rays as f32), part, direction, distance);
+            }
+        }
+        let part = left_of_it / whole.max(Vec3::splat(f32::MIN_POSITIVE));
         let hides = |way: Vec3| {
             caster.is_hidden(start, way, REACH) || self.caster.is_hidden(start, way, REACH)
         };
-        sources.iter().map(from_source).sum::<Vec3>()
-            + near * (PI / rays as f32)
+        self.volume.irradiance(surfel.position, surfel.normal) * part
             + compact_irradiance(&self.compact, start, surfel.normal, hides)
     }
 }

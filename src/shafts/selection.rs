@@ -10,6 +10,10 @@ use super::source_tree::{SourceNode, SourceTree};
 /// The part of receivers' light, on the average, below which nodes of sources are not cut: less than a level of 255.
 pub const LEAST_WEIGHT: f32 = 1.0 / 2048.0;
 
+/// One shadow for all of a node is half as wrong as it can be where the node is seen as wide as this, in parts of its distance: the
+/// wider it is the more the shadow is off, until none of it is left.
+const HALF_AS_WRONG: f32 = 0.1;
+
 /// A source as it weighs in the present frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeighedSource {
@@ -106,8 +110,8 @@ fn outer(vector: DVec3) -> DMat3 {
 }
 
 /// Up to `count` representatives for the sources, which come in the tree's order, as they are seen from `casters`. A node
-/// is cut by what one shadow for all of it does wrong: its weight times how wide it is seen, for the shadow of a narrow node
-/// is right however bright it is. Nodes below `least` there are not cut: no eye could tell.
+/// is cut by what one shadow for all of it does wrong: its weight times a part that grows with how wide it is seen, for the
+/// shadow of a narrow node is right however bright it is. Nodes below `least` there are not cut: no eye could tell.
 pub fn representatives(
     tree: &SourceTree,
     sources: &[WeighedSource],
@@ -124,7 +128,7 @@ pub fn representatives(
         let one = sums.representative(&tree.nodes[node as usize]);
         let distance = one.position.distance_squared(casters).max(1e-9);
         let width = (one.spread_trace() / (2.0 * distance)).sqrt();
-        let priority = one.weight * width;
+        let priority = one.weight * width / (width + HALF_AS_WRONG);
         Candidate { priority, node }
     };
     let weight = |node: u32| sums.representative(&tree.nodes[node as usize]).weight;
