@@ -102,23 +102,21 @@ fn unmixed(pixels: &[&[(usize, Parcel)]], patches: &RoomPatches) -> Vec<f64> {
             of.add(parcel.radiance_solid_angle, parcel.solid_angle_sr);
         }
     }
+    // Nothing is known of what no pixel shows alone.
     let radiance = |patch: usize| {
-        let of = match of_patches[patch].rays {
-            0 => &of_pieces[piece(patch)],
-            _ => &of_patches[patch],
-        };
-        let sum = luminance(of.radiance_solid_angle.as_vec3());
-        f64::from(sum) / of.solid_angle_sr.max(1e-30)
+        let known = [&of_patches[patch], &of_pieces[piece(patch)]];
+        let of = known.into_iter().find(|of| of.rays > 0)?;
+        Some(f64::from(luminance(of.radiance_solid_angle.as_vec3())) / of.solid_angle_sr)
     };
     let parts = |rays: &&[(usize, Parcel)]| -> Vec<f64> {
-        if shows_one(rays) {
-            return vec![1.0; rays.len()];
-        }
-        let expected: Vec<f64> = rays.iter().map(|&(patch, _)| radiance(patch)).collect();
-        let mean = expected.iter().sum::<f64>() / rays.len() as f64;
-        match mean > 0.0 {
-            true => expected.into_iter().map(|of| of / mean).collect(),
-            false => vec![1.0; rays.len()],
+        let expected = rays.iter().map(|&(patch, _)| radiance(patch));
+        let expected: Option<Vec<f64>> = expected.collect();
+        match expected.filter(|_| !shows_one(rays)) {
+            Some(expected) if expected.iter().sum::<f64>() > 0.0 => {
+                let mean = expected.iter().sum::<f64>() / rays.len() as f64;
+                expected.into_iter().map(|of| of / mean).collect()
+            }
+            _ => vec![1.0; rays.len()],
         }
     };
     pixels.iter().flat_map(parts).collect()

@@ -5,7 +5,7 @@
 
 use std::f32::consts::PI;
 
-use glam::{DVec3, UVec3, Vec3};
+use glam::{UVec3, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -21,10 +21,13 @@ use crate::light::harmonics::{cosine_lobe, count, sphere, write_basis};
 /// Rays from each point of the grid to all sides, if patches were so small that each met another one: a patch is looked at along
 /// as many as its solid angle has room for, ...
 const RAYS: f32 = 1024.0;
-/// ... and along one at least.
+/// ... and along some at least, which tell whether all of it is seen.
+const LEAST_RAYS_OF_A_PATCH: usize = 2;
 const MOST_RAYS_OF_A_PATCH: usize = 64;
-/// Rays that tell whether a point lies within something.
-const PROBING_RAYS: usize = 128;
+/// Rays to all sides that tell whether a point lies within something, and how much is seen of what is hidden in part.
+const SURVEYING_RAYS: usize = 1024;
+/// They correct what points on patches say by this factor at most.
+const MOST_SCALED: f32 = 2.0;
 /// Part of the way to a patch within which something hides it.
 const REACH: f32 = 1.0 - 1e-4;
 /// Degree of the harmonics.
@@ -165,64 +168,104 @@ fn gathered(
     caster: &RayCaster,
     (patches, radiance, bright): (&RoomPatches, &[Vec3], &BrightPatches),
 ) -> Option<Gathered> {
-    if is_within(point, patches, caster) {
-        return None;
-    }
-    let mut rest = [Vec3::ZERO; HARMONICS];
-    let mut values = [0.0; HARMONICS];
+    let mut whole = Received::default();
+    let mut in_part = Received::default();
+    let mut is_seen_in_part = vec![false; patches.patches.len()];
     for (index, patch) in patches.patches.iter().enumerate() {
         let is_back = patches.normal(patch).dot(point - patches.center(patch)) <= 0.0;
-        if bright.has(index) || is_back || radiance[index] == Vec3::ZERO {
+        if bright.has(index) || is_back {
             continue;
         }
-        for (direction, solid_angle_sr) in seen_parts(point, patches.corners(patch), caster) {
-            let arriving = radiance[index] * solid_angle_sr;
-            write_basis(direction.as_dvec3(), DEGREE, &mut values);
-            for (sum, value) in rest.iter_mut().zip(values) {
-                *sum += arriving * value as f32;
-            }
+        let parts = seen_parts(point, patches.corners(patch), caster);
+        is_seen_in_part[index] = parts.are_all == Some(false);
+        let received = if is_seen_in_part[index] {
+            &mut in_part
+        } else {
+            &mut whole
+        };
+        received.add(&parts.seen, radiance[index]);
+    }
+    // Few points tell badly which part of a patch is seen; rays to all sides tell how much all such parts are together.
+    let (mut backs, mut met_in_part) = (0, 0);
+    for direction in sphere(SURVEYING_RAYS) {
+        let direction = direction.as_vec3();
+        if let Some(hit) = caster.first_hit(point, direction, f32::INFINITY) {
+            let patch = &patches.patches[hit.triangle];
+            let is_back = patches.normal(patch).dot(direction) > 0.0;
+            backs += usize::from(is_back);
+            met_in_part += usize::from(!is_back && is_seen_in_part[hit.triangle]);
         }
     }
+    if backs as f32 > MOST_BACKS * SURVEYING_RAYS as f32 {
+        return None;
+    }
+    let met_sr = 4.0 * PI * met_in_part as f32 / SURVEYING_RAYS as f32;
+    let scale = met_sr / in_part.solid_angle_sr.max(f32::MIN_POSITIVE);
+    let scale = scale.clamp(MOST_SCALED.recip(), MOST_SCALED);
+    let sums = whole.harmonics.iter().zip(&in_part.harmonics);
+    let mut rest: Vec<Vec3> = sums.map(|(&whole, &part)| whole + part * scale).collect();
     for l in 0..=DEGREE {
         for coefficient in &mut rest[l * l..(l + 1) * (l + 1)] {
             *coefficient *= cosine_lobe(l) as f32;
         }
     }
     Some(Gathered {
-        rest: rest.to_vec(),
+        rest,
         seen: bright.seen_from(point, caster),
     })
 }
 
-/// Whether too many patches show their backs.
-fn is_within(point: Vec3, patches: &RoomPatches, caster: &RayCaster) -> bool {
-    let meets_back = |direction: &DVec3| {
-        let direction = direction.as_vec3();
-        let hit = caster.first_hit(point, direction, f32::INFINITY);
-        hit.is_some_and(|hit| {
-            let patch = &patches.patches[hit.triangle];
-            patches.normal(patch).dot(direction) > 0.0
-        })
-    };
-    let backs = sphere(PROBING_RAYS).filter(meets_back).count();
-    backs as f32 > MOST_BACKS * PROBING_RAYS as f32
+/// Radiance that arrives, in harmonics.
+#[derive(Default)]
+struct Received {
+    harmonics: [Vec3; HARMONICS],
+    solid_angle_sr: f32,
 }
 
-/// Unit directions to parts of a triangle that nothing hides, and their solid angles: all parts' together are the triangle's, so
-/// that no light is lost or found between them.
-fn seen_parts(point: Vec3, corners: [Vec3; 3], caster: &RayCaster) -> Vec<(Vec3, f32)> {
+impl Received {
+    /// Adds one radiance from several directions with their solid angles.
+    fn add(&mut self, from: &[(Vec3, f32)], radiance: Vec3) {
+        let mut values = [0.0; HARMONICS];
+        for &(direction, solid_angle_sr) in from {
+            self.solid_angle_sr += solid_angle_sr;
+            write_basis(direction.as_dvec3(), DEGREE, &mut values);
+            let arriving = radiance * solid_angle_sr;
+            for (sum, value) in self.harmonics.iter_mut().zip(values) {
+                *sum += arriving * value as f32;
+            }
+        }
+    }
+}
+
+/// Parts of a triangle.
+struct SeenParts {
+    /// Unit directions to those that nothing hides, and their solid angles.
+    seen: Vec<(Vec3, f32)>,
+    /// Whether these are all; `None` where they are none.
+    are_all: Option<bool>,
+}
+
+/// The parts of a triangle that nothing hides; all parts' solid angles together are the triangle's, so that no light is lost or
+/// found between them.
+fn seen_parts(point: Vec3, corners: [Vec3; 3], caster: &RayCaster) -> SeenParts {
     let whole_sr = solid_angle(corners.map(|corner| corner - point)) as f32;
     let rays = (whole_sr * RAYS / (4.0 * PI)).ceil() as usize;
     let across = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-    let ways: Vec<Vec3> = points_on(corners, rays.clamp(1, MOST_RAYS_OF_A_PATCH))
-        .map(|on_it| on_it - point)
-        .collect();
+    let ways: Vec<Vec3> = points_on(
+        corners,
+        rays.clamp(LEAST_RAYS_OF_A_PATCH, MOST_RAYS_OF_A_PATCH),
+    )
+    .map(|on_it| on_it - point)
+    .collect();
     // What parts of one area are seen under.
     let share = |way: Vec3| across.dot(way).abs() / way.length().powi(3).max(1e-30);
     let shares: f32 = ways.iter().copied().map(share).sum();
     let scale = whole_sr / shares.max(1e-30);
-    let seen = ways.into_iter();
-    seen.filter(|&way| !caster.is_hidden(point, way, REACH))
-        .map(|way| (way.normalize_or_zero(), share(way) * scale))
-        .collect()
+    let seen: Vec<(Vec3, f32)> = ways
+        .iter()
+        .filter(|&&way| !caster.is_hidden(point, way, REACH))
+        .map(|&way| (way.normalize_or_zero(), share(way) * scale))
+        .collect();
+    let are_all = (!seen.is_empty()).then_some(seen.len() == ways.len());
+    SeenParts { seen, are_all }
 }
