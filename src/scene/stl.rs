@@ -65,6 +65,17 @@ fn read_binary(path: &Path, bytes: &[u8]) -> Result<RawModel, SceneError> {
         return Err(SceneError::of_file(path, message));
     };
     let there = bytes.len() as u64;
+    let mut notes = Notes::default();
+    // Who writes as triangles come does not know their number beforehand, and leaves what is no number of them.
+    let room = (there - HEADER as u64) / TRIANGLE as u64;
+    let is_whole = room > 0 && length(room as u32) == there;
+    let count = match is_whole && (count == 0 || length(count) > there) {
+        true => {
+            notes.add_of(path, format!("byte 80: the header counts {count} triangles; the file's {room} are taken"));
+            room as u32
+        }
+        false => count,
+    };
     if count == 0 {
         return Err(SceneError::of_file(
             path,
@@ -72,12 +83,10 @@ fn read_binary(path: &Path, bytes: &[u8]) -> Result<RawModel, SceneError> {
         ));
     }
     if length(count) > there {
-        let room = (there - HEADER as u64) / TRIANGLE as u64;
         let message =
             format!("byte 80: the header counts {count} triangles, and the file has {room}");
         return Err(SceneError::of_file(path, message));
     }
-    let mut notes = Notes::default();
     if length(count) < there {
         let message = format!(
             "{} bytes behind the last triangle: not used",

@@ -2,6 +2,7 @@
 //! a stack or a memory.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::ops::Range;
 
 use saphyr_parser::{Event, Parser, ScalarStyle, ScanError, Span};
@@ -48,6 +49,7 @@ impl YamlValue {
         let mut reader = Reader {
             parser: Parser::new_from_str(&text),
             values: 0,
+            anchored: HashMap::new(),
         };
         loop {
             let (event, span) = reader.next()?;
@@ -85,7 +87,10 @@ fn without_opencv_directive(text: &str) -> Cow<'_, str> {
 
 struct Reader<'text> {
     parser: Parser<'text, saphyr_parser::StrInput<'text>>,
+    /// Values so far, those that aliases repeat among them.
     values: usize,
+    /// What `&name` stands before, by the parser's numbers.
+    anchored: HashMap<usize, YamlValue>,
 }
 
 impl<'text> Reader<'text> {
@@ -100,15 +105,24 @@ impl<'text> Reader<'text> {
     fn table(&mut self, level: u32) -> Result<Vec<(String, YamlValue)>, String> {
         let mut known = std::collections::HashSet::new();
         let mut table = Vec::new();
+        let mut merged_keys: Vec<(String, YamlValue)> = Vec::new();
         loop {
             let (event, span) = self.next()?;
             let key = match event {
-                Event::MappingEnd => return Ok(table),
+                Event::MappingEnd => {
+                    merged_keys.retain(|(key, _)| known.insert(key.clone()));
+                    table.append(&mut merged_keys);
+                    return Ok(table);
+                }
                 Event::Scalar(key, ..) => key.into_owned(),
                 _ => return Err(at(&span, "a key must be a word")),
             };
             let (event, value_span) = self.next()?;
             let value = self.value(event, &value_span, level)?;
+            if let ("<<", YamlContent::Table(merged)) = (key.as_str(), &value.content) {
+                merged_keys.extend(merged.iter().cloned());
+                continue;
+            }
             if !known.insert(key.clone()) {
                 return Err(at(&span, &format!("the key '{key}' is there twice")));
             }
@@ -128,13 +142,13 @@ impl<'text> Reader<'text> {
     }
 
     fn value(&mut self, event: Event, span: &Span, level: u32) -> Result<YamlValue, String> {
-        self.values += 1;
-        if level > MOST_LEVELS || self.values > MOST_VALUES {
-            return Err(at(
-                span,
-                &format!("more than {MOST_LEVELS} levels or {MOST_VALUES} values"),
-            ));
-        }
+        self.count(1, level, span)?;
+        let anchor = match &event {
+            Event::Scalar(_, _, anchor, _)
+            | Event::SequenceStart(anchor, _)
+            | Event::MappingStart(anchor, _) => *anchor,
+            _ => 0,
+        };
         let content = match event {
             Event::Scalar(text, style, ..) => YamlContent::Scalar {
                 text: text.into_owned(),
@@ -142,15 +156,53 @@ impl<'text> Reader<'text> {
             },
             Event::SequenceStart(..) => YamlContent::List(self.list(level + 1)?),
             Event::MappingStart(..) => YamlContent::Table(self.table(level + 1)?),
-            // Nine of them make a billion values; no file of a camera or of markers has any.
-            Event::Alias(_) => return Err(at(span, "aliases (*name) are not supported")),
+            Event::Alias(number) => {
+                let anchored = self.anchored.get(&number);
+                let anchored = anchored.ok_or_else(|| at(span, "the alias stands within what it means"))?;
+                // Nine lists of nine aliases make a billion values: they are counted before they are repeated.
+                let (repeats, levels) = size_of(anchored);
+                let content = anchored.content.clone();
+                self.count(repeats, level + levels, span)?;
+                content
+            }
             _ => return Err(at(span, "a value is missing")),
         };
-        Ok(YamlValue {
+        let value = YamlValue {
             line: span.start.line(),
             column: span.start.col() + 1,
             content,
+        };
+        if anchor > 0 {
+            // It is kept twice.
+            self.count(size_of(&value).0, level, span)?;
+            self.anchored.insert(anchor, value.clone());
+        }
+        Ok(value)
+    }
+
+    fn count(&mut self, values: usize, level: u32, span: &Span) -> Result<(), String> {
+        self.values += values;
+        if level > MOST_LEVELS || self.values > MOST_VALUES {
+            return Err(at(
+                span,
+                &format!("more than {MOST_LEVELS} levels or {MOST_VALUES} values"),
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// How many values a value is, and of how many levels below itself.
+fn size_of(value: &YamlValue) -> (usize, u32) {
+    let of_all = |values: &mut dyn Iterator<Item = &YamlValue>| {
+        values.map(size_of).fold((1, 0), |(count, levels), inner| {
+            (count + inner.0, levels.max(inner.1 + 1))
         })
+    };
+    match &value.content {
+        YamlContent::Scalar { .. } => (1, 0),
+        YamlContent::List(list) => of_all(&mut list.iter()),
+        YamlContent::Table(table) => of_all(&mut table.iter().map(|(_, value)| value)),
     }
 }
 

@@ -145,7 +145,8 @@ impl Decoder {
                     (self.tick_secs, self.fps) = (tick_secs, fps)
                 }
                 Ok(Said::Frame(head)) => self.head = Some(head),
-                Ok(Said::Corrupt) => self.corrupt = true,
+                // (While the file is looked through, it may be of a cover or of sound.)
+                Ok(Said::Corrupt) => self.corrupt |= self.has_video,
                 Ok(Said::Complaint(words) | Said::Fatal(words)) => return Next::Complaint(words),
                 Ok(Said::Colours(colours)) => {
                     if let Some(head) = self.head.take() {

@@ -75,7 +75,7 @@ pub fn read(path: &Path, text: &str, notes: &mut Notes) -> Vec<MtlMaterial> {
     let mut materials: Vec<MtlMaterial> = Vec::new();
     for record in records(text) {
         let keyword = record.keyword();
-        if keyword == "newmtl" {
+        if keyword.eq_ignore_ascii_case("newmtl") {
             let name = record.rest().to_owned();
             if name.is_empty() {
                 notes.add_at(
@@ -138,7 +138,6 @@ fn add(material: &mut MtlMaterial, keyword: &str, record: &Record) -> Option<Str
         "pr" => set_part(&mut material.roughness, part()),
         "pm" => set_part(&mut material.metallic, part()),
         "d" => {
-            // `d -halo 0.5` is thinner in the middle, which no surface here is.
             material.opacity_at = record.start;
             set_part(&mut material.opacity, part())
         }
@@ -299,7 +298,8 @@ fn reflectance(
 }
 
 fn number_of(keyword: &str, record: &Record) -> (Option<f64>, Option<String>) {
-    match record.words().next().map(number) {
+    // `d -halo 0.5` is thinner in the middle, which no surface here is.
+    match record.words().find(|word| *word != "-halo").map(number) {
         None => (None, None),
         Some(None) => (
             None,
