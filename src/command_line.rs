@@ -547,7 +547,8 @@ impl TargetArgs {
 
 /// Millimetres; what they may be, each job says.
 fn mm_of(written: &str) -> Result<f64, String> {
-    let expected = "a number of millimetres is expected, with a point and without its unit, as in 45 or 4.5";
+    let expected =
+        "a number of millimetres is expected, with a point and without its unit, as in 45 or 4.5";
     written.trim().parse().map_err(|_| expected.to_owned())
 }
 

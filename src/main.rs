@@ -56,7 +56,9 @@ fn main() -> ExitCode {
 
 /// Says how the command is used and ends the program; a file in a command's place is told as such.
 fn leave_misused(error: &clap::Error) -> ! {
-    let named = std::env::args_os().nth(1).filter(|_| error.kind() == clap::error::ErrorKind::InvalidSubcommand);
+    let named = std::env::args_os()
+        .nth(1)
+        .filter(|_| error.kind() == clap::error::ErrorKind::InvalidSubcommand);
     match named.filter(|named| Path::new(named).exists()) {
         Some(file) => {
             talk::say(format_args!(

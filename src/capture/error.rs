@@ -193,7 +193,8 @@ pub fn notices_told(notices: &[Notice]) -> String {
         Notice::OtherSize { size_px, .. } => Some(*size_px),
         _ => None,
     };
-    let alike = |one: &Notice, next: &Notice| size_of(one).is_some() && size_of(one) == size_of(next);
+    let alike =
+        |one: &Notice, next: &Notice| size_of(one).is_some() && size_of(one) == size_of(next);
     let told = notices.chunk_by(alike).map(|run| match run.len() {
         1 => run[0].to_string(),
         count => format!("{} (and {} more such)", run[0], count - 1),

@@ -270,7 +270,10 @@ impl FrameSource {
             return Ok(None);
         };
         self.good_frames += 1;
-        let time_secs = self.times.time_secs(index, 1.0 / self.fps()).unwrap_or(time_secs);
+        let time_secs = self
+            .times
+            .time_secs(index, 1.0 / self.fps())
+            .unwrap_or(time_secs);
         let mut frame = Frame {
             index,
             time_secs,
@@ -291,7 +294,10 @@ impl FrameSource {
                 .map(|remark| format!("{}: {remark}", self.path.display())),
             PictureSource::Images(images) => {
                 let missing = self.times.missing(images.frame_count())?;
-                Some(format!("{}: {missing}", self.path.join(TIMES_NAME).display()))
+                Some(format!(
+                    "{}: {missing}",
+                    self.path.join(TIMES_NAME).display()
+                ))
             }
         }
     }
@@ -321,7 +327,9 @@ fn files_of(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
         // What is hidden is no picture: macOS leaves `._1.png` beside each file on foreign disks.
-        let is_hidden = path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b"."));
+        let is_hidden = path
+            .file_name()
+            .is_some_and(|name| name.as_encoded_bytes().starts_with(b"."));
         if path.is_file() && !is_hidden {
             files.push(path);
         }
@@ -335,19 +343,32 @@ fn what_is_there(files: &[PathBuf]) -> String {
     const LISTED: usize = 3;
     let is_video = |file: &&PathBuf| has_extension(file, &VIDEO_EXTENSIONS);
     if let Some(video) = files.iter().find(is_video) {
-        return format!("; a video by another name is meant by its own path, as {}", video.display());
+        return format!(
+            "; a video by another name is meant by its own path, as {}",
+            video.display()
+        );
     }
     let names: Vec<String> = files
         .iter()
         .take(LISTED)
-        .map(|file| file.file_name().unwrap_or_default().to_string_lossy().into_owned())
+        .map(|file| {
+            file.file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned()
+        })
         .collect();
     let more = if files.len() > LISTED { ", …" } else { "" };
-    let is_heic = files.iter().any(|file| has_extension(file, &["heic", "heif", "avif"]));
+    let is_heic = files
+        .iter()
+        .any(|file| has_extension(file, &["heic", "heif", "avif"]));
     match (names.is_empty(), is_heic) {
         (true, _) => "; it is empty".to_owned(),
         (false, false) => format!("; it has {}{more}", names.join(", ")),
-        (false, true) => format!("; it has {}{more}, which have to be saved as JPEG or PNG first", names.join(", ")),
+        (false, true) => format!(
+            "; it has {}{more}, which have to be saved as JPEG or PNG first",
+            names.join(", ")
+        ),
     }
 }
 

@@ -199,11 +199,15 @@ impl Family {
         let meant: Vec<String> = NAMES
             .iter()
             .filter(|(name, ..)| !core.is_empty() && core_of(name) == core)
-            .map(|(name, codes, drawing)| match (drawing, Self::of(*codes).is_april_tag()) {
-                (Drawing::OpenCv, _) => format!("\"{name}\" (as OpenCV draws it, the other way up)"),
-                (Drawing::Own, true) => format!("\"{name}\" (as AprilTag prints it)"),
-                (Drawing::Own, false) => format!("\"{name}\""),
-            })
+            .map(
+                |(name, codes, drawing)| match (drawing, Self::of(*codes).is_april_tag()) {
+                    (Drawing::OpenCv, _) => {
+                        format!("\"{name}\" (as OpenCV draws it, the other way up)")
+                    }
+                    (Drawing::Own, true) => format!("\"{name}\" (as AprilTag prints it)"),
+                    (Drawing::Own, false) => format!("\"{name}\""),
+                },
+            )
             .collect();
         match meant.is_empty() {
             true => format!("unknown family{}", suggestion(written, &names)),

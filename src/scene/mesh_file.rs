@@ -293,9 +293,11 @@ impl MeshFormat {
             Self::Other("a Draco file")
         } else if extension == "mtl" {
             Self::Other("a library of materials, beside the .obj that is meant,")
-        } else if ["dxf", "max", "c4d", "skp", "ma", "mb", "lwo", "x3d", "iges", "igs", "splat"]
-            .iter()
-            .any(|other| extension == *other)
+        } else if [
+            "dxf", "max", "c4d", "skp", "ma", "mb", "lwo", "x3d", "iges", "igs", "splat",
+        ]
+        .iter()
+        .any(|other| extension == *other)
         {
             Self::Other("a file of this kind")
         } else if head.starts_with("BLENDER") {

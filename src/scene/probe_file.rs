@@ -311,7 +311,10 @@ mod tests {
             let [note] = &read.notes[..] else {
                 panic!("{:?}", read.notes)
             };
-            assert!(note.contains("column 3, row 1") && note.contains(word), "{note}");
+            assert!(
+                note.contains("column 3, row 1") && note.contains(word),
+                "{note}"
+            );
         }
         let text = folder.path().join("text.hdr");
         fs::write(&text, "nothing of the kind").unwrap();

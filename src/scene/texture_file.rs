@@ -11,7 +11,7 @@ use super::plain_file::{self, MOST_PICTURE};
 use crate::light::texture::{Texture, srgb_from_linear};
 
 /// What is read.
-const ALLOWED: &str = "PNG, JPEG, WebP, TGA, BMP, TIFF, GIF, DDS, PNM, HDR";
+const ALLOWED: &str = "PNG, JPEG, WebP, TGA, BMP, TIFF, GIF, DDS (DXT1 to DXT5), PNM, HDR";
 /// Longest side of a picture that is read, pixels.
 const MOST_SIDE_PX: u32 = 16384;
 /// Longest side of a picture that is kept; a larger one is scaled down.
@@ -40,7 +40,9 @@ pub fn read(path: &Path) -> Result<Texture, String> {
 /// As [`read`] has them.
 pub fn decode(name: String, bytes: &[u8], format: Option<ImageFormat>) -> Result<Texture, String> {
     if bytes.starts_with(b"\xabKTX 20\xbb") {
-        return Err(format!("is KTX2 (Basis Universal), which is not read; allowed: {ALLOWED}"));
+        return Err(format!(
+            "is KTX2 (Basis Universal), which is not read; allowed: {ALLOWED}"
+        ));
     }
     if let Some(what) = in_place_of(bytes) {
         return Err(format!("is {what}"));
@@ -121,6 +123,21 @@ mod tests {
         let read = decode("a.jpg".to_owned(), &png, None).unwrap();
         assert_eq!(read.size_px, [3, 2]);
         assert_eq!(read.rgba, image.into_raw());
+        // Linear light, whose half is 188 of 255 by sRGB's curve.
+        let half = image::Rgb32FImage::from_pixel(3, 2, image::Rgb([0.5, 0.0, 2.0]));
+        let read = decode(
+            "a".to_owned(),
+            &encoded(half.into(), ImageFormat::Hdr),
+            None,
+        )
+        .unwrap();
+        assert_eq!(read.rgba[..4], [188, 0, 255, 255]);
+        let plain = RgbaImage::from_pixel(3, 2, image::Rgba([255, 0, 0, 255]));
+        let gif = encoded(plain.clone().into(), ImageFormat::Gif);
+        assert_eq!(
+            decode("a".to_owned(), &gif, None).unwrap().rgba,
+            plain.into_raw()
+        );
         let grey = image::GrayImage::from_pixel(5, 4, image::Luma([99]));
         let jpeg = encoded(grey.into(), ImageFormat::Jpeg);
         let read = decode("b".to_owned(), &jpeg, None).unwrap();

@@ -158,7 +158,8 @@ impl<'text> Reader<'text> {
             Event::MappingStart(..) => YamlContent::Table(self.table(level + 1)?),
             Event::Alias(number) => {
                 let anchored = self.anchored.get(&number);
-                let anchored = anchored.ok_or_else(|| at(span, "the alias stands within what it means"))?;
+                let anchored =
+                    anchored.ok_or_else(|| at(span, "the alias stands within what it means"))?;
                 // Nine lists of nine aliases make a billion values: they are counted before they are repeated.
                 let (repeats, levels) = size_of(anchored);
                 let content = anchored.content.clone();
@@ -222,4 +223,55 @@ fn at(span: &Span, message: &str) -> String {
         span.start.line(),
         span.start.col() + 1
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tree without its places.
+    fn plain(value: &YamlValue) -> String {
+        match &value.content {
+            YamlContent::Scalar { text, .. } => text.clone(),
+            YamlContent::List(list) => {
+                format!("[{}]", list.iter().map(plain).collect::<Vec<_>>().join(" "))
+            }
+            YamlContent::Table(table) => {
+                let entries = table
+                    .iter()
+                    .map(|(key, value)| format!("{key}:{}", plain(value)));
+                format!("{{{}}}", entries.collect::<Vec<_>>().join(" "))
+            }
+        }
+    }
+
+    #[test]
+    fn aliases_stand_for_what_they_name() {
+        for (text, expected) in [
+            ("a: &x [1, 2]\nb: *x\n", "{a:[1 2] b:[1 2]}"),
+            (
+                "a: &x {k: 1, l: 2}\nb: {<<: *x, k: 3}\n",
+                "{a:{k:1 l:2} b:{k:3 l:2}}",
+            ),
+        ] {
+            let value = YamlValue::of_text(text).unwrap().unwrap();
+            assert_eq!(plain(&value), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_few_lines_do_not_become_a_billion_values() {
+        let mut text = "a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1]\n".to_owned();
+        for level in 1..12 {
+            let alias = vec![format!("*a{}", level - 1); 9].join(", ");
+            text += &format!("a{level}: &a{level} [{alias}]\n");
+        }
+        let message = YamlValue::of_text(&text).unwrap_err();
+        assert!(
+            message.contains("more than 32 levels or 200000 values"),
+            "{message}"
+        );
+        let itself = YamlValue::of_text("a: &x [1, *x]\n").unwrap_err();
+        assert!(itself.starts_with("line 1 column"), "{itself}");
+    }
 }

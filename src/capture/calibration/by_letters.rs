@@ -3,7 +3,10 @@
 
 use serde_json::{Map, Value};
 
-use super::kinds::{LensModel, UncheckedCalibration, distortion, flat_numbers, model_of, normalised, number, side_px};
+use super::kinds::{
+    LensModel, UncheckedCalibration, distortion, flat_numbers, model_of, normalised, number,
+    side_px,
+};
 
 /// Letters in the order in which OpenCV has its coefficients.
 const COEFFICIENTS: [&str; 8] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
@@ -72,7 +75,9 @@ fn of_letters(
         Some(value) => number(value).ok_or_else(|| format!("{name} must be a finite number")),
     };
     let model = lens_model(tree, letters)?;
-    let listed = match find(letters, &LISTS).or_else(|| find(letters, &["distcoeffs", "distortion", "dist", "d"])) {
+    let listed = match find(letters, &LISTS)
+        .or_else(|| find(letters, &["distcoeffs", "distortion", "dist", "d"]))
+    {
         Some(list @ Value::Array(_)) => Some(list.clone()),
         _ => None,
     };
@@ -82,7 +87,11 @@ fn of_letters(
     };
     let given = match listed {
         Some(list) => list,
-        None => names.iter().map(|name| coefficient(name)).collect::<Result<Vec<f64>, String>>()?.into(),
+        None => names
+            .iter()
+            .map(|name| coefficient(name))
+            .collect::<Result<Vec<f64>, String>>()?
+            .into(),
     };
     let has_any = flat_numbers(&given).is_none_or(|given| given.iter().any(|part| *part != 0.0));
     let model = match model {
@@ -97,10 +106,13 @@ fn of_letters(
     };
     let side = |names: &[&str]| {
         let side = find(letters, names).map(|value| side_px(value).ok_or(names[0]));
-        side.transpose().map_err(|name| format!("{name} must be a whole number of pixels from 1 to 32768"))
+        side.transpose()
+            .map_err(|name| format!("{name} must be a whole number of pixels from 1 to 32768"))
     };
     Ok(UncheckedCalibration {
-        size_px: side(&SIDES[0])?.zip(side(&SIDES[1])?).map(|(width, height)| [width, height]),
+        size_px: side(&SIDES[0])?
+            .zip(side(&SIDES[1])?)
+            .map(|(width, height)| [width, height]),
         focal_px: [needed(&FOCAL[0])?, needed(&FOCAL[1])?],
         center_px: [needed(&CENTER[0])?, needed(&CENTER[1])?],
         distortion: distortion(model, Some(&given))?,
@@ -108,17 +120,25 @@ fn of_letters(
 }
 
 /// The lens's model; `None`: RealSense's inverse one.
-fn lens_model(tree: &Map<String, Value>, letters: &Letters<'_>) -> Result<Option<LensModel>, String> {
+fn lens_model(
+    tree: &Map<String, Value>,
+    letters: &Letters<'_>,
+) -> Result<Option<LensModel>, String> {
     let mut named = Map::new();
     for (key, value) in tree {
         let last = key.rsplit('.').next().unwrap_or_default();
-        let is_type = matches!(normalised(last).as_str(), "modeltype" | "cameratype" | "type") && value.is_string();
+        let is_type = matches!(
+            normalised(last).as_str(),
+            "modeltype" | "cameratype" | "type"
+        ) && value.is_string();
         let key = if is_type { "camera_model" } else { last };
         named.insert(key.to_owned(), value.clone());
     }
     let is_inverse = letters.iter().any(|(key, value)| {
         matches!(key.as_str(), "model" | "distortionmodel")
-            && value.as_str().is_some_and(|name| normalised(name).contains("inversebrown"))
+            && value
+                .as_str()
+                .is_some_and(|name| normalised(name).contains("inversebrown"))
     });
     match is_inverse {
         true => Ok(None),

@@ -73,12 +73,20 @@ pub(super) fn cameras(tree: &Map<String, Value>) -> Result<Named, String> {
 /// What to say of a table that describes no camera.
 fn no_camera(tree: &Map<String, Value>) -> String {
     let keys: Vec<&str> = tree.keys().map(String::as_str).take(LISTED_KEYS).collect();
-    let more = if tree.len() > LISTED_KEYS { ", …" } else { "" };
+    let more = if tree.len() > LISTED_KEYS {
+        ", …"
+    } else {
+        ""
+    };
     format!(
         "no camera is in it: a calibration has {}, or camera_matrix and distortion_coefficients, or intrinsics, or fx, fy, \
          cx, cy; this file has {}{more}",
         OWN_KEYS.join(", "),
-        if keys.is_empty() { "nothing".to_owned() } else { keys.join(", ") }
+        if keys.is_empty() {
+            "nothing".to_owned()
+        } else {
+            keys.join(", ")
+        }
     )
 }
 
@@ -112,7 +120,7 @@ fn known_cameras(tree: &Map<String, Value>, levels: u32) -> Result<Named, String
     if tree.get("intrinsics").is_some_and(has_four) {
         return one(of_kalibr(tree)?);
     }
-    if find(tree, &MATRIX_KEYS).is_some_and(|(_, matrix)| flat_numbers(data_of(matrix)).is_some()) {
+    if find(tree, &MATRIX_KEYS).is_some_and(|(_, matrix)| data_of(matrix).is_array()) {
         return one(of_opencv(tree)?);
     }
     if let Some(camera) = by_letters::camera(tree) {
@@ -141,7 +149,8 @@ fn of_inner_tables(tree: &Map<String, Value>, levels: u32) -> Result<Named, Stri
             Value::Object(inner) => look(key.clone(), inner)?,
             Value::Array(list) => {
                 let tables = list.iter().enumerate();
-                let tables = tables.filter_map(|(number, entry)| Some((number, entry.as_object()?)));
+                let tables =
+                    tables.filter_map(|(number, entry)| Some((number, entry.as_object()?)));
                 for (number, inner) in tables {
                     look(format!("{key}[{number}]"), inner)?;
                 }
@@ -347,8 +356,8 @@ fn model_by_name(key: &str, value: &Value) -> Result<LensModel, String> {
         "plumbbob" | "radtan" | "radialtangential" | "brownconrady" | "brown" | "none" => {
             Ok(LensModel::Brown)
         }
-        "equidistant" | "equi" | "fisheye" | "kannalabrandt" | "kannalabrandt4" | "kannalabrandt8"
-        | "opencvfisheye" => Ok(LensModel::Fisheye),
+        "equidistant" | "equi" | "fisheye" | "kannalabrandt" | "kannalabrandt4"
+        | "kannalabrandt8" | "opencvfisheye" => Ok(LensModel::Fisheye),
         _ => Err(format!(
             "{key}: the model '{name}' is not supported; plumb_bob (radtan), rational_polynomial and equidistant \
              (fisheye) are"
@@ -419,7 +428,7 @@ fn data_of(matrix: &Value) -> &Value {
 
 /// `[width, height]` or `{width, height}`.
 fn size(value: &Value) -> Result<[u32; 2], String> {
-    let sides = match value {
+    let sides = match data_of(value) {
         Value::Array(sides) if sides.len() == 2 => Some((&sides[0], &sides[1])),
         Value::Object(sides) => sides.get("width").zip(sides.get("height")),
         _ => None,
@@ -444,7 +453,10 @@ fn numbers<const N: usize>(value: &Value) -> Option<[f64; N]> {
 /// A finite number, in quotes too.
 pub(super) fn number(value: &Value) -> Option<f64> {
     let written = || value.as_str()?.trim().parse().ok();
-    value.as_f64().or_else(written).filter(|number| number.is_finite())
+    value
+        .as_f64()
+        .or_else(written)
+        .filter(|number| number.is_finite())
 }
 
 /// The numbers of a list, or of a list of rows.
@@ -452,11 +464,9 @@ pub(super) fn flat_numbers(value: &Value) -> Option<Vec<f64>> {
     let mut found = Vec::new();
     for entry in value.as_array()? {
         match entry {
-            Value::Array(row) => found.extend(
-                row.iter()
-                    .map(number)
-                    .collect::<Option<Vec<f64>>>()?,
-            ),
+            Value::Array(row) => {
+                found.extend(row.iter().map(number).collect::<Option<Vec<f64>>>()?)
+            }
             one => found.push(number(one)?),
         }
     }

@@ -5,8 +5,8 @@
 
 mod by_letters;
 mod colmap;
-mod ost;
 mod kinds;
+mod ost;
 mod tree;
 
 use std::path::{Path, PathBuf};
@@ -88,9 +88,11 @@ pub fn load_calibration_among(
     frame_px: [u32; 2],
 ) -> Result<Intrinsics, CalibrationError> {
     let calibration = read(path, Some(frame_px))?;
-    let size_px = calibration.size_px.ok_or_else(|| CalibrationError::NoSize {
-        path: path.to_owned(),
-    })?;
+    let size_px = calibration
+        .size_px
+        .ok_or_else(|| CalibrationError::NoSize {
+            path: path.to_owned(),
+        })?;
     calibration.into_intrinsics(path, size_px)
 }
 

@@ -30,13 +30,19 @@ pub(super) fn tree(text: &str) -> Result<Map<String, Value>, String> {
             (camera, name) = (section.to_owned(), None);
             continue;
         }
-        let numbers: Option<Vec<f64>> = line.split_whitespace().map(|word| word.parse().ok()).collect();
+        let numbers: Option<Vec<f64>> = line
+            .split_whitespace()
+            .map(|word| word.parse().ok())
+            .collect();
         let Some(numbers) = numbers else {
             name = Some(line.to_owned());
             continue;
         };
         let Some(name) = &name else {
-            return Err(format!("line {}: a name is expected above these numbers", number + 1));
+            return Err(format!(
+                "line {}: a name is expected above these numbers",
+                number + 1
+            ));
         };
         let table = match camera.as_str() {
             "image" => &mut root,

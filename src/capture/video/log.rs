@@ -8,6 +8,8 @@
 pub enum Said {
     /// The file was opened.
     Input,
+    /// There is something in it, be it sound.
+    Stream,
     /// A video was found in it, and is decoded.
     Decoding,
     /// Of the frames that follow.
@@ -77,6 +79,12 @@ pub fn meaning(line: &str) -> Option<Said> {
     }
     if line.starts_with("[info] Stream mapping:") {
         return Some(Said::Decoding);
+    }
+    if line
+        .strip_prefix("[info]")
+        .is_some_and(|said| said.trim_start().starts_with("Stream #0:"))
+    {
+        return Some(Said::Stream);
     }
     line.starts_with("[info] Input #0").then_some(Said::Input)
 }

@@ -13,9 +13,9 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use super::error::{CaptureError, Notice};
+use crate::scene::in_its_place::in_place_of;
 use colours::{Colours, ToSrgb};
 use planes::{rgba8, rgba16};
-use crate::scene::in_its_place::in_place_of;
 use probe::{Header, Packets, Probe};
 use process::{Decoder, MOST_PIXELS_OPTION, Next, NoDecoder, RawFrame};
 
@@ -282,7 +282,9 @@ impl VideoFrames {
 
 /// What a header says of its pixels that a calibration has to know.
 fn shape_remarks(header: &Header) -> impl Iterator<Item = String> {
-    let aspect = header.pixel_aspect.filter(|aspect| (aspect - 1.0).abs() > 1e-3);
+    let aspect = header
+        .pixel_aspect
+        .filter(|aspect| (aspect - 1.0).abs() > 1e-3);
     let of_aspect = aspect.map(|aspect| {
         format!(
             "its pixels are shown {aspect:.3} times as wide as high, and taken as they are stored: it needs a calibration of \
@@ -412,14 +414,14 @@ fn no_decoder(path: &Path, error: NoDecoder) -> CaptureError {
 }
 
 fn no_frame(path: &Path, decoder: &Decoder, complaint: Option<String>) -> CaptureError {
-    match (decoder.opened, decoder.has_video) {
-        (true, true) => CaptureError::NoGoodFrame {
+    match decoder.opened {
+        true if decoder.has_video => CaptureError::NoGoodFrame {
             path: path.to_owned(),
         },
-        (true, false) => CaptureError::SoundAlone {
+        true if decoder.has_streams => CaptureError::SoundAlone {
             path: path.to_owned(),
         },
-        (false, _) => no_video(path, complaint),
+        _ => no_video(path, complaint),
     }
 }
 

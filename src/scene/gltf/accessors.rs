@@ -44,7 +44,10 @@ impl GltfFile<'_> {
             count += 1;
         }
         if count > 0 {
-            self.note(format!("{place}: {count} of {} are no finite numbers and are passed over", tuples.len()));
+            self.note(format!(
+                "{place}: {count} of {} are no finite numbers and are passed over",
+                tuples.len()
+            ));
         }
         Ok(tuples)
     }

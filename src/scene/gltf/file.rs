@@ -96,14 +96,18 @@ impl<'a> GltfFile<'a> {
     fn unpack_views(&mut self) -> Result<(), SceneError> {
         let mut total = 0_usize;
         for view in self.document.clone().views() {
-            let mut said = meshopt_views::NAMES.iter().filter_map(|name| view.extension_value(name));
+            let mut said = meshopt_views::NAMES
+                .iter()
+                .filter_map(|name| view.extension_value(name));
             let Some(said) = said.next() else { continue };
             let place = format!("bufferViews[{}]", view.index());
             let mut unpacked = || {
                 let view = CompressedView::of(said)?;
                 total = total.saturating_add(view.length()?);
                 if total as u64 > MOST_MESH {
-                    return Err(format!("more than {MOST_MESH} bytes when they are unpacked"));
+                    return Err(format!(
+                        "more than {MOST_MESH} bytes when they are unpacked"
+                    ));
                 }
                 let end = view.byte_offset.checked_add(view.byte_length);
                 let buffer = self.buffers.get(view.buffer);
@@ -229,11 +233,17 @@ fn parsed(path: &Path, text: &[u8], notes: &mut Vec<String>) -> Result<Root, Sce
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     // Some fill up the chunk with zeros where the format wants spaces.
     let text = text.trim_ascii_end();
-    let end = text.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
+    let end = text
+        .iter()
+        .rposition(|byte| *byte != 0)
+        .map_or(0, |last| last + 1);
     let text = &text[..end];
     if let Ok(mut value) = serde_json::from_slice::<Value>(text) {
         // Its lists were tables.
-        if ["meshes", "nodes", "accessors"].iter().any(|key| value[key].is_object()) {
+        if ["meshes", "nodes", "accessors"]
+            .iter()
+            .any(|key| value[key].is_object())
+        {
             let message = "glTF of version 1; version 2 is read (any viewer saves it so)";
             return Err(SceneError::of_file(path, message));
         }

@@ -34,7 +34,10 @@ pub(super) fn mend(root: &mut Value, notes: &mut Vec<String>) -> bool {
         }
     }
     for primitive in primitives(root) {
-        if let Some(attributes) = primitive.get_mut("attributes").and_then(Value::as_object_mut) {
+        if let Some(attributes) = primitive
+            .get_mut("attributes")
+            .and_then(Value::as_object_mut)
+        {
             is_mended |= mend_attributes(attributes, notes);
         }
     }
@@ -69,9 +72,7 @@ fn entries<'a>(
     list: &str,
 ) -> impl Iterator<Item = &'a mut Map<String, Value>> {
     let list = root.get_mut(list).and_then(Value::as_array_mut);
-    list.into_iter()
-        .flatten()
-        .filter_map(Value::as_object_mut)
+    list.into_iter().flatten().filter_map(Value::as_object_mut)
 }
 
 fn primitives(root: &mut Map<String, Value>) -> impl Iterator<Item = &mut Map<String, Value>> {
@@ -136,9 +137,8 @@ fn mend_sampler(sampler: &mut Map<String, Value>) -> bool {
     let is_filter = |filter: u64| matches!(filter, 9728 | 9729 | 9984..=9987);
     for key in ["magFilter", "minFilter"] {
         let filter = sampler.get(key).and_then(Value::as_u64);
-        let fits = filter.is_some_and(|filter| {
-            is_filter(filter) && (key == "minFilter" || filter <= 9729)
-        });
+        let fits = filter
+            .is_some_and(|filter| is_filter(filter) && (key == "minFilter" || filter <= 9729));
         if sampler.contains_key(key) && !fits {
             sampler.remove(key);
             is_mended = true;

@@ -67,10 +67,18 @@ impl CompressedView {
             ("TRIANGLES", 2 | 4) if !count.is_multiple_of(3) => {
                 return Err(format!("TRIANGLES: {count} indices are no triangles"));
             }
-            ("TRIANGLES", 2) => in_bytes::<u16>(meshopt::decode_index_buffer(bytes, count)).map_err(broken)?,
-            ("TRIANGLES", 4) => in_bytes::<u32>(meshopt::decode_index_buffer(bytes, count)).map_err(broken)?,
-            ("INDICES", 2) => in_bytes::<u16>(meshopt::decode_index_sequence(bytes, count)).map_err(broken)?,
-            ("INDICES", 4) => in_bytes::<u32>(meshopt::decode_index_sequence(bytes, count)).map_err(broken)?,
+            ("TRIANGLES", 2) => {
+                in_bytes::<u16>(meshopt::decode_index_buffer(bytes, count)).map_err(broken)?
+            }
+            ("TRIANGLES", 4) => {
+                in_bytes::<u32>(meshopt::decode_index_buffer(bytes, count)).map_err(broken)?
+            }
+            ("INDICES", 2) => {
+                in_bytes::<u16>(meshopt::decode_index_sequence(bytes, count)).map_err(broken)?
+            }
+            ("INDICES", 4) => {
+                in_bytes::<u32>(meshopt::decode_index_sequence(bytes, count)).map_err(broken)?
+            }
             ("TRIANGLES" | "INDICES", _) => return Err(unexpected()),
             (mode, _) => return Err(format!("the mode {mode} is not known")),
         };
@@ -79,7 +87,9 @@ impl CompressedView {
     }
 
     fn unfilter(&self, decoded: &mut [u8]) -> Result<(), String> {
-        use meshopt::{decode_filter_color, decode_filter_exp, decode_filter_oct, decode_filter_quat};
+        use meshopt::{
+            decode_filter_color, decode_filter_exp, decode_filter_oct, decode_filter_quat,
+        };
         match (self.filter.as_deref().unwrap_or("NONE"), self.byte_stride) {
             ("NONE", _) => {}
             ("OCTAHEDRAL", 4) => changed(decoded, decode_filter_oct::<i8>),
@@ -101,7 +111,10 @@ impl CompressedView {
 }
 
 /// Changes bytes as elements that they need not be aligned for.
-fn changed<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(bytes: &mut [u8], change: impl FnOnce(&mut [T])) {
+fn changed<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
+    bytes: &mut [u8],
+    change: impl FnOnce(&mut [T]),
+) {
     let mut elements: Vec<T> = bytemuck::pod_collect_to_vec(bytes);
     change(&mut elements);
     bytes.copy_from_slice(bytemuck::cast_slice(&elements));

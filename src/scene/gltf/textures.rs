@@ -194,5 +194,7 @@ fn decoded(
 /// What a file's name says of it, where its bytes do not tell (TGA).
 fn format_of_name(uri: &str) -> Option<image::ImageFormat> {
     let is_data = uri.starts_with("data:");
-    (!is_data).then(|| image::ImageFormat::from_path(uri).ok()).flatten()
+    (!is_data)
+        .then(|| image::ImageFormat::from_path(uri).ok())
+        .flatten()
 }

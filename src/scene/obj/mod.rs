@@ -174,7 +174,11 @@ impl<'a> Reader<'a> {
         }
         let [x, y, z, fourth, green, blue, _] = numbers;
         // (A weight of 0 is no place; those who write it mean nothing by it.)
-        let weight = if count == 4 && fourth != 0.0 { fourth } else { 1.0 };
+        let weight = if count == 4 && fourth != 0.0 {
+            fourth
+        } else {
+            1.0
+        };
         let place = [x / weight, y / weight, z / weight];
         let index = self.positions.len() as u32;
         if !place.iter().all(|part| part.abs() <= FARTHEST) {

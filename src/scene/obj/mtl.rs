@@ -352,6 +352,14 @@ mod tests {
     }
 
     #[test]
+    fn capitals_and_halos_change_nothing() {
+        let (materials, notes) = read_all("Newmtl a\nKD 0,5 .1 .1\nd -halo 0.25\n");
+        assert_eq!(notes, [""; 0]);
+        assert_eq!(materials[0].diffuse, Some([0.5, 0.1, 0.1]));
+        assert_eq!(materials[0].opacity, Some(0.25));
+    }
+
+    #[test]
     fn names_of_pictures_may_look_like_anything() {
         for (written, file) in [
             ("map_Kd a b.png", "a b.png"),

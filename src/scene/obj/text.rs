@@ -167,6 +167,21 @@ mod tests {
     }
 
     #[test]
+    fn numbers_are_those_that_programs_write() {
+        for (word, number_there) in [
+            ("1.5", Some(1.5)),
+            ("-1,5", Some(-1.5)),
+            ("+.5e1", Some(5.0)),
+            ("1,000,000", None),
+            ("1.000,5", None),
+            ("nan", None),
+            (",", None),
+        ] {
+            assert_eq!(number(word), number_there, "{word}");
+        }
+    }
+
+    #[test]
     fn records_go_on_and_know_where_they_are() {
         let text = "# c:\\\nf 1 \\ \n 2\\\n3 # three\nusemtl a #1 # red\nf 4\\";
         let records: Vec<Record> = records(text).collect();

@@ -45,7 +45,10 @@ pub fn first_look(scene: &Scene) -> Result<Vec<String>> {
     let mut look = Look::new(scene, &camera)?;
     let ended = look.watch(&mut source)?;
     if !source.notices().is_empty() {
-        bail!("the recording is damaged: {}", notices_told(source.notices()));
+        bail!(
+            "the recording is damaged: {}",
+            notices_told(source.notices())
+        );
     }
     let of_camera = camera.remark(&scene.camera.source, CalibrationNamed::ByKey.place());
     let of_frames = look.warnings(ended, source.good_frames());
