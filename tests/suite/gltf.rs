@@ -420,9 +420,9 @@ fn packed_views_that_lie_are_errors_with_their_place() {
             "575 indices are no triangles",
         ),
         (
-            "\"count\":98}",
-            "\"count\":99}",
-            "bufferViews[0]: ATTRIBUTES of 99 elements are broken",
+            "\"byteLength\":430",
+            "\"byteLength\":400",
+            "bufferViews[0]: ATTRIBUTES of 98 elements are broken",
         ),
         (
             "\"mode\":\"TRIANGLES\"",

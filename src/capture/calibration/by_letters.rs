@@ -3,7 +3,7 @@
 
 use serde_json::{Map, Value};
 
-use super::kinds::{
+use super::values::{
     LensModel, UncheckedCalibration, distortion, flat_numbers, model_of, normalised, number,
     side_px,
 };

@@ -8,12 +8,13 @@ mod colmap;
 mod kinds;
 mod ost;
 mod tree;
+mod values;
 
 use std::path::{Path, PathBuf};
 
 use glam::DVec2;
 
-use self::kinds::UncheckedCalibration;
+use self::values::UncheckedCalibration;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::scene::in_its_place::in_place_of;
 use crate::scene::obj::text::decoded;
