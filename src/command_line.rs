@@ -173,7 +173,7 @@ pub struct ReplayArgs {
     #[arg(long, value_name = "LAYER,…", value_delimiter = ',')]
     pub layers: Vec<Layer>,
     /// Draw these frames alone, by their index in the recording
-    #[arg(long, value_name = "N,…", value_delimiter = ',')]
+    #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = index_of, allow_negative_numbers = true)]
     pub frames: Option<Vec<u32>>,
     /// Show no virtual thing: the undistorted video alone
     #[arg(long)]
@@ -210,7 +210,7 @@ pub struct TrackArgs {
     #[arg(long, value_name = "SCENE")]
     pub anchors: Option<PathBuf>,
     /// Track every marker that is seen, each on its own: the side of their black squares
-    #[arg(long, value_name = "MM", conflicts_with = "anchors")]
+    #[arg(long, value_name = "MM", value_parser = mm_of, allow_negative_numbers = true, conflicts_with = "anchors")]
     pub size_mm: Option<f64>,
     #[command(flatten)]
     pub family: FamilyArgs,
@@ -235,7 +235,7 @@ pub struct BoardArgs {
     #[command(flatten)]
     pub recording: RecordingArgs,
     /// Side of the markers' black squares (of the gauge's with --sizes estimate)
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", value_parser = mm_of, allow_negative_numbers = true)]
     pub size_mm: f64,
     /// Whether all markers have that size, or the others' are to be learnt
     #[arg(long, value_enum, default_value = "given")]
@@ -250,7 +250,7 @@ pub struct BoardArgs {
     #[arg(long, value_enum, default_value = "seen")]
     pub shape: Shape,
     /// What a marker may lie off the plane of the others
-    #[arg(long, value_name = "MM", default_value = "2")]
+    #[arg(long, value_name = "MM", value_parser = mm_of, allow_negative_numbers = true, default_value = "2")]
     pub plane_tolerance_mm: f64,
     #[command(flatten)]
     pub family: FamilyArgs,
@@ -303,10 +303,10 @@ pub struct TargetArgs {
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = counts_of, requires_all = ["square_mm", "marker_mm"])]
     pub charuco: Option<[u32; 2]>,
     /// Side of the target's squares
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", value_parser = mm_of, allow_negative_numbers = true)]
     pub square_mm: Option<f64>,
     /// Side of the black squares of a ChArUco board's markers
-    #[arg(long, value_name = "MM", requires = "charuco")]
+    #[arg(long, value_name = "MM", value_parser = mm_of, allow_negative_numbers = true, requires = "charuco")]
     pub marker_mm: Option<f64>,
     /// Family of a ChArUco board's markers: DICT_4X4_50, DICT_6X6_250, tag36h11, …, or a dictionary's file (.yml)
     #[arg(long, value_name = "NAME", default_value = "DICT_5X5_100", value_parser = family_of, requires = "charuco")]
@@ -323,18 +323,18 @@ pub struct MarkersArgs {
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = counts_of, requires_all = ["size_mm", "gap_mm"])]
     pub board: Option<[u32; 2]>,
     /// The faces of a cube with edges of this length, a marker on each, which are one anchor
-    #[arg(long, value_name = "MM", requires = "size_mm")]
+    #[arg(long, value_name = "MM", value_parser = mm_of, allow_negative_numbers = true, requires = "size_mm")]
     pub cube: Option<f64>,
     /// Markers to be cut out, each on its own
-    #[arg(long, value_name = "ID,…", value_delimiter = ',', requires = "size_mm")]
+    #[arg(long, value_name = "ID,…", value_delimiter = ',', value_parser = index_of, allow_negative_numbers = true, requires = "size_mm")]
     pub ids: Option<Vec<u32>>,
     #[command(flatten)]
     pub target: TargetArgs,
     /// Side of the markers' black squares
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", value_parser = mm_of, allow_negative_numbers = true)]
     pub size_mm: Option<f64>,
     /// White between the markers of a board
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", value_parser = mm_of, allow_negative_numbers = true)]
     pub gap_mm: Option<f64>,
     /// Id of the board's upper left marker, the others follow row by row; or of a cube's front, then right, back, left, top
     /// and bottom
@@ -545,6 +545,19 @@ impl TargetArgs {
     }
 }
 
+/// Millimetres; what they may be, each job says.
+fn mm_of(written: &str) -> Result<f64, String> {
+    let expected =
+        "a number of millimetres is expected, with a point and without its unit, as in 45 or 4.5";
+    written.trim().parse().map_err(|_| expected.to_owned())
+}
+
+/// One of a list of whole numbers.
+fn index_of(written: &str) -> Result<u32, String> {
+    let expected = "whole numbers are expected, joined by commas, as in 0,25,50";
+    written.trim().parse().map_err(|_| expected.to_owned())
+}
+
 /// Columns and rows, "9x6".
 fn counts_of(text: &str) -> Result<[u32; 2], String> {
     let counts = text.split_once('x').and_then(|(columns, rows)| {
@@ -673,10 +686,7 @@ fn family_of(name: &str) -> Result<Family, String> {
     if Family::is_file_name(name) {
         return Family::from_file(Path::new(name)).map_err(|error| error.to_string());
     }
-    Family::from_name(name).ok_or_else(|| {
-        let known: Vec<&str> = Family::all_names().collect();
-        format!("unknown family; allowed: {}", known.join(", "))
-    })
+    Family::from_name(name).ok_or_else(|| Family::unknown(name))
 }
 
 #[cfg(test)]

@@ -43,7 +43,7 @@ const INTERRUPTED: i32 = 130;
 fn main() -> ExitCode {
     #[cfg(target_os = "linux")]
     leave_out_device_selection();
-    let done = run(Cli::parse());
+    let done = run(Cli::try_parse().unwrap_or_else(|error| leave_misused(&error)));
     end_all();
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -51,6 +51,24 @@ fn main() -> ExitCode {
             talk::say(format_args!("gnomon: {error:#}"));
             ExitCode::FAILURE
         }
+    }
+}
+
+/// Says how the command is used and ends the program; a file in a command's place is told as such.
+fn leave_misused(error: &clap::Error) -> ! {
+    let named = std::env::args_os()
+        .nth(1)
+        .filter(|_| error.kind() == clap::error::ErrorKind::InvalidSubcommand);
+    match named.filter(|named| Path::new(named).exists()) {
+        Some(file) => {
+            talk::say(format_args!(
+                "gnomon: {} is a file, not a command: gnomon live, replay and check take a scene, gnomon track, board, \
+                 calibrate and record a recording, gnomon probe pictures (gnomon --help)",
+                Path::new(&file).display()
+            ));
+            std::process::exit(error.exit_code())
+        }
+        None => error.exit(),
     }
 }
 

@@ -1,7 +1,7 @@
 //! What can go wrong with a recording: errors end it, notices do not.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::calibration::CalibrationError;
 
@@ -18,7 +18,7 @@ pub enum CaptureError {
         source_name: String,
     },
     /// There is nothing at this path.
-    #[error("{}: no such file or folder", path.display())]
+    #[error("{}: no such file or folder{}", path.display(), pattern_hint(path))]
     Missing {
         /// What was looked for.
         path: PathBuf,
@@ -32,10 +32,12 @@ pub enum CaptureError {
         error: std::io::Error,
     },
     /// A folder without a video and without pictures.
-    #[error("{}: the folder holds neither a video (video.mp4, .mkv, .avi, …) nor pictures (.png, .jpg, …)", path.display())]
+    #[error("{}: the folder holds neither a video (video.mp4, .mkv, .avi, …) nor pictures (.png, .jpg, …){there}", path.display())]
     NoPictures {
         /// The folder.
         path: PathBuf,
+        /// What it holds instead, after a semicolon, or nothing.
+        there: String,
     },
     /// A session folder in which more than one file could be the recording.
     #[error("{}: both {} and {} could be the session's video; leave one", path.display(), first.display(), second.display())]
@@ -57,6 +59,12 @@ pub enum CaptureError {
         path: PathBuf,
         /// What FFmpeg says, after a colon, or nothing.
         said: String,
+    },
+    /// FFmpeg reads the file, and there is no video in it.
+    #[error("{}: holds no video, but sound or a cover picture alone; a recording is a video or a folder of pictures", path.display())]
+    SoundAlone {
+        /// The file.
+        path: PathBuf,
     },
     /// There is no ffmpeg to decode it.
     #[error("{}: videos are read by ffmpeg, which cannot be started: {error} (Debian: sudo apt install ffmpeg)", path.display())]
@@ -105,6 +113,15 @@ pub enum CaptureError {
     /// The session's calibration cannot be used.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
+}
+
+/// What to say of a name that programs of other kinds take for many files.
+fn pattern_hint(path: &Path) -> &'static str {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    match name.contains(['%', '*', '?']) {
+        true => "; pictures are named by their folder, without a pattern",
+        false => "",
+    }
 }
 
 /// What went wrong without ending the recording.
@@ -168,6 +185,21 @@ impl Notice {
             } => announced.saturating_sub(*ended_at),
         }
     }
+}
+
+/// All of them in words, one after the other; pictures of another size that follow each other are told as one.
+pub fn notices_told(notices: &[Notice]) -> String {
+    let size_of = |notice: &Notice| match notice {
+        Notice::OtherSize { size_px, .. } => Some(*size_px),
+        _ => None,
+    };
+    let alike =
+        |one: &Notice, next: &Notice| size_of(one).is_some() && size_of(one) == size_of(next);
+    let told = notices.chunk_by(alike).map(|run| match run.len() {
+        1 => run[0].to_string(),
+        count => format!("{} (and {} more such)", run[0], count - 1),
+    });
+    told.collect::<Vec<_>>().join("; ")
 }
 
 impl fmt::Display for Notice {

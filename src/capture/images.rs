@@ -51,6 +51,7 @@ impl ImageFrames {
         if paths.is_empty() {
             return Err(CaptureError::NoPictures {
                 path: folder.to_owned(),
+                there: String::new(),
             });
         }
         paths.sort_by(|a, b| natural_order(&name_of(a), &name_of(b)));

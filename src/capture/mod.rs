@@ -21,9 +21,10 @@ use crate::geometry::quarter_turns::QuarterTurns;
 use crate::scene::plain_file;
 
 pub use calibration::{
-    CalibrationError, calibration_text, check_frame_size, load_calibration, load_calibration_for,
+    CalibrationError, calibration_text, check_frame_size, load_calibration, load_calibration_among,
+    load_calibration_for,
 };
-pub use error::{CaptureError, Notice};
+pub use error::{CaptureError, Notice, notices_told};
 
 use images::{Image, ImageFrames};
 use times::FrameTimes;
@@ -136,14 +137,20 @@ impl FrameSource {
         };
         let videos: Vec<&PathBuf> = files.iter().filter(|file| is_session_video(file)).collect();
         let pictures = match videos.as_slice() {
-            [] => PictureSource::Images(ImageFrames::open(
-                folder,
-                files
+            [] => {
+                let pictures: Vec<PathBuf> = files
                     .iter()
                     .filter(|file| images::is_image(file))
                     .cloned()
-                    .collect(),
-            )?),
+                    .collect();
+                if pictures.is_empty() {
+                    return Err(CaptureError::NoPictures {
+                        path: folder.to_owned(),
+                        there: what_is_there(&files),
+                    });
+                }
+                PictureSource::Images(ImageFrames::open(folder, pictures)?)
+            }
             [video] => PictureSource::Video(Box::new(VideoFrames::open(video)?)),
             [first, second, ..] => {
                 return Err(CaptureError::SeveralVideos {
@@ -263,7 +270,10 @@ impl FrameSource {
             return Ok(None);
         };
         self.good_frames += 1;
-        let time_secs = self.times.time_secs(index).unwrap_or(time_secs);
+        let time_secs = self
+            .times
+            .time_secs(index, 1.0 / self.fps())
+            .unwrap_or(time_secs);
         let mut frame = Frame {
             index,
             time_secs,
@@ -276,13 +286,19 @@ impl FrameSource {
         Ok(Some(frame))
     }
 
-    /// What is done to the pictures' colours that a user should know.
+    /// What is done to the pictures, or guessed of them, that a user should know.
     pub fn remark(&self) -> Option<String> {
         match &self.pictures {
             PictureSource::Video(video) => video
                 .remark()
                 .map(|remark| format!("{}: {remark}", self.path.display())),
-            PictureSource::Images(_) => None,
+            PictureSource::Images(images) => {
+                let missing = self.times.missing(images.frame_count())?;
+                Some(format!(
+                    "{}: {missing}",
+                    self.path.join(TIMES_NAME).display()
+                ))
+            }
         }
     }
 
@@ -310,12 +326,50 @@ fn files_of(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
-        if path.is_file() {
+        // What is hidden is no picture: macOS leaves `._1.png` beside each file on foreign disks.
+        let is_hidden = path
+            .file_name()
+            .is_some_and(|name| name.as_encoded_bytes().starts_with(b"."));
+        if path.is_file() && !is_hidden {
             files.push(path);
         }
     }
     files.sort();
     Ok(files)
+}
+
+/// What a folder has in place of a recording, in words that go on a sentence.
+fn what_is_there(files: &[PathBuf]) -> String {
+    const LISTED: usize = 3;
+    let is_video = |file: &&PathBuf| has_extension(file, &VIDEO_EXTENSIONS);
+    if let Some(video) = files.iter().find(is_video) {
+        return format!(
+            "; a video by another name is meant by its own path, as {}",
+            video.display()
+        );
+    }
+    let names: Vec<String> = files
+        .iter()
+        .take(LISTED)
+        .map(|file| {
+            file.file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned()
+        })
+        .collect();
+    let more = if files.len() > LISTED { ", …" } else { "" };
+    let is_heic = files
+        .iter()
+        .any(|file| has_extension(file, &["heic", "heif", "avif"]));
+    match (names.is_empty(), is_heic) {
+        (true, _) => "; it is empty".to_owned(),
+        (false, false) => format!("; it has {}{more}", names.join(", ")),
+        (false, true) => format!(
+            "; it has {}{more}, which have to be saved as JPEG or PNG first",
+            names.join(", ")
+        ),
+    }
 }
 
 fn is_session_video(file: &Path) -> bool {

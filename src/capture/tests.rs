@@ -269,6 +269,93 @@ fn a_broken_image_and_one_of_another_size_are_left_out() {
 }
 
 #[test]
+fn hidden_files_are_no_frames_and_times_go_on() {
+    let folder = tempfile::tempdir().unwrap();
+    make_images(folder.path(), 4);
+    for name in ["._shot_1.png", ".DS_Store", ".hidden.png"] {
+        fs::write(folder.path().join(name), "no picture").unwrap();
+    }
+    fs::write(
+        folder.path().join("times.csv"),
+        "frame,time_s\n0,0\n1,0.1\n",
+    )
+    .unwrap();
+    let mut source = open(folder.path()).unwrap();
+    let remark = source.remark().unwrap();
+    assert!(remark.contains("times for 2 of 4 frames"), "{remark}");
+    let mut secs = Vec::new();
+    while let Some(frame) = source.next_frame().unwrap() {
+        secs.push(frame.time_secs);
+    }
+    assert_eq!(secs.len(), 4, "{}", said(&source));
+    for (found, expected) in secs.iter().zip([0.0, 0.1, 0.2, 0.3]) {
+        assert!((found - expected).abs() < 1e-9, "{secs:?}");
+    }
+    assert!(source.notices().is_empty(), "{}", said(&source));
+}
+
+#[test]
+fn a_folder_says_what_it_has_instead() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |source: &Path| open(source).err().unwrap().to_string();
+    assert!(refused(folder.path()).contains("it is empty"));
+    fs::write(folder.path().join("IMG_1.HEIC"), "x").unwrap();
+    let heic = refused(folder.path());
+    assert!(
+        heic.contains("it has IMG_1.HEIC, which have to be saved as JPEG"),
+        "{heic}"
+    );
+    fs::write(folder.path().join("GX01.MP4"), "x").unwrap();
+    let video = refused(folder.path());
+    assert!(
+        video.contains("by its own path, as") && video.contains("GX01.MP4"),
+        "{video}"
+    );
+    let pattern = refused(&folder.path().join("%06d.png"));
+    assert!(pattern.contains("without a pattern"), "{pattern}");
+    for (name, text, part) in [
+        (
+            "a.mp4",
+            "version https://git-lfs.github.com/spec/v1\n",
+            "Git LFS",
+        ),
+        ("b.mp4", "<!DOCTYPE html>", "a page of the web"),
+        ("c.mp4", "", "the file is empty"),
+    ] {
+        let path = folder.path().join(name);
+        fs::write(&path, text).unwrap();
+        let said = refused(&path);
+        assert!(said.contains(part), "{name}: {said}");
+    }
+}
+
+#[test]
+fn notices_of_a_kind_are_told_as_one() {
+    let other = |frame| Notice::OtherSize {
+        path: "a.ts".into(),
+        frame,
+        size_px: [4, 2],
+        expected_px: [2, 2],
+    };
+    let broken = Notice::Corrupt {
+        path: "a.ts".into(),
+        first: 9,
+        count: 1,
+    };
+    let told = notices_told(&[other(3), other(4), broken, other(7)]);
+    let parts: Vec<&str> = told.split("; ").collect();
+    assert!(
+        told.contains("frame 3 is 4 x 2") && told.contains("left out (and 1 more such)"),
+        "{told}"
+    );
+    assert!(
+        told.contains("frame 7") && !told.contains("frame 4"),
+        "{told}"
+    );
+    assert!(parts.len() >= 3);
+}
+
+#[test]
 fn what_is_no_recording_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |source: &str| FrameSource::open(source).err().unwrap().to_string();

@@ -74,8 +74,30 @@ impl FrameTimes {
         }
     }
 
-    pub(super) fn time_secs(&self, frame: u32) -> Option<f64> {
-        self.secs_by_frame.get(&frame).copied()
+    /// A frame's time; of one that the file leaves out, so many frames of `frame_secs` after (else before) the nearest that it
+    /// has, for times must not go back. `None` where the file has none at all.
+    pub(super) fn time_secs(&self, frame: u32, frame_secs: f64) -> Option<f64> {
+        let before = self.secs_by_frame.range(..=frame).next_back();
+        let after = self.secs_by_frame.range(frame..).next();
+        let (near, secs) = before.or(after)?;
+        let by_rate = secs + (f64::from(frame) - f64::from(*near)) * frame_secs;
+        // Between two that it has it stays between them.
+        Some(match (before, after) {
+            (Some((first, from)), Some((last, to))) if last > first => {
+                from + (to - from) * f64::from(frame - first) / f64::from(last - first)
+            }
+            _ => by_rate,
+        })
+    }
+
+    /// What to say where the file leaves out some of so many frames.
+    pub(super) fn missing(&self, frames: u32) -> Option<String> {
+        let there = self.secs_by_frame.range(..frames).count() as u32;
+        (there > 0 && there < frames).then(|| {
+            format!(
+                "it has times for {there} of {frames} frames; the others are placed by its rate"
+            )
+        })
     }
 
     /// The mean rate; `None` with less than two times, or where it is no camera's.
@@ -106,8 +128,11 @@ mod tests {
     #[test]
     fn times_are_read() {
         let times = FrameTimes::parse("frame,time_s\n0,0.0\n1,0.04\n\n3, 0.12\r\n").unwrap();
-        assert_eq!(times.time_secs(3), Some(0.12));
-        assert_eq!(times.time_secs(2), None);
+        assert_eq!(times.time_secs(3, 0.1), Some(0.12));
+        // Between its neighbours, and beyond the last by the rate.
+        assert!((times.time_secs(2, 0.1).unwrap() - 0.08).abs() < 1e-12);
+        assert!((times.time_secs(5, 0.1).unwrap() - 0.32).abs() < 1e-12);
+        assert_eq!(FrameTimes::default().time_secs(5, 0.1), None);
         assert!((times.fps().unwrap() - 25.0).abs() < 1e-9);
     }
 

@@ -92,6 +92,14 @@ pub fn linear_from_srgb(encoded: f64) -> f64 {
     }
 }
 
+/// The display value of linear light (IEC 61966-2-1); what is darker than black or brighter than white is these.
+pub fn srgb_from_linear(linear: f64) -> f64 {
+    match linear <= 0.003_130_8 {
+        true => 12.92 * linear.max(0.0),
+        false => (1.055 * linear.powf(1.0 / 2.4) - 0.055).min(1.0),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

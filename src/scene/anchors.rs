@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
 use super::bundle::{BundleFile, TagRanges};
-use super::error::{SceneError, suggestion};
+use super::error::SceneError;
 use super::named_files::FileKind;
 use super::placement::{ANGLE, turn};
 use super::ranges::{Digits, Numbers, Whole};
@@ -275,12 +275,7 @@ impl AnchorReader {
         let family = if Family::is_file_name(written) {
             Family::from_file(&value.existing_path(FileKind::Dictionary)?)?
         } else {
-            Family::from_name(written).ok_or_else(|| {
-                value.error(format!(
-                    "unknown family{}",
-                    suggestion(written, &Family::all_names().collect::<Vec<_>>())
-                ))
-            })?
+            Family::from_name(written).ok_or_else(|| value.error(Family::unknown(written)))?
         };
         let unknown = match self.detector {
             DetectorKind::ByFamily => return Ok(family),

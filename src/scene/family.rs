@@ -4,6 +4,7 @@ use std::fmt;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
+use super::error::suggestion;
 use super::{Dictionary, SceneError};
 
 /// A family of markers as printed: its codes and the black border around them. The same code in another border is
@@ -111,6 +112,20 @@ const OTHER_NAMES: [(&str, &str); 2] = [
     ("ARUCO", "DICT_ARUCO_ORIGINAL"),
 ];
 
+/// A name without what says that it is one: `36h11` of `AprilTag 36h11` and of `DICT_APRILTAG_36h11`.
+fn core_of(name: &str) -> String {
+    let plain: String = name
+        .chars()
+        .filter(char::is_ascii_alphanumeric)
+        .map(|letter| letter.to_ascii_lowercase())
+        .collect();
+    let mut core = plain.as_str();
+    for word in ["dict", "april", "aruco", "tag"] {
+        core = core.strip_prefix(word).unwrap_or(core);
+    }
+    core.to_owned()
+}
+
 const fn own(name: &'static str, codes: Codes) -> (&'static str, Codes, Drawing) {
     (name, codes, Drawing::Own)
 }
@@ -175,6 +190,33 @@ impl Family {
             .iter()
             .find(|(known, ..)| known.eq_ignore_ascii_case(name))
             .map(|&(_, codes, drawing)| Self::of(codes).drawn_as(drawing))
+    }
+
+    /// What to say of a name that is none: the families that it may mean, and all that there are.
+    pub fn unknown(written: &str) -> String {
+        let names: Vec<&str> = Self::all_names().collect();
+        let core = core_of(written);
+        let meant: Vec<String> = NAMES
+            .iter()
+            .filter(|(name, ..)| !core.is_empty() && core_of(name) == core)
+            .map(
+                |(name, codes, drawing)| match (drawing, Self::of(*codes).is_april_tag()) {
+                    (Drawing::OpenCv, _) => {
+                        format!("\"{name}\" (as OpenCV draws it, the other way up)")
+                    }
+                    (Drawing::Own, true) => format!("\"{name}\" (as AprilTag prints it)"),
+                    (Drawing::Own, false) => format!("\"{name}\""),
+                },
+            )
+            .collect();
+        match meant.is_empty() {
+            true => format!("unknown family{}", suggestion(written, &names)),
+            false => format!(
+                "unknown family; did you mean {}? allowed: {}",
+                meant.join(" or "),
+                names.join(", ")
+            ),
+        }
     }
 
     /// Of OpenCV's dictionaries, which begin with the same markers, the smallest that has a number; else the family itself.

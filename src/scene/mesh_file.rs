@@ -8,6 +8,7 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 
 use super::animation::{Animation, WantedAnimation};
 use super::error::SceneError;
+use super::in_its_place::in_place_of;
 use super::mask_cut::cut_masks;
 use super::named_files::FileKind;
 use super::obj::files::named_file;
@@ -157,6 +158,14 @@ fn read(
             let message = format!("{what} is not read; allowed: glTF, OBJ, PLY, STL");
             return Err(SceneError::of_file(path, message));
         }
+        MeshFormat::InItsPlace(what) => {
+            let what = match what.contains("archive") {
+                true => "an archive (a ZIP file, 3MF, USDZ or what was downloaded): unpack it",
+                false => what,
+            };
+            let message = format!("{what}; a mesh is expected: glTF, OBJ, PLY, STL");
+            return Err(SceneError::of_file(path, message));
+        }
     };
     drop(bytes);
     cut_masks(&mut model, path)?;
@@ -252,6 +261,8 @@ pub enum MeshFormat {
     Ply,
     /// One that is not read, in words.
     Other(&'static str),
+    /// No model, in words, with what to do.
+    InItsPlace(&'static str),
 }
 
 impl MeshFormat {
@@ -260,7 +271,13 @@ impl MeshFormat {
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         let head = String::from_utf8_lossy(&bytes[..bytes.len().min(512)]);
         let head = head.trim_start_matches('\u{feff}').trim_start();
-        if bytes.starts_with(b"glTF") || extension == "glb" || extension == "gltf" {
+        if let Some(what) = in_place_of(bytes) {
+            Self::InItsPlace(what)
+        } else if bytes.starts_with(b"glTF")
+            || head.starts_with('{')
+            || extension == "glb"
+            || extension == "gltf"
+        {
             Self::Gltf
         } else if ply::is_ply(bytes) {
             Self::Ply
@@ -268,8 +285,21 @@ impl MeshFormat {
             Self::Stl
         } else if head.starts_with("Kaydara FBX") || head.starts_with("; FBX") {
             Self::Other("an FBX file")
-        } else if head.starts_with("PK\u{3}\u{4}") {
-            Self::Other("a ZIP file (3MF, USDZ or what was downloaded; unpack it)")
+        } else if is_picture(bytes) {
+            Self::Other("a picture")
+        } else if bytes.starts_with(b"MM\0") || extension == "3ds" {
+            Self::Other("a 3DS file")
+        } else if bytes.starts_with(b"DRACO") {
+            Self::Other("a Draco file")
+        } else if extension == "mtl" {
+            Self::Other("a library of materials, beside the .obj that is meant,")
+        } else if [
+            "dxf", "max", "c4d", "skp", "ma", "mb", "lwo", "x3d", "iges", "igs", "splat",
+        ]
+        .iter()
+        .any(|other| extension == *other)
+        {
+            Self::Other("a file of this kind")
         } else if head.starts_with("BLENDER") {
             Self::Other("a Blender file")
         } else if head.starts_with('<') {
@@ -291,9 +321,15 @@ impl MeshFormat {
     fn up(self) -> Up {
         match self {
             Self::Gltf => Up::Y,
-            Self::Obj | Self::Stl | Self::Ply | Self::Other(_) => Up::Z,
+            Self::Obj | Self::Stl | Self::Ply | Self::Other(_) | Self::InItsPlace(_) => Up::Z,
         }
     }
+}
+
+fn is_picture(bytes: &[u8]) -> bool {
+    use image::ImageFormat::{Bmp, Gif, Jpeg, Png, Tiff, WebP};
+    let format = image::guess_format(bytes);
+    format.is_ok_and(|format| [Bmp, Gif, Jpeg, Png, Tiff, WebP].contains(&format))
 }
 
 /// Tells what becomes of materials that let light through.

@@ -27,6 +27,7 @@ mod family;
 mod file_stamp;
 pub mod format;
 pub mod gltf;
+pub mod in_its_place;
 mod lights;
 mod load;
 mod mask_cut;

@@ -65,6 +65,22 @@ fn read_binary(path: &Path, bytes: &[u8]) -> Result<RawModel, SceneError> {
         return Err(SceneError::of_file(path, message));
     };
     let there = bytes.len() as u64;
+    let mut notes = Notes::default();
+    // Who writes as triangles come does not know their number beforehand, and leaves what is no number of them.
+    let room = (there - HEADER as u64) / TRIANGLE as u64;
+    let is_whole = room > 0 && length(room as u32) == there;
+    let count = match is_whole && (count == 0 || length(count) > there) {
+        true => {
+            notes.add_of(
+                path,
+                format!(
+                    "byte 80: the header counts {count} triangles; the file's {room} are taken"
+                ),
+            );
+            room as u32
+        }
+        false => count,
+    };
     if count == 0 {
         return Err(SceneError::of_file(
             path,
@@ -72,12 +88,10 @@ fn read_binary(path: &Path, bytes: &[u8]) -> Result<RawModel, SceneError> {
         ));
     }
     if length(count) > there {
-        let room = (there - HEADER as u64) / TRIANGLE as u64;
         let message =
             format!("byte 80: the header counts {count} triangles, and the file has {room}");
         return Err(SceneError::of_file(path, message));
     }
-    let mut notes = Notes::default();
     if length(count) < there {
         let message = format!(
             "{} bytes behind the last triangle: not used",
@@ -331,13 +345,24 @@ mod tests {
             message.contains("byte 80: the header counts 4 triangles, and the file has 3"),
             "{message}"
         );
-        let mut huge = whole.clone();
+        let mut huge = whole[..whole.len() - 1].to_vec();
         huge[80..84].fill(0xff);
         assert!(
             read_it(&huge)
                 .unwrap_err()
                 .contains("counts 4294967295 triangles")
         );
+        // Of whole triangles the file's number holds: who writes them as they come knows it last.
+        for count in [0, 5, u32::MAX] {
+            let mut unknown = whole.clone();
+            unknown[80..84].copy_from_slice(&count.to_le_bytes());
+            let model = read_it(&unknown).unwrap();
+            assert_eq!(model.triangles.len(), 4);
+            let expected = format!(
+                "a.stl: byte 80: the header counts {count} triangles; the file's 4 are taken"
+            );
+            assert_eq!(model.notes.told(), [expected]);
+        }
         assert!(read_it(&[0; 84]).unwrap_err().contains("no triangles"));
         assert!(
             read_it(&[0; 20])

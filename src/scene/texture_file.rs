@@ -4,11 +4,14 @@ use std::io::Cursor;
 use std::path::Path;
 
 use image::imageops::FilterType;
-use image::{ImageFormat, ImageReader};
+use image::{ColorType, DynamicImage, ImageFormat, ImageReader};
 
+use super::in_its_place::in_place_of;
 use super::plain_file::{self, MOST_PICTURE};
-use crate::light::texture::Texture;
+use crate::light::texture::{Texture, srgb_from_linear};
 
+/// What is read.
+const ALLOWED: &str = "PNG, JPEG, WebP, TGA, BMP, TIFF, GIF, DDS (DXT1 to DXT5), PNM, HDR";
 /// Longest side of a picture that is read, pixels.
 const MOST_SIDE_PX: u32 = 16384;
 /// Longest side of a picture that is kept; a larger one is scaled down.
@@ -37,10 +40,19 @@ pub fn read(path: &Path) -> Result<Texture, String> {
 /// As [`read`] has them.
 pub fn decode(name: String, bytes: &[u8], format: Option<ImageFormat>) -> Result<Texture, String> {
     if bytes.starts_with(b"\xabKTX 20\xbb") {
-        let message = "is KTX2 (Basis Universal), which is not read; allowed: PNG, JPEG, WebP";
-        return Err(message.to_owned());
+        return Err(format!(
+            "is KTX2 (Basis Universal), which is not read; allowed: {ALLOWED}"
+        ));
     }
-    let failed = |error: &dyn std::fmt::Display| format!("cannot be read: {error}");
+    if let Some(what) = in_place_of(bytes) {
+        return Err(format!("is {what}"));
+    }
+    let failed = |error: &dyn std::fmt::Display| match error.to_string() {
+        said if said.contains("not supported") || said.contains("could not be determined") => {
+            format!("cannot be read: {said}; allowed: {ALLOWED}")
+        }
+        said => format!("cannot be read: {said}"),
+    };
     let reader = || {
         let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
         if let (None, Some(format)) = (reader.format(), format) {
@@ -68,12 +80,27 @@ pub fn decode(name: String, bytes: &[u8], format: Option<ImageFormat>) -> Result
         true => picture.resize(KEPT_SIDE_PX, KEPT_SIDE_PX, FilterType::Triangle),
         false => picture,
     };
+    let picture = match picture.color() {
+        ColorType::Rgb32F | ColorType::Rgba32F => in_srgb(picture),
+        _ => picture,
+    };
     let rgba = picture.into_rgba8();
     Ok(Texture {
         name,
         size_px: [rgba.width(), rgba.height()],
         rgba: rgba.into_raw(),
     })
+}
+
+/// Colours as all other pictures have them, of one whose numbers are in proportion to light (Radiance HDR).
+fn in_srgb(picture: DynamicImage) -> DynamicImage {
+    let mut rgba = picture.into_rgba32f();
+    for pixel in rgba.pixels_mut() {
+        for channel in &mut pixel.0[..3] {
+            *channel = srgb_from_linear(f64::from(*channel)) as f32;
+        }
+    }
+    DynamicImage::ImageRgba32F(rgba)
 }
 
 #[cfg(test)]
@@ -96,6 +123,21 @@ mod tests {
         let read = decode("a.jpg".to_owned(), &png, None).unwrap();
         assert_eq!(read.size_px, [3, 2]);
         assert_eq!(read.rgba, image.into_raw());
+        // Linear light, whose half is 188 of 255 by sRGB's curve.
+        let half = image::Rgb32FImage::from_pixel(3, 2, image::Rgb([0.5, 0.0, 2.0]));
+        let read = decode(
+            "a".to_owned(),
+            &encoded(half.into(), ImageFormat::Hdr),
+            None,
+        )
+        .unwrap();
+        assert_eq!(read.rgba[..4], [188, 0, 255, 255]);
+        let plain = RgbaImage::from_pixel(3, 2, image::Rgba([255, 0, 0, 255]));
+        let gif = encoded(plain.clone().into(), ImageFormat::Gif);
+        assert_eq!(
+            decode("a".to_owned(), &gif, None).unwrap().rgba,
+            plain.into_raw()
+        );
         let grey = image::GrayImage::from_pixel(5, 4, image::Luma([99]));
         let jpeg = encoded(grey.into(), ImageFormat::Jpeg);
         let read = decode("b".to_owned(), &jpeg, None).unwrap();

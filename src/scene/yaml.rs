@@ -2,6 +2,7 @@
 //! a stack or a memory.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::ops::Range;
 
 use saphyr_parser::{Event, Parser, ScalarStyle, ScanError, Span};
@@ -48,6 +49,7 @@ impl YamlValue {
         let mut reader = Reader {
             parser: Parser::new_from_str(&text),
             values: 0,
+            anchored: HashMap::new(),
         };
         loop {
             let (event, span) = reader.next()?;
@@ -85,7 +87,10 @@ fn without_opencv_directive(text: &str) -> Cow<'_, str> {
 
 struct Reader<'text> {
     parser: Parser<'text, saphyr_parser::StrInput<'text>>,
+    /// Values so far, those that aliases repeat among them.
     values: usize,
+    /// What `&name` stands before, by the parser's numbers.
+    anchored: HashMap<usize, YamlValue>,
 }
 
 impl<'text> Reader<'text> {
@@ -100,15 +105,24 @@ impl<'text> Reader<'text> {
     fn table(&mut self, level: u32) -> Result<Vec<(String, YamlValue)>, String> {
         let mut known = std::collections::HashSet::new();
         let mut table = Vec::new();
+        let mut merged_keys: Vec<(String, YamlValue)> = Vec::new();
         loop {
             let (event, span) = self.next()?;
             let key = match event {
-                Event::MappingEnd => return Ok(table),
+                Event::MappingEnd => {
+                    merged_keys.retain(|(key, _)| known.insert(key.clone()));
+                    table.append(&mut merged_keys);
+                    return Ok(table);
+                }
                 Event::Scalar(key, ..) => key.into_owned(),
                 _ => return Err(at(&span, "a key must be a word")),
             };
             let (event, value_span) = self.next()?;
             let value = self.value(event, &value_span, level)?;
+            if let ("<<", YamlContent::Table(merged)) = (key.as_str(), &value.content) {
+                merged_keys.extend(merged.iter().cloned());
+                continue;
+            }
             if !known.insert(key.clone()) {
                 return Err(at(&span, &format!("the key '{key}' is there twice")));
             }
@@ -128,13 +142,13 @@ impl<'text> Reader<'text> {
     }
 
     fn value(&mut self, event: Event, span: &Span, level: u32) -> Result<YamlValue, String> {
-        self.values += 1;
-        if level > MOST_LEVELS || self.values > MOST_VALUES {
-            return Err(at(
-                span,
-                &format!("more than {MOST_LEVELS} levels or {MOST_VALUES} values"),
-            ));
-        }
+        self.count(1, level, span)?;
+        let anchor = match &event {
+            Event::Scalar(_, _, anchor, _)
+            | Event::SequenceStart(anchor, _)
+            | Event::MappingStart(anchor, _) => *anchor,
+            _ => 0,
+        };
         let content = match event {
             Event::Scalar(text, style, ..) => YamlContent::Scalar {
                 text: text.into_owned(),
@@ -142,15 +156,54 @@ impl<'text> Reader<'text> {
             },
             Event::SequenceStart(..) => YamlContent::List(self.list(level + 1)?),
             Event::MappingStart(..) => YamlContent::Table(self.table(level + 1)?),
-            // Nine of them make a billion values; no file of a camera or of markers has any.
-            Event::Alias(_) => return Err(at(span, "aliases (*name) are not supported")),
+            Event::Alias(number) => {
+                let anchored = self.anchored.get(&number);
+                let anchored =
+                    anchored.ok_or_else(|| at(span, "the alias stands within what it means"))?;
+                // Nine lists of nine aliases make a billion values: they are counted before they are repeated.
+                let (repeats, levels) = size_of(anchored);
+                let content = anchored.content.clone();
+                self.count(repeats, level + levels, span)?;
+                content
+            }
             _ => return Err(at(span, "a value is missing")),
         };
-        Ok(YamlValue {
+        let value = YamlValue {
             line: span.start.line(),
             column: span.start.col() + 1,
             content,
+        };
+        if anchor > 0 {
+            // It is kept twice.
+            self.count(size_of(&value).0, level, span)?;
+            self.anchored.insert(anchor, value.clone());
+        }
+        Ok(value)
+    }
+
+    fn count(&mut self, values: usize, level: u32, span: &Span) -> Result<(), String> {
+        self.values += values;
+        if level > MOST_LEVELS || self.values > MOST_VALUES {
+            return Err(at(
+                span,
+                &format!("more than {MOST_LEVELS} levels or {MOST_VALUES} values"),
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// How many values a value is, and of how many levels below itself.
+fn size_of(value: &YamlValue) -> (usize, u32) {
+    let of_all = |values: &mut dyn Iterator<Item = &YamlValue>| {
+        values.map(size_of).fold((1, 0), |(count, levels), inner| {
+            (count + inner.0, levels.max(inner.1 + 1))
         })
+    };
+    match &value.content {
+        YamlContent::Scalar { .. } => (1, 0),
+        YamlContent::List(list) => of_all(&mut list.iter()),
+        YamlContent::Table(table) => of_all(&mut table.iter().map(|(_, value)| value)),
     }
 }
 
@@ -170,4 +223,55 @@ fn at(span: &Span, message: &str) -> String {
         span.start.line(),
         span.start.col() + 1
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tree without its places.
+    fn plain(value: &YamlValue) -> String {
+        match &value.content {
+            YamlContent::Scalar { text, .. } => text.clone(),
+            YamlContent::List(list) => {
+                format!("[{}]", list.iter().map(plain).collect::<Vec<_>>().join(" "))
+            }
+            YamlContent::Table(table) => {
+                let entries = table
+                    .iter()
+                    .map(|(key, value)| format!("{key}:{}", plain(value)));
+                format!("{{{}}}", entries.collect::<Vec<_>>().join(" "))
+            }
+        }
+    }
+
+    #[test]
+    fn aliases_stand_for_what_they_name() {
+        for (text, expected) in [
+            ("a: &x [1, 2]\nb: *x\n", "{a:[1 2] b:[1 2]}"),
+            (
+                "a: &x {k: 1, l: 2}\nb: {<<: *x, k: 3}\n",
+                "{a:{k:1 l:2} b:{k:3 l:2}}",
+            ),
+        ] {
+            let value = YamlValue::of_text(text).unwrap().unwrap();
+            assert_eq!(plain(&value), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_few_lines_do_not_become_a_billion_values() {
+        let mut text = "a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1]\n".to_owned();
+        for level in 1..12 {
+            let alias = vec![format!("*a{}", level - 1); 9].join(", ");
+            text += &format!("a{level}: &a{level} [{alias}]\n");
+        }
+        let message = YamlValue::of_text(&text).unwrap_err();
+        assert!(
+            message.contains("more than 32 levels or 200000 values"),
+            "{message}"
+        );
+        let itself = YamlValue::of_text("a: &x [1, *x]\n").unwrap_err();
+        assert!(itself.starts_with("line 1 column"), "{itself}");
+    }
 }

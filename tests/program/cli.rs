@@ -887,3 +887,76 @@ fn a_machine_without_a_desktop_complains_of_nothing() {
     let said = stderr(&output);
     assert!(output.status.success() && !said.contains("error"), "{said}");
 }
+
+/// What somebody types who has not read the manual, and what says how it is meant.
+#[test]
+fn what_is_typed_wrong_is_told_how_it_is_meant() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("walk.mp4"), "x").expect("written");
+    for (arguments, code, part) in [
+        (
+            &["walk.mp4"][..],
+            2,
+            "walk.mp4 is a file, not a command: gnomon live, replay and check take a scene",
+        ),
+        (
+            &["replay", "a.toml", "--frames", "0-3"],
+            2,
+            "whole numbers are expected, joined by commas",
+        ),
+        (
+            &["replay", "a.toml", "--frames", "-1"],
+            2,
+            "whole numbers are expected",
+        ),
+        (
+            &["track", "walk.mp4", "--size-mm", "-5", "--poses", "-"],
+            1,
+            "--size-mm -5: out of range; allowed: 0.1 to",
+        ),
+        (
+            &["track", "walk.mp4", "--size-mm", "40mm", "--poses", "-"],
+            2,
+            "a number of millimetres is expected",
+        ),
+        (
+            &[
+                "markers",
+                "--ids",
+                "0",
+                "--size-mm",
+                "40",
+                "--out",
+                "a.svg",
+                "--family",
+                "AprilTag 36h11",
+            ],
+            2,
+            "did you mean \"tag36h11\" (as AprilTag prints it) or \"DICT_APRILTAG_36h11\"",
+        ),
+        (
+            &[
+                "markers",
+                "--ids",
+                "0",
+                "--size-mm",
+                "40",
+                "--out",
+                "a.svg",
+                "--family",
+                "4x4_50",
+            ],
+            2,
+            "did you mean \"DICT_4X4_50\"?",
+        ),
+    ] {
+        let output = gnomon(folder.path())
+            .args(arguments)
+            .output()
+            .expect("a run");
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {said}");
+        assert!(said.contains(part), "{arguments:?}: {said}");
+    }
+    assert!(!folder.path().join("a.svg").exists());
+}

@@ -194,11 +194,19 @@ fn textures_are_read_with_their_transforms() {
         // The picture's top lies where z is high: so does a normal's y, which is across the face's (-y) and u.
         assert_eq!(look.tangent.w, 1.0);
     }
-    let missing = read(&json, &files[..1]).unwrap_err();
+    // Without it the thing has its shape, and the picture's name is told; in capitals and with Windows' strokes it is found.
+    let missing = read(&json, &files[..1]).unwrap();
+    assert!(missing.textures.is_empty());
+    assert_eq!(missing.mesh.triangles.len(), 2);
+    let told = missing.notes.join("\n");
     assert!(
-        missing.contains("images[0]") && missing.contains("p.png"),
-        "{missing}"
+        told.contains("images[0]") && told.contains("p.png"),
+        "{told}"
     );
+    for uri in ["P.PNG", "textures\\p.png", "C:\\me\\p.png"] {
+        json["images"] = json!([{"uri": uri}]);
+        assert_eq!(read(&json, &files).unwrap().textures.len(), 1, "{uri}");
+    }
 }
 
 #[test]
@@ -304,6 +312,157 @@ fn hostile_files_are_errors_with_their_place() {
     data[0..4].copy_from_slice(&f32::NAN.to_le_bytes());
     let message = read(&json, &[("a b.bin", &data)]).unwrap_err();
     assert!(message.contains("element 0 is not finite"), "{message}");
+}
+
+/// What exporters write that no shape depends on: the thing is the same.
+#[test]
+fn what_does_not_matter_refuses_no_model() {
+    type Spoiled = (&'static str, fn(&mut Value));
+    let spoiled: [Spoiled; 11] = [
+        ("extras", |j| {
+            j["nodes"][0]["extras"] = json!(5);
+            j["extras"] = json!("made by hand");
+        }),
+        ("attributes", |j| {
+            j["meshes"][0]["primitives"][0]["attributes"]["_BATCHID"] = json!(1);
+            j["meshes"][0]["primitives"][0]["attributes"]["THICKNESS"] = json!(1);
+        }),
+        ("scenes", |j| {
+            j["scenes"] = json!([{"nodes": [0]}, {"name": "empty"}])
+        }),
+        ("cameras", |j| {
+            j["cameras"] = json!([{"type": "perspective", "perspective": {"yfov": -1}}]);
+            j["nodes"][0]["camera"] = json!(7);
+        }),
+        ("strides", |j| j["bufferViews"][1]["byteStride"] = json!(0)),
+        (
+            "samplers",
+            |j| {
+                j["samplers"] =
+                    json!([{"wrapS": 10496, "wrapT": 5, "magFilter": 9987, "minFilter": 0}])
+            },
+        ),
+        ("alpha", |j| {
+            j["materials"]
+                .as_array_mut()
+                .unwrap()
+                .push(json!({"alphaMode": "blend"}));
+        }),
+        ("required", |j| {
+            j["extensionsRequired"] = json!(["KHR_materials_transmission", "KHR_lights_punctual"])
+        }),
+        ("hidden", |j| {
+            j["nodes"].as_array_mut().unwrap().push(
+                json!({"mesh": 0, "translation": [9, 9, 9], "extensions": {"KHR_node_visibility": {"visible": false}}}),
+            );
+            j["scenes"][0]["nodes"] = json!([0, 2]);
+        }),
+        ("capitals", |j| j["buffers"][0]["uri"] = json!("A%20B.BIN")),
+        ("padding", |j| j["buffers"][0]["uri"] = json!(".\\a b.bin")),
+    ];
+    let (json, data) = square();
+    let expected = read(&json, &[("a b.bin", &data)]).unwrap();
+    for (name, spoil) in spoiled {
+        let mut json = json.clone();
+        spoil(&mut json);
+        let thing =
+            read(&json, &[("a b.bin", &data)]).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!(thing.mesh, expected.mesh, "{name}");
+    }
+    // Normals and texture coordinates that are no numbers are made anew or passed over.
+    let mut broken = data.clone();
+    broken[12..16].copy_from_slice(&f32::NAN.to_le_bytes());
+    let thing = read(&json, &[("a b.bin", &broken)]).unwrap();
+    assert_eq!(thing.mesh.triangles.len(), 2);
+    let told = thing.notes.join("\n");
+    assert!(
+        told.contains("TEXCOORD_0: 1 of 4 are no finite numbers"),
+        "{told}"
+    );
+}
+
+/// Packed by gltfpack from an OBJ file: the same places, to what sixteen bits hold.
+#[test]
+fn what_meshoptimizer_packed_is_the_same_model() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let packed = read_file(&folder.join("tests/models/tin_meshopt.glb"), "phantom").unwrap();
+    let plain = read_file(&folder.join("models/tin.obj"), "phantom").unwrap();
+    assert_eq!(packed.mesh.triangles.len(), plain.mesh.triangles.len());
+    // (Of an OBJ file z points up, of a glTF file y.)
+    let upright = |at: Vec3| Vec3::new(at.x, at.z, -at.y);
+    let size = plain
+        .mesh
+        .positions
+        .iter()
+        .fold(0.0_f32, |size, at| size.max(at.abs().max_element()));
+    for at in &packed.mesh.positions {
+        let near = plain
+            .mesh
+            .positions
+            .iter()
+            .map(|there| there.distance(upright(*at)));
+        let off = near.fold(f32::MAX, f32::min);
+        assert!(off < 2e-4 * size, "{at} is off by {off} of {size}");
+    }
+}
+
+#[test]
+fn packed_views_that_lie_are_errors_with_their_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/models/tin_meshopt.glb");
+    let whole = std::fs::read(file).unwrap();
+    let path = folder.path().join("a.glb");
+    // As long as before, so that all lengths in the file stay true.
+    for (from, to, part) in [
+        (
+            "\"count\":576}",
+            "\"count\":575}",
+            "575 indices are no triangles",
+        ),
+        (
+            "\"byteLength\":430",
+            "\"byteLength\":400",
+            "bufferViews[0]: ATTRIBUTES of 98 elements are broken",
+        ),
+        (
+            "\"mode\":\"TRIANGLES\"",
+            "\"mode\":\"TRIANGLEZ\"",
+            "TRIANGLEZ is not known",
+        ),
+        (
+            "\"byteStride\":2,",
+            "\"byteStride\":3,",
+            "byteStride 3 is not allowed",
+        ),
+        (
+            "\"byteLength\":430",
+            "\"byteLength\":999",
+            "reaches beyond its buffer",
+        ),
+    ] {
+        let at = whole
+            .windows(from.len())
+            .position(|part| part == from.as_bytes());
+        let mut bytes = whole.clone();
+        bytes[at.unwrap()..][..to.len()].copy_from_slice(to.as_bytes());
+        std::fs::write(&path, &bytes).unwrap();
+        let message = read_file(&path, "virtual").unwrap_err();
+        assert!(
+            message.contains("a.glb") && message.contains(part),
+            "{to}: {message}"
+        );
+    }
+    let mut random = fastrand::Rng::with_seed(3);
+    for _ in 0..200 {
+        let mut bytes = whole.clone();
+        for _ in 0..random.usize(1..6) {
+            let at = random.usize(bytes.len() - 700..bytes.len());
+            bytes[at] = random.u8(..);
+        }
+        std::fs::write(&path, &bytes).unwrap();
+        // Whatever it says of it.
+        let _ = read_file(&path, "virtual");
+    }
 }
 
 #[test]

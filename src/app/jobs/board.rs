@@ -16,7 +16,7 @@ use crate::app::stages::known_camera::KnownCamera;
 use crate::app::stages::progress::Progress;
 use crate::app::stages::source::{self, CalibrationNamed};
 use crate::app::talk;
-use crate::capture::{FrameSource, Notice};
+use crate::capture::{FrameSource, Notice, notices_told};
 use crate::scene::{Anchor, CameraSettings, Family, Marker, TrackingSettings};
 use crate::tracking::focal::{CameraLearner, LearntCamera};
 use crate::tracking::mapping::{
@@ -122,10 +122,9 @@ pub fn board(request: &BoardRequest, stop: &AtomicBool) -> Result<()> {
         None => talk::give(&block),
     }
     if !notices.is_empty() {
-        let notices: Vec<String> = notices.iter().map(ToString::to_string).collect();
         bail!(
             "the recording is damaged; the layout was learnt from its good frames: {}",
-            notices.join("; ")
+            notices_told(&notices)
         );
     }
     Ok(())

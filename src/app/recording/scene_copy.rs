@@ -197,7 +197,9 @@ impl Copies<'_> {
                 })?;
                 return self.put(format!("{folder}/mesh.ply"), &named);
             }
-            MeshFormat::Other(what) => bail!("{}: {what} is not copied", mesh.display()),
+            MeshFormat::Other(what) | MeshFormat::InItsPlace(what) => {
+                bail!("{}: {what} is not copied", mesh.display())
+            }
         }
         let (libraries, pictures) = (OwnNames::default(), OwnNames::default());
         let with_own_names = with_libraries_named(mesh, &bytes, |library| {

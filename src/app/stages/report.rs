@@ -5,6 +5,7 @@ use anyhow::{Result, bail};
 use super::tally::Tally;
 use super::tracked::Ended;
 use crate::app::input::sightings::Sightings;
+use crate::capture::notices_told;
 use crate::scene::Anchor;
 
 /// Markers of a size that is off by a smaller part are not worth a word.
@@ -18,7 +19,7 @@ pub struct Report {
     /// What is worth knowing, in words.
     pub remarks: Vec<String>,
     /// What was wrong with the recording, in words.
-    notices: Vec<String>,
+    notices: String,
     /// What was looked for and never found, in words.
     never_found: Option<String>,
     /// Whether it was told to stop before the end.
@@ -59,7 +60,7 @@ impl Report {
         Self {
             done,
             remarks,
-            notices: ended.notices.iter().map(ToString::to_string).collect(),
+            notices: notices_told(&ended.notices),
             never_found: ended.sightings.as_ref().and_then(Sightings::never_found),
             interrupted,
         }
@@ -76,7 +77,7 @@ impl Report {
         if !self.notices.is_empty() {
             bail!(
                 "the recording is damaged; all good frames were done: {}",
-                self.notices.join("; ")
+                self.notices
             );
         }
         if let Some(never_found) = &self.never_found {

@@ -6,7 +6,7 @@ use anyhow::{Result, anyhow};
 
 use super::known_camera::{KnownCamera, LearntFrom, learnt_camera};
 use crate::app::talk;
-use crate::capture::{FrameSource, check_frame_size, load_calibration};
+use crate::capture::{FrameSource, check_frame_size, load_calibration_among};
 use crate::geometry::camera::Intrinsics;
 use crate::scene::{CameraSettings, Scene, TrackingSettings};
 
@@ -71,7 +71,7 @@ pub(crate) fn open_as_it_is(camera: &CameraSettings) -> Result<(FrameSource, Opt
         talk::say(remark);
     }
     let calibration = match &camera.calibration {
-        Some(path) => Some(load_calibration(path)?),
+        Some(path) => Some(load_calibration_among(path, source.size_px())?),
         None => source.calibration(),
     };
     if let Some(intrinsics) = &calibration {

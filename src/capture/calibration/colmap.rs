@@ -1,6 +1,6 @@
 //! COLMAP's `cameras.txt`: a camera a line, `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`.
 
-use super::kinds::UncheckedCalibration;
+use super::values::UncheckedCalibration;
 use crate::geometry::camera::Distortion;
 
 /// COLMAP counts from the picture's corner: its first pixel's centre is at .5.

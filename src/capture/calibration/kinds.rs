@@ -2,34 +2,23 @@
 
 use serde_json::{Map, Value};
 
-use crate::geometry::camera::Distortion;
-
-/// What a file says, before it is known to make sense.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct UncheckedCalibration {
-    pub size_px: Option<[u32; 2]>,
-    pub focal_px: [f64; 2],
-    pub center_px: [f64; 2],
-    pub distortion: Distortion,
-}
-
-/// Which formula a file's coefficients belong to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum LensModel {
-    /// Told by the number of the coefficients, as OpenCV does.
-    ByNumber,
-    /// Five at most.
-    Brown,
-    /// Four.
-    Fisheye,
-}
+use super::by_letters;
+use super::values::{
+    UncheckedCalibration, bad_side, by_number, distortion, flat_numbers, model_of, normalised,
+    side_px,
+};
 
 type Named = Vec<(String, UncheckedCalibration)>;
 
+/// Keys that a message shows of a file that is not known.
+const LISTED_KEYS: usize = 8;
 const OWN_KEYS: [&str; 5] = ["size_px", "focal_px", "center_px", "model", "distortion"];
 // Keys are compared in small letters without underscores, hyphens and blanks.
-const MATRIX_KEYS: [&str; 5] = [
+const MATRIX_KEYS: [&str; 8] = [
     "cameramatrix",
+    "intrinsic",
+    "intrinsics",
+    "cameramtx",
     "intrinsicmatrix",
     "cameraintrinsics",
     "k",
@@ -47,12 +36,48 @@ const DISTORTION_KEYS: [&str; 7] = [
 const WIDTH_KEYS: [&str; 2] = ["imagewidth", "width"];
 const HEIGHT_KEYS: [&str; 2] = ["imageheight", "height"];
 const SIZE_KEYS: [&str; 3] = ["resolution", "imagesize", "imgsize"];
-const MODEL_KEYS: [&str; 3] = ["distortionmodel", "cameramodel", "model"];
+/// Tables and lists in one another in which cameras are looked for.
+const MOST_LEVELS: u32 = 4;
 
 /// The cameras that a tree describes, each with its name.
 pub(super) fn cameras(tree: &Map<String, Value>) -> Result<Named, String> {
+    let is_own = tree.keys().any(|key| OWN_KEYS[..3].contains(&key.as_str()));
+    if !is_own {
+        let found = known_cameras(tree, MOST_LEVELS)?;
+        return match found.is_empty() {
+            true => Err(no_camera(tree)),
+            false => Ok(found),
+        };
+    }
+    Ok(vec![("the camera".to_owned(), of_own(tree)?)])
+}
+
+/// What to say of a table that describes no camera.
+fn no_camera(tree: &Map<String, Value>) -> String {
+    let keys: Vec<&str> = tree.keys().map(String::as_str).take(LISTED_KEYS).collect();
+    let more = if tree.len() > LISTED_KEYS {
+        ", …"
+    } else {
+        ""
+    };
+    format!(
+        "no camera is in it: a calibration has {}, or camera_matrix and distortion_coefficients, or intrinsics, or fx, fy, \
+         cx, cy; this file has {}{more}",
+        OWN_KEYS.join(", "),
+        if keys.is_empty() {
+            "nothing".to_owned()
+        } else {
+            keys.join(", ")
+        }
+    )
+}
+
+/// The cameras of other programs' trees, in tables within tables too; none where there is nothing that is known.
+fn known_cameras(tree: &Map<String, Value>, levels: u32) -> Result<Named, String> {
     let one = |camera| Ok(vec![("the camera".to_owned(), camera)]);
-    if let Some(Value::Object(camera)) = tree.get("camera") {
+    if let Some(Value::Object(camera)) = tree.get("camera")
+        && camera.get("K").is_some_and(Value::is_object)
+    {
         return one(of_session(camera)?);
     }
     if let Some(list) = tree.get("Calibration").and_then(|it| it.get("cameras")) {
@@ -72,10 +97,50 @@ pub(super) fn cameras(tree: &Map<String, Value>) -> Result<Named, String> {
             })
             .collect();
     }
-    if find(tree, &MATRIX_KEYS).is_some() {
+    let has_four = |list: &Value| list.as_array().is_some_and(|list| list.len() == 4);
+    // A sensor of EuRoC's is a camera of Kalibr's without a name.
+    if tree.get("intrinsics").is_some_and(has_four) {
+        return one(of_kalibr(tree)?);
+    }
+    if find(tree, &MATRIX_KEYS).is_some_and(|(_, matrix)| data_of(matrix).is_array()) {
         return one(of_opencv(tree)?);
     }
-    one(of_own(tree)?)
+    if let Some(camera) = by_letters::camera(tree) {
+        return one(camera?);
+    }
+    of_inner_tables(tree, levels)
+}
+
+/// The cameras of tables and of lists of tables within a tree; where they have no size of their own it is the tree's.
+fn of_inner_tables(tree: &Map<String, Value>, levels: u32) -> Result<Named, String> {
+    let mut found = Vec::new();
+    if levels == 0 {
+        return Ok(found);
+    }
+    let size_px = size_of(tree)?;
+    let mut look = |name: String, inner: &Map<String, Value>| {
+        let cameras = known_cameras(inner, levels - 1).map_err(|why| format!("{name}: {why}"))?;
+        found.extend(cameras.into_iter().map(|(_, camera)| {
+            let size_px = camera.size_px.or(size_px);
+            (name.clone(), UncheckedCalibration { size_px, ..camera })
+        }));
+        Ok::<_, String>(())
+    };
+    for (key, value) in tree {
+        match value {
+            Value::Object(inner) => look(key.clone(), inner)?,
+            Value::Array(list) => {
+                let tables = list.iter().enumerate();
+                let tables =
+                    tables.filter_map(|(number, entry)| Some((number, entry.as_object()?)));
+                for (number, inner) in tables {
+                    look(format!("{key}[{number}]"), inner)?;
+                }
+            }
+            _ => {}
+        }
+    }
+    Ok(found)
 }
 
 /// `size_px = [640, 480]`, `focal_px`, `center_px`, `model = "fisheye"`, `distortion = [k1, k2, p1, p2, k3]`.
@@ -122,8 +187,12 @@ fn of_opencv(tree: &Map<String, Value>) -> Result<UncheckedCalibration, String> 
     let model = model_of(tree)?;
     refuse_cut_pictures(tree)?;
     let (key, matrix) = find(tree, &MATRIX_KEYS).ok_or("the camera matrix is missing")?;
-    let [fx, skew, cx, s1, fy, cy, s2, s3, one] = numbers::<9>(data_of(matrix))
+    let [fx, skew, mut cx, s1, fy, mut cy, mut s2, mut s3, one] = numbers::<9>(data_of(matrix))
         .ok_or_else(|| format!("{key} must be a matrix of 3 x 3 finite numbers"))?;
+    // Open3D and MATLAB write columns where others write rows. No picture has its centre at its corner.
+    if [cx, cy] == [0.0; 2] {
+        [cx, cy, s2, s3] = [s2, s3, 0.0, 0.0];
+    }
     if [skew, s1, s2, s3] != [0.0; 4] || one != 1.0 {
         return Err(format!("{key} must be [fx 0 cx; 0 fy cy; 0 0 1]"));
     }
@@ -217,67 +286,6 @@ fn of_calib_io_camera(entry: &Value) -> Result<UncheckedCalibration, String> {
     })
 }
 
-/// The lens model by all keys that decide it. What is not known is refused, never passed over.
-fn model_of(tree: &Map<String, Value>) -> Result<LensModel, String> {
-    let mut found = LensModel::ByNumber;
-    for (key, value) in tree {
-        let name = normalised(key);
-        let is_fisheye = matches!(name.as_str(), "fisheyemodel" | "fisheye" | "isfisheye");
-        let model = if is_fisheye {
-            match value {
-                Value::Null => LensModel::ByNumber,
-                value if value.as_bool() == Some(true) || value.as_f64() == Some(1.0) => {
-                    LensModel::Fisheye
-                }
-                value if value.as_bool() == Some(false) || value.as_f64() == Some(0.0) => {
-                    LensModel::ByNumber
-                }
-                other => return Err(format!("{key} must be 0 or 1, not {other}")),
-            }
-        } else if MODEL_KEYS.contains(&name.as_str()) {
-            model_by_name(key, value)?
-        } else if name == "xi" && value.as_f64() != Some(0.0) {
-            return Err(format!(
-                "{key} belongs to the omnidirectional model, which is not supported"
-            ));
-        } else {
-            continue;
-        };
-        match (found, model) {
-            (_, LensModel::ByNumber) => {}
-            (LensModel::ByNumber, _) => found = model,
-            (before, now) if before != now => {
-                return Err(format!(
-                    "{key} contradicts the other keys of the lens's model"
-                ));
-            }
-            _ => {}
-        }
-    }
-    Ok(found)
-}
-
-fn model_by_name(key: &str, value: &Value) -> Result<LensModel, String> {
-    let name = match value {
-        Value::Null => "",
-        Value::String(name) => name,
-        other => return Err(format!("{key} must be a name, not {other}")),
-    };
-    match normalised(name).as_str() {
-        "" | "pinhole" | "perspective" | "rationalpolynomial" | "rational" | "thinprism"
-        | "tilted" | "opencv" => Ok(LensModel::ByNumber),
-        "plumbbob" | "radtan" | "radialtangential" | "brownconrady" | "brown" | "none" => {
-            Ok(LensModel::Brown)
-        }
-        "equidistant" | "equi" | "fisheye" | "kannalabrandt" | "kannalabrandt4"
-        | "opencvfisheye" => Ok(LensModel::Fisheye),
-        _ => Err(format!(
-            "{key}: the model '{name}' is not supported; plumb_bob (radtan), rational_polynomial and equidistant \
-             (fisheye) are"
-        )),
-    }
-}
-
 /// ROS's matrix is that of the whole picture, which these keys cut or shrink.
 fn refuse_cut_pictures(tree: &Map<String, Value>) -> Result<(), String> {
     for key in ["binning_x", "binning_y"] {
@@ -327,13 +335,6 @@ fn find<'a>(tree: &'a Map<String, Value>, keys: &[&str]) -> Option<(&'a str, &'a
     })
 }
 
-fn normalised(key: &str) -> String {
-    let kept = key
-        .chars()
-        .filter(|letter| !matches!(letter, '_' | '-' | ' '));
-    kept.flat_map(char::to_lowercase).collect()
-}
-
 /// A matrix is written as `{rows, cols, data}`, or as its numbers alone.
 fn data_of(matrix: &Value) -> &Value {
     matrix.get("data").unwrap_or(matrix)
@@ -341,7 +342,7 @@ fn data_of(matrix: &Value) -> &Value {
 
 /// `[width, height]` or `{width, height}`.
 fn size(value: &Value) -> Result<[u32; 2], String> {
-    let sides = match value {
+    let sides = match data_of(value) {
         Value::Array(sides) if sides.len() == 2 => Some((&sides[0], &sides[1])),
         Value::Object(sides) => sides.get("width").zip(sides.get("height")),
         _ => None,
@@ -350,77 +351,6 @@ fn size(value: &Value) -> Result<[u32; 2], String> {
     sides.ok_or_else(|| bad_side("the picture size [width, height]"))
 }
 
-fn side_px(value: &Value) -> Option<u32> {
-    let side = value.as_f64()?;
-    (side.fract() == 0.0 && (1.0..=32768.0).contains(&side)).then_some(side as u32)
-}
-
-fn bad_side(what: &str) -> String {
-    format!("{what} must be whole numbers of pixels from 1 to 32768")
-}
-
 fn numbers<const N: usize>(value: &Value) -> Option<[f64; N]> {
     flat_numbers(value)?.try_into().ok()
-}
-
-/// The numbers of a list, or of a list of rows.
-fn flat_numbers(value: &Value) -> Option<Vec<f64>> {
-    let mut found = Vec::new();
-    for entry in value.as_array()? {
-        match entry {
-            Value::Array(row) => found.extend(
-                row.iter()
-                    .map(Value::as_f64)
-                    .collect::<Option<Vec<f64>>>()?,
-            ),
-            number => found.push(number.as_f64()?),
-        }
-    }
-    Some(found)
-}
-
-fn distortion(model: LensModel, value: Option<&Value>) -> Result<Distortion, String> {
-    let given = match value {
-        None | Some(Value::Null) => Vec::new(),
-        Some(value) => flat_numbers(value)
-            .ok_or("the distortion must be a list of finite numbers k1, k2, p1, p2, k3")?,
-    };
-    let past = |most: usize| given.iter().skip(most).find(|number| **number != 0.0);
-    match model {
-        LensModel::Fisheye => {
-            if let Some(extra) = past(4) {
-                return Err(format!(
-                    "a fisheye has 4 coefficients k1, k2, k3, k4; {extra} is among those after them"
-                ));
-            }
-            let mut four = [0.0; 4];
-            four.iter_mut()
-                .zip(&given)
-                .for_each(|(to, from)| *to = *from);
-            Ok(Distortion::Fisheye(four))
-        }
-        LensModel::Brown if past(5).is_some() => Err(format!(
-            "plumb_bob has 5 coefficients k1, k2, p1, p2, k3, not {}; name the model rational_polynomial",
-            given.len()
-        )),
-        LensModel::Brown | LensModel::ByNumber => by_number(&given),
-    }
-}
-
-/// OpenCV's order; missing coefficients are 0.
-fn by_number(given: &[f64]) -> Result<Distortion, String> {
-    if given.iter().skip(14).any(|number| *number != 0.0) {
-        return Err(format!(
-            "the distortion has {} coefficients; 4, 5, 8, 12 or 14 are supported",
-            given.len()
-        ));
-    }
-    let mut all = [0.0; 14];
-    all.iter_mut().zip(given).for_each(|(to, from)| *to = *from);
-    let [k1, k2, p1, p2, k3, rest @ ..] = all;
-    Ok(if rest == [0.0; 9] {
-        Distortion::Polynomial([k1, k2, p1, p2, k3])
-    } else {
-        Distortion::Rational(all)
-    })
 }

@@ -1,18 +1,24 @@
 //! Calibration files: gnomon's own TOML or JSON, a session's JSON, OpenCV's FileStorage (YAML, XML, JSON), ROS's
-//! `CameraInfo`, Kalibr's camchain, PhotonVision's and calib.io's JSON, COLMAP's `cameras.txt`. All but the last become the
-//! same tree of values first (`tree.rs`), so there is one place that knows the keys (`kinds.rs`).
+//! `CameraInfo` and `ost.txt`, Kalibr's camchain and EuRoC's sensors, PhotonVision's and calib.io's JSON, whatever names
+//! `fx`, `fy`, `cx`, `cy` (RealSense, ORB-SLAM, VINS, NeRF), COLMAP's `cameras.txt`. All but the last become the same tree of
+//! values first (`tree.rs`), so there is one place that knows the keys (`kinds.rs`; `by_letters.rs` for the letters).
 
+mod by_letters;
 mod colmap;
 mod kinds;
+mod ost;
 mod tree;
+mod values;
 
 use std::path::{Path, PathBuf};
 
 use glam::DVec2;
 
-use self::kinds::UncheckedCalibration;
+use self::values::UncheckedCalibration;
 use crate::geometry::camera::{Distortion, Intrinsics};
-use crate::scene::plain_file;
+use crate::scene::in_its_place::in_place_of;
+use crate::scene::obj::text::decoded;
+use crate::scene::plain_file::{self, MOST_TEXT};
 
 /// Why a calibration cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -69,6 +75,20 @@ pub enum CalibrationError {
 /// Reads a calibration that says its own picture size.
 pub fn load_calibration(path: &Path) -> Result<Intrinsics, CalibrationError> {
     let calibration = read(path, None)?;
+    let size_px = calibration
+        .size_px
+        .ok_or_else(|| CalibrationError::NoSize {
+            path: path.to_owned(),
+        })?;
+    calibration.into_intrinsics(path, size_px)
+}
+
+/// As [`load_calibration`], for frames of a known size, which tells the camera that is meant where the file holds several.
+pub fn load_calibration_among(
+    path: &Path,
+    frame_px: [u32; 2],
+) -> Result<Intrinsics, CalibrationError> {
+    let calibration = read(path, Some(frame_px))?;
     let size_px = calibration
         .size_px
         .ok_or_else(|| CalibrationError::NoSize {
@@ -196,13 +216,49 @@ impl UncheckedCalibration {
     }
 }
 
+/// What a calibration is written in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Language {
+    Toml,
+    Json,
+    Yaml,
+    Xml,
+    /// ROS's `ost.txt`.
+    Ost,
+    /// COLMAP's `cameras.txt`.
+    Colmap,
+}
+
+impl Language {
+    /// By a file's extension, and where that says nothing by its text.
+    fn of(extension: &str, text: &str) -> Option<Self> {
+        let begins = |start: &str| text.trim_start().starts_with(start);
+        match extension {
+            "toml" => return Some(Self::Toml),
+            "json" => return Some(Self::Json),
+            "yaml" | "yml" => return Some(Self::Yaml),
+            "xml" => return Some(Self::Xml),
+            _ => {}
+        }
+        if begins("{") {
+            Some(Self::Json)
+        } else if begins("<") {
+            Some(Self::Xml)
+        } else if ost::is_ost(text) {
+            Some(Self::Ost)
+        } else if extension == "txt" && !begins("%YAML") {
+            Some(Self::Colmap)
+        } else {
+            tree::of_yaml(text).is_ok().then_some(Self::Yaml)
+        }
+    }
+}
+
 fn read(path: &Path, frame_px: Option<[u32; 2]>) -> Result<UncheckedCalibration, CalibrationError> {
-    let text = plain_file::read_text(path).map_err(|error| CalibrationError::Io {
+    let bytes = plain_file::read(path, MOST_TEXT).map_err(|error| CalibrationError::Io {
         path: path.to_owned(),
         error,
     })?;
-    // Windows' editors begin a file with a byte order mark.
-    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     let syntax = |message| CalibrationError::Syntax {
         path: path.to_owned(),
         message,
@@ -211,22 +267,32 @@ fn read(path: &Path, frame_px: Option<[u32; 2]>) -> Result<UncheckedCalibration,
         path: path.to_owned(),
         message,
     };
+    if let Some(what) = in_place_of(&bytes) {
+        return Err(syntax(format!("{what}; a calibration is expected")));
+    }
+    // Windows' editors begin a file with a byte order mark, and some still write no UTF-8.
+    let text = decoded(&bytes);
     let extension = path
         .extension()
         .and_then(|extension| extension.to_str())
         .unwrap_or_default()
         .to_ascii_lowercase();
-    let tree = match extension.as_str() {
-        "toml" => tree::of_toml(text),
-        "json" => tree::of_json(text),
-        "yaml" | "yml" => tree::of_yaml(text),
-        "xml" => tree::of_xml(text),
-        "txt" => {
-            let cameras = colmap::cameras(text).map_err(value)?;
+    let language = match text.contains('\0') {
+        true => None,
+        false => Language::of(&extension, &text),
+    };
+    let tree = match language {
+        Some(Language::Toml) => tree::of_toml(&text),
+        Some(Language::Json) => tree::of_json(&text),
+        Some(Language::Yaml) => tree::of_yaml(&text),
+        Some(Language::Xml) => tree::of_xml(&text),
+        Some(Language::Ost) => ost::tree(&text),
+        Some(Language::Colmap) => {
+            let cameras = colmap::cameras(&text).map_err(value)?;
             return only_camera(cameras, frame_px).map_err(value);
         }
-        _ => Err(
-            "a calibration is a .toml, .json, .yaml, .yml or .xml file, or COLMAP's cameras.txt"
+        None => Err(
+            "a calibration is a .toml, .json, .yaml, .yml or .xml file, ROS's ost.txt or COLMAP's cameras.txt"
                 .to_owned(),
         ),
     };

@@ -416,3 +416,126 @@ fn the_frames_size_must_be_the_calibrations() {
         [1280, 720]
     );
 }
+
+/// The same camera, four coefficients, as programs that nobody here uses write it.
+#[test]
+fn other_programs_write_the_same_camera() {
+    let euroc = "sensor_type: camera\nrate_hz: 20\nresolution: [640, 480]\ncamera_model: pinhole\n\
+        intrinsics: [615.0, 613.0, 321.4, 238.2] #fu, fv, cu, cv\ndistortion_model: radial-tangential\n\
+        distortion_coefficients: [0.08, -0.19, 0.0008, -0.0005]\n";
+    let orb_slam = "%YAML:1.0\nCamera.type: \"PinHole\"\nCamera.fx: 615.0\nCamera.fy: 613.0\nCamera.cx: 321.4\n\
+        Camera.cy: 238.2\nCamera.k1: 0.08\nCamera.k2: -0.19\nCamera.p1: 0.0008\nCamera.p2: -0.0005\n\
+        Camera.width: 640\nCamera.height: 480\nCamera.fps: 30.0\n";
+    let vins = "%YAML:1.0\n---\nmodel_type: PINHOLE\nimage_width: 640\nimage_height: 480\ndistortion_parameters:\n   \
+        k1: 0.08\n   k2: -0.19\n   p1: 0.0008\n   p2: -0.0005\nprojection_parameters:\n   fx: 615.0\n   fy: 613.0\n   \
+        cx: 321.4\n   cy: 238.2\n";
+    let realsense = r#"{"width": 640, "height": 480, "fx": 615, "fy": 613, "ppx": 321.4, "ppy": 238.2,
+        "model": "Brown Conrady", "coeffs": [0.08, -0.19, 0.0008, -0.0005, 0]}"#;
+    let nerf = r#"{"camera_model": "OPENCV", "fl_x": 615, "fl_y": 613, "cx": 321.4, "cy": 238.2, "w": 640, "h": 480,
+        "k1": 0.08, "k2": -0.19, "p1": 0.0008, "p2": -0.0005, "frames": [{"file_path": "a.png"}]}"#;
+    let quoted = "image_width: \"640\"\nimage_height: '480'\ncamera_matrix: &k [['615', 0, 321.4], [0, 613, 238.2], [0, 0, 1]]\n\
+        dist_coeff: [[0.08, -0.19, 0.0008, -0.0005]]\nagain: *k\n";
+    let nested = r#"{"image_width": 640, "image_height": 480, "calibration": {"left": {"mtx":
+        [[615, 0, 321.4], [0, 613, 238.2], [0, 0, 1]], "dist": [[0.08, -0.19, 0.0008, -0.0005]]}}}"#;
+    let columns = r#"{"width": 640, "height": 480, "intrinsic_matrix": [615, 0, 0, 0, 613, 0, 321.4, 238.2, 1],
+        "distortion": [0.08, -0.19, 0.0008, -0.0005]}"#;
+    let size_matrix = "%YAML:1.0\n---\nintrinsic: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 615., 0., 321.4, \
+        0., 613., 238.2, 0., 0., 1. ]\ndistCoeffs: !!opencv-matrix\n   rows: 1\n   cols: 4\n   dt: d\n   data: [ 0.08, -0.19, \
+        0.0008, -0.0005 ]\nimageSize: !!opencv-matrix\n   rows: 2\n   cols: 1\n   dt: d\n   data: [ 640., 480. ]\n";
+    let ost = "# oST version 5.0 parameters\n\n[image]\n\nwidth\n640\n\nheight\n480\n\n[narrow_stereo]\n\ncamera matrix\n\
+        615.0 0.0 321.4\n0.0 613.0 238.2\n0.0 0.0 1.0\n\ndistortion\n0.08 -0.19 0.0008 -0.0005 0.0\n\nrectification\n\
+        1 0 0\n0 1 0\n0 0 1\n\nprojection\n615 0 321 0\n0 613 238 0\n0 0 1 0\n";
+    let mut expected = lamp();
+    expected.distortion = Distortion::Polynomial([0.08, -0.19, 0.0008, -0.0005, 0.0]);
+    for (name, text) in [
+        ("sensor.yaml", euroc),
+        ("orb.yaml", orb_slam),
+        ("vins.yaml", vins),
+        ("realsense.json", realsense),
+        ("transforms.json", nerf),
+        ("quoted.yaml", quoted),
+        ("nested.json", nested),
+        ("open3d.json", columns),
+        ("size.yml", size_matrix),
+        ("ost.txt", ost),
+        ("no_extension", euroc),
+    ] {
+        let found = load(name, text).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!(found, expected, "{name}");
+    }
+    // No UTF-8 (Latin-1), and UTF-16 as Windows' editors save it.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.yaml");
+    let latin1 = [b"# Kamera f\xfcr innen\n", euroc.as_bytes()].concat();
+    let utf16 = "\u{feff}".encode_utf16().chain(euroc.encode_utf16());
+    for bytes in [latin1, utf16.flat_map(u16::to_le_bytes).collect()] {
+        std::fs::write(&path, bytes).unwrap();
+        assert_eq!(load_calibration(&path).unwrap(), expected);
+    }
+}
+
+#[test]
+fn what_only_looks_like_a_camera_is_refused_by_name() {
+    let inverse = r#"{"width": 640, "height": 480, "fx": 615, "fy": 613, "ppx": 321.4, "ppy": 238.2,
+        "model": "Inverse Brown Conrady", "coeffs": [0.08, -0.19, 0, 0, 0]}"#;
+    for (name, text, part) in [
+        ("a.json", inverse, "Inverse Brown Conrady"),
+        (
+            "a.yaml",
+            "Camera1.fx: 1\nCamera2.fx: 1\nCamera1.fy: 1\n",
+            "several fx",
+        ),
+        (
+            "a.yaml",
+            "fx: 1\nfy: x\ncx: 1\ncy: 1\n",
+            "fy must be a finite number",
+        ),
+        (
+            "a.yaml",
+            "model_type: MEI\nfx: 1\nfy: 1\ncx: 1\ncy: 1\n",
+            "'MEI' is not supported",
+        ),
+        (
+            "a.yaml",
+            "camera_matrix: [.nan, 0, 0, 0, 1, 0, 0, 0, 1]\n",
+            "3 x 3 finite numbers",
+        ),
+        ("a.yaml", "other: 1\n", "this file has other"),
+        ("a.npz", "PK\u{3}\u{4}", "an archive"),
+        ("a.npy", "NUMPY\0", "a calibration is a .toml"),
+        ("a.yaml", "<!DOCTYPE html><html>", "a page of the web"),
+    ] {
+        let said = message(name, text);
+        assert!(said.contains(part), "{text}: {said}");
+    }
+    let without = inverse.replace("0.08, -0.19", "0, 0");
+    assert_eq!(
+        load("a.json", &without).unwrap().distortion,
+        Distortion::NONE
+    );
+}
+
+/// Of two cameras of different sizes frames of a known size tell which is meant.
+#[test]
+fn the_frames_tell_the_camera() {
+    let camera = |name: &str, f: u32, size: &str| {
+        format!(
+            "{name}:\n  camera_model: pinhole\n  intrinsics: [{f}, {f}, 300, 200]\n  distortion_model: none\n  \
+             distortion_coeffs: []\n  resolution: {size}\n"
+        )
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("camchain.yaml");
+    let two = camera("cam0", 600, "[640, 480]") + &camera("cam1", 900, "[1280, 720]");
+    std::fs::write(&path, two).unwrap();
+    for (size_px, focal) in [([640, 480], 600.0), ([1280, 720], 900.0)] {
+        assert_eq!(
+            load_calibration_among(&path, size_px).unwrap().focal_px.x,
+            focal
+        );
+    }
+    let none = load_calibration_among(&path, [320, 240])
+        .unwrap_err()
+        .to_string();
+    assert!(none.contains("2 cameras (cam0, cam1)"), "{none}");
+}

@@ -8,6 +8,8 @@
 pub enum Said {
     /// The file was opened.
     Input,
+    /// There is sound in it, or a picture.
+    Stream,
     /// A video was found in it, and is decoded.
     Decoding,
     /// Of the frames that follow.
@@ -77,6 +79,12 @@ pub fn meaning(line: &str) -> Option<Said> {
     }
     if line.starts_with("[info] Stream mapping:") {
         return Some(Said::Decoding);
+    }
+    let stream = line.strip_prefix("[info]").map(str::trim_start);
+    // (What a cut-off index leaves is called data.)
+    if let Some(said) = stream.filter(|said| said.starts_with("Stream #0:")) {
+        let is_media = said.contains(": Audio:") || said.contains(": Video:");
+        return is_media.then_some(Said::Stream);
     }
     line.starts_with("[info] Input #0").then_some(Said::Input)
 }
@@ -170,6 +178,12 @@ mod tests {
         assert_eq!(
             meaning(broken),
             Some(Said::Complaint("Invalid NAL unit size (1 > 0).".to_owned()))
+        );
+        let sound = "[info]   Stream #0:0[0x1](und): Audio: aac (LC), 44100 Hz, mono";
+        assert_eq!(meaning(sound), Some(Said::Stream));
+        assert_eq!(
+            meaning("[info]   Stream #0:0[0x1]: Data: none (default)"),
+            None
         );
         let ours = "[rawvideo @ 0x5] [error] Application provided invalid dts";
         assert_eq!(meaning(ours), None);

@@ -13,6 +13,7 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use super::error::{CaptureError, Notice};
+use crate::scene::in_its_place::in_place_of;
 use colours::{Colours, ToSrgb};
 use planes::{rgba8, rgba16};
 use probe::{Header, Packets, Probe};
@@ -47,7 +48,7 @@ pub(super) struct VideoFrames {
     waiting: Option<RawFrame>,
     clock: Clock,
     conversion: Conversion,
-    remark: Option<&'static str>,
+    remark: Option<String>,
     damage: Damage,
     next_index: u32,
     good_frames: u32,
@@ -113,7 +114,13 @@ impl VideoFrames {
         if let (Some(first), Some((_, layout, [_, lines]))) =
             (&video.waiting, video.decoder.pixels())
         {
-            video.remark = Colours::of(&first.colours, layout, lines).remark();
+            let of_colours = Colours::of(&first.colours, layout, lines).remark();
+            let remarks: Vec<String> = of_colours
+                .map(str::to_owned)
+                .into_iter()
+                .chain(shape_remarks(&video.header))
+                .collect();
+            video.remark = (!remarks.is_empty()).then(|| remarks.join("; "));
         }
         Ok(video)
     }
@@ -135,9 +142,9 @@ impl VideoFrames {
         self.size_px
     }
 
-    /// What is done to its colours that a user should know.
-    pub(super) fn remark(&self) -> Option<&'static str> {
-        self.remark
+    /// What is done to it that a user should know.
+    pub(super) fn remark(&self) -> Option<&str> {
+        self.remark.as_deref()
     }
 
     pub(super) fn next_picture(
@@ -273,6 +280,25 @@ impl VideoFrames {
     }
 }
 
+/// What a header says of its pixels that a calibration has to know.
+fn shape_remarks(header: &Header) -> impl Iterator<Item = String> {
+    let aspect = header
+        .pixel_aspect
+        .filter(|aspect| (aspect - 1.0).abs() > 1e-3);
+    let of_aspect = aspect.map(|aspect| {
+        format!(
+            "its pixels are shown {aspect:.3} times as wide as high, and taken as they are stored: it needs a calibration of \
+             the same camera and mode"
+        )
+    });
+    let of_fields = header.is_interlaced.then(|| {
+        "it is interlaced: each of its pictures is of two moments, so what moves is combed (ffmpeg -i IN -vf yadif OUT \
+         mends that)"
+            .to_owned()
+    });
+    of_aspect.into_iter().chain(of_fields)
+}
+
 /// From decoded pixels to sRGB.
 #[derive(Default)]
 struct Conversion {
@@ -388,15 +414,25 @@ fn no_decoder(path: &Path, error: NoDecoder) -> CaptureError {
 }
 
 fn no_frame(path: &Path, decoder: &Decoder, complaint: Option<String>) -> CaptureError {
-    if decoder.opened && decoder.has_video {
-        return CaptureError::NoGoodFrame {
+    match decoder.opened {
+        true if decoder.has_video => CaptureError::NoGoodFrame {
             path: path.to_owned(),
-        };
+        },
+        true if decoder.has_streams => CaptureError::SoundAlone {
+            path: path.to_owned(),
+        },
+        _ => no_video(path, complaint),
     }
-    no_video(path, complaint)
 }
 
 fn no_video(path: &Path, complaint: Option<String>) -> CaptureError {
+    let mut head = Vec::new();
+    let read = std::fs::File::open(path).and_then(|file| file.take(256).read_to_end(&mut head));
+    let complaint = match in_place_of(&head) {
+        Some(what) => Some(what.to_owned()),
+        None if read.is_ok() && head.is_empty() => Some("the file is empty".to_owned()),
+        None => complaint,
+    };
     CaptureError::NotAVideo {
         path: path.to_owned(),
         said: complaint.map_or(String::new(), |words| format!(": {words}")),

@@ -31,6 +31,10 @@ pub struct Header {
     pub lines: Option<u32>,
     /// FFmpeg's names of the container.
     pub container: String,
+    /// How wide a pixel is shown for its height, where that is said.
+    pub pixel_aspect: Option<f64>,
+    /// Whether a frame's lines are of two moments.
+    pub is_interlaced: bool,
 }
 
 #[derive(Deserialize)]
@@ -49,6 +53,8 @@ struct Stream {
     avg_frame_rate: Option<String>,
     duration: Option<String>,
     nb_frames: Option<String>,
+    sample_aspect_ratio: Option<String>,
+    field_order: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -73,7 +79,8 @@ pub(super) struct Probe {
 impl Probe {
     /// Begins to ask for the header; `None` where the program cannot be started.
     pub(super) fn start(input_options: &[&str], input: &OsStr) -> Option<Self> {
-        let entries = "stream=height,r_frame_rate,avg_frame_rate,duration,nb_frames:format=format_name,duration";
+        let entries = "stream=height,r_frame_rate,avg_frame_rate,duration,nb_frames,sample_aspect_ratio,field_order\
+                       :format=format_name,duration";
         Self::ask(input_options, input, entries)
     }
 
@@ -130,6 +137,12 @@ pub fn header_of(answer: &str) -> Option<Header> {
         duration_secs: secs(stream.duration.as_ref()).or_else(|| secs(whole)),
         fps: nominal_fps(rate(&stream.avg_frame_rate), rate(&stream.r_frame_rate)),
         lines: stream.height,
+        pixel_aspect: stream
+            .sample_aspect_ratio
+            .and_then(|aspect| ratio(&aspect.replace(':', "/"))),
+        is_interlaced: stream
+            .field_order
+            .is_some_and(|order| matches!(order.as_str(), "tt" | "bb" | "tb" | "bt")),
         container: container
             .and_then(|format| format.format_name)
             .unwrap_or_default(),

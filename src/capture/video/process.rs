@@ -68,6 +68,8 @@ pub(super) struct Decoder {
     /// Whether the file was opened, and there is a video in it.
     pub opened: bool,
     pub has_video: bool,
+    /// Whether there is anything in it.
+    pub has_streams: bool,
     ended: bool,
 }
 
@@ -131,6 +133,7 @@ impl Decoder {
             patience,
             opened: false,
             has_video: false,
+            has_streams: false,
             ended: false,
         })
     }
@@ -140,12 +143,14 @@ impl Decoder {
         while !self.ended {
             match self.said.recv_timeout(self.patience) {
                 Ok(Said::Input) => self.opened = true,
+                Ok(Said::Stream) => self.has_streams = true,
                 Ok(Said::Decoding) => self.has_video = true,
                 Ok(Said::TimeBase { tick_secs, fps }) => {
                     (self.tick_secs, self.fps) = (tick_secs, fps)
                 }
                 Ok(Said::Frame(head)) => self.head = Some(head),
-                Ok(Said::Corrupt) => self.corrupt = true,
+                // (While the file is looked through, it may be of a cover or of sound.)
+                Ok(Said::Corrupt) => self.corrupt |= self.has_video,
                 Ok(Said::Complaint(words) | Said::Fatal(words)) => return Next::Complaint(words),
                 Ok(Said::Colours(colours)) => {
                     if let Some(head) = self.head.take() {

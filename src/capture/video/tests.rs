@@ -298,3 +298,51 @@ fn a_playlist_reaches_for_nothing_else_than_files() {
         "{said}"
     );
 }
+
+/// A cover picture is another stream: what is wrong with it is no damage of the video's.
+#[test]
+fn what_lies_beside_the_video_does_not_damage_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let inside = |name: &str| folder.path().join(name);
+    ffmpeg(
+        folder.path(),
+        "-f lavfi -i testsrc2=size=128x96:rate=30:duration=0.5 -f lavfi -i color=red:s=64x64:d=0.04 -map 0 -map 1 -c:v:0 \
+         libx264 -pix_fmt yuv420p -c:v:1 mjpeg -disposition:v:1 attached_pic cover.mp4",
+    );
+    // Cut off in the cover's own data, as ffprobe sees it in none of the video's packets.
+    let mut bytes = std::fs::read(inside("cover.mp4")).unwrap();
+    let jpeg_end = bytes.windows(2).rposition(|pair| pair == [0xff, 0xd9]);
+    if let Some(end) = jpeg_end {
+        bytes[end..end + 2].fill(0);
+    }
+    std::fs::write(inside("cover.mp4"), bytes).unwrap();
+    let (frames, notices) = all(&inside("cover.mp4"));
+    assert_eq!((frames.len(), notices.len()), (15, 0), "{notices:?}");
+    ffmpeg(folder.path(), "-f lavfi -i sine=d=0.2 sound.m4a");
+    let sound = FrameSource::open(inside("sound.m4a").to_str().unwrap());
+    let message = sound.err().unwrap().to_string();
+    assert!(message.contains("sound.m4a: holds no video"), "{message}");
+}
+
+#[test]
+fn fields_and_oblong_pixels_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    ffmpeg(
+        folder.path(),
+        &format!("{SOURCE} -frames:v 4 -vf setsar=4/3 -c:v libx264 -pix_fmt yuv420p wide.mp4"),
+    );
+    ffmpeg(
+        folder.path(),
+        &format!(
+            "{SOURCE} -frames:v 8 -vf tinterlace=interleave_top -c:v mpeg2video -flags +ilme+ildct fields.mpg"
+        ),
+    );
+    for (name, part) in [
+        ("wide.mp4", "1.333 times as wide as high"),
+        ("fields.mpg", "it is interlaced"),
+    ] {
+        let source = FrameSource::open(folder.path().join(name).to_str().unwrap()).unwrap();
+        let remark = source.remark().unwrap_or_default();
+        assert!(remark.contains(part), "{name}: {remark}");
+    }
+}

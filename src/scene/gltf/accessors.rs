@@ -19,6 +19,46 @@ impl GltfFile<'_> {
         allowed: &[Dimensions],
         missing: f32,
     ) -> Result<Vec<[f32; N]>, SceneError> {
+        let tuples = self.numbers(place, accessor, allowed, missing)?;
+        match tuples.iter().position(|tuple| !is_finite(tuple)) {
+            Some(index) => {
+                let place = format!("{place}: accessors[{}]", accessor.index());
+                Err(self.error(&place, format!("element {index} is not finite")))
+            }
+            None => Ok(tuples),
+        }
+    }
+
+    /// The same of what a surface can do without: a tuple with a number that is none becomes `mended`, and that is told.
+    pub fn mended_floats<const N: usize>(
+        &mut self,
+        place: &str,
+        accessor: &Accessor<'_>,
+        allowed: &[Dimensions],
+        (missing, mended): (f32, [f32; N]),
+    ) -> Result<Vec<[f32; N]>, SceneError> {
+        let mut tuples = self.numbers(place, accessor, allowed, missing)?;
+        let mut count = 0;
+        for tuple in tuples.iter_mut().filter(|tuple| !is_finite(*tuple)) {
+            *tuple = mended;
+            count += 1;
+        }
+        if count > 0 {
+            self.note(format!(
+                "{place}: {count} of {} are no finite numbers and are passed over",
+                tuples.len()
+            ));
+        }
+        Ok(tuples)
+    }
+
+    fn numbers<const N: usize>(
+        &self,
+        place: &str,
+        accessor: &Accessor<'_>,
+        allowed: &[Dimensions],
+        missing: f32,
+    ) -> Result<Vec<[f32; N]>, SceneError> {
         let place = &format!("{place}: accessors[{}]", accessor.index());
         if !allowed.contains(&accessor.dimensions()) {
             let message = format!("{:?}; {allowed:?} is expected", accessor.dimensions());
@@ -40,14 +80,7 @@ impl GltfFile<'_> {
             }
             tuple
         };
-        let tuples = self.elements(place, accessor, [0.0; N], read)?;
-        match tuples
-            .iter()
-            .position(|tuple| !tuple.iter().all(|value| value.is_finite()))
-        {
-            Some(index) => Err(self.error(place, format!("element {index} is not finite"))),
-            None => Ok(tuples),
-        }
+        self.elements(place, accessor, [0.0; N], read)
     }
 
     /// Whole numbers.
@@ -130,6 +163,10 @@ impl GltfFile<'_> {
         }
         Ok(elements)
     }
+}
+
+fn is_finite(tuple: &[f32]) -> bool {
+    tuple.iter().all(|value| value.is_finite())
 }
 
 /// The bytes of elements that stand in steps, all of them there.

@@ -1,22 +1,35 @@
 //! A glTF file as it lies on disk: its JSON, checked, and the bytes of its buffers.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD;
+use base64::alphabet;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use gltf::json::{self, Root};
 use gltf::{Document, Glb};
+use serde_json::Value;
 
-use super::extensions;
+use super::meshopt_views::{self, CompressedView};
+use super::{extensions, lenient};
 use crate::scene::error::SceneError;
+use crate::scene::obj::files::named_file;
 use crate::scene::plain_file::{self, MOST_MESH};
+
+/// With or without the signs at its end, which some exporters leave out.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &alphabet::STANDARD,
+    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
+);
 
 /// A file that was read, with what was told of it so far.
 pub(super) struct GltfFile<'a> {
     pub path: &'a Path,
     pub document: Document,
     pub buffers: Vec<Vec<u8>>,
+    /// Views that were compressed, by their numbers.
+    unpacked_views: HashMap<usize, Vec<u8>>,
     /// Bytes of the file and of all that it names: what else takes memory is held against it.
     pub bytes: usize,
     /// Sentences for the user, each once.
@@ -32,8 +45,8 @@ impl<'a> GltfFile<'a> {
     ) -> Result<Self, SceneError> {
         let failed = |message: String| SceneError::of_file(path, message);
         let (text, binary) = parts(bytes).map_err(failed)?;
-        let mut root = parsed(path, &text)?;
         let mut notes = Vec::new();
+        let mut root = parsed(path, &text, &mut notes)?;
         extensions::check(&root, &mut notes).map_err(failed)?;
         // They were checked; the crate knows fewer of them.
         root.extensions_required.clear();
@@ -44,12 +57,22 @@ impl<'a> GltfFile<'a> {
             path,
             bytes: bytes.len(),
             buffers: Vec::new(),
+            unpacked_views: HashMap::new(),
             notes,
             document,
         };
         let mut binary = binary.map(Cow::into_owned);
         for buffer in file.document.clone().buffers() {
             let place = format!("buffers[{}]", buffer.index());
+            // What was compressed has a stand-in, which need not be there.
+            let is_stand_in = meshopt_views::NAMES.iter().any(|name| {
+                let said = buffer.extension_value(name);
+                said.is_some_and(|said| said["fallback"] == Value::Bool(true))
+            });
+            if is_stand_in {
+                file.buffers.push(Vec::new());
+                continue;
+            }
             let found = match buffer.source() {
                 gltf::buffer::Source::Bin => binary.take().ok_or_else(|| {
                     failed(format!("{place}: no uri, and the file has no binary chunk"))
@@ -65,7 +88,37 @@ impl<'a> GltfFile<'a> {
             }
             file.buffers.push(found);
         }
+        file.unpack_views()?;
         Ok(file)
+    }
+
+    /// Decompresses the views that say that they are compressed.
+    fn unpack_views(&mut self) -> Result<(), SceneError> {
+        let mut total = 0_usize;
+        for view in self.document.clone().views() {
+            let mut said = meshopt_views::NAMES
+                .iter()
+                .filter_map(|name| view.extension_value(name));
+            let Some(said) = said.next() else { continue };
+            let place = format!("bufferViews[{}]", view.index());
+            let mut unpacked = || {
+                let view = CompressedView::of(said)?;
+                total = total.saturating_add(view.length()?);
+                if total as u64 > MOST_MESH {
+                    return Err(format!(
+                        "more than {MOST_MESH} bytes when they are unpacked"
+                    ));
+                }
+                let end = view.byte_offset.checked_add(view.byte_length);
+                let buffer = self.buffers.get(view.buffer);
+                let packed = end.and_then(|end| buffer?.get(view.byte_offset..end));
+                view.decoded(packed.ok_or("it reaches beyond its buffer")?)
+            };
+            let unpacked = unpacked().map_err(|message| self.error(&place, message))?;
+            self.bytes += unpacked.len();
+            self.unpacked_views.insert(view.index(), unpacked);
+        }
+        Ok(())
     }
 
     /// An error of a place in the file.
@@ -105,6 +158,9 @@ impl<'a> GltfFile<'a> {
 
     /// The bytes of a view of a buffer.
     pub fn view(&self, place: &str, view: &gltf::buffer::View<'_>) -> Result<&[u8], SceneError> {
+        if let Some(unpacked) = self.unpacked_views.get(&view.index()) {
+            return Ok(unpacked);
+        }
         let buffer = &self.buffers[view.buffer().index()];
         let end = view.offset().checked_add(view.length());
         end.and_then(|end| buffer.get(view.offset()..end))
@@ -119,12 +175,14 @@ impl<'a> GltfFile<'a> {
     }
 }
 
-/// The file that a relative URI names, beside the one that names it.
+/// The file that a relative URI names, beside the one that names it. Where it is not there as it is written, it is looked for as
+/// [`named_file`] does: exporters write other systems' paths.
 ///
 /// # Errors
 /// A URI with a scheme or a host; one that is no text.
 pub(super) fn file_of_uri(beside: &Path, uri: &str) -> Result<PathBuf, String> {
     let has_scheme = uri.split_once(':').is_some_and(|(scheme, _)| {
+        // (`C:` is a disk.)
         scheme.len() > 1 && scheme.chars().all(|c| c.is_ascii_alphanumeric())
     });
     if has_scheme || uri.starts_with("//") {
@@ -136,7 +194,13 @@ pub(super) fn file_of_uri(beside: &Path, uri: &str) -> Result<PathBuf, String> {
     let name = decoded
         .decode_utf8()
         .map_err(|_| format!("\"{uri}\" is no text"))?;
-    Ok(beside.parent().unwrap_or(Path::new("")).join(&*name))
+    let folder = beside.parent().unwrap_or(Path::new(""));
+    let plain = folder.join(&*name);
+    let found = || named_file(folder, uri).or_else(|| named_file(folder, &name));
+    Ok(match plain.is_file() {
+        true => plain,
+        false => found().unwrap_or(plain),
+    })
 }
 
 /// The JSON and the binary chunk.
@@ -164,8 +228,30 @@ fn parts(bytes: &[u8]) -> Result<Parts<'_>, String> {
     Ok((glb.json, glb.bin))
 }
 
-fn parsed(path: &Path, text: &[u8]) -> Result<Root, SceneError> {
+/// The JSON as the crate knows it, with what does not matter mended.
+fn parsed(path: &Path, text: &[u8], notes: &mut Vec<String>) -> Result<Root, SceneError> {
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+    // Some fill up the chunk with zeros where the format wants spaces.
+    let text = text.trim_ascii_end();
+    let end = text
+        .iter()
+        .rposition(|byte| *byte != 0)
+        .map_or(0, |last| last + 1);
+    let text = &text[..end];
+    if let Ok(mut value) = serde_json::from_slice::<Value>(text) {
+        // Its lists were tables.
+        if ["meshes", "nodes", "accessors"]
+            .iter()
+            .any(|key| value[key].is_object())
+        {
+            let message = "glTF of version 1; version 2 is read (any viewer saves it so)";
+            return Err(SceneError::of_file(path, message));
+        }
+        if lenient::mend(&mut value, notes) {
+            return json::deserialize::from_value(value)
+                .map_err(|error| SceneError::of_file(path, format!("not glTF: {error}")));
+        }
+    }
     json::deserialize::from_slice(text).map_err(|error| {
         let message = format!("not glTF: {error}");
         match std::str::from_utf8(text) {
@@ -219,8 +305,8 @@ fn from_data_uri(data: &str) -> Result<Vec<u8>, String> {
         return Err("a data URI without a comma".to_owned());
     };
     match kind.ends_with(";base64") {
-        true => STANDARD
-            .decode(content.trim_end())
+        true => BASE64
+            .decode(content.split_ascii_whitespace().collect::<String>())
             .map_err(|error| format!("a data URI that is not base64: {error}")),
         false => Ok(percent_encoding::percent_decode_str(content).collect()),
     }

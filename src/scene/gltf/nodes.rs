@@ -2,6 +2,7 @@
 
 use glam::{DQuat, DVec3, Mat4};
 use gltf::{Document, Node};
+use serde_json::Value;
 
 use super::file::GltfFile;
 use crate::geometry::rig::{NodeParts, NodePose, NodeTree, RigNode};
@@ -60,6 +61,11 @@ pub(super) fn placed<'a>(
             return Err(file.error(&place, "it stands twice in its scene"));
         }
         let node = nodes[index].clone();
+        // What is not visible has no shadow either, nor has what hangs on it.
+        let visibility = node.extension_value("KHR_node_visibility");
+        if visibility.is_some_and(|said| said["visible"] == Value::Bool(false)) {
+            continue;
+        }
         let children: Vec<usize> = node.children().map(|child| child.index()).collect();
         open.extend(children.into_iter().rev());
         of_scene.push(node);

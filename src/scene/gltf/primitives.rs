@@ -267,7 +267,7 @@ impl Moving {
 }
 
 fn vertices(
-    file: &GltfFile<'_>,
+    file: &mut GltfFile<'_>,
     place: &str,
     primitive: &Primitive<'_>,
 ) -> Result<Vertices, SceneError> {
@@ -279,7 +279,7 @@ fn vertices(
     let vec3 = [Dimensions::Vec3];
     let positions: Vec<[f32; 3]> = file.floats(&named("POSITION"), &positions, &vec3, 0.0)?;
     let count = positions.len();
-    let checked = |name: &str, found: usize| match found < count {
+    let checked = |file: &GltfFile<'_>, name: &str, found: usize| match found < count {
         true => Err(file.error(
             &named(name),
             format!("{found} elements for {count} positions"),
@@ -295,15 +295,16 @@ fn vertices(
         has_tangents: false,
     };
     if let Some(accessor) = of(Semantic::Normals) {
-        let normals: Vec<[f32; 3]> = file.floats(&named("NORMAL"), &accessor, &vec3, 0.0)?;
-        checked("NORMAL", normals.len())?;
+        let none = (0.0, [0.0; 3]);
+        let normals = file.mended_floats::<3>(&named("NORMAL"), &accessor, &vec3, none)?;
+        checked(file, "NORMAL", normals.len())?;
         let normals = normals.into_iter().map(|normal| Some(in_double(normal)));
         vertices.normals = normals.take(count).collect();
     }
     if let Some(accessor) = of(Semantic::Tangents) {
-        let tangents: Vec<[f32; 4]> =
-            file.floats(&named("TANGENT"), &accessor, &[Dimensions::Vec4], 0.0)?;
-        checked("TANGENT", tangents.len())?;
+        let (vec4, none) = ([Dimensions::Vec4], (0.0, [0.0; 4]));
+        let tangents = file.mended_floats::<4>(&named("TANGENT"), &accessor, &vec4, none)?;
+        checked(file, "TANGENT", tangents.len())?;
         vertices.has_tangents = true;
         for (look, tangent) in vertices.looks.iter_mut().zip(tangents) {
             look.tangent = Vec4::from_array(tangent);
@@ -312,9 +313,9 @@ fn vertices(
     for set in 0..2 {
         if let Some(accessor) = of(Semantic::TexCoords(set)) {
             let name = format!("TEXCOORD_{set}");
-            let uv: Vec<[f32; 2]> =
-                file.floats(&named(&name), &accessor, &[Dimensions::Vec2], 0.0)?;
-            checked(&name, uv.len())?;
+            let (vec2, none) = ([Dimensions::Vec2], (0.0, [0.0; 2]));
+            let uv = file.mended_floats::<2>(&named(&name), &accessor, &vec2, none)?;
+            checked(file, &name, uv.len())?;
             for (look, uv) in vertices.looks.iter_mut().zip(uv) {
                 look.uv[set as usize] = Vec2::from_array(uv);
             }
@@ -322,8 +323,9 @@ fn vertices(
     }
     if let Some(accessor) = of(Semantic::Colors(0)) {
         let allowed = [Dimensions::Vec3, Dimensions::Vec4];
-        let colors: Vec<[f32; 4]> = file.floats(&named("COLOR_0"), &accessor, &allowed, 1.0)?;
-        checked("COLOR_0", colors.len())?;
+        let none = (1.0, [1.0; 4]);
+        let colors = file.mended_floats::<4>(&named("COLOR_0"), &accessor, &allowed, none)?;
+        checked(file, "COLOR_0", colors.len())?;
         vertices.has_colors = true;
         for (look, color) in vertices.looks.iter_mut().zip(colors) {
             look.color = Vec4::from_array(color).clamp(Vec4::ZERO, Vec4::ONE);

@@ -22,7 +22,7 @@ const MOST_BYTES: usize = 1 << 30;
 pub(super) struct Textures {
     pub kept: Vec<Arc<Texture>>,
     /// By the image's number; `None` for one that is passed over.
-    index_of_image: HashMap<usize, u32>,
+    index_of_image: HashMap<usize, Option<u32>>,
 }
 
 impl Textures {
@@ -48,22 +48,12 @@ impl Textures {
             ));
             return Ok(None);
         };
-        let index = match self.index_of_image.get(&image) {
-            Some(&index) => index,
-            None => {
-                let decoded = decoded(file, &place, image, note_read)?;
-                let bytes: usize = self.kept.iter().map(|texture| texture.bytes()).sum();
-                if bytes + decoded.bytes() > MOST_BYTES {
-                    let message =
-                        format!("the pictures take more than {MOST_BYTES} bytes of memory");
-                    return Err(file.error(&place, message));
-                }
-                let index = self.kept.len() as u32;
-                self.kept.push(Arc::new(decoded));
-                self.index_of_image.insert(image, index);
-                index
-            }
+        let known = self.index_of_image.get(&image).copied();
+        let index = match known {
+            Some(index) => index,
+            None => self.kept_picture(file, &place, image, note_read)?,
         };
+        let Some(index) = index else { return Ok(None) };
         let transform = extension.map(Transform::of).unwrap_or_default();
         let mut uv_set = transform.uv_set.unwrap_or(uv_set);
         if uv_set > 1 {
@@ -88,6 +78,31 @@ impl Textures {
                 Some(MagFilter::Linear) | None => Filter::Smooth,
             },
         }))
+    }
+}
+
+impl Textures {
+    /// Decodes a picture and keeps it; `None` where that is told as not to be used.
+    fn kept_picture(
+        &mut self,
+        file: &mut GltfFile<'_>,
+        place: &str,
+        image: usize,
+        note_read: &dyn Fn(&Path),
+    ) -> Result<Option<u32>, SceneError> {
+        let Some(decoded) = decoded(file, place, image, note_read)? else {
+            self.index_of_image.insert(image, None);
+            return Ok(None);
+        };
+        let bytes: usize = self.kept.iter().map(|texture| texture.bytes()).sum();
+        if bytes + decoded.bytes() > MOST_BYTES {
+            let message = format!("the pictures take more than {MOST_BYTES} bytes of memory");
+            return Err(file.error(place, message));
+        }
+        let index = self.kept.len() as u32;
+        self.kept.push(Arc::new(decoded));
+        self.index_of_image.insert(image, Some(index));
+        Ok(Some(index))
     }
 }
 
@@ -135,12 +150,13 @@ impl Transform {
     }
 }
 
+/// A picture; `None` where it is not there or cannot be read, which leaves its surface without it and is told.
 fn decoded(
     file: &mut GltfFile<'_>,
     asked_by: &str,
     image: usize,
     note_read: &dyn Fn(&Path),
-) -> Result<Texture, SceneError> {
+) -> Result<Option<Texture>, SceneError> {
     let place = format!("images[{image}]");
     let document = file.document.clone();
     let Some(json) = document.as_json().images.get(image) else {
@@ -157,11 +173,28 @@ fn decoded(
         .and_then(|view| document.views().nth(view.value()));
     let read = match (view, &json.uri) {
         (Some(view), _) => texture_file::decode(name.clone(), file.view(&place, &view)?, None),
-        (None, Some(uri)) => {
-            let bytes = file.resource(&place, uri, note_read)?;
-            texture_file::decode(name.clone(), &bytes, None)
-        }
+        (None, Some(uri)) => match file.resource(&place, uri, note_read) {
+            Ok(bytes) => texture_file::decode(name.clone(), &bytes, format_of_name(uri)),
+            Err(error) => {
+                file.note(format!("{}; not used", error.message));
+                return Ok(None);
+            }
+        },
         (None, None) => return Err(file.error(&place, "neither bufferView nor uri")),
     };
-    read.map_err(|message| file.error(&place, format!("\"{name}\" {message}")))
+    match read {
+        Ok(texture) => Ok(Some(texture)),
+        Err(message) => {
+            file.note(format!("{place}: \"{name}\" {message}; not used"));
+            Ok(None)
+        }
+    }
+}
+
+/// What a file's name says of it, where its bytes do not tell (TGA).
+fn format_of_name(uri: &str) -> Option<image::ImageFormat> {
+    let is_data = uri.starts_with("data:");
+    (!is_data)
+        .then(|| image::ImageFormat::from_path(uri).ok())
+        .flatten()
 }

@@ -87,7 +87,8 @@ impl Libraries {
         Ok(())
     }
 
-    /// The material that a name means: as it stands, or without the comment behind it on either side.
+    /// The material that a name means: as it stands, or without the comment behind it on either side, or without its quotes and
+    /// capitals.
     pub fn find(&self, name: &str) -> Option<usize> {
         let name = name.trim();
         let exact = |name: &str| self.index_of.get(name).copied();
@@ -96,6 +97,11 @@ impl Libraries {
             .or_else(|| {
                 let mut names = self.materials.iter().map(|material| &material.name);
                 names.position(|known| without_comment(known) == without_comment(name))
+            })
+            .or_else(|| {
+                let plain = |name: &str| without_comment(name).trim_matches('"').to_lowercase();
+                let mut names = self.materials.iter().map(|material| &material.name);
+                names.position(|known| plain(known) == plain(name))
             })
     }
 
@@ -141,7 +147,7 @@ pub fn with_libraries_named<E>(
 ) -> Result<Vec<u8>, E> {
     let folder = mesh.parent().unwrap_or(Path::new(""));
     with_records(bytes, |record| {
-        if record.keyword() != "mtllib" {
+        if !record.keyword().eq_ignore_ascii_case("mtllib") {
             return Ok(None);
         }
         let mut renamed = String::new();

@@ -119,7 +119,8 @@ impl<'a> Reader<'a> {
     }
 
     fn add(&mut self, record: &Record) -> Result<(), SceneError> {
-        match record.keyword() {
+        // (A few programs write capitals.)
+        match record.keyword().to_ascii_lowercase().as_str() {
             "v" => self.add_vertex(record),
             "vt" => {
                 let mut numbers = record
@@ -172,7 +173,12 @@ impl<'a> Reader<'a> {
             count += 1;
         }
         let [x, y, z, fourth, green, blue, _] = numbers;
-        let weight = if count == 4 { fourth } else { 1.0 };
+        // (A weight of 0 is no place; those who write it mean nothing by it.)
+        let weight = if count == 4 && fourth != 0.0 {
+            fourth
+        } else {
+            1.0
+        };
         let place = [x / weight, y / weight, z / weight];
         let index = self.positions.len() as u32;
         if !place.iter().all(|part| part.abs() <= FARTHEST) {

@@ -75,7 +75,7 @@ pub fn read(path: &Path, text: &str, notes: &mut Notes) -> Vec<MtlMaterial> {
     let mut materials: Vec<MtlMaterial> = Vec::new();
     for record in records(text) {
         let keyword = record.keyword();
-        if keyword == "newmtl" {
+        if keyword.eq_ignore_ascii_case("newmtl") {
             let name = record.rest().to_owned();
             if name.is_empty() {
                 notes.add_at(
@@ -138,7 +138,6 @@ fn add(material: &mut MtlMaterial, keyword: &str, record: &Record) -> Option<Str
         "pr" => set_part(&mut material.roughness, part()),
         "pm" => set_part(&mut material.metallic, part()),
         "d" => {
-            // `d -halo 0.5` is thinner in the middle, which no surface here is.
             material.opacity_at = record.start;
             set_part(&mut material.opacity, part())
         }
@@ -299,7 +298,8 @@ fn reflectance(
 }
 
 fn number_of(keyword: &str, record: &Record) -> (Option<f64>, Option<String>) {
-    match record.words().next().map(number) {
+    // `d -halo 0.5` is thinner in the middle, which no surface here is.
+    match record.words().find(|word| *word != "-halo").map(number) {
         None => (None, None),
         Some(None) => (
             None,
@@ -349,6 +349,14 @@ mod tests {
         assert_eq!((map.scale, map.offset), ([2.0, 3.0], [0.5, 0.0]));
         assert_eq!((map.multiplier, map.is_clamped), (0.2, true));
         assert_eq!(materials[1].opacity, Some(0.75));
+    }
+
+    #[test]
+    fn capitals_and_halos_change_nothing() {
+        let (materials, notes) = read_all("Newmtl a\nKD 0,5 .1 .1\nd -halo 0.25\n");
+        assert_eq!(notes, [""; 0]);
+        assert_eq!(materials[0].diffuse, Some([0.5, 0.1, 0.1]));
+        assert_eq!(materials[0].opacity, Some(0.25));
     }
 
     #[test]

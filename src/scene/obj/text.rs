@@ -130,9 +130,14 @@ fn before_sign(line: &str) -> &str {
     line.strip_suffix('\\').unwrap_or(line)
 }
 
-/// A finite number; some write `1.#QNAN` or `-nan(ind)` for what is none.
+/// A finite number; some write `1.#QNAN` or `-nan(ind)` for what is none, and some a comma for the point.
 pub fn number(word: &str) -> Option<f64> {
-    word.parse().ok().filter(|number: &f64| number.is_finite())
+    let with_point = || match word.matches([',', '.']).count() {
+        1 => word.replace(',', ".").parse().ok(),
+        _ => None,
+    };
+    let number: Option<f64> = word.parse().ok().or_else(with_point);
+    number.filter(|number| number.is_finite())
 }
 
 #[cfg(test)]
@@ -159,6 +164,21 @@ mod tests {
             assert_eq!(decoded(&bytes), text);
         }
         assert_eq!(decoded(&[0xff, 0xfe, 0x41]), "");
+    }
+
+    #[test]
+    fn numbers_are_those_that_programs_write() {
+        for (word, number_there) in [
+            ("1.5", Some(1.5)),
+            ("-1,5", Some(-1.5)),
+            ("+.5e1", Some(5.0)),
+            ("1,000,000", None),
+            ("1.000,5", None),
+            ("nan", None),
+            (",", None),
+        ] {
+            assert_eq!(number(word), number_there, "{word}");
+        }
     }
 
     #[test]

@@ -8,8 +8,9 @@ use std::path::Path;
 
 use glam::Vec3;
 
+use super::in_its_place::in_place_of;
 use super::plain_file::{self, MOST_PICTURE};
-use crate::light::radiance_picture::RadiancePicture;
+use crate::light::radiance_picture::{Flaw, Flaws, RadiancePicture};
 
 /// Pixels of the largest picture that is read: 32768 x 16384 would take 6 GiB.
 const MOST_PIXELS: usize = 16384 * 8192;
@@ -23,7 +24,7 @@ const LARGEST_HALF: f32 = 65504.0;
 /// A picture as its file has it, and what there is to know of that.
 #[derive(Debug, Clone)]
 pub struct RadianceFile {
-    /// In linear sRGB; no channel is infinite.
+    /// In linear sRGB; every channel is finite and not negative.
     pub picture: RadiancePicture,
     /// What was passed over or taken for something else, one sentence each, without the path.
     pub notes: Vec<String>,
@@ -61,6 +62,8 @@ pub fn read(path: &Path, layer: Option<&str>) -> Result<RadianceFile, String> {
         }
     } else if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
         exr::read(bytes, layer)
+    } else if let Some(what) = in_place_of(&bytes) {
+        Err(what.to_owned())
     } else if image::guess_format(&bytes).is_ok() {
         Err(
             "a picture of display values, which is cut off where light is brightest; a probe is Radiance HDR (.hdr) or \
@@ -72,12 +75,35 @@ pub fn read(path: &Path, layer: Option<&str>) -> Result<RadianceFile, String> {
     }
     .map_err(say)?;
     read.notes.extend(make_finite(&mut read.pixels));
-    let picture = RadiancePicture::new(read.size_px, read.pixels)
+    let mut picture = RadiancePicture::new(read.size_px, read.pixels)
         .ok_or_else(|| say("the picture has no pixels".to_owned()))?;
+    if let Some(flaws) = picture.flaws() {
+        read.notes.push(format!(
+            "{}; taken as black where negative, else as the mean of the pixels beside it",
+            flaws_told(flaws)
+        ));
+        picture = picture.mended();
+    }
     Ok(RadianceFile {
         picture,
         notes: read.notes,
     })
+}
+
+/// What is wrong with a picture's pixels, in words.
+fn flaws_told(flaws: Flaws) -> String {
+    let [column, row] = flaws.first_px;
+    let what = match flaws.first {
+        Flaw::NotANumber => "is not a number",
+        Flaw::Infinite => "is infinite",
+        Flaw::Negative => "is negative",
+    };
+    match flaws.count {
+        1 => format!("the pixel in column {column}, row {row} (from 0) {what}"),
+        count => format!(
+            "{count} pixels are no radiance, the first one in column {column}, row {row} (from 0): it {what}"
+        ),
+    }
 }
 
 /// Puts the largest finite channel, but no less than the largest half, in the place of infinite ones, and tells of it.

@@ -10,7 +10,7 @@ use crate::app::input::sightings::Sightings;
 use crate::app::stages::known_camera::KnownCamera;
 use crate::app::stages::source::{self, CalibrationNamed};
 use crate::capture::live::is_live;
-use crate::capture::{Frame, FrameSource, load_calibration};
+use crate::capture::{Frame, FrameSource, load_calibration, notices_told};
 use crate::geometry::camera::Intrinsics;
 use crate::scene::{Object, Scene};
 use crate::tracking::Tracker;
@@ -45,8 +45,10 @@ pub fn first_look(scene: &Scene) -> Result<Vec<String>> {
     let mut look = Look::new(scene, &camera)?;
     let ended = look.watch(&mut source)?;
     if !source.notices().is_empty() {
-        let notices: Vec<String> = source.notices().iter().map(ToString::to_string).collect();
-        bail!("the recording is damaged: {}", notices.join("; "));
+        bail!(
+            "the recording is damaged: {}",
+            notices_told(source.notices())
+        );
     }
     let of_camera = camera.remark(&scene.camera.source, CalibrationNamed::ByKey.place());
     let of_frames = look.warnings(ended, source.good_frames());

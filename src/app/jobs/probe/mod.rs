@@ -20,7 +20,6 @@ use crate::light::probe::Probe;
 use crate::light::probe_maps::{Circle, Projection, fitting_width_px, unwrap, world_from_camera};
 use crate::light::radiance_picture::RadiancePicture;
 use crate::light::response::{Exposure, Response, merge};
-use crate::scene::probe_file::flaws_told;
 use crate::scene::{plain_file, radiance_file};
 use preview::preview;
 
@@ -207,15 +206,7 @@ impl ProbeSource {
         let read = radiance_file::read(path, None).map_err(anyhow::Error::msg)?;
         let told = read.notes.into_iter();
         remarks.extend(told.map(|note| format!("{}: {note}", path.display())));
-        let mut picture = read.picture;
-        if let Some(flaws) = picture.flaws() {
-            remarks.push(format!(
-                "{}: {}; taken as black where negative, else as the mean of the pixels beside it",
-                path.display(),
-                flaws_told(flaws)
-            ));
-            picture = picture.mended();
-        }
+        let picture = read.picture;
         let [width, height] = picture.size_px();
         let circle = match request.kind {
             ProbePictureKind::Panorama => None,
