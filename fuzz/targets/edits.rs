@@ -1,5 +1,4 @@
 //! Edits that are written into scenes of any look.
-#![no_main]
 
 use glam::DVec3;
 use gnomon::app::authoring::{Edit, NewForm, NewThing, SceneDocument};
@@ -45,9 +44,10 @@ fn edits(scene: &Scene) -> Vec<Edit> {
     ]
 }
 
-gnomon_fuzz::target!(|text: &str| {
-    gnomon_fuzz::file("a.obj", MESH);
-    let path = gnomon_fuzz::file("edited.toml", text.as_bytes());
+pub fn run(bytes: &[u8]) {
+    let text = super::text(bytes);
+    super::file("a.obj", MESH);
+    let path = super::file("edited.toml", text.as_bytes());
     if let Ok(mut document) = SceneDocument::open(&path) {
         for edit in edits(document.scene()) {
             let before = document.text().to_owned();
@@ -61,4 +61,4 @@ gnomon_fuzz::target!(|text: &str| {
             }
         }
     }
-});
+}

@@ -1,5 +1,4 @@
 //! All that is done with triangles of any kind: mending, volumes, levels, holes, cuts.
-#![no_main]
 
 use glam::{DVec3, Vec2, Vec3};
 use gnomon::geometry::coincidence::{IN_ONE_PLACE_M, coincidence};
@@ -129,4 +128,8 @@ fn work(soup: &Soup) {
     assert_eq!(cut_mesh.corner_looks.len(), cut_mesh.triangles.len());
 }
 
-gnomon_fuzz::target!(|input: &[u8]| Soup::of_bytes(input).as_ref().map(work));
+pub fn run(input: &[u8]) {
+    if let Some(soup) = Soup::of_bytes(input) {
+        work(&soup);
+    }
+}
