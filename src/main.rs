@@ -430,7 +430,7 @@ fn size_m(size_mm: f64) -> Result<f64> {
     let millimetres = MARKER.size_m.takes.scaled(1e3, "mm");
     match millimetres.check(size_mm) {
         Ok(size_mm) => Ok(size_mm * 1e-3),
-        Err(refusal) => bail!("--size-mm {size_mm}: {refusal}"),
+        Err(refusal) => bail!("--size-mm {size_mm:?}: {refusal}"),
     }
 }
 

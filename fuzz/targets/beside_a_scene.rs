@@ -21,8 +21,15 @@ pub fn file(name: &str, bytes: &[u8]) -> PathBuf {
             let folder = tempfile::tempdir().expect("a folder");
             // A scene that is refused for what it is would leave all files unread.
             std::fs::write(folder.path().join("good.obj"), MESH).expect("a file");
-            let scene = Scene::parse(&folder.path().join("good.toml"), &scene_with_mesh("good.obj"));
-            assert!(scene.is_ok(), "{}", scene.err().map_or(String::new(), |error| error.to_string()));
+            let scene = Scene::parse(
+                &folder.path().join("good.toml"),
+                &scene_with_mesh("good.obj"),
+            );
+            assert!(
+                scene.is_ok(),
+                "{}",
+                scene.err().map_or(String::new(), |error| error.to_string())
+            );
             folder
         });
         let path = folder.path().join(name);
@@ -47,14 +54,19 @@ fn scene_with_mesh(name: &str) -> String {
 /// Reads a scene that has a probe of these bytes.
 pub fn probe(name: &str, bytes: &[u8]) {
     let path = file(name, bytes);
-    let probe = format!("{CAMERA}{MARKER}[probe]\nimage = \"{name}\"\nkind = \"panorama\"\nposition_m = [0, 0, 0.1]\n");
+    let probe = format!(
+        "{CAMERA}{MARKER}[probe]\nimage = \"{name}\"\nkind = \"panorama\"\nposition_m = [0, 0, 0.1]\n"
+    );
     scene(&path.with_file_name("scene.toml"), &probe);
 }
 
 /// Reads a scene that is this text, after its camera, beside a file of these bytes.
 pub fn beside(name: &str, bytes: &[u8], text: &str) {
     let path = file(name, bytes);
-    scene(&path.with_file_name("scene.toml"), &format!("{CAMERA}{text}"));
+    scene(
+        &path.with_file_name("scene.toml"),
+        &format!("{CAMERA}{text}"),
+    );
 }
 
 /// Reads a scene.

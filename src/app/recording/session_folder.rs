@@ -57,7 +57,8 @@ impl SessionFolder {
             path: path.to_owned(),
             error,
         };
-        let make = || Begun::make(path, replacing, io_error).map(|begun| Arc::new(Mutex::new(begun)));
+        let make =
+            || Begun::make(path, replacing, io_error).map(|begun| Arc::new(Mutex::new(begun)));
         let (begun, unfinished) = Unfinished::begin(make, |begun| {
             let begun = Arc::clone(begun);
             Box::new(move || locked(&begun).settle_at_once())

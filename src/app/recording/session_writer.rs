@@ -194,8 +194,7 @@ impl Drop for SessionWriter {
     fn drop(&mut self) {
         drop(self.video.take());
         // An encoder that fails soon was given frames, and its video has none.
-        if self.frames > 0
-            && (self.is_whole || shows_a_frame(&self.folder.path().join(VIDEO_NAME)))
+        if self.frames > 0 && (self.is_whole || shows_a_frame(&self.folder.path().join(VIDEO_NAME)))
         {
             self.folder.keep();
         }
