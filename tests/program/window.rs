@@ -264,11 +264,11 @@ fn a_target_that_is_held_to_the_camera_calibrates_it_though_the_gpu_is_lost() {
     let mut command = display.command(&arguments);
     let fault = format!("file {}", loss.display());
     let mut window = gpu_faults::let_fail(&mut command, &fault).spawn().unwrap();
-    let press = |key: &str| {
-        display.xdotool(&["windowfocus", &display.window(), "key", key]);
+    let press = |shown: &str, key: &str| {
+        display.xdotool(&["windowfocus", shown, "key", key]);
     };
     // Too early: it says so, and goes on.
-    press("Return");
+    press(&display.window(), "Return");
     let seconds = good_poses(Print::chessboard()).len() as f64 * 1.2;
     thread::sleep(Duration::from_secs_f64(seconds / 2.0));
     // The views that it has are not lost with the device.
@@ -276,10 +276,11 @@ fn a_target_that_is_held_to_the_camera_calibrates_it_though_the_gpu_is_lost() {
     wait_for("the loss", || !loss.exists());
     thread::sleep(Duration::from_secs_f64(seconds / 2.0 + 3.0));
     assert!(window.try_wait().unwrap().is_none(), "it ended by itself");
+    let shown = display.window();
     let began = Instant::now();
     while window.try_wait().unwrap().is_none() {
         assert!(began.elapsed() < SOON, "Enter does not end it");
-        press("Return");
+        press(&shown, "Return");
         thread::sleep(Duration::from_millis(300));
     }
     let output = ended(window);
