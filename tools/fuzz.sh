@@ -39,9 +39,9 @@ for target in $targets; do
     timeout -k 5 $((seconds + 60)) "$fuzzer" -max_total_time=$seconds -timeout=20 -rss_limit_mb=768 -max_len=65536 \
         -print_final_stats=1 -verbosity=1 -artifact_prefix="$kept/" "$corpus" "fuzz/seeds/$target" >"$kept.log" 2>&1 || failed="$failed $target"
     ended=$(date +%s)
-    # What others reach too is not kept.
+    # What others reach too is not kept, where finding out takes no longer than the run did.
     mkdir "$TMPDIR/least"
-    timeout 120 "$fuzzer" -merge=1 -timeout=20 -rss_limit_mb=768 -artifact_prefix="$kept/" "$TMPDIR/least" "fuzz/seeds/$target" "$corpus" \
+    timeout "$seconds" "$fuzzer" -merge=1 -timeout=20 -rss_limit_mb=768 -artifact_prefix="$TMPDIR/" "$TMPDIR/least" "fuzz/seeds/$target" "$corpus" \
         >"$kept.merge.log" 2>&1 && rm -r "$corpus" && mv "$TMPDIR/least" "$corpus"
     rm -rf "$TMPDIR/least"
     last=$(grep -a '^#[0-9].* cov: ' "$kept.log" | tail -1 | tr '\t' ' ')
