@@ -821,7 +821,17 @@ fn check_and_replay_agree_on_what_cannot_be_played() {
 #[test]
 fn check_and_replay_agree_on_markers_that_are_not_there() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = lamp_scene_with(folder.path(), &project_file("recordings/lamp"));
+    let recording = folder.path().join("short");
+    std::fs::create_dir(&recording).unwrap();
+    let lamp = project_file("recordings/lamp");
+    let cut = std::process::Command::new("ffmpeg")
+        .args(["-v", "error", "-i"])
+        .arg(lamp.join("video.mp4"))
+        .args(["-c", "copy", "-frames:v", "12"])
+        .arg(recording.join("video.mp4"))
+        .status();
+    assert!(cut.unwrap().success());
+    let scene = lamp_scene_with(folder.path(), &recording);
     let good = text(PathBuf::from(&scene));
     let lone = "[[marker]]\nname = \"card\"\nid = 77\nsize_m = 0.04\n";
     for (written, says) in [
