@@ -12,7 +12,8 @@ use anyhow::{Context as _, Result, bail};
 use clap::{CommandFactory as _, Parser};
 
 use gnomon::app::chart::{self, chart};
-use gnomon::app::files::new_file::{exit_without_traces, is_stdout};
+use gnomon::app::files::new_file::is_stdout;
+use gnomon::app::files::unfinished::exit_without_traces;
 use gnomon::app::jobs::board::{self, board};
 use gnomon::app::jobs::calibrate;
 use gnomon::app::jobs::cameras;
@@ -43,6 +44,8 @@ const INTERRUPTED: i32 = 130;
 fn main() -> ExitCode {
     #[cfg(target_os = "linux")]
     leave_out_device_selection();
+    #[cfg(unix)]
+    outlive_limits_on_files();
     let done = run(Cli::try_parse().unwrap_or_else(|error| leave_misused(&error)));
     end_all();
     match done {
@@ -90,16 +93,16 @@ fn run(cli: Cli) -> Result<()> {
         Command::Check { scene } => {
             let scene = Scene::load(&scene)?;
             talk::give(&check::summary(&scene));
-            for warning in first_look(&scene)? {
-                talk::give(&check::warning_line(&warning));
+            let look = first_look(&scene)?;
+            for warning in &look.warnings {
+                talk::give(&check::warning_line(warning));
             }
-            Ok(())
+            look.never_found.map_or(Ok(()), |told| bail!("{told}"))
         }
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "gnomon", &mut script);
-            talk::give(&String::from_utf8_lossy(&script));
-            Ok(())
+            hand_out(&script)
         }
         Command::Manual { command } => give_manual(command.as_deref()),
     }
@@ -122,8 +125,11 @@ fn give_manual(name: Option<&str>) -> Result<()> {
     };
     let mut roff = Vec::new();
     clap_mangen::Man::new(page).render(&mut roff)?;
-    talk::give(&String::from_utf8_lossy(&roff));
-    Ok(())
+    hand_out(&roff)
+}
+
+fn hand_out(bytes: &[u8]) -> Result<()> {
+    talk::hand_out(&String::from_utf8_lossy(bytes)).context("stdout")
 }
 
 /// Starts the program again without Mesa's layer that asks the desktop for its favourite card: where there is no desktop it
@@ -148,6 +154,14 @@ fn leave_out_device_selection() {
         .args(words)
         .env(SWITCH, "1")
         .exec();
+}
+
+/// Lets writing beyond a limit on the size of files (`ulimit -f`) fail with an error, as on a full disk: the signal ends only who
+/// does not listen to it. Programs that run for a job do not, and their status says so.
+#[cfg(unix)]
+fn outlive_limits_on_files() {
+    // Where nobody can listen, the limit ends the program.
+    let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
 }
 
 fn run_live(args: LiveArgs) -> Result<()> {
@@ -434,7 +448,7 @@ fn size_m(size_mm: f64) -> Result<f64> {
     let millimetres = MARKER.size_m.takes.scaled(1e3, "mm");
     match millimetres.check(size_mm) {
         Ok(size_mm) => Ok(size_mm * 1e-3),
-        Err(refusal) => bail!("--size-mm {size_mm}: {refusal}"),
+        Err(refusal) => bail!("--size-mm {size_mm:?}: {refusal}"),
     }
 }
 

@@ -7,17 +7,15 @@ set -u
 cd "$(dirname "$0")/.."
 minutes=${1:-60}
 [ $# -gt 0 ] && shift
-targets=${*:-$(sed -n '/^\[\[bin\]\]/,/^path/s/^name = "\(.*\)"/\1/p' fuzz/Cargo.toml)}
+targets=${*:-$(ls fuzz/seeds)}
 count=$(echo "$targets" | wc -w)
 seconds=$((minutes * 60 / count))
 [ "$seconds" -gt 0 ] || seconds=1
 host=$(rustc -vV | sed -n 's/^host: //p')
 
-coverage="-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 -Cllvm-args=-sanitizer-coverage-inline-8bit-counters \
--Cllvm-args=-sanitizer-coverage-pc-table -Cllvm-args=-sanitizer-coverage-trace-compares \
--Cllvm-args=-simplifycfg-branch-fold-threshold=0 -Ccodegen-units=1 --cfg fuzzing"
-# Only what is built for a named host gets the flags: programs that run while building must not.
-RUSTFLAGS="$coverage" cargo build --release --manifest-path fuzz/Cargo.toml --target "$host" || exit
+# Only what reads files is followed: the rest is compiled as fast as can be.
+RUSTC_WRAPPER=$PWD/fuzz/compiler.sh "${CARGO:-cargo}" build --release --manifest-path fuzz/Cargo.toml --target "$host" || exit
+fuzzer=fuzz/target/$host/release/gnomon-fuzz
 
 # Files in memory, gone afterwards.
 TMPDIR=$(mktemp -d -p "$([ -w /dev/shm ] && echo /dev/shm || echo /tmp)") || exit
@@ -37,9 +35,15 @@ for target in $targets; do
     begun=$(date +%s)
     # The heap is limited to 256 MB by the targets themselves; the rest is the program, OpenCV and what the fuzzer keeps.
     # A broken heap may keep it from ending.
-    timeout -k 5 $((seconds + 60)) "fuzz/target/$host/release/$target" -max_total_time=$seconds -timeout=20 -rss_limit_mb=768 -max_len=65536 \
+    export GNOMON_FUZZ_TARGET="$target"
+    timeout -k 5 $((seconds + 60)) "$fuzzer" -max_total_time=$seconds -timeout=20 -rss_limit_mb=768 -max_len=65536 \
         -print_final_stats=1 -verbosity=1 -artifact_prefix="$kept/" "$corpus" "fuzz/seeds/$target" >"$kept.log" 2>&1 || failed="$failed $target"
     ended=$(date +%s)
+    # What others reach too is not kept, where finding out takes no longer than the run did.
+    mkdir "$TMPDIR/least"
+    timeout "$seconds" "$fuzzer" -merge=1 -timeout=20 -rss_limit_mb=768 -artifact_prefix="$TMPDIR/" "$TMPDIR/least" "fuzz/seeds/$target" "$corpus" \
+        >"$kept.merge.log" 2>&1 && rm -r "$corpus" && mv "$TMPDIR/least" "$corpus"
+    rm -rf "$TMPDIR/least"
     last=$(grep -a '^#[0-9].* cov: ' "$kept.log" | tail -1 | tr '\t' ' ')
     of() { echo "$last" | LC_ALL=C grep -a -o "$1[0-9]*" | head -1 | tr -dc 0-9; }
     stat() { sed -n "s/^stat::$1: *//p" "$kept.log"; }

@@ -1,6 +1,7 @@
 #!/bin/bash
 # What no quick test sees: all that is drawn under Khronos's validation layer, synchronization too, and the C shim of libapriltag
-# under Valgrind. Each message of either is a failure: tools/test_deep.sh [FILTER...] (as cargo test takes it, for the first part).
+# under Valgrind. Each message of either is a failure: tools/test_deep.sh [FILTER...] (as cargo test takes it, in place of the tests
+# that draw).
 set -euo pipefail
 # Else gnomon starts itself again, out of Valgrind's sight.
 export NODEVICE_SELECT=1
@@ -33,8 +34,14 @@ for scene in config/*.toml; do
     "${validated[@]}" target/release/gnomon replay "$scene" --frames 0,1 --layers role,shadow,gain,depth --out "$work/$(basename "$scene" .toml)"
     no_messages "$scene"
 done
-# Tests that let the GPU fail bring a layer of their own.
-"${validated[@]}" cargo test --release -- "$@" --skip faults:: --skip a_gpu_that_is_lost || failed=1
+# All tests that draw: those of the passes, and the picture's; what tracks or reads says nothing to a GPU. Tests that let the GPU
+# fail bring a layer of their own, and the layer takes longer than one test of times allows.
+drawing=(render:: picture:: counting:: deforming:: detail:: environment:: final_gather:: motion:: probe_light:: shading:: shafts::
+    sized_lights:: stability:: translucent:: volumes:: live::)
+[ $# -gt 0 ] || set -- "${drawing[@]}"
+cargo test --release --lib --test suite --test program --no-run
+"${validated[@]}" cargo test --release --no-fail-fast --lib --test suite --test program -- "$@" --skip faults:: --skip a_gpu_that_is_lost \
+    --skip a_recording_is_shown_in_time || failed=1
 no_messages "the tests"
 
 # The shim and libapriltag at work, from the first picture to the end. What is merely possibly lost belongs to other libraries.
@@ -42,7 +49,7 @@ mkdir "$work/clip"
 cp recordings/lamp/camera.toml "$work/clip"
 ffmpeg -v error -i recordings/lamp/video.mp4 -c copy -frames:v 6 "$work/clip/video.mp4"
 for family in tag36h11 tag16h5 tagStandard41h12; do
-    valgrind --quiet --error-exitcode=9 --leak-check=full --errors-for-leak-kinds=definite \
+    valgrind --quiet --error-exitcode=9 --leak-check=full --show-leak-kinds=definite --errors-for-leak-kinds=definite \
         target/release/gnomon track "$work/clip" --size-mm 44 --family $family --poses "$work/$family.csv" || [ $? -ne 9 ] || failed=1
 done
 exit $failed

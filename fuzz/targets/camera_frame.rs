@@ -1,13 +1,12 @@
 //! Pictures as drivers of cameras hand them out.
-#![no_main]
 
 use gnomon::capture::live::decode::{RawPicture, Tolerance, rgba_of};
 use gnomon::scene::PixelFormat;
 
 // The choice is the format; width, height and padding come next.
-gnomon_fuzz::target!(|input: &[u8]| {
+pub fn run(input: &[u8]) {
     let formats = PixelFormat::BY_NAME;
-    let (format, rest) = gnomon_fuzz::choice(input, formats.len()).unwrap_or_default();
+    let (format, rest) = super::choice(input, formats.len()).unwrap_or_default();
     if let Some(([width, height, padding], bytes)) = rest.split_first_chunk() {
         let (width, height) = (u32::from(*width), u32::from(*height));
         let picture = RawPicture {
@@ -25,4 +24,4 @@ gnomon_fuzz::target!(|input: &[u8]| {
             }
         }
     }
-});
+}

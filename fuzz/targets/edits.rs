@@ -1,5 +1,4 @@
 //! Edits that are written into scenes of any look.
-#![no_main]
 
 use glam::DVec3;
 use gnomon::app::authoring::{Edit, NewForm, NewThing, SceneDocument};
@@ -10,8 +9,13 @@ const MESH: &[u8] = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
 fn edits(scene: &Scene) -> Vec<Edit> {
     let things = scene.phantoms.iter().chain(&scene.virtuals);
-    let thing = things.last().map_or(String::new(), |thing| thing.name.clone());
-    let anchor = scene.anchors.last().map_or(String::new(), |anchor| anchor.name.clone());
+    let thing = things
+        .last()
+        .map_or(String::new(), |thing| thing.name.clone());
+    let anchor = scene
+        .anchors
+        .last()
+        .map_or(String::new(), |anchor| anchor.name.clone());
     let light = Light::point(DVec3::new(0.1, -0.2, 0.3), DVec3::splat(0.5));
     let placement = Placement {
         position_m: DVec3::new(0.1, 0.0, -0.25),
@@ -19,17 +23,29 @@ fn edits(scene: &Scene) -> Vec<Edit> {
         scale: DVec3::new(1.0, 2.0, 1.0),
     };
     vec![
-        Edit::Place { thing: thing.clone(), placement },
-        Edit::Show { thing: thing.clone(), visible: false },
+        Edit::Place {
+            thing: thing.clone(),
+            placement,
+        },
+        Edit::Show {
+            thing: thing.clone(),
+            visible: false,
+        },
         Edit::Light { index: 0, light },
         Edit::AddLight(light),
         Edit::RemoveLight(0),
         Edit::Ambient(DVec3::new(0.2, 0.1, 0.3)),
-        Edit::AnchorSize { anchor: anchor.clone(), size_m: 0.0625 },
+        Edit::AnchorSize {
+            anchor: anchor.clone(),
+            size_m: 0.0625,
+        },
         Edit::AddThing(NewThing {
             is_real: true,
             name: "new".to_owned(),
-            form: NewForm::Mesh { file: "a.obj".to_owned(), fit_m: Some(0.1) },
+            form: NewForm::Mesh {
+                file: "a.obj".to_owned(),
+                fit_m: Some(0.1),
+            },
             on: anchor,
             placement,
         }),
@@ -38,16 +54,27 @@ fn edits(scene: &Scene) -> Vec<Edit> {
             name: "new".to_owned(),
             position_m: DVec3::new(0.1, 0.2, 0.0),
         },
-        Edit::Rename { thing: thing.clone(), name: "new".to_owned() },
-        Edit::Material { thing: thing.clone(), albedo: Some(DVec3::splat(0.25)), roughness: Some(0.5) },
-        Edit::Animate { thing: thing.clone(), animation: None },
+        Edit::Rename {
+            thing: thing.clone(),
+            name: "new".to_owned(),
+        },
+        Edit::Material {
+            thing: thing.clone(),
+            albedo: Some(DVec3::splat(0.25)),
+            roughness: Some(0.5),
+        },
+        Edit::Animate {
+            thing: thing.clone(),
+            animation: None,
+        },
         Edit::RemoveThing(thing),
     ]
 }
 
-gnomon_fuzz::target!(|text: &str| {
-    gnomon_fuzz::file("a.obj", MESH);
-    let path = gnomon_fuzz::file("edited.toml", text.as_bytes());
+pub fn run(bytes: &[u8]) {
+    let text = super::text(bytes);
+    super::file("a.obj", MESH);
+    let path = super::file("edited.toml", text.as_bytes());
     if let Ok(mut document) = SceneDocument::open(&path) {
         for edit in edits(document.scene()) {
             let before = document.text().to_owned();
@@ -61,4 +88,4 @@ gnomon_fuzz::target!(|text: &str| {
             }
         }
     }
-});
+}

@@ -1,4 +1,5 @@
 //! Light probes: .exr.
-#![no_main]
 
-gnomon_fuzz::target!(|bytes: &[u8]| gnomon_fuzz::probe("a.exr", bytes));
+pub fn run(bytes: &[u8]) {
+    super::probe("a.exr", bytes);
+}

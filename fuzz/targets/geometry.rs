@@ -1,5 +1,4 @@
 //! All that is done with triangles of any kind: mending, volumes, levels, holes, cuts.
-#![no_main]
 
 use glam::{DVec3, Vec2, Vec3};
 use gnomon::geometry::coincidence::{IN_ONE_PLACE_M, coincidence};
@@ -46,12 +45,18 @@ impl Soup {
         let corners = bytes.chunks_exact(3).take(MOST_TRIANGLES);
         Some(Self {
             positions,
-            triangles: corners.map(|at| [index(&at[0]), index(&at[1]), index(&at[2])]).collect(),
+            triangles: corners
+                .map(|at| [index(&at[0]), index(&at[1]), index(&at[2])])
+                .collect(),
         })
     }
 
     fn raw(&self) -> Vec<RawTriangle> {
-        let raw = |&vertices: &[u32; 3]| RawTriangle { vertices, normals: [None; 3], material: 0 };
+        let raw = |&vertices: &[u32; 3]| RawTriangle {
+            vertices,
+            normals: [None; 3],
+            material: 0,
+        };
         self.triangles.iter().map(raw).collect()
     }
 
@@ -110,7 +115,10 @@ fn work(soup: &Soup) {
     let raw = soup.raw();
     let (mesh, _) = Mesh::weld(&soup.positions, &raw, 0.5);
     assert!(mesh.positions.iter().all(|place| place.is_finite()));
-    let place = soup.positions.first().map_or(DVec3::Z, |place| place.as_dvec3() * 1.5);
+    let place = soup
+        .positions
+        .first()
+        .map_or(DVec3::Z, |place| place.as_dvec3() * 1.5);
     cast(&mesh, place);
     let _ = holes(&mesh);
     for level in levels(&mesh) {
@@ -119,14 +127,30 @@ fn work(soup: &Soup) {
     let _ = SampledSurface::new(&mesh).map(|surface| surface.distance_to(&surface));
     let corners_of = |triangle: &[u32; 3]| triangle.map(|index| mesh.positions[index as usize]);
     let corners: Vec<[Vec3; 3]> = mesh.triangles.iter().map(corners_of).collect();
-    let exact: Vec<[DVec3; 3]> = corners.iter().map(|t| t.map(|place| place.as_dvec3())).collect();
+    let exact: Vec<[DVec3; 3]> = corners
+        .iter()
+        .map(|t| t.map(|place| place.as_dvec3()))
+        .collect();
     let _ = coincidence(&exact, &exact, IN_ONE_PLACE_M);
-    let cornered = corners.iter().map(|t| t.map(|place| (place, Vec3::Z))).collect();
+    let cornered = corners
+        .iter()
+        .map(|t| t.map(|place| (place, Vec3::Z)))
+        .collect();
     let _ = subdivided(cornered, |_, _| 0.5, MOST_PIECES);
     let region_of = |_| Some(&Ring as &dyn Region);
-    let cut = cut((&soup.positions, &[]), &raw, &soup.looks(), region_of, MOST_PIECES);
+    let cut = cut(
+        (&soup.positions, &[]),
+        &raw,
+        &soup.looks(),
+        region_of,
+        MOST_PIECES,
+    );
     let (cut_mesh, _) = Mesh::weld_with_looks(&cut.positions, &cut.triangles, &cut.looks, 0.5);
     assert_eq!(cut_mesh.corner_looks.len(), cut_mesh.triangles.len());
 }
 
-gnomon_fuzz::target!(|input: &[u8]| Soup::of_bytes(input).as_ref().map(work));
+pub fn run(input: &[u8]) {
+    if let Some(soup) = Soup::of_bytes(input) {
+        work(&soup);
+    }
+}

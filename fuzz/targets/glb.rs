@@ -1,4 +1,5 @@
 //! Meshes: .glb.
-#![no_main]
 
-gnomon_fuzz::target!(|bytes: &[u8]| gnomon_fuzz::mesh("a.glb", bytes));
+pub fn run(bytes: &[u8]) {
+    super::mesh("a.glb", bytes);
+}

@@ -1,4 +1,5 @@
 //! Meshes: .gltf.
-#![no_main]
 
-gnomon_fuzz::target!(|bytes: &[u8]| gnomon_fuzz::mesh("a.gltf", bytes));
+pub fn run(bytes: &[u8]) {
+    super::mesh("a.gltf", bytes);
+}

@@ -1,4 +1,5 @@
 //! Light probes: .hdr.
-#![no_main]
 
-gnomon_fuzz::target!(|bytes: &[u8]| gnomon_fuzz::probe("a.hdr", bytes));
+pub fn run(bytes: &[u8]) {
+    super::probe("a.hdr", bytes);
+}

@@ -1,4 +1,5 @@
 //! Meshes: .obj.
-#![no_main]
 
-gnomon_fuzz::target!(|bytes: &[u8]| gnomon_fuzz::mesh("a.obj", bytes));
+pub fn run(bytes: &[u8]) {
+    super::mesh("a.obj", bytes);
+}

@@ -1,5 +1,4 @@
 //! Frames of a folder of pictures, and the exposures that they carry.
-#![no_main]
 
 use gnomon::capture::FrameSource;
 use gnomon::capture::exposures::exif_exposure;
@@ -7,14 +6,14 @@ use gnomon::capture::exposures::exif_exposure;
 const NAMES: [&str; 4] = ["a.png", "a.jpg", "a.tif", "a.ppm"];
 
 // The choice says which name the bytes get.
-gnomon_fuzz::target!(|input: &[u8]| {
-    gnomon_fuzz::choice(input, NAMES.len()).map(|(name, bytes)| {
-        let path = gnomon_fuzz::file(NAMES[name], bytes);
+pub fn run(input: &[u8]) {
+    if let Some((name, bytes)) = super::choice(input, NAMES.len()) {
+        let path = super::file(NAMES[name], bytes);
         let _ = exif_exposure(&path);
         let source = path.to_str().map(FrameSource::open);
         if let Some(Ok(source)) = source {
             let mut source = source.as_taken();
             while let Ok(Some(_)) = source.next_frame() {}
         }
-    })
-});
+    }
+}

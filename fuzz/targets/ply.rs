@@ -1,4 +1,5 @@
 //! Meshes: .ply.
-#![no_main]
 
-gnomon_fuzz::target!(|bytes: &[u8]| gnomon_fuzz::mesh("a.ply", bytes));
+pub fn run(bytes: &[u8]) {
+    super::mesh("a.ply", bytes);
+}

@@ -1,10 +1,10 @@
 //! Responses of cameras.
-#![no_main]
 
 use gnomon::light::response::Response;
 
-gnomon_fuzz::target!(|text: &str| {
+pub fn run(bytes: &[u8]) {
+    let text = super::text(bytes);
     if let Ok(response) = Response::from_csv(text) {
         assert!(Response::from_csv(&response.csv()).is_ok());
     }
-});
+}

@@ -1,4 +1,5 @@
 //! Rooms that were kept on disk.
-#![no_main]
 
-gnomon_fuzz::target!(|bytes: &[u8]| gnomon::app::precomputed::room_of_bytes(bytes, &[]));
+pub fn run(bytes: &[u8]) {
+    let _ = gnomon::app::precomputed::room_of_bytes(bytes, &[]);
+}

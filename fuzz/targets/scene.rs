@@ -1,8 +1,8 @@
 //! Scene files.
-#![no_main]
 
 use std::path::Path;
 
-gnomon_fuzz::target!(|text: &str| {
-    gnomon_fuzz::scene(Path::new("/nowhere/scene.toml"), text);
-});
+pub fn run(bytes: &[u8]) {
+    let text = super::text(bytes);
+    super::read_scene(Path::new("/nowhere/scene.toml"), text);
+}

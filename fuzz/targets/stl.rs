@@ -1,4 +1,5 @@
 //! Meshes: .stl.
-#![no_main]
 
-gnomon_fuzz::target!(|bytes: &[u8]| gnomon_fuzz::mesh("a.stl", bytes));
+pub fn run(bytes: &[u8]) {
+    super::mesh("a.stl", bytes);
+}

@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 use std::fmt::Display;
-use std::io::{Write, stderr, stdout};
+use std::io::{self, Write, stderr, stdout};
 
 /// A line of talk.
 pub fn say(message: impl Display) {
@@ -20,6 +20,21 @@ pub fn say_lines(lines: &str) {
 /// Lines of a result, whose ends they bring along.
 pub fn give(lines: &str) {
     write_to(&mut stdout().lock(), lines);
+}
+
+/// A result that is worth nothing unless it is whole, as a file that a shell makes of it.
+///
+/// # Errors
+/// A full disk. Who reads no further has what was wanted.
+pub fn hand_out(text: &str) -> io::Result<()> {
+    let mut stream = stdout().lock();
+    let written = stream
+        .write_all(text.as_bytes())
+        .and_then(|()| stream.flush());
+    match written {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error),
+        _ => Ok(()),
+    }
 }
 
 fn write_to(stream: &mut impl Write, text: &str) {

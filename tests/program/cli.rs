@@ -817,6 +817,54 @@ fn check_and_replay_agree_on_what_cannot_be_played() {
     }
 }
 
+/// Whatever `check` makes of a scene, playing it comes to the same end.
+#[test]
+fn check_and_replay_agree_on_markers_that_are_not_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = folder.path().join("short");
+    std::fs::create_dir(&recording).unwrap();
+    let lamp = project_file("recordings/lamp");
+    let cut = std::process::Command::new("ffmpeg")
+        .args(["-v", "error", "-i"])
+        .arg(lamp.join("video.mp4"))
+        .args(["-c", "copy", "-frames:v", "12"])
+        .arg(recording.join("video.mp4"))
+        .status();
+    assert!(cut.unwrap().success());
+    let scene = lamp_scene_with(folder.path(), &recording);
+    let good = text(PathBuf::from(&scene));
+    let lone = "[[marker]]\nname = \"card\"\nid = 77\nsize_m = 0.04\n";
+    for (written, says) in [
+        (
+            good.replace("size_m = 0.044", "size_m = 44.0"),
+            "\"table\" was never found",
+        ),
+        (
+            good.replace("tag36h11", "tag25h9"),
+            "are seen; the scene wants tag25h9 0 to 5",
+        ),
+        (
+            good.replace("[[virtual]]", &format!("{lone}[[virtual]]")),
+            "\"card\" was never found",
+        ),
+    ] {
+        assert_ne!(written, good, "{says}");
+        std::fs::write(&scene, &written).unwrap();
+        for job in [
+            vec!["check", &scene],
+            vec!["track", &scene, "--poses", "p.csv"],
+        ] {
+            let output = gnomon(folder.path()).args(&job).output().unwrap();
+            assert!(!output.status.success(), "{job:?} {says}");
+            assert!(
+                stderr(&output).contains(says),
+                "{job:?}: {}",
+                stderr(&output)
+            );
+        }
+    }
+}
+
 #[test]
 fn check_warns_of_what_shows_nothing() {
     let folder = tempfile::tempdir().unwrap();
@@ -838,18 +886,7 @@ fn check_warns_of_what_shows_nothing() {
         "{before}{}",
         after.replace(position, "position_m = [40.0, 0.0, 0.0]")
     );
-    for (written, says) in [
-        (
-            good.replace("size_m = 0.044", "size_m = 44.0"),
-            "was 0.044 meant?",
-        ),
-        (
-            good.replace("tag36h11", "tag25h9"),
-            "was never found: tag36h11 0, 2 to 4 are seen; the scene wants tag25h9 0 to 5",
-        ),
-        (away, "out of view"),
-        (dark, "nothing lights the scene"),
-    ] {
+    for (written, says) in [(away, "out of view"), (dark, "nothing lights the scene")] {
         assert_ne!(written, good, "{says}");
         std::fs::write(&scene, &written).unwrap();
         let said = checked(folder.path(), &scene);
@@ -871,6 +908,17 @@ fn shells_and_man_get_what_they_need() {
         assert!(output.status.success() && output.stderr.is_empty());
         let given = String::from_utf8(output.stdout).unwrap();
         assert!(given.contains(part), "{arguments:?} lacks {part}: {given}");
+        #[cfg(target_os = "linux")]
+        {
+            // A shell makes a file of it, which must not be half there without a word.
+            let full = std::fs::File::create("/dev/full").unwrap();
+            let output = std::process::Command::new(assert_cmd::cargo::cargo_bin("gnomon"))
+                .args(arguments)
+                .stdout(full)
+                .output()
+                .unwrap();
+            assert!(!output.status.success() && stderr(&output).contains("No space left"));
+        }
     }
 }
 

@@ -15,6 +15,7 @@ mod job_files;
 mod live;
 mod live_panel;
 mod markers;
+mod readers;
 mod record;
 mod soak;
 mod track;

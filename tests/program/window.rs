@@ -251,7 +251,7 @@ fn film(path: &Path) {
 
 #[test]
 #[cfg_attr(not(has_xvfb), ignore = "needs Xvfb and xdotool")]
-fn a_target_that_is_held_to_the_camera_calibrates_it() {
+fn a_target_that_is_held_to_the_camera_calibrates_it_though_the_gpu_is_lost() {
     let display = Display::open();
     let folder = tempfile::tempdir().unwrap();
     let recorded = folder.path().join("film.mkv");
@@ -260,25 +260,33 @@ fn a_target_that_is_held_to_the_camera_calibrates_it() {
     let mut arguments = vec!["calibrate", recorded.to_str().unwrap(), "--watch"];
     arguments.extend(CHESSBOARD.split_whitespace());
     arguments.extend(["--out", written.to_str().unwrap()]);
-    let mut window = display.gnomon(&arguments);
-    let shown = display.window();
-    let press = |key: &str| {
-        display.xdotool(&["windowfocus", &shown, "key", key]);
+    let loss = folder.path().join("loss");
+    let mut command = display.command(&arguments);
+    let fault = format!("file {}", loss.display());
+    let mut window = gpu_faults::let_fail(&mut command, &fault).spawn().unwrap();
+    let press = |shown: &str, key: &str| {
+        display.xdotool(&["windowfocus", shown, "key", key]);
     };
     // Too early: it says so, and goes on.
-    press("Return");
+    press(&display.window(), "Return");
     let seconds = good_poses(Print::chessboard()).len() as f64 * 1.2;
-    thread::sleep(Duration::from_secs_f64(seconds + 3.0));
+    thread::sleep(Duration::from_secs_f64(seconds / 2.0));
+    // The views that it has are not lost with the device.
+    std::fs::write(&loss, "").unwrap();
+    wait_for("the loss", || !loss.exists());
+    thread::sleep(Duration::from_secs_f64(seconds / 2.0 + 3.0));
     assert!(window.try_wait().unwrap().is_none(), "it ended by itself");
+    let shown = display.window();
     let began = Instant::now();
     while window.try_wait().unwrap().is_none() {
         assert!(began.elapsed() < SOON, "Enter does not end it");
-        press("Return");
+        press(&shown, "Return");
         thread::sleep(Duration::from_millis(300));
     }
     let output = ended(window);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{said}");
+    assert!(said.contains("a new device is opened"), "{said}");
     let printed = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(printed.contains("focal length"), "{printed}");
     let found = load_calibration(&written).unwrap();

@@ -83,6 +83,12 @@ impl Encoder {
         if status.success() && !unwritten {
             return Ok(());
         }
+        #[cfg(unix)]
+        if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status)
+            && signal == rustix::process::Signal::XFSZ.as_raw()
+        {
+            return Err("File too large (ulimit -f)".to_owned());
+        }
         match last_lines(&said) {
             words if words.is_empty() => Err(status.to_string()),
             words => Err(words),
@@ -238,6 +244,8 @@ mod tests {
         assert_eq!(finished.unwrap_err(), "no such codec");
         let (_, finished) = fed(script("cat >/dev/null; kill -9 $$"));
         assert!(finished.unwrap_err().contains("signal: 9"));
+        let (_, finished) = fed(script("cat >/dev/null; kill -XFSZ $$"));
+        assert!(finished.unwrap_err().contains("File too large"));
         let (_, finished) = fed(script(
             "cat >/dev/null; echo 'av_interleaved_write_frame: No space left on device' >&2",
         ));

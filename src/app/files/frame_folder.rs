@@ -11,13 +11,15 @@ use super::locked_folder::lock;
 use super::new_file::{NewFile, vanished};
 use super::output_error::OutputError;
 
-/// A folder of frames that is being written.
+/// A folder of frames that is being written. One that it has made goes again where it got nothing.
 #[derive(Debug)]
 pub struct FrameFolder {
     path: PathBuf,
     /// Open, so that it is known again, and locked.
     folder: File,
     written: BTreeSet<String>,
+    /// Whether nothing was there before.
+    is_new: bool,
 }
 
 impl FrameFolder {
@@ -26,6 +28,7 @@ impl FrameFolder {
     /// # Errors
     /// One that cannot be made, or that another run writes to.
     pub fn create(path: &Path) -> Result<Self, OutputError> {
+        let is_new = !path.exists();
         let open = || {
             fs::create_dir_all(path)?;
             lock(path)
@@ -34,6 +37,7 @@ impl FrameFolder {
             path: path.to_owned(),
             folder: open().map_err(|error| io_error(path, error))?,
             written: BTreeSet::new(),
+            is_new,
         })
     }
 
@@ -86,6 +90,15 @@ impl FrameFolder {
     }
 }
 
+impl Drop for FrameFolder {
+    fn drop(&mut self) {
+        if self.is_new && self.written.is_empty() && is_at(&self.path, &self.folder) {
+            // What somebody else has put there keeps it.
+            _ = fs::remove_dir(&self.path);
+        }
+    }
+}
+
 /// The name of a frame's picture: its index in the recording, six digits.
 pub fn frame_name(index: u32) -> String {
     format!("{index:06}.png")
@@ -104,6 +117,17 @@ mod tests {
 
     fn put(folder: &mut FrameFolder, index: u32) -> Result<(), OutputError> {
         folder.put(&frame_name(index), |_| Ok(b"x".to_vec()))
+    }
+
+    #[test]
+    fn a_folder_that_got_nothing_goes_again() {
+        let outer = tempfile::tempdir().unwrap();
+        let path = outer.path().join("out");
+        drop(FrameFolder::create(&path).unwrap());
+        assert!(!path.exists());
+        fs::create_dir(&path).unwrap();
+        drop(FrameFolder::create(&path).unwrap());
+        assert!(path.exists(), "it was there before");
     }
 
     #[test]

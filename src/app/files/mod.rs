@@ -16,6 +16,7 @@ pub mod picture_files;
 pub mod poses_file;
 pub mod result_kind;
 mod stamped_frames;
+pub mod unfinished;
 pub mod video_writer;
 
 pub(crate) use file_identity::is_at;

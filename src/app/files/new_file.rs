@@ -1,25 +1,20 @@
 //! Files that get their names when they are whole: until then they have a name that nobody can foresee, in the same folder.
 //! A link keeps standing and what it leads to is replaced; a device, a pipe and `-` (stdout) are written through.
 
-use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::NamedTempFile;
 
 use super::file_identity::{is_at, is_open_file, real_place};
 use super::output_error::OutputError;
-use crate::capture::children::end_all;
+use super::unfinished::Unfinished;
 
 /// What names of unfinished files begin with.
 const PREFIX: &str = ".gnomon-";
 /// Letters and digits that follow, so many that none is met by chance or guessed.
 const RANDOM_LETTERS: usize = 16;
-
-/// The unfinished files of this process.
-static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// A file that is being written. Dropped before [`NewFile::finish`] it leaves nothing.
 pub struct NewFile {
@@ -29,8 +24,8 @@ pub struct NewFile {
     /// Whether nothing may be there.
     is_first: bool,
     temporary: NamedTempFile,
-    // Forgotten after the file is gone.
-    _listed: Listed,
+    // Dropped after the file is gone.
+    _unfinished: Unfinished,
 }
 
 /// The place where what is written goes.
@@ -88,16 +83,20 @@ impl NewFile {
             // The rights that any new file gets.
             #[cfg(unix)]
             builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-            let mut list = unfinished();
-            let temporary = builder.tempfile_in(&folder)?;
-            list.insert(temporary.path().to_owned());
-            drop(list);
+            let (temporary, unfinished) = Unfinished::begin(
+                || builder.tempfile_in(&folder),
+                |temporary| {
+                    let place = temporary.path().to_owned();
+                    // Nobody is left to be told of a failure.
+                    Box::new(move || _ = fs::remove_file(place))
+                },
+            )?;
             Ok(Self {
                 path: path.to_owned(),
-                _listed: Listed(temporary.path().to_owned()),
                 target,
                 is_first,
                 temporary,
+                _unfinished: unfinished,
             })
         };
         create().map_err(|error| io_error(path, error))
@@ -193,32 +192,6 @@ impl WriteTarget {
     }
 }
 
-/// Forgets an unfinished file.
-struct Listed(PathBuf);
-
-impl Drop for Listed {
-    fn drop(&mut self) {
-        unfinished().remove(&self.0);
-    }
-}
-
-fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
-    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Removes what is unfinished, ends what runs for this program, and ends the program with this status: for an interrupt of a job that has no better way to
-/// end.
-pub fn exit_without_traces(status: i32) -> ! {
-    // Held to the end, so that no other file is begun.
-    let unfinished = unfinished();
-    for path in unfinished.iter() {
-        // Nobody is left to be told of a failure.
-        _ = fs::remove_file(path);
-    }
-    end_all();
-    std::process::exit(status)
-}
-
 /// What a file or a folder is when somebody took it away meanwhile.
 pub fn vanished() -> io::Error {
     io::Error::new(
@@ -289,11 +262,6 @@ mod tests {
         write(&path, "again").unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap(), "again");
         assert_eq!(names_in(path.parent().unwrap()), ["a.csv"]);
-        assert!(
-            unfinished()
-                .iter()
-                .all(|listed| !listed.starts_with(folder.path()))
-        );
     }
 
     #[test]

@@ -2,8 +2,9 @@
 //! has a frame.
 
 use std::fs::{self, File};
-use std::io;
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tempfile::TempDir;
 
@@ -12,6 +13,7 @@ use crate::app::files::is_at;
 use crate::app::files::job_files::Replacing;
 use crate::app::files::lock;
 use crate::app::files::output_error::OutputError;
+use crate::app::files::unfinished::Unfinished;
 
 /// A session's video.
 pub(super) const VIDEO_NAME: &str = "video.mkv";
@@ -28,11 +30,21 @@ const FILES: [&str; 5] = [
 #[derive(Debug)]
 pub struct SessionFolder {
     path: PathBuf,
+    begun: Arc<Mutex<Begun>>,
+    // Dropped after what it takes back is settled.
+    _unfinished: Unfinished,
+}
+
+/// What there is of a session until it is settled what becomes of it.
+#[derive(Debug)]
+struct Begun {
+    path: PathBuf,
     /// Open, so that it is known again, and locked.
     folder: File,
     /// Holds the older session.
     older: Option<TempDir>,
     kept: bool,
+    is_settled: bool,
 }
 
 impl SessionFolder {
@@ -45,9 +57,49 @@ impl SessionFolder {
             path: path.to_owned(),
             error,
         };
-        fs::create_dir_all(path).map_err(io_error)?;
-        let mut folder = lock(path).map_err(io_error)?;
-        let names = names_in(path).map_err(io_error)?;
+        let make =
+            || Begun::make(path, replacing, io_error).map(|begun| Arc::new(Mutex::new(begun)));
+        let (begun, unfinished) = Unfinished::begin(make, |begun| {
+            let begun = Arc::clone(begun);
+            Box::new(move || locked(&begun).settle_at_once())
+        })?;
+        Ok(Self {
+            path: path.to_owned(),
+            begun,
+            _unfinished: unfinished,
+        })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The session has a frame: it stays, and an older one goes; unless somebody took the session away.
+    pub fn keep(&mut self) {
+        locked(&self.begun).keep();
+    }
+}
+
+impl Drop for SessionFolder {
+    fn drop(&mut self) {
+        locked(&self.begun).settle();
+    }
+}
+
+fn locked(begun: &Mutex<Begun>) -> MutexGuard<'_, Begun> {
+    begun.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Begun {
+    fn make(
+        path: &Path,
+        replacing: Replacing,
+        io_error: impl Fn(io::Error) -> OutputError,
+    ) -> Result<Self, OutputError> {
+        fs::create_dir_all(path).map_err(&io_error)?;
+        let mut folder = lock(path).map_err(&io_error)?;
+        let names = names_in(path).map_err(&io_error)?;
         let mut older = None;
         if let Some(first) = names.first() {
             let foreign = names.iter().find(|name| !is_of_session(name));
@@ -61,8 +113,8 @@ impl SessionFolder {
                     "the folder holds something already that is no part of a session ({foreign}); a recording takes a new one"
                 ),
                 (Replacing::Anything, None) => {
-                    older = Some(set_aside(path).map_err(io_error)?);
-                    folder = lock(path).map_err(io_error)?;
+                    older = Some(set_aside(path).map_err(&io_error)?);
+                    folder = lock(path).map_err(&io_error)?;
                     String::new()
                 }
             };
@@ -78,23 +130,29 @@ impl SessionFolder {
             folder,
             older,
             kept: false,
+            is_settled: false,
         })
     }
 
-    /// Where it is.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// The session has a frame: it stays, and an older one goes; unless somebody took the session away.
-    pub fn keep(&mut self) {
+    fn keep(&mut self) {
         self.kept = is_at(&self.path, &self.folder);
     }
-}
 
-impl Drop for SessionFolder {
-    fn drop(&mut self) {
+    /// Nothing more is written, and no time is left to see what the video shows: an encoder writes a cluster of frames as a
+    /// whole.
+    fn settle_at_once(&mut self) {
+        if has_cluster(&self.path.join(VIDEO_NAME)) {
+            self.keep();
+        }
+        self.settle();
+    }
+
+    fn settle(&mut self) {
+        if std::mem::replace(&mut self.is_settled, true) {
+            return;
+        }
         if self.kept {
+            drop(self.older.take());
             return;
         }
         if is_at(&self.path, &self.folder) {
@@ -116,6 +174,16 @@ impl Drop for SessionFolder {
             }
         }
     }
+}
+
+/// Whether frames of a Matroska file are on the disk: the head of a cluster is.
+fn has_cluster(video: &Path) -> bool {
+    const CLUSTER: [u8; 4] = [0x1f, 0x43, 0xb6, 0x75];
+    /// All that stands before it is less.
+    const MOST_HEAD: u64 = 1 << 16;
+    let mut head = Vec::new();
+    let read = File::open(video).and_then(|file| file.take(MOST_HEAD).read_to_end(&mut head));
+    read.is_ok() && head.windows(CLUSTER.len()).any(|bytes| bytes == CLUSTER)
 }
 
 /// The older session's name meanwhile.

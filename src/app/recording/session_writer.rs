@@ -14,7 +14,7 @@ use crate::app::files::new_file::{sync_folder, vanished};
 use crate::app::files::output_error::OutputError;
 use crate::app::files::poses_file::PosesText;
 use crate::app::files::video_writer::{Codec, Naming, Pace, VideoWriter};
-use crate::capture::{Frame, calibration_text, check_frame_size};
+use crate::capture::{Frame, FrameSource, calibration_text, check_frame_size};
 use crate::geometry::camera::Intrinsics;
 use crate::scene::Anchor;
 use crate::tracking::AnchorPose;
@@ -50,6 +50,8 @@ pub struct SessionWriter {
     last_secs: Option<f64>,
     /// The numbers in the session, by those that the frames came with.
     numbers: BTreeMap<u32, u32>,
+    /// Whether all that was given is on the disk.
+    is_whole: bool,
 }
 
 impl SessionWriter {
@@ -76,6 +78,7 @@ impl SessionWriter {
             frames: 0,
             last_secs: None,
             numbers: BTreeMap::new(),
+            is_whole: false,
             head,
         };
         if let Some(calibration) = &writer.head.calibration {
@@ -162,6 +165,7 @@ impl SessionWriter {
                 poses.finish()?;
             }
             sync_folder(Some(self.folder.path()));
+            self.is_whole = true;
         }
         Ok(self.frames)
     }
@@ -189,11 +193,18 @@ impl SessionWriter {
 impl Drop for SessionWriter {
     fn drop(&mut self) {
         drop(self.video.take());
-        // An encoder that fails at once has frames and no video.
-        if self.frames > 0 && self.folder.path().join(VIDEO_NAME).exists() {
+        // An encoder that fails soon was given frames, and its video has none.
+        if self.frames > 0 && (self.is_whole || shows_a_frame(&self.folder.path().join(VIDEO_NAME)))
+        {
             self.folder.keep();
         }
     }
+}
+
+fn shows_a_frame(video: &Path) -> bool {
+    let mut source = video.to_str().map(FrameSource::open).and_then(Result::ok);
+    let frame = source.as_mut().map(FrameSource::next_frame);
+    matches!(frame, Some(Ok(Some(_))))
 }
 
 /// A text file that is whole after each row: what does not fit on to the disk is taken back.
@@ -255,7 +266,6 @@ impl GrowingFile {
 mod tests {
     use super::*;
     use crate::app::files::poses_file::GivenPoses;
-    use crate::capture::FrameSource;
     use glam::{DAffine3, DVec3};
 
     fn frame(index: u32, time_secs: f64, size_px: [u32; 2]) -> Frame {

@@ -15,23 +15,31 @@ use crate::geometry::camera::Intrinsics;
 use crate::scene::{Object, Scene};
 use crate::tracking::Tracker;
 
-/// Frames that are read at most, a few seconds of a recording…
+/// Frames that are read where all anchors were found, a few seconds of a recording…
 const READ_FRAMES: u32 = 120;
 /// …of which one in so many is looked at, after the first ones.
 const STRIDE: u32 = 10;
 /// The first ones, each of which is looked at.
 const FIRST_FRAMES: u32 = 16;
 
-/// The warnings that the first frames of a scene's recording give: mirrored pictures, anchors that are not seen, things that
-/// are out of view; and what is learnt of a camera that is not calibrated. A live camera is not asked, but its calibration
-/// is read.
+/// What a recording tells of its scene before it is played.
+#[derive(Debug, Default)]
+pub struct FirstLook {
+    /// Mirrored pictures, things that are out of view, a camera that is not calibrated.
+    pub warnings: Vec<String>,
+    /// The anchors that are in none of its frames, which playing it ends with, in words.
+    pub never_found: Option<String>,
+}
+
+/// A look at the first frames of a scene's recording, and at all of them where an anchor does not come. A live camera is not
+/// asked, but its calibration is read.
 ///
 /// # Errors
 /// What keeps the scene from being replayed: a recording that cannot be opened, is damaged where it was read, or has a
 /// calibration of another size.
-pub fn first_look(scene: &Scene) -> Result<Vec<String>> {
+pub fn first_look(scene: &Scene) -> Result<FirstLook> {
     if is_live(&scene.camera.source) {
-        return Ok(match &scene.camera.calibration {
+        let warnings = match &scene.camera.calibration {
             Some(path) => load_calibration(path).map(|_| Vec::new())?,
             None => vec![format!(
                 "{} has no calibration: its focal length is guessed, and learnt from the markers while pictures come \
@@ -39,6 +47,10 @@ pub fn first_look(scene: &Scene) -> Result<Vec<String>> {
                 scene.camera.source,
                 CalibrationNamed::ByKey.place()
             )],
+        };
+        return Ok(FirstLook {
+            warnings,
+            never_found: None,
         });
     }
     let (mut source, camera) = source::open(scene, &AtomicBool::new(false))?;
@@ -52,7 +64,10 @@ pub fn first_look(scene: &Scene) -> Result<Vec<String>> {
     }
     let of_camera = camera.remark(&scene.camera.source, CalibrationNamed::ByKey.place());
     let of_frames = look.warnings(ended, source.good_frames());
-    Ok(of_camera.into_iter().chain(of_frames).collect())
+    Ok(FirstLook {
+        warnings: of_camera.into_iter().chain(of_frames).collect(),
+        never_found: look.sightings.never_found().filter(|_| ended),
+    })
 }
 
 /// What was seen so far.
@@ -85,17 +100,20 @@ impl<'a> Look<'a> {
         })
     }
 
-    /// Reads frames until all was seen; whether the recording came to its end.
+    /// Reads frames until all was seen, or enough where only things are out of view; whether the recording came to its end.
     fn watch(&mut self, source: &mut FrameSource) -> Result<bool> {
-        for number in 0..READ_FRAMES {
+        for number in 0.. {
+            let are_found = self.found.iter().all(|&found| found);
+            let is_enough = number >= READ_FRAMES || self.in_view.iter().all(|&seen| seen);
+            if are_found && is_enough {
+                return Ok(false);
+            }
             let Some(frame) = source.next_frame()? else {
                 return Ok(true);
             };
-            if number < FIRST_FRAMES || number % STRIDE == 0 {
+            // Where an anchor is missing all frames count, as they do when it is played.
+            if !are_found || number < FIRST_FRAMES || number % STRIDE == 0 {
                 self.add(&frame)?;
-            }
-            if self.found.iter().chain(&self.in_view).all(|&seen| seen) {
-                return Ok(false);
             }
         }
         Ok(false)
@@ -125,33 +143,15 @@ impl<'a> Look<'a> {
     }
 
     fn warnings(&self, ended: bool, read_frames: u32) -> Vec<String> {
+        if let Some(hint) = self.mirror.hint(self.scene.camera.mirror) {
+            return vec![hint];
+        }
         let frames = match ended {
             true => "any frame".to_owned(),
             false => format!("the first {read_frames} frames"),
         };
-        if let Some(hint) = self.mirror.hint(self.scene.camera.mirror) {
-            return vec![hint];
-        }
-        if !self.found.contains(&true) {
-            if self.sightings.saw_others()
-                && let Some(told) = self.sightings.never_found()
-            {
-                return vec![told];
-            }
-            return vec![format!(
-                "no marker of the scene is found in {frames}: are family and ids those of the print, and is it in the \
-                 picture?"
-            )];
-        }
-        let anchors = self.scene.anchors.iter().zip(&self.found);
-        let lost = anchors.filter(|(_, found)| !**found).map(|(anchor, _)| {
-            format!(
-                "\"{}\" is not found in {frames}: what stands on it is not shown",
-                anchor.name
-            )
-        });
         let things = self.scene.virtuals.iter().zip(&self.in_view);
-        // What stands on an anchor that is not found has been told of.
+        // What stands on an anchor that is never found is told of with it.
         let out_of_view = things
             .filter(|(thing, seen)| !**seen && self.found.get(thing.anchor) != Some(&false))
             .map(|(thing, _)| {
@@ -160,7 +160,7 @@ impl<'a> Look<'a> {
                     thing.name
                 )
             });
-        lost.chain(out_of_view).collect()
+        out_of_view.collect()
     }
 }
 

@@ -1,17 +1,9 @@
-//! What all targets share: a limit on memory, and bytes as files that a scene names, in a folder that each process has to itself.
+//! What targets share: bytes as files that a scene names, in a folder that each thread has to itself.
 
-use std::alloc::System;
 use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
 
-use cap::Cap;
 use gnomon::scene::Scene;
-
-/// What may be taken beyond what there was before, bytes, for an input of less than a megabyte.
-const MOST_MEMORY: usize = 256 << 20;
-
-#[global_allocator]
-static MEMORY: Cap<System> = Cap::new(System, usize::MAX);
 
 thread_local! {
     static FOLDER: OnceCell<tempfile::TempDir> = const { OnceCell::new() };
@@ -22,24 +14,6 @@ pub const CAMERA: &str = "[camera]\nsource = \"webcam:0\"\n";
 const MARKER: &str = "[[marker]]\nname = \"card\"\nid = 0\nsize_m = 0.05\n";
 const MESH: &[u8] = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
-/// A target that ends where an input takes more memory than it may.
-#[macro_export]
-macro_rules! target {
-    (|$input:ident: $kind:ty| $body:expr) => {
-        libfuzzer_sys::fuzz_target!(|$input: $kind| {
-            $crate::limit_memory();
-            let _ = $body;
-        });
-    };
-}
-
-/// From now on [`MOST_MEMORY`] more may be taken; who asks for more ends the process. What OpenCV takes is not counted.
-pub fn limit_memory() {
-    // Raised first: the limit must never lie below what is taken.
-    let _ = MEMORY.set_limit(usize::MAX);
-    let _ = MEMORY.set_limit(MEMORY.allocated() + MOST_MEMORY);
-}
-
 /// A file of some bytes; the last one of the same name is gone.
 pub fn file(name: &str, bytes: &[u8]) -> PathBuf {
     FOLDER.with(|folder| {
@@ -47,8 +21,15 @@ pub fn file(name: &str, bytes: &[u8]) -> PathBuf {
             let folder = tempfile::tempdir().expect("a folder");
             // A scene that is refused for what it is would leave all files unread.
             std::fs::write(folder.path().join("good.obj"), MESH).expect("a file");
-            let scene = Scene::parse(&folder.path().join("good.toml"), &scene_with_mesh("good.obj"));
-            assert!(scene.is_ok(), "{}", scene.err().map_or(String::new(), |error| error.to_string()));
+            let scene = Scene::parse(
+                &folder.path().join("good.toml"),
+                &scene_with_mesh("good.obj"),
+            );
+            assert!(
+                scene.is_ok(),
+                "{}",
+                scene.err().map_or(String::new(), |error| error.to_string())
+            );
             folder
         });
         let path = folder.path().join(name);
@@ -73,14 +54,19 @@ fn scene_with_mesh(name: &str) -> String {
 /// Reads a scene that has a probe of these bytes.
 pub fn probe(name: &str, bytes: &[u8]) {
     let path = file(name, bytes);
-    let probe = format!("{CAMERA}{MARKER}[probe]\nimage = \"{name}\"\nkind = \"panorama\"\nposition_m = [0, 0, 0.1]\n");
+    let probe = format!(
+        "{CAMERA}{MARKER}[probe]\nimage = \"{name}\"\nkind = \"panorama\"\nposition_m = [0, 0, 0.1]\n"
+    );
     scene(&path.with_file_name("scene.toml"), &probe);
 }
 
 /// Reads a scene that is this text, after its camera, beside a file of these bytes.
 pub fn beside(name: &str, bytes: &[u8], text: &str) {
     let path = file(name, bytes);
-    scene(&path.with_file_name("scene.toml"), &format!("{CAMERA}{text}"));
+    scene(
+        &path.with_file_name("scene.toml"),
+        &format!("{CAMERA}{text}"),
+    );
 }
 
 /// Reads a scene.
@@ -92,4 +78,12 @@ pub fn scene(path: &Path, text: &str) {
 pub fn choice(input: &[u8], of: usize) -> Option<(usize, &[u8])> {
     let (first, rest) = input.split_first()?;
     Some((usize::from(first.wrapping_sub(b'0')) % of, rest))
+}
+
+/// The bytes as text, as far as they are.
+pub fn text(bytes: &[u8]) -> &str {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => text,
+        Err(error) => std::str::from_utf8(&bytes[..error.valid_up_to()]).unwrap_or_default(),
+    }
 }
