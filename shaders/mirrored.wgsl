@@ -2,6 +2,8 @@
 
 @group(2) @binding(7) var environment: texture_2d<f32>;
 @group(2) @binding(8) var environment_sampler: sampler;
+// What a layer mirrors of light from everywhere, over the square roots of the cosine to the camera and of roughness.
+@group(2) @binding(9) var layer_albedo: texture_2d<f32>;
 
 // Radiance of a virtual surface with a glossy layer in a probe's light. `arriving`: irradiance of what lies below the layer;
 // `left`: part of what the layer mirrors that nothing hides.
@@ -30,7 +32,7 @@ fn radiance_in_probe(look: Look, normal: vec3f, to_camera: vec3f, arriving: vec3
 }
 
 // Radiance that the glossy layer mirrors of the environment (Karis 2013: a mean over the lobe times what the layer reflects
-// of light from everywhere, here as fitted by Karis 2014).
+// of light from everywhere).
 //!if LOOKS
 fn mirrored_by_metal(direction: vec3f, look: Look, cos_camera: f32) -> vec3f {
     return mirrored(direction, sqrt(look.roughness), cos_camera, look.albedo);
@@ -42,8 +44,8 @@ fn mirrored(direction: vec3f, evenness: f32, cos_camera: f32, head_on: vec3f) ->
     let place = vec2f(atan2(direction.y, direction.x) / (2.0 * PI) + 0.5, acos(clamp(direction.z, -1.0, 1.0)) / PI);
     let level = evenness * f32(textureNumLevels(environment) - 1u);
     let mean = textureSampleLevel(environment, environment_sampler, place, level).rgb;
-    let fit = evenness * vec4f(-1.0, -0.0275, -0.572, 0.022) + vec4f(1.0, 0.0425, 1.04, -0.04);
-    let grazing = min(fit.x * fit.x, exp2(-9.28 * cos_camera)) * fit.x + fit.y;
-    let reflected = vec2f(-1.04, 1.04) * grazing + fit.zw;
+    let side = vec2f(textureDimensions(layer_albedo));
+    let entry = (vec2f(sqrt(cos_camera), evenness) * (side - 1.0) + 0.5) / side;
+    let reflected = textureSampleLevel(layer_albedo, environment_sampler, entry, 0.0).rg;
     return mean * (head_on * reflected.x + reflected.y);
 }

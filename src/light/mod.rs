@@ -8,6 +8,7 @@ pub mod contrast;
 pub mod form_factor;
 pub mod harmonics;
 pub mod irradiance_records;
+pub mod layer_albedo;
 pub mod material;
 pub mod pieces;
 pub mod prefiltered;
@@ -272,9 +273,7 @@ pub fn reflectance(material: &Material, normal: DVec3, to_light: DVec3, to_camer
     let alpha_squared = alpha * alpha;
     let spread = cos_half * cos_half * (alpha_squared - 1.0) + 1.0;
     let distribution = alpha_squared / (PI * spread * spread);
-    let smith = |cosine: f64| (cosine * cosine * (1.0 - alpha_squared) + alpha_squared).sqrt();
-    let visibility = 0.5 / (cos_light * smith(cos_camera) + cos_camera * smith(cos_light));
-    let lobe = distribution * visibility;
+    let lobe = distribution * layer_visibility(alpha, cos_light, cos_camera);
     let way = to_light.dot(halfway);
     let metal = lobe * (material.albedo + (DVec3::ONE - material.albedo) * grazing(way));
     // What the layer lets in and out again; the mean keeps a white material white.
@@ -282,6 +281,13 @@ pub fn reflectance(material: &Material, normal: DVec3, to_light: DVec3, to_camer
         (1.0 - fresnel(cos_light)) * (1.0 - fresnel(cos_camera)) / (1.0 - MEAN_FRESNEL);
     let dielectric = diffuse * let_through + lobe * fresnel(way);
     dielectric.lerp(metal, material.metallic)
+}
+
+/// Height-correlated Smith term of GGX over four times both cosines.
+fn layer_visibility(alpha: f64, cos_light: f64, cos_camera: f64) -> f64 {
+    let alpha_squared = alpha * alpha;
+    let smith = |cosine: f64| (cosine * cosine * (1.0 - alpha_squared) + alpha_squared).sqrt();
+    0.5 / (cos_light * smith(cos_camera) + cos_camera * smith(cos_light))
 }
 
 /// Cosine-weighted mean of [`fresnel`] over the hemisphere: F₀ + (1 − F₀) / 21.

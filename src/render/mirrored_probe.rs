@@ -3,6 +3,7 @@
 use half::f16;
 use wgpu::util::DeviceExt as _;
 
+use crate::light::layer_albedo::layer_albedo;
 use crate::light::prefiltered::{LEVELS, SHARPEST_PX, prefiltered};
 use crate::light::probe::Probe;
 
@@ -10,6 +11,8 @@ use crate::light::probe::Probe;
 pub(super) struct MirroredProbe {
     pub view: wgpu::TextureView,
     pub sampler: wgpu::Sampler,
+    /// What a layer mirrors of light from everywhere.
+    pub layer_albedo: wgpu::TextureView,
 }
 
 impl MirroredProbe {
@@ -29,27 +32,52 @@ impl MirroredProbe {
         if glossy.is_none() {
             halves = vec![[f16::ZERO; 4]; 2];
         }
-        let texture = device.create_texture_with_data(
-            queue,
-            &wgpu::TextureDescriptor {
-                label: Some("environment"),
-                size: wgpu::Extent3d {
-                    width,
-                    height: width / 2,
-                    depth_or_array_layers: 1,
+        let layer = match glossy {
+            Some(_) => layer_albedo(),
+            None => vec![[0.0; 2]],
+        };
+        let side = layer.len().isqrt() as u32;
+        let layer: Vec<[f16; 2]> = layer
+            .into_iter()
+            .map(|entry| entry.map(f16::from_f32))
+            .collect();
+        let texture = |label, [width, height]: [u32; 2], levels, format, halves: &[u8]| {
+            let texture = device.create_texture_with_data(
+                queue,
+                &wgpu::TextureDescriptor {
+                    label: Some(label),
+                    size: wgpu::Extent3d {
+                        width,
+                        height,
+                        depth_or_array_layers: 1,
+                    },
+                    mip_level_count: levels,
+                    sample_count: 1,
+                    dimension: wgpu::TextureDimension::D2,
+                    format,
+                    usage: wgpu::TextureUsages::TEXTURE_BINDING,
+                    view_formats: &[],
                 },
-                mip_level_count: levels,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format: wgpu::TextureFormat::Rgba16Float,
-                usage: wgpu::TextureUsages::TEXTURE_BINDING,
-                view_formats: &[],
-            },
-            wgpu::util::TextureDataOrder::MipMajor,
-            bytemuck::cast_slice(&halves),
-        );
+                wgpu::util::TextureDataOrder::MipMajor,
+                halves,
+            );
+            texture.create_view(&Default::default())
+        };
         Self {
-            view: texture.create_view(&Default::default()),
+            view: texture(
+                "environment",
+                [width, width / 2],
+                levels,
+                wgpu::TextureFormat::Rgba16Float,
+                bytemuck::cast_slice(&halves),
+            ),
+            layer_albedo: texture(
+                "layer albedo",
+                [side; 2],
+                1,
+                wgpu::TextureFormat::Rg16Float,
+                bytemuck::cast_slice(&layer),
+            ),
             sampler: device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("environment"),
                 address_mode_u: wgpu::AddressMode::Repeat,

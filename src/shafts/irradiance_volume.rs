@@ -20,9 +20,9 @@ use crate::light::harmonics::{cosine_lobe, count, sphere, write_basis};
 
 /// Rays from each point of the grid to all sides, if patches were so small that each met another one: a patch is looked at along
 /// as many as its solid angle has room for, ...
-const RAYS: f32 = 1024.0;
+const RAYS: f32 = 4096.0;
 /// ... and along some at least, which tell whether all of it is seen.
-const LEAST_RAYS_OF_A_PATCH: usize = 2;
+const LEAST_RAYS_OF_A_PATCH: usize = 3;
 const MOST_RAYS_OF_A_PATCH: usize = 64;
 /// Rays to all sides that tell whether a point lies within something, and how much is seen of what is hidden in part.
 const SURVEYING_RAYS: usize = 1024;

@@ -1,0 +1,108 @@
+//! What a rough layer mirrors of light that is the same from everywhere (Karis 2013, the second of his two sums), as a table.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{grazing, layer_visibility};
+
+/// Entries along a side of the table.
+pub const SIDE: usize = 32;
+/// Halfway vectors of an entry: so many angles, and half as many azimuths.
+const SAMPLES: usize = 128;
+
+/// For cosines to the camera (the square of what rises from entry to entry, from 0 to 1) and GGX α (likewise, row by row) factor and
+/// summand that make the part that is mirrored of what the layer mirrors head-on.
+pub fn layer_albedo() -> Vec<[f32; 2]> {
+    let along = |index: usize| (index as f64 / (SIDE - 1) as f64).powi(2);
+    let entries = (0..SIDE * SIDE).into_par_iter();
+    entries
+        .map(|index| entry(along(index % SIDE), along(index / SIDE)))
+        .collect()
+}
+
+/// By halfway vectors as the distribution has them.
+fn entry(cos_camera: f64, alpha: f64) -> [f32; 2] {
+    let (cos_camera, alpha) = (cos_camera.max(1e-3), alpha.max(1e-4));
+    let to_camera = DVec3::new((1.0 - cos_camera * cos_camera).sqrt(), 0.0, cos_camera);
+    let [mut factor, mut summand] = [0.0; 2];
+    for index in 0..SAMPLES * SAMPLES / 2 {
+        let [part, around] = [index % SAMPLES, index / SAMPLES].map(|index| index as f64 + 0.5);
+        let part = part / SAMPLES as f64;
+        let cos_squared = (1.0 - part) / (1.0 + (alpha * alpha - 1.0) * part);
+        let (sine, cosine) = (around / SAMPLES as f64 * 2.0 * TAU).sin_cos();
+        let radius = (1.0 - cos_squared).sqrt();
+        let halfway = DVec3::new(radius * cosine, radius * sine, cos_squared.sqrt());
+        let way = halfway.dot(to_camera);
+        let cos_light = (halfway * (2.0 * way) - to_camera).z;
+        if way <= 0.0 || cos_light <= 0.0 {
+            continue;
+        }
+        let mirrored = 4.0 * layer_visibility(alpha, cos_light, cos_camera) * cos_light * way
+            / halfway.z.max(1e-9);
+        factor += mirrored * (1.0 - grazing(way));
+        summand += mirrored * grazing(way);
+    }
+    [factor, summand].map(|sum| (sum / (SAMPLES * SAMPLES / 2) as f64) as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::light::material::Material;
+    use crate::light::reflectance;
+
+    /// As the graphics card reads it.
+    fn between(table: &[[f32; 2]], cos_camera: f64, alpha: f64) -> [f64; 2] {
+        let at = |value: f64| {
+            let place = value.sqrt() * (SIDE - 1) as f64;
+            let low = (place as usize).min(SIDE - 2);
+            (low, place - low as f64)
+        };
+        let ((column, right), (row, down)) = (at(cos_camera), at(alpha));
+        [0, 1].map(|part| {
+            let entry = |across: usize, below: usize| {
+                f64::from(table[(row + below) * SIDE + column + across][part])
+            };
+            let upper = entry(0, 0) * (1.0 - right) + entry(1, 0) * right;
+            let lower = entry(0, 1) * (1.0 - right) + entry(1, 1) * right;
+            upper * (1.0 - down) + lower * down
+        })
+    }
+
+    #[test]
+    fn the_table_is_what_the_brdf_reflects_of_light_from_everywhere() {
+        let table = layer_albedo();
+        for alpha in [0.2, 0.3, 0.55, 1.0] {
+            for cos_camera in [1.0, 0.8, 0.5, 0.25] {
+                let to_camera =
+                    DVec3::new((1.0_f64 - cos_camera * cos_camera).sqrt(), 0.0, cos_camera);
+                let color = DVec3::new(0.04, 0.5, 1.0);
+                let metal = Material {
+                    roughness: Some(alpha),
+                    metallic: 1.0,
+                    ..Material::matt(color)
+                };
+                let steps = 500;
+                let mut sum = DVec3::ZERO;
+                for index in 0..steps * steps {
+                    let [down, around] =
+                        [index / steps, index % steps].map(|at| (at as f64 + 0.5) / steps as f64);
+                    // Even in the square of the sine: the cosine is in it.
+                    let (sine, cosine) = (TAU * around).sin_cos();
+                    let radius = down.sqrt();
+                    let to_light = DVec3::new(radius * cosine, radius * sine, (1.0 - down).sqrt());
+                    sum += reflectance(&metal, DVec3::Z, to_light, to_camera);
+                }
+                let expected = sum * std::f64::consts::PI / (steps * steps) as f64;
+                let [factor, summand] = between(&table, cos_camera, alpha);
+                let found = color * factor + summand;
+                assert!(
+                    (found - expected).abs().max_element() < 0.005,
+                    "{alpha} {cos_camera}: {found} {expected}"
+                );
+            }
+        }
+    }
+}
