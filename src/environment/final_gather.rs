@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::geometry::bounds::Bounds;
 use crate::light::irradiance_records::IrradianceRecords;
 use crate::light::{Light, irradiance};
-use crate::shafts::light_of_room::hemisphere;
+use crate::shafts::light_of_room::{hemisphere, over_hemisphere};
 
 use super::placed::{OFFSET_M, PlacedScene, PlacedThing, SeenSurface, way_to};
 use super::sky::Sky;
@@ -24,6 +24,12 @@ const AWAY_PART: f32 = 0.25;
 const INSIDE_PART: f32 = 0.5;
 /// Places that a light of some size shines from on what rays meet.
 const PLACES_OF_A_LIGHT: usize = 8;
+/// Directions over the place that a ray ends at, ...
+const DIRECTIONS_OF_AN_END: usize = 64;
+/// ... of which each ray takes so many, ...
+const RAYS_OF_AN_END: usize = 2;
+/// ... and the next ray those that are so many on: no divisor of the others.
+const DIRECTIONS_APART: usize = 37;
 /// Points inside of a solid have the light of those outside for so many edges.
 const EDGES_INWARDS: usize = 2;
 /// Changes below the first of these parts of all light at a point are none, so that what nothing touches stays as it is; from
@@ -39,6 +45,17 @@ pub struct Gathered {
     pub taken: Vec3,
 }
 
+/// What rays that end on a surface take from there beside what the lights give it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FurtherLight {
+    /// The sky's light as if nothing hid it, which stands for what hides it and reflects other light.
+    Estimated,
+    /// The sky's light as far as nothing hides it.
+    None,
+    /// That, and what is reflected by what hides it.
+    Bounce,
+}
+
 /// How light is gathered.
 #[derive(Debug, Clone)]
 pub struct Gathering<'a> {
@@ -46,6 +63,8 @@ pub struct Gathering<'a> {
     pub sky: &'a Sky,
     /// From each record.
     pub rays: usize,
+    /// What goes on being reflected.
+    pub further: FurtherLight,
     /// Of each compact light of the scene the places that it shines from, so that each ray's end sees one of them.
     pub shining_from: Vec<Vec<Light>>,
 }
@@ -205,13 +224,45 @@ impl PlacedScene<'_> {
         sums
     }
 
-    /// Radiance that a surface reflects of the lights and of the sky, which it sees all of: without virtual things, and with
-    /// them.
+    /// Radiance that a surface reflects of the lights and of what is around it: without virtual things, and with them.
     fn reflected_by(&self, seen: &SeenSurface, how: &Gathering<'_>, number: usize) -> [Vec3; 2] {
         let start = seen.place + seen.normal * OFFSET_M;
-        let of_sky = how.sky.irradiance(seen.normal);
         let direct = self.direct(start, seen.normal, how, number);
-        direct.map(|direct| seen.albedo * (of_sky + direct) * FRAC_1_PI)
+        let around = self.around(start, seen.normal, how, number);
+        [0, 1].map(|with| seen.albedo * (direct[with] + around[with]) * FRAC_1_PI)
+    }
+
+    /// Irradiance of a place that a ray with this number came to, but for the lights themselves: without virtual things, and with
+    /// them.
+    fn around(&self, start: Vec3, normal: Vec3, how: &Gathering<'_>, number: usize) -> [Vec3; 2] {
+        let of_sky = how.sky.irradiance(normal);
+        if how.further == FurtherLight::Estimated {
+            return [of_sky; 2];
+        }
+        let of_surface = |seen: &SeenSurface| match how.further {
+            FurtherLight::None | FurtherLight::Estimated => [Vec3::ZERO; 2],
+            FurtherLight::Bounce => {
+                let start = seen.place + seen.normal * OFFSET_M;
+                let direct = self.direct(start, seen.normal, how, number);
+                direct.map(|direct| seen.albedo * (direct + how.sky.irradiance(seen.normal)))
+            }
+        };
+        let axes = normal.any_orthonormal_pair();
+        // Neighbouring rays look elsewhere.
+        let first = number * DIRECTIONS_APART;
+        let mut sums = [Vec3::ZERO; 2];
+        for ray in 0..RAYS_OF_AN_END {
+            let turn = first + ray * DIRECTIONS_OF_AN_END / RAYS_OF_AN_END;
+            let which = [turn % DIRECTIONS_OF_AN_END, DIRECTIONS_OF_AN_END];
+            let direction = over_hemisphere(normal, axes, which);
+            let real = self.seen(start, direction, is_real);
+            let reach = real.as_ref().map_or(f32::INFINITY, |seen| seen.distance);
+            let before = self.seen_within(start, direction, reach, is_virtual_caster);
+            let [without, behind] = real.as_ref().map_or([of_sky; 2], of_surface);
+            sums[0] += without;
+            sums[1] += before.as_ref().map_or(behind, |seen| of_surface(seen)[1]);
+        }
+        sums.map(|sum| sum / RAYS_OF_AN_END as f32)
     }
 
     /// Irradiance of a place of the lights themselves, without virtual things and with them, as that of their places whose turn

@@ -11,7 +11,7 @@ use glam::{DAffine3, DVec3, Vec3};
 
 use crate::environment::distant_light::DistantLight;
 use crate::environment::final_gather::{
-    GatherPoints, Gathered, Gathering, longest_edge_m, shining_from,
+    FurtherLight, GatherPoints, Gathered, Gathering, longest_edge_m, shining_from,
 };
 use crate::environment::placed::{PlacedScene, PlacedThing};
 use crate::environment::sky::Sky;
@@ -21,7 +21,7 @@ use crate::geometry::corner_points::corner_points;
 use crate::geometry::reach::{self, PixelRect};
 use crate::geometry::subdivide::{Corner, subdivided};
 use crate::light::Light;
-use crate::scene::Scene;
+use crate::scene::{Bounces, Scene};
 
 use super::anchor_geometry::Role;
 use super::deforming::DeformingThing;
@@ -81,6 +81,7 @@ pub(super) struct FinalGather {
     sky: Sky,
     /// That the scene asks for.
     rays: usize,
+    further: FurtherLight,
     pipeline: wgpu::RenderPipeline,
     /// Whether things can move to each other without an edit.
     moves: bool,
@@ -155,6 +156,11 @@ impl FinalGather {
             distant: DistantLight::default(),
             sky: sky(rays_of_sky(rays, moves)),
             rays,
+            further: match (scene.shadows.bounces, moves) {
+                (Bounces::Estimated, _) | (Bounces::Auto, true) => FurtherLight::Estimated,
+                (Bounces::Once, _) => FurtherLight::None,
+                (Bounces::Twice, _) | (Bounces::Auto, false) => FurtherLight::Bounce,
+            },
             pipeline: gpu.pipeline(&PipelineDescription {
                 shader: "final_gather.wgsl",
                 vertex: "place_gathered",
@@ -267,6 +273,7 @@ impl FinalGather {
         let how = Gathering {
             sky: &self.sky,
             rays: self.rays.div_ceil(fineness.rays_for_one),
+            further: self.further,
             shining_from: lights.iter().map(shining_from).collect(),
         };
         for model in models {

@@ -80,7 +80,7 @@ pub use ranges::{Digits, Numbers, Whole};
 pub use raw_model::ClipInfo;
 pub use reference::reference;
 pub use shadows::{
-    EnvironmentMethod, EnvironmentSettings, ShadowChange, ShadowSettings, ShadowTechnique,
+    Bounces, EnvironmentMethod, EnvironmentSettings, ShadowChange, ShadowSettings, ShadowTechnique,
     ShaftSettings, Technique, VolumeCounting,
 };
 pub use shapes::ShapeKind;

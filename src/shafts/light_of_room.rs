@@ -226,12 +226,20 @@ pub const START_OFFSET_M: f32 = 2e-5;
 
 /// Directions over a unit normal, spread by the cosine (Malley's method on a golden-angle spiral): the same each time.
 pub fn hemisphere(normal: Vec3, count: usize) -> impl Iterator<Item = Vec3> {
-    let (tangent, bitangent) = normal.any_orthonormal_pair();
-    (0..count).map(move |index| {
-        let radius = ((index as f32 + 0.5) / count as f32).sqrt();
-        let (sine, cosine) = (TAU * (0.618_034 * index as f32).fract()).sin_cos();
-        tangent * (radius * cosine)
-            + bitangent * (radius * sine)
-            + normal * (1.0 - radius * radius).max(0.0).sqrt()
-    })
+    let axes = normal.any_orthonormal_pair();
+    (0..count).map(move |index| over_hemisphere(normal, axes, [index, count]))
+}
+
+/// One of the directions of [`hemisphere`], by its index and their count; `tangents` are two unit vectors across the normal and
+/// each other.
+pub fn over_hemisphere(
+    normal: Vec3,
+    (tangent, bitangent): (Vec3, Vec3),
+    [index, count]: [usize; 2],
+) -> Vec3 {
+    let radius = ((index as f32 + 0.5) / count as f32).sqrt();
+    let (sine, cosine) = (TAU * (0.618_034 * index as f32).fract()).sin_cos();
+    tangent * (radius * cosine)
+        + bitangent * (radius * sine)
+        + normal * (1.0 - radius * radius).max(0.0).sqrt()
 }
