@@ -448,7 +448,9 @@ fn size_m(size_mm: f64) -> Result<f64> {
     let millimetres = MARKER.size_m.takes.scaled(1e3, "mm");
     match millimetres.check(size_mm) {
         Ok(size_mm) => Ok(size_mm * 1e-3),
-        Err(refusal) => bail!("--size-mm {size_mm:?}: {refusal}"),
+        // (The largest numbers have three hundred digits.)
+        Err(refusal) if size_mm.abs() >= 1e15 => bail!("--size-mm {size_mm:e}: {refusal}"),
+        Err(refusal) => bail!("--size-mm {size_mm}: {refusal}"),
     }
 }
 

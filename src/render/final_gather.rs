@@ -156,7 +156,7 @@ impl FinalGather {
             distant: DistantLight::default(),
             sky: sky(rays_of_sky(rays, moves)),
             rays,
-            further: match (scene.shadows.bounces, moves) {
+            further: match (scene.bounces, moves) {
                 (Bounces::Estimated, _) | (Bounces::Auto, true) => FurtherLight::Estimated,
                 (Bounces::Once, _) => FurtherLight::None,
                 (Bounces::Twice, _) | (Bounces::Auto, false) => FurtherLight::Bounce,

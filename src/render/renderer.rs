@@ -14,7 +14,7 @@ use crate::geometry::reach::PixelRect;
 use crate::light::Material;
 use crate::light::texture::Texture;
 use crate::scene::{
-    Object, Scene, SceneLight, ShadowSettings, ShadowTechnique, Shortcut, Shortcuts,
+    Bounces, Object, Scene, SceneLight, ShadowSettings, ShadowTechnique, Shortcut, Shortcuts,
 };
 
 use super::attachments::texture;
@@ -82,6 +82,7 @@ struct Shape {
     /// Of each light what it stands on, whether it has a size and what it is.
     lights: Vec<(usize, bool, LightKind)>,
     ambient_radiance: DVec3,
+    bounces: Bounces,
     nodes: usize,
     /// Of each thing its name, its anchor, its mesh's triangles and whether it casts.
     things: Vec<(String, usize, usize, bool)>,
@@ -107,6 +108,7 @@ impl Shape {
             shadows: scene.shadows,
             lights: lights.iter().map(kind).collect(),
             ambient_radiance: scene.ambient_radiance,
+            bounces: scene.bounces,
             nodes: scene.node_count(),
             things: things().map(shape).collect(),
             animations: things()

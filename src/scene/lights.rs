@@ -134,12 +134,34 @@ keys! {
     up: DVec3, Vectors::three(DIRECTION) => Is(DVec3::Z);
 }
 
+choices! {
+    /// How often light is followed that things reflect on to real surfaces.
+    pub enum Bounces, "number of bounces" {
+        /// Twice where nothing moves to anything else, estimated elsewhere.
+        Auto = "auto",
+        /// Once; where it is reflected the ambient light counts as if nothing hid it, which stands for light that goes on.
+        Estimated = "estimated",
+        /// Once, and no more.
+        Once = "once",
+        /// Twice, the second time by few rays.
+        Twice = "twice",
+    }
+}
+
+impl Default for Bounces {
+    fn default() -> Self {
+        *AMBIENT.bounces.default()
+    }
+}
+
 keys! {
     /// Keys of `[ambient]`.
     pub static AMBIENT: AmbientKeys;
 
     /// Radiance from everywhere, W/(m² sr) up to the camera's exposure, linear RGB.
     radiance: DVec3, Vectors::one_or_three(POWER) => Is(DVec3::ZERO);
+    /// How often light that things reflect on to real surfaces is followed (`ambient_samples` of `[shadows]` are the rays).
+    bounces: Bounces => Is(Bounces::Auto);
 }
 
 /// `[[light]]` of any kind, as it may be before its kind is known.
@@ -378,10 +400,13 @@ pub fn unit_direction(written: DVec3) -> DVec3 {
     (written / written.abs().max_element()).normalize_or_zero()
 }
 
-/// The radiance of the constant surrounding light; none where the scene has no `[ambient]`.
-pub fn ambient_radiance(root: &Table) -> Result<DVec3, SceneError> {
+/// The radiance of the constant surrounding light, none where the scene has no `[ambient]`, and how often light is followed.
+pub fn ambient(root: &Table) -> Result<(DVec3, Bounces), SceneError> {
     match AMBIENT_SECTION.table(root)? {
-        Some(ambient) => AMBIENT.radiance.read(&ambient),
-        None => Ok(*AMBIENT.radiance.default()),
+        Some(ambient) => Ok((
+            AMBIENT.radiance.read(&ambient)?,
+            AMBIENT.bounces.read(&ambient)?,
+        )),
+        None => Ok((*AMBIENT.radiance.default(), *AMBIENT.bounces.default())),
     }
 }

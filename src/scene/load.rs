@@ -87,7 +87,7 @@ impl Scene {
         let tracking = tracking::tracking(&root)?;
         let anchors = anchors::anchors(&root, tracking.detector)?;
         let lights = lights::lights(&root, &anchors)?;
-        let ambient_radiance = lights::ambient_radiance(&root)?;
+        let (ambient_radiance, bounces) = lights::ambient(&root)?;
         let probe = probe::probe(&root, &anchors)?;
         let shadows = shadows::shadows(&root, probe.as_ref())?;
         let (phantoms, virtuals) = objects::objects(&root, &anchors)?;
@@ -99,6 +99,7 @@ impl Scene {
             virtuals,
             lights,
             ambient_radiance,
+            bounces,
             probe,
             shadows,
         })

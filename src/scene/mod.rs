@@ -69,7 +69,7 @@ pub use error::{SceneError, TextPlace};
 pub use faces::Face;
 pub use family::{Codes, Drawing, Family, Ink};
 pub use file_stamp::FileStamp;
-pub use lights::{SceneLight, unit_direction};
+pub use lights::{Bounces, SceneLight, unit_direction};
 pub use load::Reading;
 pub use model_cache::ModelCache;
 pub use motion::{Motion, PathEnd, Station};
@@ -80,7 +80,7 @@ pub use ranges::{Digits, Numbers, Whole};
 pub use raw_model::ClipInfo;
 pub use reference::reference;
 pub use shadows::{
-    Bounces, EnvironmentMethod, EnvironmentSettings, ShadowChange, ShadowSettings, ShadowTechnique,
+    EnvironmentMethod, EnvironmentSettings, ShadowChange, ShadowSettings, ShadowTechnique,
     ShaftSettings, Technique, VolumeCounting,
 };
 pub use shapes::ShapeKind;
@@ -104,6 +104,8 @@ pub struct Scene {
     pub lights: Vec<SceneLight>,
     /// Radiance of the constant surrounding light, linear RGB.
     pub ambient_radiance: DVec3,
+    /// How often light is followed that things reflect on to real surfaces.
+    pub bounces: Bounces,
     /// The light that a probe saw, and the room that sent it.
     pub probe: Option<ProbeScene>,
     /// How shadows are made.

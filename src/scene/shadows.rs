@@ -48,20 +48,6 @@ choices! {
 }
 
 choices! {
-    /// How often light is followed that things reflect on to real surfaces.
-    pub enum Bounces, "number of bounces" {
-        /// Twice where nothing moves to anything else, estimated elsewhere.
-        Auto = "auto",
-        /// Once; where it is reflected the ambient light counts as if nothing hid it, which stands for light that goes on.
-        Estimated = "estimated",
-        /// Once, and no more.
-        Once = "once",
-        /// Twice, the second time by few rays.
-        Twice = "twice",
-    }
-}
-
-choices! {
     /// How shadow volumes are counted.
     pub enum VolumeCounting, "way of counting" {
         /// Depth-pass where it is known to be right, depth-fail elsewhere: the same picture for less.
@@ -142,8 +128,6 @@ settings! {
     /// By so many rays from each point real surfaces get the ambient light, an environment's too, and what things reflect on to
     /// them; 0: virtual things hide and reflect none of that. Where things move there are fewer. Takes no part in shafts.
     ambient_samples: u32, Whole::between(0, 1024) => ByQuality { fast: 0, balanced: 256, accurate: 512 };
-    /// How often light that things reflect on to real surfaces is followed by these rays.
-    bounces: Bounces => ByQuality { fast: Bounces::Auto, balanced: Bounces::Auto, accurate: Bounces::Twice };
     /// How volumes are counted.
     counting: VolumeCounting => Is(VolumeCounting::Auto);
     /// By less than this many pixels a coarser version of a thing may move its silhouette, as the camera and the lights
@@ -448,7 +432,6 @@ mod tests {
             ("samples", None),
             ("light_samples", None),
             ("ambient_samples", None),
-            ("bounces", None),
             ("max_silhouette_error_px", None),
             ("sources", None),
         ];

@@ -28,7 +28,7 @@ use gnomon::geometry::camera::Intrinsics;
 use gnomon::geometry::mesh::{Mesh, MeshReport};
 use gnomon::light::{Light, Material};
 use gnomon::render::{Gpu, Layers, REAL, Renderer, Shown, VIRTUAL};
-use gnomon::scene::{Anchor, Object, Scene, ShadowSettings, ShapeKind, Technique};
+use gnomon::scene::{Anchor, Bounces, Object, Scene, ShadowSettings, ShapeKind, Technique};
 
 use shapes::Soup;
 
@@ -128,6 +128,7 @@ pub fn scene(
         virtuals,
         lights: lights.into_iter().map(Into::into).collect(),
         ambient_radiance: DVec3::splat(ambient),
+        bounces: Bounces::Auto,
         shadows: ShadowSettings {
             technique: Technique::Auto,
             samples: 4,

@@ -15,8 +15,8 @@ use gnomon::app::truth::{draw, key_frames};
 use gnomon::light::{Light, Shape};
 use gnomon::render::Renderer;
 use gnomon::scene::{
-    Bounces, Difference, Placement, Quality, Scene, ShadowChange, ShadowSettings, ShaftSettings,
-    Shortcuts, Technique, VolumeCounting,
+    Difference, Placement, Quality, Scene, ShadowChange, ShadowSettings, ShaftSettings, Shortcuts,
+    Technique, VolumeCounting,
 };
 
 /// What is promised for the time from a saved file to its scene.
@@ -585,7 +585,6 @@ mod edits {
                     without: Shortcuts::NONE,
                     light_samples: [16, 64, 100][random.below(3)],
                     ambient_samples: [0, 32, 50][random.below(3)],
-                    bounces: [Bounces::Auto, Bounces::Once, Bounces::Twice][random.below(3)],
                     technique: if random.chance(0.5) {
                         Technique::Auto
                     } else {

@@ -7,7 +7,7 @@ use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::geometry::ray_caster::RayCaster;
 use gnomon::light::Light;
 use gnomon::render::{REAL, Shown};
-use gnomon::scene::{Object, Scene};
+use gnomon::scene::{Bounces, Object, Scene};
 
 use crate::common::shapes::{cuboid, rectangle};
 use crate::common::{Stage, flat_mesh, look_at, object, scene};
@@ -36,6 +36,8 @@ fn on_table(phantoms: Vec<Object>, virtuals: Vec<Object>, lights: Vec<Light>) ->
     let mut scene = scene(phantoms, virtuals, lights, AMBIENT);
     scene.shadows.samples = 1;
     scene.shadows.ambient_samples = 512;
+    // As the closed forms have it.
+    scene.bounces = Bounces::Estimated;
     scene
 }
 

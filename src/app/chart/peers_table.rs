@@ -8,7 +8,7 @@ use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::cuboid;
 use crate::geometry::mesh::{Mesh, RawTriangle};
 use crate::light::{Light, Material};
-use crate::scene::{Anchor, Object, Scene, ShadowSettings, ShapeKind};
+use crate::scene::{Anchor, Bounces, Object, Scene, ShadowSettings, ShapeKind};
 
 /// Where the lamp of the peers' scenes stands, metres in world space.
 pub const LIGHT_M: DVec3 = DVec3::new(-0.35, 0.15, 0.6);
@@ -92,6 +92,7 @@ impl PeersStage {
                 })
                 .collect(),
             ambient_radiance: DVec3::splat(0.05),
+            bounces: Bounces::Auto,
             shadows: ShadowSettings {
                 samples,
                 ambient_samples: 0,

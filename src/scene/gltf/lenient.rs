@@ -45,12 +45,10 @@ pub(super) fn mend(root: &mut Value, notes: &mut Vec<String>) -> bool {
         is_mended |= mend_sampler(sampler);
     }
     for view in entries(root, "bufferViews") {
-        let is_nothing = |key: &str| view.get(key).and_then(Value::as_u64) == Some(0);
         for key in ["byteStride", "target"] {
-            if is_nothing(key) {
+            if view.get(key).and_then(Value::as_u64) == Some(0) {
                 view.remove(key);
                 is_mended = true;
-                break;
             }
         }
     }

@@ -16,7 +16,7 @@ use gnomon::app::jobs::check::summary;
 use gnomon::geometry::mesh::Mesh;
 use gnomon::light::{Light, Material};
 use gnomon::scene::{
-    ArucoRefinement, Bounces, Codes, DetectorKind, Family, Object, Quality, Scene, SceneError,
+    ArucoRefinement, Codes, DetectorKind, Family, Object, Quality, Scene, SceneError,
     ShadowSettings, ShaftSettings, Shortcuts, Technique, VolumeCounting,
 };
 use tempfile::TempDir;
@@ -138,7 +138,6 @@ fn a_small_scene_has_the_defaults() {
             samples: 4,
             light_samples: 64,
             ambient_samples: 256,
-            bounces: Bounces::Auto,
             counting: VolumeCounting::Auto,
             max_silhouette_error_px: 0.5,
             compact_penumbra_px: 12.0,
@@ -307,7 +306,6 @@ frame_budget_ms = 16
             samples: 1,
             light_samples: 256,
             ambient_samples: 512,
-            bounces: Bounces::Twice,
             counting: VolumeCounting::DepthFail,
             max_silhouette_error_px: 0.0,
             compact_penumbra_px: 12.0,
