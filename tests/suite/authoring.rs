@@ -43,6 +43,9 @@ impl Project {
         }
         let text = fs::read_to_string(crate::common::project_file("config/lamp.toml"))
             .expect("a project of its own");
+        // What is edited here stands as in most scenes.
+        let is_kept = |line: &&str| !line.starts_with("bounces = ");
+        let text: String = text.split_inclusive('\n').filter(is_kept).collect();
         let text = text.replace("\"recordings/lamp\"", "\"webcam:0\"");
         fs::write(folder.path().join("scene.toml"), change(text)).expect("a project of its own");
         Self(folder)
