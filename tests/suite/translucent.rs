@@ -258,8 +258,10 @@ fn what_a_mask_leaves_is_seen_and_throws_its_own_shadow() {
     let folder = tempfile::tempdir().expect("a folder");
     write_card(folder.path());
     for (suns, samples) in [(&SUNS[..1], 1), (&SUNS[..], 4)] {
+        // (What is expected is the suns' light alone, and the card reflects some of it.)
         let keys = format!(
-            "[[virtual]]\nname = \"card\"\nmesh = {:?}\nposition_m = {:?}\n[shadows]\nsamples = {samples}\n",
+            "[[virtual]]\nname = \"card\"\nmesh = {:?}\nposition_m = {:?}\n[shadows]\nsamples = {samples}\n\
+             ambient_samples = 0\n",
             folder.path().join("card.obj"),
             DISC.middle.to_array()
         );
