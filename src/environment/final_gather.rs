@@ -175,9 +175,7 @@ impl PlacedScene<'_> {
         let [mut without, mut with] = [Vec3::ZERO; 2];
         let (mut inside_real, mut inside) = (0, 0);
         for (number, direction) in hemisphere(normal, rays).enumerate() {
-            let real = self.seen(start, direction, is_real);
-            let reach = real.map_or(f32::INFINITY, |seen| seen.distance);
-            let before = self.seen_within(start, direction, reach, is_virtual_caster);
+            let [real, before] = self.met(start, direction);
             let [of_real, behind] = match &real {
                 Some(seen) => self.reflected_by(seen, how, number),
                 None => [how.sky.radiance; 2],
@@ -200,6 +198,14 @@ impl PlacedScene<'_> {
             is_inside_real: inside_real > most_inside,
             is_inside: inside > most_inside,
         }
+    }
+
+    /// What a ray meets that is real, and what it meets of virtual casters before it.
+    fn met(&self, start: Vec3, direction: Vec3) -> [Option<SeenSurface>; 2] {
+        let real = self.seen(start, direction, is_real);
+        let reach = real.as_ref().map_or(f32::INFINITY, |seen| seen.distance);
+        let before = self.seen_within(start, direction, reach, is_virtual_caster);
+        [real, before]
     }
 
     /// Irradiance of a place of the sky's single directions: without virtual things, and with them.
@@ -239,13 +245,13 @@ impl PlacedScene<'_> {
         if how.further == FurtherLight::Estimated {
             return [of_sky; 2];
         }
-        let of_surface = |seen: &SeenSurface| match how.further {
-            FurtherLight::None | FurtherLight::Estimated => [Vec3::ZERO; 2],
-            FurtherLight::Bounce => {
-                let start = seen.place + seen.normal * OFFSET_M;
-                let direct = self.direct(start, seen.normal, how, number);
-                direct.map(|direct| seen.albedo * (direct + how.sky.irradiance(seen.normal)))
+        let of_surface = |seen: &SeenSurface| {
+            if how.further == FurtherLight::None {
+                return [Vec3::ZERO; 2];
             }
+            let start = seen.place + seen.normal * OFFSET_M;
+            let direct = self.direct(start, seen.normal, how, number);
+            direct.map(|direct| seen.albedo * (direct + how.sky.irradiance(seen.normal)))
         };
         let axes = normal.any_orthonormal_pair();
         // Neighbouring rays look elsewhere.
@@ -255,9 +261,7 @@ impl PlacedScene<'_> {
             let turn = first + ray * DIRECTIONS_OF_AN_END / RAYS_OF_AN_END;
             let which = [turn % DIRECTIONS_OF_AN_END, DIRECTIONS_OF_AN_END];
             let direction = over_hemisphere(normal, axes, which);
-            let real = self.seen(start, direction, is_real);
-            let reach = real.as_ref().map_or(f32::INFINITY, |seen| seen.distance);
-            let before = self.seen_within(start, direction, reach, is_virtual_caster);
+            let [real, before] = self.met(start, direction);
             let [without, behind] = real.as_ref().map_or([of_sky; 2], of_surface);
             sums[0] += without;
             sums[1] += before.as_ref().map_or(behind, |seen| of_surface(seen)[1]);

@@ -1,6 +1,7 @@
 //! What a rough layer mirrors of light that is the same from everywhere (Karis 2013, the second of his two sums), as a table.
 
 use std::f64::consts::TAU;
+use std::sync::LazyLock;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -14,13 +15,13 @@ const SAMPLES: usize = 128;
 
 /// For cosines to the camera (the square of what rises from entry to entry, from 0 to 1) and GGX α (likewise, row by row) factor and
 /// summand that make the part that is mirrored of what the layer mirrors head-on.
-pub fn layer_albedo() -> Vec<[f32; 2]> {
+pub static LAYER_ALBEDO: LazyLock<Vec<[f32; 2]>> = LazyLock::new(|| {
     let along = |index: usize| (index as f64 / (SIDE - 1) as f64).powi(2);
     let entries = (0..SIDE * SIDE).into_par_iter();
     entries
         .map(|index| entry(along(index % SIDE), along(index / SIDE)))
         .collect()
-}
+});
 
 /// By halfway vectors as the distribution has them.
 fn entry(cos_camera: f64, alpha: f64) -> [f32; 2] {
@@ -73,7 +74,7 @@ mod tests {
 
     #[test]
     fn the_table_is_what_the_brdf_reflects_of_light_from_everywhere() {
-        let table = layer_albedo();
+        let table = &*LAYER_ALBEDO;
         for alpha in [0.2, 0.3, 0.55, 1.0] {
             for cos_camera in [1.0, 0.8, 0.5, 0.25] {
                 let to_camera =
@@ -96,7 +97,7 @@ mod tests {
                     sum += reflectance(&metal, DVec3::Z, to_light, to_camera);
                 }
                 let expected = sum * std::f64::consts::PI / (steps * steps) as f64;
-                let [factor, summand] = between(&table, cos_camera, alpha);
+                let [factor, summand] = between(table, cos_camera, alpha);
                 let found = color * factor + summand;
                 assert!(
                     (found - expected).abs().max_element() < 0.005,

@@ -3,7 +3,7 @@
 use half::f16;
 use wgpu::util::DeviceExt as _;
 
-use crate::light::layer_albedo::layer_albedo;
+use crate::light::layer_albedo::LAYER_ALBEDO;
 use crate::light::prefiltered::{LEVELS, SHARPEST_PX, prefiltered};
 use crate::light::probe::Probe;
 
@@ -32,15 +32,12 @@ impl MirroredProbe {
         if glossy.is_none() {
             halves = vec![[f16::ZERO; 4]; 2];
         }
-        let layer = match glossy {
-            Some(_) => layer_albedo(),
-            None => vec![[0.0; 2]],
+        let layer: &[[f32; 2]] = match glossy {
+            Some(_) => &LAYER_ALBEDO,
+            None => &[[0.0; 2]],
         };
         let side = layer.len().isqrt() as u32;
-        let layer: Vec<[f16; 2]> = layer
-            .into_iter()
-            .map(|entry| entry.map(f16::from_f32))
-            .collect();
+        let layer: Vec<[f16; 2]> = layer.iter().map(|entry| entry.map(f16::from_f32)).collect();
         let texture = |label, [width, height]: [u32; 2], levels, format, halves: &[u8]| {
             let texture = device.create_texture_with_data(
                 queue,

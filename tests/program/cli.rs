@@ -941,6 +941,10 @@ fn a_machine_without_a_desktop_complains_of_nothing() {
 fn what_is_typed_wrong_is_told_how_it_is_meant() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("walk.mp4"), "x").expect("written");
+    let markers_of = |family| {
+        let size = ["markers", "--ids", "0", "--size-mm", "40"];
+        [&size[..], &["--out", "a.svg", "--family", family]].concat()
+    };
     for (arguments, code, part) in [
         (
             &["walk.mp4"][..],
@@ -968,35 +972,11 @@ fn what_is_typed_wrong_is_told_how_it_is_meant() {
             "a number of millimetres is expected",
         ),
         (
-            &[
-                "markers",
-                "--ids",
-                "0",
-                "--size-mm",
-                "40",
-                "--out",
-                "a.svg",
-                "--family",
-                "AprilTag 36h11",
-            ],
+            &markers_of("AprilTag 36h11"),
             2,
             "did you mean \"tag36h11\" (as AprilTag prints it) or \"DICT_APRILTAG_36h11\"",
         ),
-        (
-            &[
-                "markers",
-                "--ids",
-                "0",
-                "--size-mm",
-                "40",
-                "--out",
-                "a.svg",
-                "--family",
-                "4x4_50",
-            ],
-            2,
-            "did you mean \"DICT_4X4_50\"?",
-        ),
+        (&markers_of("4x4_50"), 2, "did you mean \"DICT_4X4_50\"?"),
     ] {
         let output = gnomon(folder.path())
             .args(arguments)

@@ -501,22 +501,7 @@ fn a_second_interrupt_ends_all_at_once() {
     ] {
         let place = Place::new();
         place.stand_in(kind, hangs);
-        let child = place.command(job, AS_IT_IS).spawn().unwrap();
-        wait_for("the one that hangs", || {
-            !place.running_stand_ins().is_empty()
-        });
-        for _ in 0..2 {
-            std::thread::sleep(Duration::from_millis(500));
-            signals::send(Signal::INT, child.id()).unwrap();
-        }
-        let output = ended(child, job.arguments);
-        assert_eq!(
-            output.status.code(),
-            Some(INTERRUPTED),
-            "{}: {output:?}",
-            job.arguments
-        );
-        place.judge(job, "two interrupts", &output);
+        interrupt_twice(&place, job);
         assert_eq!(
             files(&place.at("out")),
             BTreeSet::new(),
@@ -524,6 +509,26 @@ fn a_second_interrupt_ends_all_at_once() {
             job.arguments
         );
     }
+}
+
+/// Runs a job beside something that hangs, interrupts it twice, and judges what it leaves.
+fn interrupt_twice(place: &Place, job: Job) {
+    let child = place.command(job, AS_IT_IS).spawn().unwrap();
+    wait_for("the one that hangs", || {
+        !place.running_stand_ins().is_empty()
+    });
+    for _ in 0..2 {
+        std::thread::sleep(Duration::from_millis(500));
+        signals::send(Signal::INT, child.id()).unwrap();
+    }
+    let output = ended(child, job.arguments);
+    assert_eq!(
+        output.status.code(),
+        Some(INTERRUPTED),
+        "{}: {output:?}",
+        job.arguments
+    );
+    place.judge(job, "two interrupts", &output);
 }
 
 /// The one that was to be replaced is there again.
@@ -539,17 +544,7 @@ fn a_second_interrupt_gives_an_older_session_back() {
         "record short/scene.toml --seconds 0.1 --force --out out/s",
         RECORD.outputs,
     );
-    let child = place.command(again, AS_IT_IS).spawn().unwrap();
-    wait_for("the one that hangs", || {
-        !place.running_stand_ins().is_empty()
-    });
-    for _ in 0..2 {
-        std::thread::sleep(Duration::from_millis(500));
-        signals::send(Signal::INT, child.id()).unwrap();
-    }
-    let output = ended(child, again.arguments);
-    assert_eq!(output.status.code(), Some(INTERRUPTED), "{output:?}");
-    place.judge(again, "two interrupts", &output);
+    interrupt_twice(&place, again);
     assert_eq!(files(&place.at("out")), files_before);
     assert_eq!(times(), times_before);
 }

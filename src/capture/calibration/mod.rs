@@ -74,13 +74,7 @@ pub enum CalibrationError {
 
 /// Reads a calibration that says its own picture size.
 pub fn load_calibration(path: &Path) -> Result<Intrinsics, CalibrationError> {
-    let calibration = read(path, None)?;
-    let size_px = calibration
-        .size_px
-        .ok_or_else(|| CalibrationError::NoSize {
-            path: path.to_owned(),
-        })?;
-    calibration.into_intrinsics(path, size_px)
+    with_own_size(path, read(path, None)?)
 }
 
 /// As [`load_calibration`], for frames of a known size, which tells the camera that is meant where the file holds several.
@@ -88,7 +82,13 @@ pub fn load_calibration_among(
     path: &Path,
     frame_px: [u32; 2],
 ) -> Result<Intrinsics, CalibrationError> {
-    let calibration = read(path, Some(frame_px))?;
+    with_own_size(path, read(path, Some(frame_px))?)
+}
+
+fn with_own_size(
+    path: &Path,
+    calibration: UncheckedCalibration,
+) -> Result<Intrinsics, CalibrationError> {
     let size_px = calibration
         .size_px
         .ok_or_else(|| CalibrationError::NoSize {
