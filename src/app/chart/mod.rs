@@ -19,6 +19,7 @@ pub mod peers_table;
 mod pictures;
 mod scaling;
 mod shadows;
+mod shaft_settings;
 mod sheet;
 mod shots;
 mod stability;
@@ -74,16 +75,18 @@ trait AnyChart {
 }
 
 /// All charts, in the order in which they are made and read.
-fn all() -> [Box<dyn AnyChart>; 13] {
+fn all() -> [Box<dyn AnyChart>; 15] {
     [
         Box::new(tracking::Tracking),
         Box::new(footage::Footage),
         Box::new(shadows::Shadows),
         Box::new(environment::EnvironmentChart),
-        Box::new(pictures::PicturesChart),
+        Box::new(pictures::ShadowPictures),
+        Box::new(pictures::SourcePictures),
         Box::new(moved::Moved),
         Box::new(compositing::Compositing),
         Box::new(left_out::LeftOut),
+        Box::new(shaft_settings::ShaftSettingsChart),
         Box::new(scaling::Scaling),
         Box::new(stability::Stability),
         Box::new(displacement::Displacement),

@@ -6,6 +6,7 @@ use anyhow::Result;
 
 use super::AnyChart;
 use super::lab::Lab;
+use super::shadows::with_sources;
 use super::sheet::{Cell, Sheet, changed_part};
 use super::shots::{Shot, Shots, mean};
 use crate::app::files::picture_files::write_rgb_png;
@@ -16,16 +17,23 @@ use crate::app::truth::{Drawn, LinearPicture};
 use crate::render::{Renderer, Shown, VIRTUAL};
 use crate::scene::{EnvironmentMethod, Quality, Scene, ShadowSettings, ShadowTechnique};
 
-const NAME: &str = "shadow-pictures";
 /// The error is shown so much stronger, about a middle grey.
 const STRONGER: f64 = 4.0;
+/// How many sources get a shadow each; `None`: all (Gibson et al. 2003, figure 9).
+const SOURCES: [Option<u32>; 4] = [Some(10), Some(20), Some(50), None];
 
-/// The pictures.
-pub struct PicturesChart;
+/// Ways to draw a scene beside each other, by name.
+type Ways = Vec<(String, Scene)>;
 
-impl AnyChart for PicturesChart {
+/// What each technique has to offer.
+pub struct ShadowPictures;
+
+/// Soft shadows by ever more sources, in environments of several kinds (Gibson et al. 2003, figures 8 and 9).
+pub struct SourcePictures;
+
+impl AnyChart for ShadowPictures {
     fn name(&self) -> &'static str {
-        NAME
+        "shadow-pictures"
     }
 
     fn family(&self) -> &'static str {
@@ -33,9 +41,10 @@ impl AnyChart for PicturesChart {
     }
 
     fn shows(&self) -> &'static str {
-        "The qualities, numbers of sources, or an environment's methods beside the truth, in the middle key frame of each recording (the part that the virtual \
-         things change, enlarged twice), with the time of a frame and the rms error of the shadow's factor. Below each its error, four times stronger about a middle grey: of virtual surfaces as they are, of real ones by \
-         what changes on them."
+        "The qualities, numbers of sources, or an environment's methods beside the truth, in the middle key frame of each \
+         recording (the part that the virtual things change, enlarged twice), with the time of a frame and the rms error of \
+         the shadow's factor. Below each its error, four times stronger about a middle grey: of virtual surfaces as they \
+         are, of real ones by what changes on them."
     }
 
     fn unit_count(&self, lab: &Lab<'_>) -> Result<usize> {
@@ -43,80 +52,123 @@ impl AnyChart for PicturesChart {
     }
 
     fn make(&self, lab: &Lab<'_>, out: &Path, progress: &Progress) -> Result<bool> {
-        let mut rows = Vec::new();
-        for recording in lab.recordings()? {
-            progress.tell(&format!("{NAME}: {}", recording.name));
+        let title = "Shadows beside the truth";
+        make_sheet(self, title, qualities, lab, out, progress)
+    }
+}
+
+impl AnyChart for SourcePictures {
+    fn name(&self) -> &'static str {
+        "source-pictures"
+    }
+
+    fn family(&self) -> &'static str {
+        "shadows"
+    }
+
+    fn shows(&self) -> &'static str {
+        "Real places without and with virtual things in them, as in figures 8 and 9 of Gibson et al. 2003: a room with soft \
+         light, a low sun, a studio with several lamps; shadows of 10, 20, 50 and all sources beside the path-traced truth, \
+         with the time of a frame, the rms error of the shadow's factor, and below each its error, four times stronger. What \
+         is compact in a probe, such as the sun, is drawn by shadow volumes beside the sources."
+    }
+
+    fn unit_count(&self, lab: &Lab<'_>) -> Result<usize> {
+        Ok(lab.recording_names()?.len())
+    }
+
+    fn make(&self, lab: &Lab<'_>, out: &Path, progress: &Progress) -> Result<bool> {
+        let title = "Soft shadows by 10, 20, 50 and all sources beside the truth";
+        make_sheet(self, title, by_sources, lab, out, progress)
+    }
+}
+
+/// A pair of rows for each recording that is drawn in any way; whether it was made to its end.
+fn make_sheet(
+    chart: &dyn AnyChart,
+    title: &'static str,
+    ways: fn(&Scene) -> Ways,
+    lab: &Lab<'_>,
+    out: &Path,
+    progress: &Progress,
+) -> Result<bool> {
+    let mut rows = Vec::new();
+    for recording in lab.recordings()? {
+        progress.tell(&format!("{}: {}", chart.name(), recording.name));
+        if lab.is_stopped() {
+            return Ok(false);
+        }
+        let scene = recording.load_scene()?;
+        // For a look the cheaper ones do.
+        let ways = ways(&scene)
+            .into_iter()
+            .take(if lab.quick { 2 } else { usize::MAX });
+        let shots = Shots::middle_of(&recording, &scene)?;
+        let mut drawn = Vec::new();
+        for (name, scene) in ways {
             if lab.is_stopped() {
                 return Ok(false);
             }
-            let scene = recording.load_scene()?;
-            let shots = Shots::middle_of(&recording, &scene)?;
-            let mut drawn = Vec::new();
-            for (name, shadows) in ways(&scene, lab.quick) {
-                let mut scene = scene.clone();
-                scene.shadows = shadows;
-                let mut renderer =
-                    crate::app::precomputed::renderer(lab.gpu()?, &scene, shots.intrinsics)?;
-                let pictures = shots.draw_with(&mut renderer)?;
-                let took_ms = frame_ms(lab, &shots, &mut renderer)?;
-                let factor = mean(&shots.errors(&pictures)?, |errors| errors.factor);
-                let label = format!("{name}: {took_ms:.0} ms, ±{factor:.3}");
-                drawn.extend(pictures.into_iter().map(|picture| (label.clone(), picture)));
-            }
-            if let Some(shot) = shots.shots.first() {
-                let width = shots.size_px()[0] as usize;
-                rows.extend(
-                    two_rows(&recording.name, shot, &drawn, width)
-                        .into_iter()
-                        .flatten(),
-                );
-            }
-            progress.advance();
+            let mut renderer =
+                crate::app::precomputed::renderer(lab.gpu()?, &scene, shots.intrinsics)?;
+            let pictures = shots.draw_with(&mut renderer)?;
+            let took_ms = frame_ms(lab, &shots, &mut renderer)?;
+            let factor = mean(&shots.errors(&pictures)?, |errors| errors.factor);
+            let label = format!("{name}: {took_ms:.0} ms, ±{factor:.3}");
+            drawn.extend(pictures.into_iter().map(|picture| (label.clone(), picture)));
         }
-        let (size_px, rgba) = Sheet {
-            title: "Shadows beside the truth",
-            reading: "Above each picture the time of a frame and the rms error of its shadows; below it its error, four times stronger.",
-            rows,
+        if let Some(shot) = shots.shots.first() {
+            let width = shots.size_px()[0] as usize;
+            let pair = two_rows(&recording.name, shot, &drawn, width);
+            rows.extend(pair.into_iter().flatten());
         }
-        .paint()?;
-        write_rgb_png(&out.join(format!("{NAME}.png")), size_px, &rgba)?;
-        Ok(true)
+        progress.advance();
+    }
+    let (size_px, rgba) = Sheet {
+        title,
+        reading: "Above each picture the time of a frame and the rms error of its shadows; below it its error, four times stronger.",
+        rows,
+    }
+    .paint()?;
+    write_rgb_png(&out.join(format!("{}.png", chart.name())), size_px, &rgba)?;
+    Ok(true)
+}
+
+/// What the technique of a scene has to offer: the qualities, numbers of sources, or an environment's methods.
+fn qualities(scene: &Scene) -> Ways {
+    let with = |name: &str, shadows: ShadowSettings| {
+        let mut scene = scene.clone();
+        scene.shadows = shadows;
+        (name.to_owned(), scene)
+    };
+    match scene.chosen_technique().0 {
+        ShadowTechnique::Environment => environment_ways(scene),
+        technique if technique.has_shafts() => by_sources(scene),
+        _ => {
+            let qualities = Quality::BY_NAME.into_iter();
+            let technique = scene.shadows.technique;
+            let shadows = |quality: Quality| ShadowSettings {
+                technique,
+                ..quality.shadows()
+            };
+            qualities
+                .map(|(name, quality)| with(name, shadows(quality)))
+                .collect()
+        }
     }
 }
 
-/// What the technique of a scene has to offer: the qualities, or so many sources (Gibson et al. 2003, fig. 9).
-fn ways(scene: &Scene, quick: bool) -> Vec<(String, ShadowSettings)> {
-    let technique = scene.shadows.technique;
-    if scene.chosen_technique().0 == ShadowTechnique::Environment {
-        return environment_ways(scene);
-    }
-    if !scene.chosen_technique().0.has_shafts() {
-        let qualities = Quality::BY_NAME.into_iter();
-        return qualities
-            .map(|(name, quality)| {
-                let shadows = ShadowSettings {
-                    technique,
-                    ..quality.shadows()
-                };
-                (name.to_owned(), shadows)
-            })
-            .collect();
-    }
-    // For a look the cheaper ones do.
-    let sources = [Some(10), Some(20), Some(50), None].into_iter();
-    sources
-        .take(if quick { 2 } else { usize::MAX })
-        .map(|sources| {
-            let name = sources.map_or("all".to_owned(), |count: u32| count.to_string());
-            let mut shadows = scene.shadows;
-            shadows.shafts.sources = sources;
-            (format!("{name} sources"), shadows)
-        })
-        .collect()
+/// Shafts beside compact light by ever more sources; none without a probe.
+fn by_sources(scene: &Scene) -> Ways {
+    let with = |sources: Option<u32>| {
+        let name = sources.map_or("all".to_owned(), |count| count.to_string());
+        Some((format!("{name} sources"), with_sources(scene, sources)?))
+    };
+    SOURCES.into_iter().filter_map(with).collect()
 }
 
 /// The third paper's own way with fewer and more regions (Tamura et al. 2005, fig. 6), and ours.
-fn environment_ways(scene: &Scene) -> Vec<(String, ShadowSettings)> {
+fn environment_ways(scene: &Scene) -> Ways {
     let ways = [
         (EnvironmentMethod::Maps, 32, "maps, 32 regions"),
         (EnvironmentMethod::Maps, 64, "maps, 64 regions"),
@@ -124,10 +176,10 @@ fn environment_ways(scene: &Scene) -> Vec<(String, ShadowSettings)> {
     ];
     ways.into_iter()
         .map(|(method, regions, name)| {
-            let mut shadows = scene.shadows;
-            shadows.environment.method = method;
-            shadows.environment.regions = regions;
-            (name.to_owned(), shadows)
+            let mut scene = scene.clone();
+            scene.shadows.environment.method = method;
+            scene.shadows.environment.regions = regions;
+            (name.to_owned(), scene)
         })
         .collect()
 }

@@ -18,6 +18,7 @@ use super::shots::{Shots, grey_frame};
 use crate::app::stages::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
 use crate::geometry::camera::Intrinsics;
+use crate::light::{Light, Shape};
 use crate::render::{Gpu, Renderer, Shown};
 use crate::scene::Scene;
 
@@ -37,16 +38,27 @@ pub struct ScalingRow {
 
 /// Of the caster where its size is not varied.
 const TRIANGLES: usize = 2_500;
-const UNITS: [&str; 6] = ["triangles", "lights", "casters", "pixels", SOURCES, MODELS];
-const SWEEPS: [&str; 7] = [
+const UNITS: [&str; 7] = [
     "triangles",
     "lights",
+    RADIUS,
+    "casters",
+    "pixels",
+    SOURCES,
+    MODELS,
+];
+const SWEEPS: [&str; 8] = [
+    "triangles",
+    "lights",
+    RADIUS,
     "casters",
     "pixels",
     SOURCES,
     STANDING,
     WALKING,
 ];
+/// Of a lamp that is a sphere.
+const RADIUS: &str = "lamp's radius, mm";
 const SOURCES: &str = "sources";
 /// Models that have an animation, of so many triangles: as they stand, and as they walk.
 const MODELS: &str = "models";
@@ -160,6 +172,7 @@ fn sweep(lab: &Lab<'_>, varied: &str, samples: u32) -> Vec<(f64, PeersStage)> {
         "triangles" if lab.quick => &[100, 300, 1_000, 3_000, 10_000],
         "triangles" => &[100, 300, 1_000, 3_000, 10_000, 30_000, 100_000],
         "lights" => &[1, 2, 3, 4, 6, 8],
+        RADIUS => &[1, 2, 5, 10, 20, 40, 80],
         "casters" => &[1, 2, 4, 8, 16, 32],
         _ => &[240, 480, 720, 960, 1_080],
     };
@@ -174,6 +187,16 @@ fn sweep(lab: &Lab<'_>, varied: &str, samples: u32) -> Vec<(f64, PeersStage)> {
             let around = |index: u32| DQuat::from_rotation_z(f64::from(index) * 0.7) * LIGHT_M;
             let places: Vec<DVec3> = (0..size).map(around).collect();
             let stage = PeersStage::new(one(TRIANGLES), &places, SIZE_PX, samples);
+            (f64::from(size), stage)
+        }
+        RADIUS => {
+            let mut stage = PeersStage::new(one(TRIANGLES), &[LIGHT_M], SIZE_PX, samples);
+            let radius_m = f64::from(size) / 1e3;
+            for light in &mut stage.scene.lights {
+                if let Light::Point { shape, .. } = &mut light.light {
+                    *shape = Shape::Sphere { radius_m };
+                }
+            }
             (f64::from(size), stage)
         }
         "casters" => {
@@ -213,8 +236,8 @@ impl Chart for Scaling {
     const NAME: &'static str = "scaling";
     const FAMILY: &'static str = "scaling";
     const SHOWS: &'static str = "How the time for a frame with shadow volumes made anew grows with triangles of the caster, \
-        lights, casters and pixels, one varied at a time: a torus of 2,500 triangles that turns over a table under one \
-        lamp, 640 x 480 pixels (casters: smaller ones). Drawn and waited for, without video going up or a picture coming \
+        lights, the lamp's size, casters and pixels, one varied at a time: a torus of 2,500 triangles that turns over a table \
+        under one lamp, a point, 640 x 480 pixels (casters: smaller ones). Drawn and waited for, without video going up or a picture coming \
         back. Sources: soft shadows by shafts in the room that ships, where nothing \
         moves but the camera. Triangles that stand and that walk: Khronos's Fox and CesiumMan without their animation, with \
         volumes kept, and with it, where each frame poses the mesh and makes its volumes anew. The number at a line is its slope, the exponent of growth over the upper half of its sizes. Memory is what \

@@ -39,7 +39,7 @@ pub struct ShadowsRow {
 }
 
 const VOLUMES_4: &str = "volumes, 4 samples";
-const SHAFTS: &str = "shafts, by sources";
+const SHAFTS: &str = "shafts and compact light, by sources";
 const GATHERED: &str = "volumes and gathered light, by rays";
 const ENVIRONMENT: &str = "environment, by quality";
 const VOLUMES_1: &str = "volumes, 1 sample";
@@ -64,6 +64,13 @@ struct ShadowWay {
 /// What each technique has to set. Another one adds its ways here.
 fn ways(scene: &Scene) -> Vec<ShadowWay> {
     let mut ways = Vec::new();
+    for sources in SHAFT_SOURCES {
+        ways.extend(with_sources(scene, sources).map(|scene| ShadowWay {
+            technique: SHAFTS,
+            setting: sources.map_or("all".to_owned(), |count| count.to_string()),
+            scene,
+        }));
+    }
     let mut add = |technique, setting: String, shadows: ShadowSettings| {
         let mut scene = scene.clone();
         scene.shadows = shadows;
@@ -73,20 +80,6 @@ fn ways(scene: &Scene) -> Vec<ShadowWay> {
             scene,
         });
     };
-    if scene.probe.is_some() {
-        for sources in SHAFT_SOURCES {
-            let setting = sources.map_or("all".to_owned(), |count| count.to_string());
-            let shadows = ShadowSettings {
-                technique: Technique::Shafts,
-                shafts: ShaftSettings {
-                    sources,
-                    ..ShaftSettings::default()
-                },
-                ..ShadowSettings::default()
-            };
-            add(SHAFTS, setting, shadows);
-        }
-    }
     if scene.probe.as_ref().is_some_and(|probe| probe.is_far) {
         for (name, quality) in Quality::BY_NAME {
             let shadows = ShadowSettings {
@@ -138,6 +131,23 @@ fn ways(scene: &Scene) -> Vec<ShadowWay> {
         add(series(samples), setting, shadows);
     }
     ways
+}
+
+/// A scene with a probe, in a room or from afar, by shafts beside compact light; `None` without a probe. `sources`: so many get a
+/// shadow each; `None`: all that are hidden.
+pub fn with_sources(scene: &Scene, sources: Option<u32>) -> Option<Scene> {
+    let mut scene = scene.clone();
+    // Else light from afar is left to the environment.
+    scene.probe.as_mut()?.is_far = false;
+    scene.shadows = ShadowSettings {
+        technique: Technique::Auto,
+        shafts: ShaftSettings {
+            sources,
+            ..ShaftSettings::default()
+        },
+        ..ShadowSettings::default()
+    };
+    Some(scene)
 }
 
 fn series(samples: u32) -> &'static str {
