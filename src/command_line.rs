@@ -1,4 +1,6 @@
-//! What can be typed: commands, options, and how their values are read.
+//! What can be typed: commands and options.
+
+mod values;
 
 use std::path::{Path, PathBuf};
 
@@ -14,6 +16,10 @@ use gnomon::calibration::{Target, TargetMarkers};
 use gnomon::light::probe_maps::Circle;
 use gnomon::scene::format::{ANCHOR_NAME, AnyKey as _, CAMERA, PRINTED, PROBE, TRACKING};
 use gnomon::scene::{Family, Ink, PixelFormat, Shortcut, WantedFormat};
+use values::{
+    ball_distance_of, circle_of, counts_of, degrees_of, distance_of, family_of, index_of, mm_of,
+    probe_width_of, reflectance_of, seconds_of,
+};
 
 /// Virtual things on a real table, lit and shadowed as if they stood there.
 #[derive(Parser)]
@@ -545,107 +551,6 @@ impl TargetArgs {
     }
 }
 
-/// Millimetres; what they may be, each job says.
-fn mm_of(written: &str) -> Result<f64, String> {
-    let expected =
-        "a number of millimetres is expected, with a point and without its unit, as in 45 or 4.5";
-    written.trim().parse().map_err(|_| expected.to_owned())
-}
-
-/// One of a list of whole numbers.
-fn index_of(written: &str) -> Result<u32, String> {
-    let expected = "whole numbers are expected, joined by commas, as in 0,25,50";
-    written.trim().parse().map_err(|_| expected.to_owned())
-}
-
-/// Columns and rows, "9x6".
-fn counts_of(text: &str) -> Result<[u32; 2], String> {
-    let counts = text.split_once('x').and_then(|(columns, rows)| {
-        Some([columns.trim().parse().ok()?, rows.trim().parse().ok()?])
-    });
-    counts
-        .filter(|counts| counts.iter().all(|&count| (1..=1000).contains(&count)))
-        .ok_or_else(|| "columns and rows are expected, as in 9x6".to_owned())
-}
-
-fn distance_of(text: &str) -> Result<Distance, String> {
-    let parts: Vec<&str> = text.split(':').collect();
-    let parsed = match parts[..] {
-        [a, b, mm] => (a.parse().ok()).zip(b.parse().ok()).zip(mm.parse().ok()),
-        _ => None,
-    };
-    let expected = "two ids and the millimetres between their centres are expected, like 0:7:412.5";
-    match parsed {
-        Some(((a, b), mm)) if a != b && (1e-3..1e6).contains(&mm) => Ok(Distance {
-            ids: [a, b],
-            distance_m: mm * 1e-3,
-        }),
-        _ => Err(expected.to_owned()),
-    }
-}
-
-fn circle_of(written: &str) -> Result<Circle, String> {
-    let numbers: Option<Vec<f64>> = written
-        .split(',')
-        .map(|number| {
-            number
-                .trim()
-                .parse()
-                .ok()
-                .filter(|number: &f64| number.is_finite())
-        })
-        .collect();
-    match numbers.as_deref() {
-        Some([x, y, radius_px]) if *radius_px >= 2.0 => Ok(Circle {
-            center_px: glam::DVec2::new(*x, *y),
-            radius_px: *radius_px,
-        }),
-        _ => Err(
-            "three numbers are expected, like 640,360,210: the middle, and a radius of at least 2"
-                .to_owned(),
-        ),
-    }
-}
-
-fn number_between(written: &str, allowed: std::ops::RangeInclusive<f64>) -> Result<f64, String> {
-    let number = written.parse().ok();
-    number
-        .filter(|number| allowed.contains(number))
-        .ok_or_else(|| {
-            format!(
-                "out of range; allowed: {} to {}",
-                allowed.start(),
-                allowed.end()
-            )
-        })
-}
-
-fn ball_distance_of(written: &str) -> Result<f64, String> {
-    number_between(written, 1.5..=1e6)
-}
-
-fn reflectance_of(written: &str) -> Result<f64, String> {
-    number_between(written, 0.01..=1.0)
-}
-
-fn degrees_of(written: &str) -> Result<f64, String> {
-    number_between(written, -360.0..=360.0)
-}
-
-fn probe_width_of(written: &str) -> Result<usize, String> {
-    let width_px = written.parse().ok();
-    width_px
-        .filter(|width_px| (16..=8192).contains(width_px) && width_px % 2 == 0)
-        .ok_or_else(|| "an even number from 16 to 8192 is expected".to_owned())
-}
-
-fn seconds_of(written: &str) -> Result<f64, String> {
-    let seconds = written.parse().ok();
-    seconds
-        .filter(|seconds: &f64| *seconds > 0.0 && seconds.is_finite())
-        .ok_or_else(|| "not a time; a number above 0 is expected".to_owned())
-}
-
 impl RecordingArgs {
     pub fn decimation(&self) -> f64 {
         self.decimation.unwrap_or(*TRACKING.decimation.default())
@@ -682,97 +587,5 @@ impl FamilyArgs {
     }
 }
 
-fn family_of(name: &str) -> Result<Family, String> {
-    if Family::is_file_name(name) {
-        return Family::from_file(Path::new(name)).map_err(|error| error.to_string());
-    }
-    Family::from_name(name).ok_or_else(|| Family::unknown(name))
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::collections::BTreeSet;
-
-    use clap::CommandFactory as _;
-    use gnomon::scene::format::SECTIONS;
-
-    /// What is refused in a scene's file is refused here.
-    #[test]
-    fn options_take_what_the_keys_of_their_names_take() {
-        let track = "track a.mp4 --size-mm 40 --poses p.csv";
-        let record = "record webcam:0 --out s";
-        for (command, refused, allowed) in [
-            (track, "--decimation 12", "1 to 8"),
-            (track, "--decimation 0.5", "1 to 8"),
-            (track, "--decimation nan", "1 to 8"),
-            (track, "--border-cells 3", "1 to 2"),
-            (record, "--fps 0", "1 to 1000"),
-            (record, "--fps 1001", "1 to 1000"),
-            (record, "--size 40000x480", "1 to 32768"),
-            (record, "--size 640", "WIDTHxHEIGHT"),
-            (record, "--format YUV", "MJPEG, YUYV"),
-            (
-                "board --from a --size-mm 40",
-                "--name a,b",
-                "without commas",
-            ),
-            (
-                "probe a.hdr --kind panorama --out b.hdr",
-                "--turn-deg 2000000",
-                "-1000000 to 1000000",
-            ),
-            (
-                "markers --ids 1 --size-mm 40 --out a.pdf",
-                "--name a;b",
-                "without commas",
-            ),
-        ] {
-            let parsed = |more: &str| {
-                let words = format!("gnomon {command} {more}");
-                Cli::try_parse_from(words.split_whitespace()).map(|_| ())
-            };
-            assert!(parsed("").is_ok(), "{command}");
-            let message = parsed(refused).unwrap_err().to_string();
-            assert!(message.contains(allowed), "{refused}: {message}");
-        }
-        let words =
-            "gnomon record webcam:0 --out s --decimation 8 --fps 30 --size 640x480 --format yuyv";
-        assert!(Cli::try_parse_from(words.split_whitespace()).is_ok());
-    }
-
-    /// An option that gets the name of a key belongs above.
-    #[test]
-    fn these_options_have_the_names_of_keys() {
-        let keys: BTreeSet<String> = SECTIONS
-            .iter()
-            .flat_map(|section| section.names())
-            .map(|name| name.replace('_', "-"))
-            .collect();
-        let command = Cli::command();
-        let options = command
-            .get_subcommands()
-            .flat_map(clap::Command::get_arguments);
-        let shared: BTreeSet<&str> = options
-            .filter_map(|option| option.get_long())
-            .filter(|name| keys.contains(*name))
-            .collect();
-        let expected = [
-            "border-cells",
-            "calibration",
-            "decimation",
-            "family",
-            "format",
-            "fps",
-            "inverted",
-            // Of the pictures that a probe is made from, not of the probe.
-            "kind",
-            // A file to write.
-            "markers",
-            "mirror",
-            "name",
-            "turn-deg",
-        ];
-        assert_eq!(shared, BTreeSet::from(expected));
-    }
-}
+mod tests;

@@ -61,6 +61,11 @@ impl Belief {
         }
     }
 
+    /// Markers of which no other picture has confirmed the sight yet.
+    pub(super) fn unconfirmed(&self) -> impl Iterator<Item = (Family, u32)> {
+        self.waiting.iter().map(|sight| sight.marker)
+    }
+
     /// Whether an earlier picture showed the marker nearby; remembers that this one does.
     fn was_seen_before(&mut self, detection: &Detection, now_secs: f64) -> bool {
         self.waiting

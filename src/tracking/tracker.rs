@@ -334,6 +334,11 @@ impl Tracker {
         &self.detections
     }
 
+    /// Markers of weak families that were seen of late and are not believed unless another picture shows them too.
+    pub fn unconfirmed_markers(&self) -> impl Iterator<Item = (Family, u32)> {
+        self.belief.unconfirmed()
+    }
+
     /// The markers that the last frame's poses rest on: where the poses put them, or where a search found them.
     pub fn used_markers(&self) -> &[Detection] {
         &self.used

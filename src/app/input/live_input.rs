@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use crate::capture::live::{LiveOptions, is_live};
-use crate::capture::{FrameSource, load_calibration};
+use crate::capture::{CalibrationError, FrameSource, load_calibration, load_calibration_among};
 use crate::geometry::camera::Intrinsics;
 use crate::scene::{CameraSettings, WantedFormat};
 
@@ -23,7 +23,12 @@ impl LiveInput {
     /// A calibration that cannot be read.
     pub fn of(camera: &CameraSettings) -> Result<Self> {
         let calibration = match &camera.calibration {
-            Some(path) => Some(load_calibration(path)?),
+            Some(path) => Some(match (load_calibration(path), camera.wanted.size_px) {
+                (Err(CalibrationError::NoSize { .. }), Some(wanted_px)) => {
+                    load_calibration_among(path, wanted_px)?.0
+                }
+                (loaded, _) => loaded?,
+            }),
             None if is_live(&camera.source) => None,
             None => FrameSource::open(&camera.source)?.calibration(),
         };

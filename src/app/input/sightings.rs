@@ -20,6 +20,8 @@ pub(crate) struct Sightings {
     seen: BTreeMap<Family, BTreeSet<u32>>,
     /// Markers of weak families, which one look among several does not prove.
     seen_once: BTreeSet<(Family, u32)>,
+    /// Markers that tracking saw and did not believe for want of another picture.
+    unconfirmed: BTreeMap<Family, BTreeSet<u32>>,
 }
 
 /// Something that is looked for.
@@ -63,6 +65,14 @@ impl Sightings {
             looks: 0,
             seen: BTreeMap::new(),
             seen_once: BTreeSet::new(),
+            unconfirmed: BTreeMap::new(),
+        }
+    }
+
+    /// Takes the markers of the frame watched next that are not believed before another one shows them.
+    pub(crate) fn note_unconfirmed(&mut self, markers: impl Iterator<Item = (Family, u32)>) {
+        for (family, id) in markers {
+            self.unconfirmed.entry(family).or_default().insert(id);
         }
     }
 
@@ -101,6 +111,16 @@ impl Sightings {
         !self.seen().is_empty()
     }
 
+    /// What is wanted and seen in a single picture, which has no other to confirm it.
+    fn seen_unconfirmed(&self) -> Option<String> {
+        (self.frames == 1 && !self.unconfirmed.is_empty()).then(|| {
+            format!(
+                "{} and not believed: so weak a code needs a second picture that shows it",
+                are_seen(&self.unconfirmed)
+            )
+        })
+    }
+
     /// What was seen: in two looks where the code alone proves little, unless there was but one.
     fn seen(&self) -> BTreeMap<Family, BTreeSet<u32>> {
         let mut seen = self.seen.clone();
@@ -115,17 +135,14 @@ impl Sightings {
     /// What was never found, and what was seen instead, in words; `None` where all was.
     pub(crate) fn never_found(&self) -> Option<String> {
         let seen = self.seen();
-        let is_or_are = match seen.values().map(BTreeSet::len).sum() {
-            1 => "is",
-            _ => "are",
-        };
-        let seen: Vec<String> = seen.iter().map(in_words).collect();
-        let seen = match seen.is_empty() {
-            true => "no marker of any family is seen".to_owned(),
-            false => format!("{} {is_or_are} seen", listed(&seen)),
-        };
+        let unconfirmed = self.seen_unconfirmed();
         // Nobody said that there is any marker where every one is wanted.
-        let is_told = |wanted: &&Wanted| !wanted.markers.is_empty() || self.saw_others();
+        let is_any_seen = unconfirmed.is_some() || self.saw_others();
+        let is_told = |wanted: &&Wanted| !wanted.markers.is_empty() || is_any_seen;
+        let seen = unconfirmed.unwrap_or_else(|| match seen.is_empty() {
+            true => "no marker of any family is seen".to_owned(),
+            false => are_seen(&seen),
+        });
         let missing = self.wanted.iter().filter(|wanted| !wanted.is_found);
         let missing = missing.filter(is_told);
         let told: Vec<String> = missing
@@ -140,6 +157,16 @@ impl Sightings {
             .collect();
         (!told.is_empty()).then(|| told.join("\n"))
     }
+}
+
+/// `tag36h11 0 to 5 and DICT_4X4_50 3 are seen`.
+fn are_seen(markers: &BTreeMap<Family, BTreeSet<u32>>) -> String {
+    let is_or_are = match markers.values().map(BTreeSet::len).sum() {
+        1 => "is",
+        _ => "are",
+    };
+    let markers: Vec<String> = markers.iter().map(in_words).collect();
+    format!("{} {is_or_are} seen", listed(&markers))
 }
 
 /// `tag36h11 0 to 5 and 17`; of OpenCV's dictionaries, which are parts of each other, the smallest that has them all.
@@ -207,6 +234,16 @@ mod tests {
         assert!(!sightings.saw_others());
         sightings.looks = 1;
         assert!(sightings.saw_others());
+        // What tracking read in the only picture and could not confirm goes before that.
+        sightings.frames = 1;
+        sightings.note_unconfirmed([(dictionary, 3)].into_iter());
+        let told = sightings.never_found().unwrap();
+        assert!(
+            told.contains(
+                "DICT_4X4_50 3 is seen and not believed: so weak a code needs a second picture"
+            ),
+            "{told}"
+        );
         sightings.wanted[0].is_found = true;
         assert_eq!(sightings.never_found(), None);
     }

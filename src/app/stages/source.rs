@@ -71,7 +71,18 @@ pub(crate) fn open_as_it_is(camera: &CameraSettings) -> Result<(FrameSource, Opt
         talk::say(remark);
     }
     let calibration = match &camera.calibration {
-        Some(path) => Some(load_calibration_among(path, source.size_px())?),
+        Some(path) => {
+            let [width, height] = source.size_px();
+            let (intrinsics, is_size_assumed) = load_calibration_among(path, [width, height])?;
+            if is_size_assumed {
+                talk::say(format!(
+                    "{} does not say for which picture size it holds; taken to be {width} x {height}, as {} has",
+                    path.display(),
+                    camera.source
+                ));
+            }
+            Some(intrinsics)
+        }
         None => source.calibration(),
     };
     if let Some(intrinsics) = &calibration {

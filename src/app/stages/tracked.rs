@@ -298,6 +298,8 @@ impl Poser {
                 let shows_marker = !poser.tracker.detections().is_empty();
                 poser.mirror_watch.watch(frame, shows_marker)?;
                 let is_there = |pose: &AnchorPose| pose.camera_from_anchor.is_some();
+                let unconfirmed = poser.tracker.unconfirmed_markers();
+                poser.sightings.note_unconfirmed(unconfirmed);
                 match poser.tracker.is_of_every_marker() {
                     true => {
                         let any = poses.iter().any(is_there);

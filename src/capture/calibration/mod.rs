@@ -57,6 +57,20 @@ pub enum CalibrationError {
         /// The file.
         path: PathBuf,
     },
+    /// The file holds no picture size, and its principal point tells that it is not that of the frames.
+    #[error(
+        "{}: the calibration does not say for which picture size it holds, and with its principal point at ({:.0}, {:.0}) that is \
+         hardly {} x {} pixels, as the frames have; add size_px = [width, height] (OpenCV: image_width and image_height)",
+        path.display(), center_px.x, center_px.y, frame_px[0], frame_px[1]
+    )]
+    UnlikelySize {
+        /// The file.
+        path: PathBuf,
+        /// Its principal point.
+        center_px: DVec2,
+        /// Width and height of the frames.
+        frame_px: [u32; 2],
+    },
     /// The frames are of another size than the calibration.
     #[error(
         "{frames_of} has frames of {} x {} pixels, but its calibration is for {} x {}; calibrate at the recording's size",
@@ -74,27 +88,38 @@ pub enum CalibrationError {
 
 /// Reads a calibration that says its own picture size.
 pub fn load_calibration(path: &Path) -> Result<Intrinsics, CalibrationError> {
-    with_own_size(path, read(path, None)?)
-}
-
-/// As [`load_calibration`], for frames of a known size, which tells the camera that is meant where the file holds several.
-pub fn load_calibration_among(
-    path: &Path,
-    frame_px: [u32; 2],
-) -> Result<Intrinsics, CalibrationError> {
-    with_own_size(path, read(path, Some(frame_px))?)
-}
-
-fn with_own_size(
-    path: &Path,
-    calibration: UncheckedCalibration,
-) -> Result<Intrinsics, CalibrationError> {
+    let calibration = read(path, None)?;
     let size_px = calibration
         .size_px
         .ok_or_else(|| CalibrationError::NoSize {
             path: path.to_owned(),
         })?;
     calibration.into_intrinsics(path, size_px)
+}
+
+/// As [`load_calibration`], for frames of a known size, which tells the camera that is meant where the file holds several. A file
+/// without a size, such as examples of OpenCV's write, is taken to hold for them where its principal point lies near their
+/// middle; whether that was so stands beside the calibration.
+pub fn load_calibration_among(
+    path: &Path,
+    frame_px: [u32; 2],
+) -> Result<(Intrinsics, bool), CalibrationError> {
+    // Half of the difference between two usual sizes is more, what lenses are off is less.
+    const FARTHEST_OFF: f64 = 0.1;
+    let calibration = read(path, Some(frame_px))?;
+    let is_assumed = calibration.size_px.is_none();
+    let size_px = calibration.size_px.unwrap_or(frame_px);
+    let intrinsics = calibration.into_intrinsics(path, size_px)?;
+    let sides = DVec2::from_array(frame_px.map(f64::from));
+    let off = (intrinsics.center_px - 0.5 * (sides - 1.0)) / sides;
+    if is_assumed && off.abs().max_element() > FARTHEST_OFF {
+        return Err(CalibrationError::UnlikelySize {
+            path: path.to_owned(),
+            center_px: intrinsics.center_px,
+            frame_px,
+        });
+    }
+    Ok((intrinsics, is_assumed))
 }
 
 /// Reads a calibration for frames of a known size: one that says no size is taken to hold for them, one that says

@@ -142,6 +142,26 @@ fn opencvs_tutorial_calibrations_are_read() {
     );
 }
 
+/// Examples of OpenCV's write matrix and coefficients alone.
+#[test]
+fn without_a_size_the_frames_have_it_where_the_principal_point_is_theirs() {
+    let folder = tempfile::tempdir().unwrap();
+    let among = |text: &str, frame_px| {
+        let path = folder.path().join("a.toml");
+        std::fs::write(&path, text).unwrap();
+        load_calibration_among(&path, frame_px).map_err(|error| error.to_string())
+    };
+    let sizeless = OWN.replace("size_px = [640, 480]\n", "");
+    assert_eq!(among(OWN, [640, 480]), Ok((lamp(), false)));
+    assert_eq!(among(&sizeless, [640, 480]), Ok((lamp(), true)));
+    for other_px in [[1280, 720], [320, 240], [640, 360], [800, 600]] {
+        let message = among(&sizeless, other_px).unwrap_err();
+        let [width, height] = other_px;
+        let expected = format!("principal point at (321, 238) that is hardly {width} x {height}");
+        assert!(message.contains(&expected), "{message}");
+    }
+}
+
 #[test]
 fn what_is_written_is_read_to_the_bit() {
     let folder = tempfile::tempdir().unwrap();
@@ -530,7 +550,7 @@ fn the_frames_tell_the_camera() {
     std::fs::write(&path, two).unwrap();
     for (size_px, focal) in [([640, 480], 600.0), ([1280, 720], 900.0)] {
         assert_eq!(
-            load_calibration_among(&path, size_px).unwrap().focal_px.x,
+            load_calibration_among(&path, size_px).unwrap().0.focal_px.x,
             focal
         );
     }

@@ -74,7 +74,9 @@ impl Converter {
             }
         }
         if let Some(color) = material.maps.color {
-            self.cover(&mut material, color, &mtl);
+            if let Some((at, message)) = self.cover(&mut material, color, &mtl) {
+                notes.add_at(library.0, library.1, at, message);
+            }
         }
         GivenMaterial {
             name: mtl.name,
@@ -110,7 +112,9 @@ impl Converter {
         let opacity = mtl.maps.iter().find(|map| map.role == MapRole::Opacity);
         let opacity = opacity
             .filter(|_| matches!(map.role, MapRole::Diffuse | MapRole::Opacity))
-            .and_then(|opacity| named_file(folder, &opacity.file));
+            .and_then(|opacity| named_file(folder, &opacity.file))
+            // (Exporters that name the colours' picture here mean its alpha.)
+            .filter(|opacity| map.role == MapRole::Opacity || *opacity != path);
         let texture = match self.texture(&path, opacity.as_deref(), map.role) {
             Ok(texture) => texture?,
             Err(message) => {
@@ -159,15 +163,25 @@ impl Converter {
         }
     }
 
-    /// How a material is covered whose picture has opacity: alpha counts only where `map_d` says so.
-    fn cover(&self, material: &mut Material, color: Map, mtl: &MtlMaterial) {
-        if !mtl.maps.iter().any(|map| map.role == MapRole::Opacity) {
-            return;
-        }
+    /// How a material is covered whose picture has opacity: alpha counts only where `map_d` says so. What there is to say of that,
+    /// and the byte of the library's text.
+    fn cover(
+        &self,
+        material: &mut Material,
+        color: Map,
+        mtl: &MtlMaterial,
+    ) -> Option<(usize, String)> {
+        let of_role = |role| mtl.maps.iter().find(|map| map.role == role);
+        let opacity = of_role(MapRole::Opacity)?;
         let texture = &self.textures[color.texture as usize].1;
         let alphas = || texture.rgba.iter().skip(3).step_by(4);
-        if alphas().all(|alpha| *alpha == 255) || material.coverage == Coverage::Blend {
-            return;
+        if alphas().all(|alpha| *alpha == 255) {
+            let is_same = of_role(MapRole::Diffuse).is_some_and(|map| map.file == opacity.file);
+            let message = "map_d: the picture of the colours, which has no alpha; taken for opaque";
+            return is_same.then(|| (opacity.at, message.to_owned()));
+        }
+        if material.coverage == Coverage::Blend {
+            return None;
         }
         let between = alphas().filter(|alpha| (16..240).contains(*alpha)).count();
         // A picture of leaves has edges alone between what is there and what is not.
@@ -175,6 +189,7 @@ impl Converter {
             true => Coverage::Mask { cutoff: 0.5 },
             false => Coverage::Blend,
         };
+        None
     }
 }
 

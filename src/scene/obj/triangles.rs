@@ -110,6 +110,7 @@ impl Reader<'_> {
     fn materials(&mut self, libraries: &Libraries, has_colors: bool) -> UsedMaterials {
         let mut used = UsedMaterials::default();
         let mut index_of: BTreeMap<Option<usize>, u32> = BTreeMap::new();
+        let sole = self.sole_material(libraries);
         for face in &self.faces {
             let material_use = face.material_use;
             if used.of_use.contains_key(&material_use) {
@@ -119,7 +120,10 @@ impl Reader<'_> {
                 .checked_sub(1)
                 .and_then(|index| self.uses.get(index))
                 .filter(|(name, _)| !name.is_empty());
-            let found = named.and_then(|(name, _)| libraries.find(name));
+            let found = match named {
+                Some((name, _)) => libraries.find(name),
+                None => sole,
+            };
             if let (Some((name, at)), None) = (named, found) {
                 let message = match libraries.are_there() {
                     true => format!(
@@ -142,6 +146,31 @@ impl Reader<'_> {
             used.of_use.insert(material_use, index);
         }
         used
+    }
+
+    /// What faces are made of where the file has libraries and no `usemtl`: of their material, if there is one alone, as programs
+    /// for scans mean it. What becomes of the libraries is told.
+    fn sole_material(&mut self, libraries: &Libraries) -> Option<usize> {
+        let at = self.libraries.first().map(|(_, at)| *at)?;
+        if !self.uses.is_empty() {
+            return None;
+        }
+        let (sole, message) = match libraries.materials.as_slice() {
+            [] => return None,
+            [sole] => {
+                let message = format!("there is no usemtl: all is of \"{}\"", sole.name);
+                (Some(0), message)
+            }
+            several => {
+                let (count, files) = (several.len(), libraries.told());
+                let message = format!(
+                    "there is no usemtl: which of the {count} materials in {files} is meant? it is grey"
+                );
+                (None, message)
+            }
+        };
+        self.notes.add_at(self.path, self.text, at, message);
+        sole
     }
 }
 

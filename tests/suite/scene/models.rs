@@ -198,6 +198,74 @@ fn files_of_other_machines_are_found_and_what_comes_later_is_known() {
     assert_eq!(&object.textures[0].rgba[..4], [255, 0, 0, 255]);
 }
 
+/// What a material library and the lines before the faces make of a pyramid.
+fn of_library(here: &Path, mtl: &str, head: &str) -> (Object, Vec<String>) {
+    fs::write(here.join("a.mtl"), mtl).unwrap();
+    let path = here.join("a.obj");
+    write_pyramid(&path, head, "");
+    thing(&path, "").unwrap()
+}
+
+/// Exporters of scans and games name the colours' picture as that of opacity too, and so do not make the thing half clear by it.
+#[test]
+fn the_colours_picture_as_opacity_means_its_alpha() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let picture = image::RgbImage::from_pixel(2, 2, image::Rgb([200, 40, 40]));
+    picture.save(here.join("plain.png")).unwrap();
+    let leaves = image::RgbaImage::from_fn(2, 1, |x, _| image::Rgba([9, 99, 9, 255 * x as u8]));
+    leaves.save(here.join("leaves.png")).unwrap();
+    // A square whose left half is where the leaves are not.
+    let square = "mtllib a.mtl\nusemtl a\nv 0 0 0\nv .1 0 0\nv .1 .1 0\nv 0 .1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
+    let path = here.join("square.obj");
+    fs::write(&path, square).unwrap();
+    let with = |picture: &str| {
+        let mtl = format!("newmtl a\nKd 1 1 1\nmap_d {picture}\nmap_Kd {picture}\n");
+        fs::write(here.join("a.mtl"), mtl).unwrap();
+        thing(&path, "").unwrap()
+    };
+    let area = |object: &Object| -> f32 {
+        let triangles = object.mesh.triangles.iter();
+        let corners = |triangle: &[u32; 3]| triangle.map(|at| object.mesh.positions[at as usize]);
+        let areas = triangles
+            .map(corners)
+            .map(|[a, b, c]| (b - a).cross(c - a).length() / 2.0);
+        areas.sum()
+    };
+    let (plain, warnings) = with("plain.png");
+    assert_eq!(plain.materials[0].coverage, Coverage::Opaque);
+    assert_eq!(&plain.textures[0].rgba[..4], [200, 40, 40, 255]);
+    assert!((area(&plain) - 0.01).abs() < 1e-6);
+    let told = "a.mtl:3: map_d: the picture of the colours, which has no alpha";
+    assert!(warnings[0].contains(told), "{warnings:?}");
+    let (leaves, warnings) = with("leaves.png");
+    assert!((area(&leaves) - 0.005).abs() < 2e-4, "{}", area(&leaves));
+    assert!(!warnings.iter().any(|warning| warning.contains("map_d")));
+}
+
+/// Scanners' programs write a library and no `usemtl`.
+#[test]
+fn without_usemtl_a_material_alone_is_meant_and_one_of_several_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    for (mtl, albedo, told) in [
+        (
+            "newmtl scan\nKd .8 .02 .02\n",
+            RED,
+            "a.obj:1: there is no usemtl: all is of \"scan\"",
+        ),
+        (
+            "newmtl a\nKd .8 .02 .02\nnewmtl b\n",
+            GREY,
+            "a.obj:1: there is no usemtl: which of the 2 materials in a.mtl is meant? it is grey",
+        ),
+    ] {
+        let (object, warnings) = of_library(here, mtl, "mtllib a.mtl\n");
+        assert_eq!(object.materials[0].albedo.to_array(), albedo);
+        assert!(warnings[0].contains(told), "{warnings:?}");
+    }
+}
+
 #[test]
 fn what_cannot_be_meant_is_a_mistake_with_its_place() {
     let folder = tempfile::tempdir().unwrap();

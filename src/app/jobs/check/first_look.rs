@@ -5,12 +5,13 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Result, bail};
 use glam::{DAffine3, DVec2, DVec3};
 
+use crate::app::input::live_input::LiveInput;
 use crate::app::input::mirror_watch::MirrorWatch;
 use crate::app::input::sightings::Sightings;
 use crate::app::stages::known_camera::KnownCamera;
 use crate::app::stages::source::{self, CalibrationNamed};
 use crate::capture::live::is_live;
-use crate::capture::{Frame, FrameSource, load_calibration, notices_told};
+use crate::capture::{Frame, FrameSource, notices_told};
 use crate::geometry::camera::Intrinsics;
 use crate::scene::{Object, Scene};
 use crate::tracking::Tracker;
@@ -40,7 +41,7 @@ pub struct FirstLook {
 pub fn first_look(scene: &Scene) -> Result<FirstLook> {
     if is_live(&scene.camera.source) {
         let warnings = match &scene.camera.calibration {
-            Some(path) => load_calibration(path).map(|_| Vec::new())?,
+            Some(_) => LiveInput::of(&scene.camera).map(|_| Vec::new())?,
             None => vec![format!(
                 "{} has no calibration: its focal length is guessed, and learnt from the markers while pictures come \
                  ({} is better)",
