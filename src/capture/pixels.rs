@@ -9,6 +9,8 @@ use opencv::core::{Mat, MatTraitConst, Vec4b};
 use opencv::{imgcodecs, imgproc};
 
 use crate::geometry::quarter_turns::QuarterTurns;
+use crate::scene::plain_file::{self, MOST_PICTURE};
+use crate::scene::tiff_header;
 
 /// No file is too small for a picture of so many pixels.
 const SMALL_PIXELS: u64 = 32 << 20;
@@ -62,7 +64,11 @@ fn read(path: &Path, flags: i32) -> Option<Mat> {
         .ok()
         .filter(std::fs::Metadata::is_file)?;
     let reader = ImageReader::open(path).ok()?.with_guessed_format().ok()?;
-    reader.format().filter(|format| FORMATS.contains(format))?;
+    let format = reader.format().filter(|format| FORMATS.contains(format))?;
+    if format == ImageFormat::Tiff {
+        let bytes = plain_file::read(path, MOST_PICTURE).ok()?;
+        tiff_header::counts_fit(&bytes).then_some(())?;
+    }
     let (width, height) = reader.into_dimensions().ok()?;
     let most = SMALL_PIXELS.max(file.len().saturating_mul(MOST_PIXELS_PER_BYTE));
     if u64::from(width) * u64::from(height) > most {

@@ -56,6 +56,7 @@ mod shapes;
 mod shortcuts;
 mod stl;
 mod texture_file;
+pub mod tiff_header;
 mod tracking;
 mod transport;
 mod vertex_colors;

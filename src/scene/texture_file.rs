@@ -8,6 +8,7 @@ use image::{ColorType, DynamicImage, ImageFormat, ImageReader};
 
 use super::in_its_place::in_place_of;
 use super::plain_file::{self, MOST_PICTURE};
+use super::tiff_header;
 use crate::light::texture::{Texture, srgb_from_linear};
 
 /// What is read.
@@ -46,6 +47,12 @@ pub fn decode(name: String, bytes: &[u8], format: Option<ImageFormat>) -> Result
     }
     if let Some(what) = in_place_of(bytes) {
         return Err(format!("is {what}"));
+    }
+    if !tiff_header::counts_fit(bytes) {
+        return Err(
+            "cannot be read: an entry of its directory has more values than the file has bytes"
+                .to_owned(),
+        );
     }
     let failed = |error: &dyn std::fmt::Display| match error.to_string() {
         said if said.contains("not supported") || said.contains("could not be determined") => {
