@@ -48,7 +48,7 @@ pub(super) const CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::Vertex
 /// What a corner has where any material of the scene's virtual things needs more, as `SurfaceCorner` in shading.wgsl reads it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct CornerOfMaterial {
+pub(super) struct CornerOfMaterial {
     uv: [f32; 4],
     color: [f32; 4],
     tangent: [f32; 4],
@@ -486,7 +486,7 @@ impl AnchoredModel {
 }
 
 /// What a corner of a triangle has for its material.
-fn corner_of_material(
+pub(super) fn corner_of_material(
     object: &Object,
     mesh: &Mesh,
     (triangle, corner): (usize, usize),

@@ -149,7 +149,7 @@ impl GpuScene {
                 lights: light_kinds,
                 looks,
             },
-            materials: looks.then(|| materials_group(gpu, scene)),
+            materials: looks.then(|| materials_group(gpu, &scene.virtuals)),
             intrinsics,
             views,
         }

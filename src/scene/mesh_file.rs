@@ -77,6 +77,8 @@ pub struct MeshReading {
     pub up: Option<Up>,
     /// What its longest side is scaled to, metres; `None`: its numbers are metres.
     pub fit_m: Option<f64>,
+    /// Whether its corners keep their texture coordinates though no picture of its own asks for them.
+    pub keeps_coordinates: bool,
 }
 
 impl MeshReading {
@@ -86,6 +88,7 @@ impl MeshReading {
             normals,
             up: None,
             fit_m: None,
+            keeps_coordinates: false,
         }
     }
 }
@@ -176,7 +179,11 @@ fn read(
     let motion = model.motion.take();
     let clips = std::mem::take(&mut model.clips);
     let together = motion.as_ref().map(|motion| &motion.together[..]);
-    let mut loaded = welded_as(model, reading.normals, together)
+    let looks = match reading.keeps_coordinates {
+        true => Kept::All,
+        false => Kept::Needed,
+    };
+    let mut loaded = welded_as(model, (reading.normals, looks), together)
         .ok_or_else(|| SceneError::of_file(path, "no triangle has an area; a mesh is expected"))?;
     loaded.clips = clips;
     if let Some(((wanted, number), motion)) = wanted.zip(number).zip(motion) {
@@ -191,13 +198,22 @@ fn read(
 
 /// A model's mesh; `None` where no triangle has an area.
 pub fn welded(model: RawModel, normals: Normals) -> Option<LoadedMesh> {
-    welded_as(model, normals, None)
+    welded_as(model, (normals, Kept::Needed), None)
+}
+
+/// What corners keep of texture coordinates and colours.
+#[derive(Clone, Copy, PartialEq)]
+enum Kept {
+    /// What their materials ask for.
+    Needed,
+    /// All.
+    All,
 }
 
 /// The same of a model that moves, given for each position the number of those that are one place, always.
 fn welded_as(
     mut model: RawModel,
-    normals: Normals,
+    (normals, kept): (Normals, Kept),
     together: Option<&[u32]>,
 ) -> Option<LoadedMesh> {
     if normals == Normals::Flat {
@@ -206,10 +222,11 @@ fn welded_as(
     }
     let crease_rad = normals.crease_rad();
     // Corners need texture coordinates for pictures alone.
-    let is_plain = model
-        .materials
-        .iter()
-        .all(|it| it.material.maps.used().next().is_none())
+    let is_plain = kept == Kept::Needed
+        && model
+            .materials
+            .iter()
+            .all(|it| it.material.maps.used().next().is_none())
         && model
             .looks
             .looks
