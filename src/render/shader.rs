@@ -11,7 +11,7 @@ macro_rules! files {
 }
 
 /// All files under `shaders/`.
-const FILES: [(&str, &str); 29] = files![
+const FILES: [(&str, &str); 30] = files![
     "area_lights.wgsl",
     "background.wgsl",
     "common.wgsl",
@@ -23,6 +23,7 @@ const FILES: [(&str, &str); 29] = files![
     "fade.wgsl",
     "final_gather.wgsl",
     "fullscreen.wgsl",
+    "layer_albedo.wgsl",
     "layers.wgsl",
     "light_sums.wgsl",
     "mapped_source.wgsl",

@@ -29,7 +29,7 @@ impl<'a> Laid<'a> {
     pub fn on(shape: ShapeKind, loaded: &'a mut LoadedMesh) -> Self {
         Self {
             shape,
-            mesh: &mut loaded.mesh,
+            mesh: Arc::make_mut(&mut loaded.mesh),
             materials: &mut loaded.materials,
             textures: &mut loaded.textures,
         }

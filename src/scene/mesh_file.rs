@@ -9,7 +9,9 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 use super::animation::{Animation, WantedAnimation};
 use super::error::SceneError;
 use super::in_its_place::in_place_of;
+use super::loading::LoadStage;
 use super::mask_cut::cut_masks;
+use super::model_cache::ModelCache;
 use super::named_files::FileKind;
 use super::obj::files::named_file;
 use super::plain_file::{self, MOST_MESH};
@@ -27,7 +29,7 @@ use crate::light::texture::Texture;
 #[derive(Debug, Clone)]
 pub struct LoadedMesh {
     /// Its triangles, welded.
-    pub mesh: Mesh,
+    pub mesh: Arc<Mesh>,
     /// What was done to it.
     pub report: MeshReport,
     /// What it is made of.
@@ -129,21 +131,28 @@ fn read_named(
     how: (MeshReading, Option<&WantedAnimation>),
     note_read: &dyn Fn(&Path),
 ) -> Result<LoadedMesh, SceneError> {
+    let loading = value.models().and_then(ModelCache::loading);
+    let enter = |stage: LoadStage| match loading.is_none_or(|loading| loading.enter(stage)) {
+        true => Ok(()),
+        false => Err(SceneError::of_file(path, "its reading was given up")),
+    };
+    enter(LoadStage::Reading)?;
     let bytes = plain_file::read(path, MOST_MESH)
         .map_err(|error| value.error(format!("the mesh cannot be read: {error}")))?;
-    read(path, bytes, how, note_read).map_err(|mut error| {
+    read(path, bytes, how, (note_read, &enter)).map_err(|mut error| {
         error.message += &format!(" (a mesh of {})", value.location());
         error
     })
 }
 
-/// `note_read` is told of every file that is looked for besides.
+/// `note_read` is told of every file that is looked for besides, `enter` of what comes next.
 fn read(
     path: &Path,
     bytes: Vec<u8>,
     (reading, wanted): (MeshReading, Option<&WantedAnimation>),
-    note_read: &dyn Fn(&Path),
+    (note_read, enter): (&dyn Fn(&Path), &dyn Fn(LoadStage) -> Result<(), SceneError>),
 ) -> Result<LoadedMesh, SceneError> {
+    enter(LoadStage::Unpacking)?;
     let format = MeshFormat::of(path, &bytes);
     let choose = |clips: &[ClipInfo]| wanted.map(|wanted| wanted.choose(clips)).transpose();
     let mut model = match format {
@@ -171,6 +180,7 @@ fn read(
         }
     };
     drop(bytes);
+    enter(LoadStage::Joining)?;
     cut_masks(&mut model, path)?;
     note_coverage(&mut model, path, reading.normals);
     let up = reading.up.unwrap_or(format.up());
@@ -193,6 +203,7 @@ fn read(
         let poser = MeshPoser::new(rig, &loaded.mesh, object_from_scene, crease_rad);
         loaded.animation = Some(wanted.playing(number, poser));
     }
+    enter(LoadStage::Ready)?;
     Ok(loaded)
 }
 
@@ -253,7 +264,7 @@ fn welded_as(
     let notes = model.notes.told();
     let materials = || model.materials.iter();
     (!mesh.triangles.is_empty()).then(|| LoadedMesh {
-        mesh,
+        mesh: Arc::new(mesh),
         report,
         materials: materials().map(|given| given.material).collect(),
         material_names: materials().map(|given| given.name.clone()).collect(),

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use glam::{DAffine3, DVec3, Vec3};
 
@@ -9,7 +10,7 @@ use super::anchors::unique_name;
 use super::animation::AnimationKeys;
 use super::error::{SceneError, suggestion};
 use super::laid_picture::Laid;
-use super::mesh_file;
+use super::mesh_file::{self, LoadedMesh};
 use super::motion::{Motion, MotionKeys, motion};
 use super::named_files::FileKind;
 use super::placement::{POSITION, PlacementKeys, placement};
@@ -21,7 +22,6 @@ use super::schema::section::{Example, Section, Times};
 use super::schema::values::{InWords, Vectors, Written};
 use super::shapes::{ShapeKeys, ShapeKind, of_basic_shape, rectangle, shape};
 use super::{Anchor, Object};
-use crate::geometry::mesh::Mesh;
 use crate::light::Material;
 
 /// Diffuse reflectance.
@@ -305,7 +305,7 @@ fn object(
     let (shape, mut loaded) = shape(table, &name, normals, picture.is_some())?;
     let changes_shape = loaded.animation.is_some();
     if let Some(material) = &material {
-        override_materials(&mut loaded.materials, &mut loaded.mesh, material)?;
+        override_materials(&mut loaded, material)?;
         if let Some(picture) = picture {
             let is_white = MATERIAL.albedo.value(material).is_none();
             Laid::on(shape, &mut loaded).lay(&picture, is_white)?;
@@ -315,7 +315,7 @@ fn object(
     // A mirror turns each triangle's winding; turning it back keeps the outside outside.
     let mirrored = anchor_from_object.matrix3.determinant() < 0.0;
     let mesh = if mirrored {
-        mesh.with_winding_reversed()
+        Arc::new(Arc::unwrap_or_clone(mesh).with_winding_reversed())
     } else {
         mesh
     };
@@ -355,14 +355,10 @@ pub fn anchor_index(on: &Value, anchors: &[Anchor]) -> Result<usize, SceneError>
 
 /// Each key that the scene gives replaces that of every material of the mesh, with the picture that says it and, of the
 /// colour, the corners' colours.
-fn override_materials(
-    materials: &mut [Material],
-    mesh: &mut Mesh,
-    table: &Table,
-) -> Result<(), SceneError> {
+fn override_materials(loaded: &mut LoadedMesh, table: &Table) -> Result<(), SceneError> {
     let albedo = MATERIAL.albedo.read(table)?;
     let roughness = MATERIAL.roughness.read(table)?;
-    for material in materials {
+    for material in &mut loaded.materials {
         if let Some(albedo) = albedo {
             material.albedo = albedo;
             material.maps.color = None;
@@ -372,8 +368,8 @@ fn override_materials(
             material.maps.roughness = None;
         }
     }
-    if albedo.is_some() {
-        for look in &mut mesh.looks {
+    if albedo.is_some() && !loaded.mesh.looks.is_empty() {
+        for look in &mut Arc::make_mut(&mut loaded.mesh).looks {
             look.color = Vec3::ONE.extend(look.color.w);
         }
     }

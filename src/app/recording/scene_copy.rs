@@ -342,10 +342,13 @@ mod tests {
         fs::write(home.join("tags.yaml"), tags).unwrap();
         let probe = config("../recordings/room/probe.hdr");
         fs::copy(probe, home.join("probe.hdr")).unwrap();
+        let cloth = image::RgbImage::new(2, 2);
+        cloth.save(home.join("cloth.png")).unwrap();
         fs::create_dir(home.join("take")).unwrap();
         let text = "[camera]\nsource = \"take\"\ncalibration = \"lens.toml\"\n[tracking]\ndetector = \"aruco\"\n\
             [[board]]\nname = \"b\"\nfamily = \"board.yml\"\nbundle = \"tags.yaml\"\n\
             [[marker]]\nname = \"m\"\nfamily = \"marker.yml\"\nid = 1\nsize_m = 0.04\n\
+            [table]\nrect_m = [0, 0, 1, 1]\nalbedo_texture = \"cloth.png\"\n\
             [[phantom]]\nname = \"p\"\nmesh = \"phantom.obj\"\n[[virtual]]\nname = \"v\"\nmesh = \"virtual.obj\"\n\
             [probe]\nimage = \"probe.hdr\"\nroom = [\"floor.obj\", \"wall.obj\"]\n[[room]]\nmesh = \"shelf.obj\"\n";
         let scene = home.join("scene.toml");

@@ -249,7 +249,6 @@ impl Shafts {
             wgpu::BindingResource::Sampler(&self.sampler),
             wgpu::BindingResource::TextureView(&self.environment.view),
             wgpu::BindingResource::Sampler(&self.environment.sampler),
-            wgpu::BindingResource::TextureView(&self.environment.layer_albedo),
         ];
         gpu.bind_group(&SHAFT_GROUP, buffers.into_iter().chain(textures))
     }

@@ -1,0 +1,85 @@
+//! How far the reading of a model has come, told to whoever waits beside it, and the wish that it end.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+
+/// What is done with a model's file, in this order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum LoadStage {
+    /// Nothing yet.
+    Waiting,
+    /// Its bytes are read.
+    Reading,
+    /// Its triangles and pictures are unpacked.
+    Unpacking,
+    /// What belongs together is joined, and what is open mended.
+    Joining,
+    /// It is there.
+    Ready,
+}
+
+impl LoadStage {
+    const ALL: [Self; 5] = [
+        Self::Waiting,
+        Self::Reading,
+        Self::Unpacking,
+        Self::Joining,
+        Self::Ready,
+    ];
+
+    /// In words.
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Self::Waiting => "waits",
+            Self::Reading => "reads its file",
+            Self::Unpacking => "unpacks triangles and pictures",
+            Self::Joining => "joins its triangles",
+            Self::Ready => "is read",
+        }
+    }
+
+    /// The part that is behind it, 0 to 1, as it mostly is of large models with pictures.
+    pub fn part(self) -> f32 {
+        match self {
+            Self::Waiting => 0.0,
+            Self::Reading => 0.05,
+            Self::Unpacking => 0.1,
+            Self::Joining => 0.6,
+            Self::Ready => 1.0,
+        }
+    }
+}
+
+/// The reading of one model; copies are of the same one.
+#[derive(Debug, Clone, Default)]
+pub struct Loading(Arc<Shared>);
+
+#[derive(Debug, Default)]
+struct Shared {
+    stage: AtomicU8,
+    is_given_up: AtomicBool,
+}
+
+impl Loading {
+    /// What it is at.
+    pub fn stage(&self) -> LoadStage {
+        LoadStage::ALL[usize::from(self.0.stage.load(Ordering::Relaxed))]
+    }
+
+    /// It is at something else now. False where nobody waits for it any more.
+    pub(super) fn enter(&self, stage: LoadStage) -> bool {
+        self.0.stage.store(stage as u8, Ordering::Relaxed);
+        !self.is_given_up()
+    }
+
+    /// Nobody waits for it any more: it ends as soon as it may.
+    pub fn give_up(&self) {
+        self.0.is_given_up.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether nobody waits for it any more.
+    pub fn is_given_up(&self) -> bool {
+        self.0.is_given_up.load(Ordering::Relaxed)
+    }
+}
