@@ -47,6 +47,8 @@ const LARGEST_PART: f64 = 0.8;
 const LARGEST_ERROR: f64 = 0.05;
 /// What a unit of difference between normals counts for, against a displacement by the mesh's size.
 const NORMAL_WEIGHT: f32 = 0.05;
+/// The same of how far a picture slides.
+const PICTURE_WEIGHT: f64 = 3.0;
 /// The same of a unit of difference between colours at corners.
 const COLOR_WEIGHT: f32 = 0.2;
 /// Colours at corners are nowhere off by more, of 1.
@@ -349,7 +351,7 @@ fn uv_scale(source: &Mesh) -> f32 {
     let around = Bounds::around(source.positions.iter().map(|position| position.as_dvec3()));
     let size = around.map_or(0.0, |around| (around.high - around.low).max_element());
     match size > 0.0 {
-        true => (metres_of_picture(source) / size) as f32,
+        true => (PICTURE_WEIGHT * metres_of_picture(source) / size) as f32,
         false => 0.0,
     }
 }

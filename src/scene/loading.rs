@@ -1,7 +1,8 @@
 //! How far the reading of a model has come, told to whoever waits beside it, and the wish that it end.
 
-use std::sync::Arc;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// What is done with a model's file, in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -51,12 +52,14 @@ impl LoadStage {
     }
 }
 
-/// The reading of one model; copies are of the same one.
+/// The reading of models, one after the other; copies are of the same.
 #[derive(Debug, Clone, Default)]
 pub struct Loading(Arc<Shared>);
 
 #[derive(Debug, Default)]
 struct Shared {
+    /// Name of the file.
+    file: Mutex<String>,
     stage: AtomicU8,
     is_given_up: AtomicBool,
 }
@@ -67,8 +70,16 @@ impl Loading {
         LoadStage::ALL[usize::from(self.0.stage.load(Ordering::Relaxed))]
     }
 
-    /// It is at something else now. False where nobody waits for it any more.
-    pub(super) fn enter(&self, stage: LoadStage) -> bool {
+    /// What it is at, in words.
+    pub fn in_words(&self) -> String {
+        let file = self.0.file.lock().unwrap_or_else(PoisonError::into_inner);
+        format!("{file} {}", self.stage().in_words())
+    }
+
+    /// It is at something else of a file now. False where nobody waits for it any more.
+    pub(super) fn enter(&self, path: &Path, stage: LoadStage) -> bool {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.clone_into(&mut self.0.file.lock().unwrap_or_else(PoisonError::into_inner));
         self.0.stage.store(stage as u8, Ordering::Relaxed);
         !self.is_given_up()
     }

@@ -132,7 +132,7 @@ fn read_named(
     note_read: &dyn Fn(&Path),
 ) -> Result<LoadedMesh, SceneError> {
     let loading = value.models().and_then(ModelCache::loading);
-    let enter = |stage: LoadStage| match loading.is_none_or(|loading| loading.enter(stage)) {
+    let enter = |stage: LoadStage| match loading.is_none_or(|loading| loading.enter(path, stage)) {
         true => Ok(()),
         false => Err(SceneError::of_file(path, "its reading was given up")),
     };

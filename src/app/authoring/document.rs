@@ -62,9 +62,17 @@ impl SceneDocument {
     /// # Errors
     /// The first mistake in it.
     pub fn open(path: &Path) -> Result<Self, SceneError> {
+        Self::open_telling(path, Loading::default())
+    }
+
+    /// The same, telling `loading` how far its models are.
+    ///
+    /// # Errors
+    /// The first mistake in it.
+    pub fn open_telling(path: &Path, loading: Loading) -> Result<Self, SceneError> {
         let text = Scene::read_text(path)?;
         let models = ModelCache::default();
-        let reading = Scene::read_with(path, &text, &models);
+        let reading = Scene::read_with(path, &text, &models.telling(loading));
         Ok(Self {
             models,
             path: path.to_owned(),

@@ -373,12 +373,15 @@ mod tests {
         copy_scene(&scene, &session).unwrap();
         fs::remove_dir_all(&home).unwrap();
         let copy = Scene::load(&session.join(SCENE_NAME)).unwrap();
-        assert_eq!((copy.anchors.len(), copy.phantoms.len()), (2, 1));
+        assert_eq!((copy.anchors.len(), copy.phantoms.len()), (2, 2));
         assert_eq!(copy.probe.map(|probe| probe.room.len()), Some(3));
         // Folders that an older session is known by.
         let mut folders: Vec<&str> = copy_folders().collect();
         folders.sort_unstable();
-        assert_eq!(folders, ["bundles", "markers", "models", "probe", "room"]);
+        assert_eq!(
+            folders,
+            ["bundles", "markers", "models", "pictures", "probe", "room"]
+        );
     }
 
     #[test]

@@ -181,9 +181,14 @@ impl<'a> Charts<'a> {
     }
 }
 
+/// Texture coordinates that differ by less than this show the same: some two texels of most pictures.
+const UNSEEN: f64 = 1.0 / 1024.0;
+
 /// How far it is on a triangle's plane to where texture coordinates differ by so much, metres; without end where they are
 /// everywhere the same.
 fn slid_m(difference: DVec2, [u, v, w]: [DVec2; 3], [a, b, c]: [DVec3; 3]) -> f64 {
+    let beyond = (difference.abs() - UNSEEN).max(DVec2::ZERO);
+    let difference = beyond * difference.signum();
     if difference == DVec2::ZERO {
         return 0.0;
     }
