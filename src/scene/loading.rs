@@ -79,7 +79,7 @@ impl Loading {
     /// It is at something else of a file now. False where nobody waits for it any more.
     pub(super) fn enter(&self, path: &Path, stage: LoadStage) -> bool {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        name.clone_into(&mut self.0.file.lock().unwrap_or_else(PoisonError::into_inner));
+        *self.0.file.lock().unwrap_or_else(PoisonError::into_inner) = name.into_owned();
         self.0.stage.store(stage as u8, Ordering::Relaxed);
         !self.is_given_up()
     }
