@@ -145,12 +145,15 @@ fn read_named(
     })
 }
 
-/// `note_read` is told of every file that is looked for besides, `enter` of what comes next.
+/// Told of what comes next; an error where nobody waits for it any more.
+type EnterStage<'a> = &'a dyn Fn(LoadStage) -> Result<(), SceneError>;
+
+/// `note_read` is told of every file that is looked for besides.
 fn read(
     path: &Path,
     bytes: Vec<u8>,
     (reading, wanted): (MeshReading, Option<&WantedAnimation>),
-    (note_read, enter): (&dyn Fn(&Path), &dyn Fn(LoadStage) -> Result<(), SceneError>),
+    (note_read, enter): (&dyn Fn(&Path), EnterStage<'_>),
 ) -> Result<LoadedMesh, SceneError> {
     enter(LoadStage::Unpacking)?;
     let format = MeshFormat::of(path, &bytes);

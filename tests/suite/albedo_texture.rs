@@ -80,32 +80,37 @@ fn seen_squares(camera: &Intrinsics, camera_from_world: &DAffine3) -> (Vec<f64>,
         .unzip()
 }
 
-/// In a room of one brightness a table is as bright as it reflects: what a shadow takes away as radiance is the part that a
-/// ratio takes.
-#[test]
-fn what_is_subtracted_from_a_pictured_table_is_the_part_that_a_ratio_takes() {
-    let folder = tempfile::tempdir().unwrap();
+/// A table with squares in a room of one brightness, and a black thing above it.
+fn scene_of_squares(folder: &Path) -> Scene {
     let cloth = RgbImage::from_fn(1200, 1000, |column, row| {
         let place = DVec2::new(f64::from(column) - 599.5, 499.5 - f64::from(row));
         grey(squares(place * 0.001))
     });
-    cloth.save(folder.path().join("cloth.png")).unwrap();
+    cloth.save(folder.join("cloth.png")).unwrap();
     let line = "albedo = [0.5, 0.335, 0.2]                # the mean of its wood";
-    let mut scene = room_with(folder.path(), (line, "albedo_texture = \"cloth.png\""));
+    let mut scene = room_with(folder, (line, "albedo_texture = \"cloth.png\""));
     scene.shadows.shafts.patches = 600;
     let probe = scene.probe.as_mut().unwrap();
     probe.probe = Probe::new([64, 32], vec![Vec3::ONE; 64 * 32]).unwrap();
     probe.exposure = 0.5;
     scene.phantoms.retain(|phantom| phantom.name == "table");
-    let mean = scene.phantoms[0].albedo(0);
-    assert!((mean - 0.5).abs().max_element() < 0.03, "{mean}");
     scene.virtuals.truncate(1);
     scene.virtuals[0].anchor_from_object.translation.z += 0.03;
     for material in &mut scene.virtuals[0].materials {
         material.albedo = DVec3::ZERO;
     }
     scene.shadows.samples = 1;
+    scene
+}
 
+/// In a room of one brightness a table is as bright as it reflects: what a shadow takes away as radiance is the part that a
+/// ratio takes.
+#[test]
+fn what_is_subtracted_from_a_pictured_table_is_the_part_that_a_ratio_takes() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = scene_of_squares(folder.path());
+    let mean = scene.phantoms[0].albedo(0);
+    assert!((mean - 0.5).abs().max_element() < 0.03, "{mean}");
     let camera = intrinsics();
     let (frame, poses) = key_frames(&project_file("recordings/room"), &scene.anchors)
         .unwrap()
@@ -152,7 +157,7 @@ fn what_is_subtracted_from_a_pictured_table_is_the_part_that_a_ratio_takes() {
             }
         }
         assert!(count > 1000.0, "{count}");
-        [(sum / count as f64).sqrt(), (taken / count as f64).sqrt()]
+        [(sum / count).sqrt(), (taken / count).sqrt()]
     };
     let [textured, taken] = off(&with(Difference::Subtract, true).0);
     let [flat, _] = off(&with(Difference::Subtract, false).0);
