@@ -365,10 +365,6 @@ fn a_picture_keeps_its_seams_and_slides_no_farther_than_is_said() {
             }
         }
         let said_m = level.max_error_m;
-        eprintln!(
-            "{} triangles: {most_m}, said {said_m}",
-            level.mesh.triangles.len()
-        );
         assert!(
             most_m < 1.5 * said_m + 2.0 * sag_m,
             "{most_m}, said {said_m}"
