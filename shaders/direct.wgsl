@@ -61,13 +61,15 @@ fn nothing() -> Shaded {
 }
 
 // No light reaches it that could be taken again.
-//!if LOOKS
+//!if LAYERED
 @fragment
 fn ambient_on_virtual(surface: Surface, @builtin(front_facing) outside: bool) -> Shaded {
     let look = look(surface, outside);
+//!if LOOKS
     if look.opacity == 0.0 {
         discard;
     }
+//!end
     return Shaded(vec4f(srgb_from_linear(ambient_radiance(surface, look)), 1.0), vec4f(NOT_VIRTUAL));
 }
 

@@ -185,6 +185,12 @@ fn linear_of(map: MapOnGpu, at: TextureCoordinates) -> vec4f {
     return sum / f32(s.spots);
 }
 
+// What a surface of a material reflects head-on, whatever else the material is.
+fn albedo_at(number: u32, uv: vec4f, color: vec3f) -> vec3f {
+    let at = TextureCoordinates(uv, dpdx(uv), dpdy(uv));
+    return materials[number].albedo * srgb_of(materials[number].maps[0], at).rgb * color;
+}
+
 // What the pictures make of a material; `normal` has unit length and looks out of the surface.
 fn material_at(number: u32, uv: vec4f, color: vec4f, tangent: vec4f, normal: vec3f, side: f32) -> Look {
     let at = TextureCoordinates(uv, dpdx(uv), dpdy(uv));

@@ -1,5 +1,6 @@
 // Surfaces and how they reflect one light, for all passes that shade.
 //!include "area_lights.wgsl"
+//!include "layer_albedo.wgsl"
 //!if LOOKS
 //!include "materials.wgsl"
 //!end
@@ -65,13 +66,11 @@ fn look(surface: Surface, outside: bool) -> Look {
 //!end
 }
 
-// Radiance of a virtual surface without lights.
+// Radiance of a virtual surface without lights. What its layer mirrors is as bright as what arrives is on the average: the
+// ambient light with what hides it taken off, and what things around reflect.
 fn ambient_radiance(surface: Surface, look: Look) -> vec3f {
-//!if LOOKS
-    return look.albedo / PI * surface.indirect * look.occlusion + look.emission;
-//!else
-    return look.albedo / PI * surface.indirect;
-//!end
+    let cos_camera = max(dot(look.normal, normalize(-surface.point_in_camera)), 1e-3);
+    return radiance_all_around(look, cos_camera, surface.indirect, surface.indirect / PI);
 }
 
 @vertex

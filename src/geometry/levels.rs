@@ -5,16 +5,22 @@
 //! wherever they are seen: where one covers a point of the picture and the other does not, the outline of the latter
 //! passes within the projection of e. A shadow's edge is an outline seen from the light. Hence a level may stand for
 //! its mesh as long as e stays below the pixel that counts, and nothing but e has to be known of it. The simplifier's
-//! own estimate is no such bound; e is measured.
+//! own estimate is no such bound; e is measured. Where pictures or colours lie on a mesh, e counts how far these slide as well
+//! (`picture_shift`).
+
+mod picture_shift;
+
+use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 use meshopt::{SimplifyOptions, VertexDataAdapter, simplify_with_attributes_and_locks};
 
 use super::bounds::Bounds;
-use super::mesh::Mesh;
+use super::mesh::{CornerLook, Mesh};
 use super::normals::face_normal;
 use super::soup::{by_edge, edge_uses};
 use super::surface_distance::SampledSurface;
+use picture_shift::{Charts, PictureShift};
 
 /// A coarser version of a mesh. Its vertices are some of the mesh's.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,7 +28,7 @@ pub struct Level {
     /// Closed if the mesh is.
     pub mesh: Mesh,
     /// No point of either surface lies farther from the other, so no outline is off by more, metres; as
-    /// [`SampledSurface::distance_to`] finds it.
+    /// [`SampledSurface::distance_to`] finds it. Nor does a picture on it slide by more.
     pub max_error_m: f64,
     /// How far outlines are off on the average over their length and over all directions of view, metres.
     pub mean_error_m: f64,
@@ -41,16 +47,20 @@ const LARGEST_PART: f64 = 0.8;
 const LARGEST_ERROR: f64 = 0.05;
 /// What a unit of difference between normals counts for, against a displacement by the mesh's size.
 const NORMAL_WEIGHT: f32 = 0.05;
+/// The same of how far a picture slides.
+const PICTURE_WEIGHT: f64 = 3.0;
+/// The same of a unit of difference between colours at corners.
+const COLOR_WEIGHT: f32 = 0.2;
+/// Colours at corners are nowhere off by more, of 1.
+const LARGEST_COLOR_ERROR: f32 = 0.04;
 /// The mean error may be this part of the largest one that a pixel allows: a mask is right to 0.02 % only if its edges
 /// are right to a tenth of a pixel nearly everywhere.
 const MEAN_TO_MAX: f64 = 1.0 / 12.0;
 
 /// Ever coarser versions of a mesh, each with about half the triangles of the one before; the mesh itself is not among
-/// them. Any soup of triangles will do: a version that is no good is left out. A mesh with texture coordinates or colours has
-/// none.
+/// them. Any soup of triangles will do: a version that is no good is left out.
 pub fn levels(mesh: &Mesh) -> Vec<Level> {
-    // Texture coordinates have seams where a simplified surface would tear or smear what lies on it.
-    if mesh.triangles.len() < WORTH_IT || !mesh.looks.is_empty() {
+    if mesh.triangles.len() < WORTH_IT {
         return Vec::new();
     }
     chain(mesh, FEWEST)
@@ -71,6 +81,7 @@ fn chain(mesh: &Mesh, fewest: usize) -> Vec<Level> {
     let largest_error_m = LARGEST_ERROR * (bounds.high - bounds.low).length();
     let closed = mesh.closed_and_consistent();
     let simplifier = Simplifier::new(mesh);
+    let charts = (!mesh.looks.is_empty()).then(|| Charts::new(&simplifier));
     let mut indices = simplifier.indices.clone();
     loop {
         let count = indices.len() / 3;
@@ -92,13 +103,16 @@ fn chain(mesh: &Mesh, fewest: usize) -> Vec<Level> {
         else {
             return levels;
         };
-        if distance.max_m > largest_error_m {
+        let shift = charts.as_ref().map(|charts| charts.shift(&indices));
+        let shift = shift.unwrap_or(PictureShift::NONE);
+        let max_error_m = distance.max_m.max(shift.max_m);
+        if max_error_m > largest_error_m || shift.color > LARGEST_COLOR_ERROR {
             return levels;
         }
         levels.push(Level {
             largest_facet_m: largest_facet_m(&coarse),
             mesh: coarse,
-            max_error_m: distance.max_m,
+            max_error_m,
             mean_error_m: distance.outline_mean_m,
         });
     }
@@ -125,16 +139,20 @@ fn largest_facet_m(mesh: &Mesh) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// A mesh as the simplifier takes it. A vertex is a position with a material, so that materials keep their borders;
-/// the simplifier knows by itself which vertices share a position and keeps them together.
+/// A mesh as the simplifier takes it. A vertex is a position with a material, texture coordinates and a colour, so that materials
+/// and what lies on them keep their borders; the simplifier knows by itself which vertices share a position and keeps them
+/// together.
 struct Simplifier<'a> {
     source: &'a Mesh,
     /// Index of each vertex's position.
     vertex_positions: Vec<u32>,
     vertex_materials: Vec<u32>,
     positions: Vec<[f32; 3]>,
-    /// Mean normal at each vertex.
-    normals: Vec<[f32; 3]>,
+    /// Mean normal at each vertex, and then the texture coordinates of both sets and the colour that the simplifier is to keep, all
+    /// weighted.
+    attributes: Vec<f32>,
+    /// For each vertex what its corners have for pictures and colours, but for tangents; empty where the mesh has none.
+    looks: Vec<CornerLook>,
     indices: Vec<u32>,
     face_normals: Vec<DVec3>,
     /// 1 where each corner has the normal of its face, as phantoms do, -1 where each has the opposite, as mirrored
@@ -147,28 +165,31 @@ struct Simplifier<'a> {
 
 impl<'a> Simplifier<'a> {
     fn new(source: &'a Mesh) -> Self {
-        let mut keyed: Vec<(u32, u32, u32, usize)> = Vec::with_capacity(3 * source.triangles.len());
-        for (triangle, corners) in source.triangles.iter().enumerate() {
-            let material = source.triangle_materials[triangle];
-            for (corner, &position) in corners.iter().enumerate() {
-                keyed.push((position, material, triangle as u32, corner));
-            }
-        }
-        keyed.sort_unstable();
+        let keyed = keyed_corners(source);
+        let uv_scale = uv_scale(source);
         let mut vertex_positions = Vec::new();
         let mut vertex_materials = Vec::new();
-        let mut normals = Vec::new();
+        let mut attributes = Vec::new();
+        let mut looks = Vec::new();
         let mut indices = vec![0; keyed.len()];
         let mut corner_starts = vec![0];
-        for vertex in keyed.chunk_by(|one, two| (one.0, one.1) == (two.0, two.1)) {
+        for vertex in keyed.chunk_by(|one, two| one.0 == two.0) {
             let mut sum = Vec3::ZERO;
-            for &(_, _, triangle, corner) in vertex {
+            for &(_, triangle, corner) in vertex {
                 indices[3 * triangle as usize + corner] = vertex_positions.len() as u32;
                 sum += source.corner_normals[triangle as usize][corner];
             }
-            vertex_positions.push(vertex[0].0);
-            vertex_materials.push(vertex[0].1);
-            normals.push(sum.normalize_or_zero().to_array());
+            let ([position, material, _], triangle, corner) = vertex[0];
+            vertex_positions.push(position);
+            vertex_materials.push(material);
+            attributes.extend((sum.normalize_or_zero() * NORMAL_WEIGHT).to_array());
+            if let Some(corners) = source.corner_looks.get(triangle as usize) {
+                let look = source.looks[corners[corner] as usize];
+                let uv = look.uv.map(|uv| (uv * uv_scale).to_array());
+                attributes.extend(uv.as_flattened());
+                attributes.extend((look.color * COLOR_WEIGHT).to_array());
+                looks.push(look);
+            }
             corner_starts.push(corner_starts[corner_starts.len() - 1] + vertex.len());
         }
         let face_normals: Vec<DVec3> = source
@@ -193,17 +214,19 @@ impl<'a> Simplifier<'a> {
             source,
             vertex_positions,
             vertex_materials,
-            normals,
+            attributes,
+            looks,
             indices,
             face_normals,
             flat,
             corners: keyed
                 .into_iter()
-                .map(|(_, _, triangle, corner)| (triangle, corner))
+                .map(|(_, triangle, corner)| (triangle, corner))
                 .collect(),
             corner_starts,
         }
     }
+
     /// Indices of a coarser mesh with about `triangles` triangles.
     fn simplified(&self, indices: &[u32], triangles: usize) -> Vec<u32> {
         let positions = VertexDataAdapter::new(
@@ -214,12 +237,13 @@ impl<'a> Simplifier<'a> {
         let Ok(positions) = positions else {
             return Vec::new();
         };
+        let parts = self.attributes.len() / self.positions.len();
         simplify_with_attributes_and_locks(
             indices,
             &positions,
-            self.normals.as_flattened(),
-            &[NORMAL_WEIGHT; 3],
-            size_of::<[f32; 3]>(),
+            &self.attributes,
+            &vec![1.0; parts],
+            parts * size_of::<f32>(),
             &vec![false; self.positions.len()],
             3 * triangles,
             // The error is measured afterwards.
@@ -247,27 +271,88 @@ impl<'a> Simplifier<'a> {
             let face = face_normal(&self.source.positions, corners);
             mesh.triangles.push(corners);
             mesh.triangle_materials.push(material);
-            mesh.corner_normals
-                .push(vertices.map(|vertex| match self.flat {
-                    Some(side) => (face * side).as_vec3(),
-                    None => self.corner_normal(vertex, face),
-                }));
+            let sources = vertices.map(|vertex| self.likest_corner(vertex, face));
+            let normal = |(triangle, corner): (u32, usize)| match self.flat {
+                Some(side) => (face * side).as_vec3(),
+                None => self.source.corner_normals[triangle as usize][corner],
+            };
+            mesh.corner_normals.push(sources.map(normal));
+            if !self.looks.is_empty() {
+                mesh.corner_looks.push(
+                    sources.map(|(triangle, corner)| {
+                        self.source.corner_looks[triangle as usize][corner]
+                    }),
+                );
+            }
         }
-        Some(mesh.without_unused_positions())
+        mesh.looks.clone_from(&self.source.looks);
+        Some(mesh.without_unused_positions().without_unused_looks())
     }
 
-    /// The normal that the source has at a vertex for the corner whose face is turned most like `face`: so creases stay, and
-    /// what is smooth stays smooth.
-    fn corner_normal(&self, vertex: u32, face: DVec3) -> Vec3 {
+    /// Of the source's corners at a vertex the one whose face is turned most like `face`: so creases stay, and what is smooth
+    /// stays smooth.
+    fn likest_corner(&self, vertex: u32, face: DVec3) -> (u32, usize) {
         let [start, end] = [vertex, vertex + 1].map(|vertex| self.corner_starts[vertex as usize]);
         let likeness =
             |(triangle, _): &(u32, usize)| self.face_normals[*triangle as usize].dot(face);
         self.corners[start..end]
             .iter()
             .max_by(|one, two| likeness(one).total_cmp(&likeness(two)))
-            .map_or(Vec3::ZERO, |&(triangle, corner)| {
-                self.source.corner_normals[triangle as usize][corner]
-            })
+            .copied()
+            .unwrap_or_default()
+    }
+}
+
+/// Each corner with what makes its vertex (position, material, and the number of its texture coordinates and colour among all),
+/// its triangle and its place there; in the order of the vertices.
+fn keyed_corners(source: &Mesh) -> Vec<([u32; 3], u32, usize)> {
+    let mut numbers: HashMap<[u32; 8], u32> = HashMap::new();
+    let look_numbers: Vec<u32> = source
+        .looks
+        .iter()
+        .map(|look| {
+            let [[a, b], [c, d]] = look.uv.map(|uv| uv.to_array());
+            let [red, green, blue, alpha] = look.color.to_array();
+            let next = numbers.len() as u32;
+            // (Adding 0 makes 0 of -0.)
+            let key = [a, b, c, d, red, green, blue, alpha].map(|part| (part + 0.0).to_bits());
+            *numbers.entry(key).or_insert(next)
+        })
+        .collect();
+    let mut keyed = Vec::with_capacity(3 * source.triangles.len());
+    for (triangle, corners) in source.triangles.iter().enumerate() {
+        let material = source.triangle_materials[triangle];
+        for (corner, &position) in corners.iter().enumerate() {
+            let looks = source.corner_looks.get(triangle);
+            let look = looks.map_or(0, |looks| look_numbers[looks[corner] as usize]);
+            keyed.push(([position, material, look], triangle as u32, corner));
+        }
+    }
+    keyed.sort_unstable();
+    keyed
+}
+
+/// Metres of a mesh for a unit of texture coordinates, on the average; 0 where it has none.
+fn metres_of_picture(source: &Mesh) -> f64 {
+    let (mut uv_area, mut area) = (0.0, 0.0);
+    for (triangle, looks) in source.triangles.iter().zip(&source.corner_looks) {
+        let [a, b, c] = triangle.map(|index| source.positions[index as usize].as_dvec3());
+        let [u, v, w] = looks.map(|look| source.looks[look as usize].uv[0].as_dvec2());
+        area += (b - a).cross(c - a).length();
+        uv_area += (v - u).perp_dot(w - u).abs();
+    }
+    let metres = (area / uv_area).sqrt();
+    if metres.is_finite() { metres } else { 0.0 }
+}
+
+/// What a unit of texture coordinates counts for, against a displacement by the mesh's size: as far as the picture slides, over
+/// that size.
+fn uv_scale(source: &Mesh) -> f32 {
+    let around = Bounds::around(source.positions.iter().map(|position| position.as_dvec3()));
+    let size = around.map_or(0.0, |around| (around.high - around.low).max_element());
+    match size > 0.0 {
+        true => (PICTURE_WEIGHT * metres_of_picture(source) / size) as f32,
+        false => 0.0,
     }
 }
 

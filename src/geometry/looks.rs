@@ -149,7 +149,7 @@ pub(super) fn looks_of_faces(
 
 /// Barycentric coordinates of the point of a triangle that is nearest to a point of its plane; the nearest corner's in a
 /// triangle without area.
-fn weights(point: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
+pub(super) fn weights(point: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
     // Exact where it matters most.
     for (corner, place) in [a, b, c].into_iter().enumerate() {
         if place == point {

@@ -308,6 +308,24 @@ impl Mesh {
     }
 }
 
+impl Mesh {
+    /// Leaves out the looks that no corner has.
+    pub(super) fn without_unused_looks(mut self) -> Self {
+        let mut new_index = vec![u32::MAX; self.looks.len()];
+        let mut kept = Vec::new();
+        for index in self.corner_looks.iter_mut().flatten() {
+            let old = *index as usize;
+            if new_index[old] == u32::MAX {
+                new_index[old] = kept.len() as u32;
+                kept.push(self.looks[old]);
+            }
+            *index = new_index[old];
+        }
+        self.looks = kept;
+        self
+    }
+}
+
 /// Where the normal of a face's corner comes from; `raw` is the triangle that the face was.
 fn held_normal(face: &Face, raw: &RawTriangle, corner: usize) -> HeldNormal {
     let is_as_given = (face.front.normals.iter()).all(|normal| raw.normals.contains(normal));

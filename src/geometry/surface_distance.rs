@@ -350,7 +350,7 @@ fn edges(mesh: &Mesh) -> (Vec<SurfaceEdge>, Vec<[u32; 3]>) {
 }
 
 /// Triangles in a hierarchy of boxes.
-struct NearestTriangle {
+pub(super) struct NearestTriangle {
     /// In the order of the hierarchy's leaves.
     corners: Vec<[DVec3; 3]>,
     hierarchy: Bvh2,
@@ -358,14 +358,15 @@ struct NearestTriangle {
 
 /// The triangle nearest to a point.
 #[derive(Clone, Copy)]
-struct Near {
-    distance_m: f64,
+pub(super) struct Near {
+    /// How far off it is.
+    pub distance_m: f64,
     /// Index into [`NearestTriangle::corners`].
     triangle: usize,
 }
 
 /// Searches one after another, each beginning with what the last one found: points come in runs of neighbours.
-struct NearestSearch<'a> {
+pub(super) struct NearestSearch<'a> {
     triangles: &'a NearestTriangle,
     last: usize,
     /// Nodes, with the squared distances of their boxes.
@@ -374,7 +375,7 @@ struct NearestSearch<'a> {
 
 impl NearestTriangle {
     /// `mesh` has triangles, with finite corners.
-    fn new(mesh: &Mesh) -> Self {
+    pub fn new(mesh: &Mesh) -> Self {
         let corners = |triangle: &[u32; 3]| triangle.map(|corner| mesh.positions[corner as usize]);
         let triangles: Vec<Triangle> = mesh
             .triangles
@@ -400,7 +401,13 @@ impl NearestTriangle {
         }
     }
 
-    fn search(&self) -> NearestSearch<'_> {
+    /// The triangle's number in the mesh.
+    pub fn in_mesh(&self, near: Near) -> usize {
+        self.hierarchy.primitive_indices[near.triangle] as usize
+    }
+
+    /// A search for triangles that are nearest to points.
+    pub fn search(&self) -> NearestSearch<'_> {
         NearestSearch {
             triangles: self,
             last: 0,
@@ -425,7 +432,8 @@ impl NearestTriangle {
 }
 
 impl NearestSearch<'_> {
-    fn nearest(&mut self, point: DVec3) -> Near {
+    /// The triangle nearest to a finite point.
+    pub fn nearest(&mut self, point: DVec3) -> Near {
         let nodes = &self.triangles.hierarchy.nodes;
         // Boxes are compared in single precision, with the slack that makes up for its rounding.
         let rounded = point.as_vec3a();

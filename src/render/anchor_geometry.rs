@@ -4,6 +4,7 @@
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::ops::Range;
+use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3, Vec4};
@@ -48,7 +49,7 @@ pub(super) const CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::Vertex
 /// What a corner has where any material of the scene's virtual things needs more, as `SurfaceCorner` in shading.wgsl reads it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct CornerOfMaterial {
+pub(super) struct CornerOfMaterial {
     uv: [f32; 4],
     color: [f32; 4],
     tangent: [f32; 4],
@@ -158,23 +159,31 @@ pub(super) struct AnchorGeometry {
 
 /// Coarser versions of meshes, which take long to make: each with the mesh that it is of.
 #[derive(Default)]
-pub(super) struct KnownLevels(Vec<(Mesh, Vec<Level>)>);
+pub(super) struct KnownLevels(Vec<(Arc<Mesh>, Vec<Level>)>);
 
 impl KnownLevels {
     /// The coarser versions of a mesh, made where they are not known.
-    fn of(&mut self, mesh: &Mesh) -> &[Level] {
-        let known = self.0.iter().position(|(known, _)| known == mesh);
-        let index = known.unwrap_or_else(|| {
-            self.0.push((mesh.clone(), levels(mesh)));
+    fn of(&mut self, mesh: &Arc<Mesh>) -> &[Level] {
+        let index = self.position(mesh).unwrap_or_else(|| {
+            self.0.push((Arc::clone(mesh), levels(mesh)));
             self.0.len() - 1
         });
         &self.0[index].1
     }
 
+    /// (To compare large meshes takes longer than a frame.)
+    fn position(&self, mesh: &Arc<Mesh>) -> Option<usize> {
+        let same = |(known, _): &(Arc<Mesh>, _)| Arc::ptr_eq(known, mesh);
+        let like = |(known, _): &(Arc<Mesh>, _)| known == mesh;
+        let all = &self.0;
+        all.iter()
+            .position(same)
+            .or_else(|| all.iter().position(like))
+    }
+
     /// Those that are known.
-    pub fn known(&self, mesh: &Mesh) -> &[Level] {
-        let known = self.0.iter().find(|(known, _)| known == mesh);
-        known.map_or(&[], |(_, levels)| levels)
+    pub fn known(&self, mesh: &Arc<Mesh>) -> &[Level] {
+        self.position(mesh).map_or(&[], |index| &self.0[index].1)
     }
 }
 
@@ -267,7 +276,7 @@ fn thing(
     shared: &mut SharedCorners,
 ) -> Option<AnchoredModel> {
     let scale = largest_scale(&object.anchor_from_object);
-    let itself = (&object.mesh, [0.0; 3]);
+    let itself = (object.mesh.as_ref(), [0.0; 3]);
     let coarser = coarser.iter().map(|level| {
         let lengths_m = [level.max_error_m, level.mean_error_m, level.largest_facet_m];
         (&level.mesh, lengths_m)
@@ -486,7 +495,7 @@ impl AnchoredModel {
 }
 
 /// What a corner of a triangle has for its material.
-fn corner_of_material(
+pub(super) fn corner_of_material(
     object: &Object,
     mesh: &Mesh,
     (triangle, corner): (usize, usize),

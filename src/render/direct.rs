@@ -254,10 +254,13 @@ impl SurfacesOverVideo<'_> {
             targets: vec![written(PICTURE_FORMAT), written(PICTURE_FORMAT)],
             ..self.over_video(None)
         };
-        let description = match fragment {
+        let mut description = match fragment {
             "depth_alone" => description,
             _ => self.kinds.of_virtual(description),
         };
+        if self.kinds.looks || self.kinds.glossy {
+            description.flags.push("LAYERED");
+        }
         Sided::new(self.gpu, &description)
     }
 

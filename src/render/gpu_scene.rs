@@ -5,6 +5,7 @@ mod drawing;
 mod spaces;
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::{DAffine3, Vec3};
 use rayon::prelude::*;
@@ -29,6 +30,7 @@ use super::light_kind::LightKind;
 use super::light_piece::LitBy;
 use super::lights::Lights;
 use super::materials::{materials_group, needs_looks};
+use super::mirrored_probe::LayerAlbedo;
 use super::screen_bounds::{ScreenBounds, screen_bounds};
 use super::shown::Shown;
 use super::surfaces::SurfaceKinds;
@@ -118,6 +120,11 @@ impl GpuScene {
         let mut known_levels = KnownLevels::default();
         let AnchorGeometry { batches, things } = AnchorGeometry::new(gpu, scene, &mut known_levels);
         let looks = scene.virtuals.iter().any(needs_looks);
+        let glossy = scene.virtuals.iter().any(|object| {
+            let mut materials = object.materials.iter();
+            materials.any(|material| material.roughness.is_some())
+        });
+        let layer_albedo = LayerAlbedo::new(device, &gpu.queue, glossy);
         let light_kinds = lights.iter().map(|light| LightKind::of(&light.light));
         let light_kinds = light_kinds.collect();
         Self {
@@ -138,18 +145,22 @@ impl GpuScene {
             insides: vec![Insides::Anywhere; things.len()],
             batches,
             things,
-            view_group: gpu.bind_group(&VIEW_GROUP, [views.binding()]),
+            view_group: gpu.bind_group(
+                &VIEW_GROUP,
+                [
+                    views.binding(),
+                    wgpu::BindingResource::TextureView(&layer_albedo.view),
+                    wgpu::BindingResource::Sampler(&layer_albedo.sampler),
+                ],
+            ),
             camera_from_anchor: vec![None; scene.node_count()],
             lights: Lights::new(gpu, lights),
             kinds: SurfaceKinds {
-                glossy: scene.virtuals.iter().any(|object| {
-                    let mut materials = object.materials.iter();
-                    materials.any(|material| material.roughness.is_some())
-                }),
+                glossy,
                 lights: light_kinds,
                 looks,
             },
-            materials: looks.then(|| materials_group(gpu, scene)),
+            materials: looks.then(|| materials_group(gpu, &scene.virtuals)),
             intrinsics,
             views,
         }
@@ -311,7 +322,7 @@ impl GpuScene {
     }
 
     /// The coarser versions of a thing's mesh, in their order.
-    pub fn coarser_meshes(&self, mesh: &Mesh) -> impl Iterator<Item = &Mesh> {
+    pub fn coarser_meshes(&self, mesh: &Arc<Mesh>) -> impl Iterator<Item = &Mesh> {
         self.known_levels
             .known(mesh)
             .iter()

@@ -1,6 +1,7 @@
 //! What lets light through, taken out of a scene's things: layers that are drawn one over the other.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use glam::DVec3;
 
@@ -78,7 +79,7 @@ impl<'a> LayeredScene<'a> {
             rest.visible &= !left.is_empty();
             // (A thing of no triangles is none.)
             if !left.is_empty() {
-                rest.mesh = thing.mesh.part(&left);
+                rest.mesh = Arc::new(thing.mesh.part(&left));
             }
         }
     }
@@ -86,7 +87,7 @@ impl<'a> LayeredScene<'a> {
     fn add(&mut self, thing: &Object, part: &[usize], opacity: f64) {
         let node = self.scene.node_count();
         let layer = Object {
-            mesh: thing.mesh.part(part),
+            mesh: Arc::new(thing.mesh.part(part)),
             anchor: node,
             motion: Some(Motion::none(thing.stands_on())),
             ..thing.clone()

@@ -1,4 +1,4 @@
-//! Materials of virtual things on the GPU, with their pictures. Reads the scene. Writes the group that materials.wgsl reads.
+//! Materials of things on the GPU, with their pictures. Reads the scene. Writes the group that materials.wgsl reads.
 //!
 //! Pictures lie in stacks whose layers have one size, three for sRGB and three for numbers: so surfaces of all materials are
 //! drawn in one go, as they are without pictures.
@@ -10,7 +10,7 @@ use super::gpu::Gpu;
 use super::pipelines::{GroupLayout, filtered_array, sampler, storage};
 use crate::light::material::{Coverage, Encoding, Filter, Map, Material, Shading, Wrap};
 use crate::light::texture::{Texture, linear_from_srgb};
-use crate::scene::{Object, Scene};
+use crate::scene::Object;
 
 /// Group 3 of every shader that includes materials.wgsl.
 pub(super) const MATERIALS_GROUP: GroupLayout = GroupLayout {
@@ -67,11 +67,14 @@ pub(super) fn needs_looks(object: &Object) -> bool {
     !object.mesh.looks.is_empty() || object.materials.iter().any(|material| !material.is_plain())
 }
 
-/// The group of all materials of a scene's virtual things, in their order.
-pub(super) fn materials_group(gpu: &Gpu, scene: &Scene) -> wgpu::BindGroup {
+/// The group of all materials of some things, in their order.
+pub(super) fn materials_group<'a>(
+    gpu: &Gpu,
+    things: impl IntoIterator<Item = &'a Object>,
+) -> wgpu::BindGroup {
     let mut stacks: [[Stack<'_>; 3]; 2] = Default::default();
     let mut materials: Vec<MaterialOnGpu> = Vec::new();
-    for object in &scene.virtuals {
+    for object in things {
         for material in &object.materials {
             materials.push(on_gpu(material, object, &mut stacks));
         }

@@ -1,4 +1,5 @@
-//! The probe as glossy virtual surfaces mirror it: a texture whose levels are lobes of rising roughness.
+//! Light from all around as glossy virtual surfaces mirror it: a probe as a texture whose levels are lobes of rising roughness,
+//! and what a layer mirrors of light from everywhere.
 
 use half::f16;
 use wgpu::util::DeviceExt as _;
@@ -11,8 +12,6 @@ use crate::light::probe::Probe;
 pub(super) struct MirroredProbe {
     pub view: wgpu::TextureView,
     pub sampler: wgpu::Sampler,
-    /// What a layer mirrors of light from everywhere.
-    pub layer_albedo: wgpu::TextureView,
 }
 
 impl MirroredProbe {
@@ -32,48 +31,13 @@ impl MirroredProbe {
         if glossy.is_none() {
             halves = vec![[f16::ZERO; 4]; 2];
         }
-        let layer: &[[f32; 2]] = match glossy {
-            Some(_) => &LAYER_ALBEDO,
-            None => &[[0.0; 2]],
-        };
-        let side = layer.len().isqrt() as u32;
-        let layer: Vec<[f16; 2]> = layer.iter().map(|entry| entry.map(f16::from_f32)).collect();
-        let texture = |label, [width, height]: [u32; 2], levels, format, halves: &[u8]| {
-            let texture = device.create_texture_with_data(
-                queue,
-                &wgpu::TextureDescriptor {
-                    label: Some(label),
-                    size: wgpu::Extent3d {
-                        width,
-                        height,
-                        depth_or_array_layers: 1,
-                    },
-                    mip_level_count: levels,
-                    sample_count: 1,
-                    dimension: wgpu::TextureDimension::D2,
-                    format,
-                    usage: wgpu::TextureUsages::TEXTURE_BINDING,
-                    view_formats: &[],
-                },
-                wgpu::util::TextureDataOrder::MipMajor,
-                halves,
-            );
-            texture.create_view(&Default::default())
-        };
         Self {
             view: texture(
+                (device, queue),
                 "environment",
-                [width, width / 2],
-                levels,
+                ([width, width / 2], levels),
                 wgpu::TextureFormat::Rgba16Float,
                 bytemuck::cast_slice(&halves),
-            ),
-            layer_albedo: texture(
-                "layer albedo",
-                [side; 2],
-                1,
-                wgpu::TextureFormat::Rg16Float,
-                bytemuck::cast_slice(&layer),
             ),
             sampler: device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("environment"),
@@ -85,4 +49,67 @@ impl MirroredProbe {
             }),
         }
     }
+}
+
+/// What a glossy layer mirrors of light from everywhere, as layer_albedo.wgsl reads it.
+pub(super) struct LayerAlbedo {
+    pub view: wgpu::TextureView,
+    pub sampler: wgpu::Sampler,
+}
+
+impl LayerAlbedo {
+    /// One entry of nothing where nothing is glossy.
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, is_glossy: bool) -> Self {
+        let table: &[[f32; 2]] = match is_glossy {
+            true => &LAYER_ALBEDO,
+            false => &[[0.0; 2]],
+        };
+        let side = table.len().isqrt() as u32;
+        let halves: Vec<[f16; 2]> = table.iter().map(|entry| entry.map(f16::from_f32)).collect();
+        Self {
+            view: texture(
+                (device, queue),
+                "layer albedo",
+                ([side; 2], 1),
+                wgpu::TextureFormat::Rg16Float,
+                bytemuck::cast_slice(&halves),
+            ),
+            sampler: device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("layer albedo"),
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                ..Default::default()
+            }),
+        }
+    }
+}
+
+/// A texture with its levels, the largest first.
+fn texture(
+    (device, queue): (&wgpu::Device, &wgpu::Queue),
+    label: &str,
+    ([width, height], levels): ([u32; 2], u32),
+    format: wgpu::TextureFormat,
+    texels: &[u8],
+) -> wgpu::TextureView {
+    let texture = device.create_texture_with_data(
+        queue,
+        &wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d {
+                width,
+                height,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: levels,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        },
+        wgpu::util::TextureDataOrder::MipMajor,
+        texels,
+    );
+    texture.create_view(&Default::default())
 }

@@ -165,6 +165,22 @@ pub(super) fn added(
     }
 }
 
+/// A colour target whose colours are multiplied by what is drawn, and whose alpha stays.
+pub(super) fn multiplied(format: wgpu::TextureFormat) -> wgpu::ColorTargetState {
+    let part = |src_factor, dst_factor| wgpu::BlendComponent {
+        src_factor,
+        dst_factor,
+        operation: wgpu::BlendOperation::Add,
+    };
+    wgpu::ColorTargetState {
+        blend: Some(wgpu::BlendState {
+            color: part(wgpu::BlendFactor::Dst, wgpu::BlendFactor::Zero),
+            alpha: part(wgpu::BlendFactor::Zero, wgpu::BlendFactor::One),
+        }),
+        ..format.into()
+    }
+}
+
 /// A colour target that what is drawn is taken off.
 pub(super) fn taken_off(format: wgpu::TextureFormat) -> wgpu::ColorTargetState {
     let take = wgpu::BlendComponent {

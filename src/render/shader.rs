@@ -11,7 +11,7 @@ macro_rules! files {
 }
 
 /// All files under `shaders/`.
-const FILES: [(&str, &str); 28] = files![
+const FILES: [(&str, &str); 30] = files![
     "area_lights.wgsl",
     "background.wgsl",
     "common.wgsl",
@@ -23,6 +23,7 @@ const FILES: [(&str, &str); 28] = files![
     "fade.wgsl",
     "final_gather.wgsl",
     "fullscreen.wgsl",
+    "layer_albedo.wgsl",
     "layers.wgsl",
     "light_sums.wgsl",
     "mapped_source.wgsl",
@@ -31,6 +32,7 @@ const FILES: [(&str, &str); 28] = files![
     "occlusion_maps.wgsl",
     "partly_covered.wgsl",
     "pixel_sums.wgsl",
+    "real_albedo.wgsl",
     "sampled_surface.wgsl",
     "shading.wgsl",
     "shaft_maps.wgsl",

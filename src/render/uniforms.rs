@@ -9,7 +9,7 @@ use crate::geometry::lens;
 use crate::geometry::shadow_volume::LightPlace;
 use crate::light::{Light, Shape, spot_ramp};
 
-use super::pipelines::{GroupLayout, uniform};
+use super::pipelines::{GroupLayout, filtered, sampler, uniform};
 
 /// Nearest depth that is drawn, metres. Reversed floating depth keeps its precision however near this is.
 pub(super) const NEAR_M: f32 = 1e-3;
@@ -194,10 +194,14 @@ impl Lens {
     }
 }
 
-/// Group 0 where geometry is drawn: an [`AnchorView`].
+/// Group 0 where geometry is drawn: an [`AnchorView`], and what a glossy layer mirrors of light from everywhere.
 pub(super) const VIEW_GROUP: GroupLayout = GroupLayout {
     label: "view",
-    entries: &[uniform(0, wgpu::ShaderStages::VERTEX_FRAGMENT, true)],
+    entries: &[
+        uniform(0, wgpu::ShaderStages::VERTEX_FRAGMENT, true),
+        filtered(1),
+        sampler(2),
+    ],
 };
 
 /// Group 1 where geometry is drawn: a [`CameraLight`], or a [`CastingLight`] for volumes.

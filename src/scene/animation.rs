@@ -66,7 +66,7 @@ impl Object {
             return false;
         };
         let time_s = animation.clip_time_s(time_s);
-        animation.poser.pose(&mut self.mesh, time_s)
+        animation.poser.pose(Arc::make_mut(&mut self.mesh), time_s)
     }
 }
 

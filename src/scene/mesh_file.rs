@@ -9,7 +9,9 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 use super::animation::{Animation, WantedAnimation};
 use super::error::SceneError;
 use super::in_its_place::in_place_of;
+use super::loading::LoadStage;
 use super::mask_cut::cut_masks;
+use super::model_cache::ModelCache;
 use super::named_files::FileKind;
 use super::obj::files::named_file;
 use super::plain_file::{self, MOST_MESH};
@@ -27,7 +29,7 @@ use crate::light::texture::Texture;
 #[derive(Debug, Clone)]
 pub struct LoadedMesh {
     /// Its triangles, welded.
-    pub mesh: Mesh,
+    pub mesh: Arc<Mesh>,
     /// What was done to it.
     pub report: MeshReport,
     /// What it is made of.
@@ -77,6 +79,8 @@ pub struct MeshReading {
     pub up: Option<Up>,
     /// What its longest side is scaled to, metres; `None`: its numbers are metres.
     pub fit_m: Option<f64>,
+    /// Whether its corners keep their texture coordinates though no picture of its own asks for them.
+    pub keeps_coordinates: bool,
 }
 
 impl MeshReading {
@@ -86,6 +90,7 @@ impl MeshReading {
             normals,
             up: None,
             fit_m: None,
+            keeps_coordinates: false,
         }
     }
 }
@@ -126,21 +131,31 @@ fn read_named(
     how: (MeshReading, Option<&WantedAnimation>),
     note_read: &dyn Fn(&Path),
 ) -> Result<LoadedMesh, SceneError> {
+    let loading = value.models().and_then(ModelCache::loading);
+    let enter = |stage: LoadStage| match loading.is_none_or(|loading| loading.enter(path, stage)) {
+        true => Ok(()),
+        false => Err(SceneError::of_file(path, "its reading was given up")),
+    };
+    enter(LoadStage::Reading)?;
     let bytes = plain_file::read(path, MOST_MESH)
         .map_err(|error| value.error(format!("the mesh cannot be read: {error}")))?;
-    read(path, bytes, how, note_read).map_err(|mut error| {
+    read(path, bytes, how, (note_read, &enter)).map_err(|mut error| {
         error.message += &format!(" (a mesh of {})", value.location());
         error
     })
 }
+
+/// Told of what comes next; an error where nobody waits for it any more.
+type EnterStage<'a> = &'a dyn Fn(LoadStage) -> Result<(), SceneError>;
 
 /// `note_read` is told of every file that is looked for besides.
 fn read(
     path: &Path,
     bytes: Vec<u8>,
     (reading, wanted): (MeshReading, Option<&WantedAnimation>),
-    note_read: &dyn Fn(&Path),
+    (note_read, enter): (&dyn Fn(&Path), EnterStage<'_>),
 ) -> Result<LoadedMesh, SceneError> {
+    enter(LoadStage::Unpacking)?;
     let format = MeshFormat::of(path, &bytes);
     let choose = |clips: &[ClipInfo]| wanted.map(|wanted| wanted.choose(clips)).transpose();
     let mut model = match format {
@@ -168,6 +183,7 @@ fn read(
         }
     };
     drop(bytes);
+    enter(LoadStage::Joining)?;
     cut_masks(&mut model, path)?;
     note_coverage(&mut model, path, reading.normals);
     let up = reading.up.unwrap_or(format.up());
@@ -176,7 +192,11 @@ fn read(
     let motion = model.motion.take();
     let clips = std::mem::take(&mut model.clips);
     let together = motion.as_ref().map(|motion| &motion.together[..]);
-    let mut loaded = welded_as(model, reading.normals, together)
+    let looks = match reading.keeps_coordinates {
+        true => Kept::All,
+        false => Kept::Needed,
+    };
+    let mut loaded = welded_as(model, (reading.normals, looks), together)
         .ok_or_else(|| SceneError::of_file(path, "no triangle has an area; a mesh is expected"))?;
     loaded.clips = clips;
     if let Some(((wanted, number), motion)) = wanted.zip(number).zip(motion) {
@@ -186,18 +206,28 @@ fn read(
         let poser = MeshPoser::new(rig, &loaded.mesh, object_from_scene, crease_rad);
         loaded.animation = Some(wanted.playing(number, poser));
     }
+    enter(LoadStage::Ready)?;
     Ok(loaded)
 }
 
 /// A model's mesh; `None` where no triangle has an area.
 pub fn welded(model: RawModel, normals: Normals) -> Option<LoadedMesh> {
-    welded_as(model, normals, None)
+    welded_as(model, (normals, Kept::Needed), None)
+}
+
+/// What corners keep of texture coordinates and colours.
+#[derive(Clone, Copy, PartialEq)]
+enum Kept {
+    /// What their materials ask for.
+    Needed,
+    /// All.
+    All,
 }
 
 /// The same of a model that moves, given for each position the number of those that are one place, always.
 fn welded_as(
     mut model: RawModel,
-    normals: Normals,
+    (normals, kept): (Normals, Kept),
     together: Option<&[u32]>,
 ) -> Option<LoadedMesh> {
     if normals == Normals::Flat {
@@ -206,10 +236,11 @@ fn welded_as(
     }
     let crease_rad = normals.crease_rad();
     // Corners need texture coordinates for pictures alone.
-    let is_plain = model
-        .materials
-        .iter()
-        .all(|it| it.material.maps.used().next().is_none())
+    let is_plain = kept == Kept::Needed
+        && model
+            .materials
+            .iter()
+            .all(|it| it.material.maps.used().next().is_none())
         && model
             .looks
             .looks
@@ -236,7 +267,7 @@ fn welded_as(
     let notes = model.notes.told();
     let materials = || model.materials.iter();
     (!mesh.triangles.is_empty()).then(|| LoadedMesh {
-        mesh,
+        mesh: Arc::new(mesh),
         report,
         materials: materials().map(|given| given.material).collect(),
         material_names: materials().map(|given| given.name.clone()).collect(),

@@ -28,8 +28,10 @@ mod file_stamp;
 pub mod format;
 pub mod gltf;
 pub mod in_its_place;
+mod laid_picture;
 mod lights;
 mod load;
+mod loading;
 mod mask_cut;
 pub mod mesh_file;
 mod mip_36h12;
@@ -72,6 +74,7 @@ pub use family::{Codes, Drawing, Family, Ink};
 pub use file_stamp::FileStamp;
 pub use lights::{Bounces, SceneLight, unit_direction};
 pub use load::Reading;
+pub use loading::{LoadStage, Loading};
 pub use model_cache::ModelCache;
 pub use motion::{Motion, PathEnd, Station};
 pub use named_files::{FileKind, NamedFile};
@@ -243,8 +246,8 @@ pub struct Object {
     /// What its mesh was made from.
     pub shape: ShapeKind,
     /// Its triangles are counter-clockwise seen from outside *in the anchor's frame*: where `anchor_from_object` mirrors,
-    /// they are turned round against the file's.
-    pub mesh: Mesh,
+    /// they are turned round against the file's. Copies of a scene share it: a model may be large, and each edit is one.
+    pub mesh: Arc<Mesh>,
     /// What was found and mended when the mesh was read.
     pub mesh_report: MeshReport,
     /// As many as `mesh.triangle_materials` names; never empty.

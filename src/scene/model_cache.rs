@@ -5,13 +5,18 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::file_stamp::FileStamp;
+use super::loading::Loading;
 
 /// So many models stay, those that were asked for last.
 const MOST_MODELS: usize = 64;
 
 /// Models by their files; copies share them.
 #[derive(Debug, Clone, Default)]
-pub struct ModelCache(Arc<Mutex<Vec<KeptModel>>>);
+pub struct ModelCache {
+    kept: Arc<Mutex<Vec<KeptModel>>>,
+    /// Told of what is read by way of this copy.
+    loading: Option<Loading>,
+}
 
 /// A model, and what it was read from.
 #[derive(Debug)]
@@ -25,13 +30,26 @@ struct KeptModel {
 }
 
 impl ModelCache {
+    /// A copy that tells `loading` of what is read.
+    pub fn telling(&self, loading: Loading) -> Self {
+        Self {
+            loading: Some(loading),
+            ..self.clone()
+        }
+    }
+
+    /// What is told of what is read.
+    pub(super) fn loading(&self) -> Option<&Loading> {
+        self.loading.as_ref()
+    }
+
     /// A model that was read so, with the files that it depends on; `None` where it was not, or any of them has changed.
     pub(super) fn get<T: Any + Send + Sync>(
         &self,
         path: &Path,
         reading: &str,
     ) -> Option<(Arc<T>, Vec<PathBuf>)> {
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let index = kept
             .iter()
             .position(|model| model.path == path && model.reading == reading)?;
@@ -67,7 +85,7 @@ impl ModelCache {
         });
         let files: Vec<_> = std::iter::once(own).chain(besides).collect();
         if FileStamp::of(path) == files[0].1 {
-            let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
             if kept.len() >= MOST_MODELS {
                 kept.remove(0);
             }
@@ -102,7 +120,7 @@ mod tests {
             let scene = reading.scene.expect("a scene");
             (scene.virtuals[0].materials[0].albedo.x, reading.files)
         };
-        let count = || models.0.lock().expect("nobody panicked").len();
+        let count = || models.kept.lock().expect("nobody panicked").len();
         let first = read();
         assert!(first.1.contains(&file("t.mtl")), "{:?}", first.1);
         assert_eq!((read(), count()), (first.clone(), 1));

@@ -16,6 +16,8 @@ pub enum FileKind {
     RoomMesh,
     /// A light probe's picture.
     Probe,
+    /// A picture that lies on a surface.
+    Picture,
     /// A dictionary of markers (YAML).
     Dictionary,
     /// Bundles of markers (YAML).
@@ -24,12 +26,13 @@ pub enum FileKind {
 
 impl FileKind {
     /// All of them.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Recording,
         Self::Calibration,
         Self::Mesh,
         Self::RoomMesh,
         Self::Probe,
+        Self::Picture,
         Self::Dictionary,
         Self::Bundles,
     ];
@@ -41,6 +44,7 @@ impl FileKind {
             Self::Calibration => "a calibration's file",
             Self::Mesh | Self::RoomMesh => "a glTF, OBJ, PLY or STL file",
             Self::Probe => "a picture in linear radiance, .hdr or .exr",
+            Self::Picture => "a picture: PNG, JPEG, WebP, TGA, BMP, TIFF, GIF",
             Self::Dictionary => "a dictionary of markers, .yml",
             Self::Bundles => "bundles of tags as apriltag_ros has them, .yaml",
         }

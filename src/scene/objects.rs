@@ -1,14 +1,18 @@
 //! `[[phantom]]`, `[[virtual]]` and `[table]`: the things.
 
 use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::Arc;
 
 use glam::{DAffine3, DVec3, Vec3};
 
 use super::anchors::unique_name;
 use super::animation::AnimationKeys;
 use super::error::{SceneError, suggestion};
-use super::mesh_file;
+use super::laid_picture::Laid;
+use super::mesh_file::{self, LoadedMesh};
 use super::motion::{Motion, MotionKeys, motion};
+use super::named_files::FileKind;
 use super::placement::{POSITION, PlacementKeys, placement};
 use super::ranges::Numbers;
 use super::raw_model::DEFAULT_ALBEDO;
@@ -18,7 +22,6 @@ use super::schema::section::{Example, Section, Times};
 use super::schema::values::{InWords, Vectors, Written};
 use super::shapes::{ShapeKeys, ShapeKind, of_basic_shape, rectangle, shape};
 use super::{Anchor, Object};
-use crate::geometry::mesh::Mesh;
 use crate::light::Material;
 
 /// Diffuse reflectance.
@@ -68,6 +71,9 @@ keys! {
 
     /// Diffuse reflectance, linear RGB.
     albedo: Option<DVec3>, ALBEDO => Means(None, "what the MTL file says, else 0.5");
+    /// A picture of the diffuse reflectance, in sRGB, that lies as the mesh's texture coordinates say, or is spread over a
+    /// rect_m, its upper edge towards +y. It is multiplied by albedo, which is then 1 where it is not given.
+    albedo_texture: Option<PathBuf>, FileKind::Picture => Means(None, "what the mesh's file says");
     /// Of a GGX layer over it.
     roughness: Option<f64>, Numbers::above(0.0, 1.0) => Means(None, "what the MTL file says, else none: the surface is matt");
 }
@@ -83,6 +89,9 @@ keys! {
     height_m: f64, POSITION => Is(0.0);
     /// Diffuse reflectance, linear RGB.
     albedo: DVec3, ALBEDO => Is(DVec3::splat(DEFAULT_ALBEDO));
+    /// A picture of the diffuse reflectance, in sRGB, spread over the table, its upper edge towards +y. It is multiplied by
+    /// albedo, which is then 1 where it is not given.
+    albedo_texture: Option<PathBuf>, FileKind::Picture => Means(None, "none: it has one colour");
     /// It is there; what is not neither shows, nor catches shadows.
     visible: bool => Is(true);
 }
@@ -106,6 +115,7 @@ pub static TABLE_SECTION: Section = Section {
     shown: &[
         ("rect_m", Example::Live("[-0.6, -0.5, 0.6, 0.5]")),
         ("albedo", Example::Live("0.5")),
+        ("albedo_texture", Example::Aside("\"cloth.png\"")),
     ],
     is_aside: false,
 };
@@ -242,15 +252,20 @@ fn table_top(table: &Table) -> Result<Object, SceneError> {
     let rect = TABLE.rect_m.require(table)?;
     let albedo = TABLE.albedo.read(table)?;
     let height_m = TABLE.height_m.read(table)?;
-    let loaded = of_basic_shape(&rectangle(&rect)?, mesh_file::Normals::Flat, &rect)?;
+    let mut loaded = of_basic_shape(&rectangle(&rect)?, mesh_file::Normals::Flat, &rect)?;
+    loaded.materials = vec![Material::matt(albedo)];
+    if let Some(picture) = TABLE.albedo_texture.value(table) {
+        let laid = Laid::on(ShapeKind::Rectangle, &mut loaded);
+        laid.lay(&picture, TABLE.albedo.value(table).is_none())?;
+    }
     Ok(Object {
         name: TABLE_SECTION.name.to_owned(),
         shape: ShapeKind::Rectangle,
         mesh: loaded.mesh,
         mesh_report: loaded.report,
-        materials: vec![Material::matt(albedo)],
+        materials: loaded.materials,
         material_names: loaded.material_names,
-        textures: Vec::new(),
+        textures: loaded.textures,
         notes: Vec::new(),
         clips: Vec::new(),
         animation: None,
@@ -283,17 +298,24 @@ fn object(
             crease_rad: VIRTUAL.smooth_deg.read(table)?.to_radians(),
         },
     };
-    let (shape, loaded) = shape(table, &name, normals)?;
+    let material = MATERIAL_SECTION.table(table)?;
+    let picture = material
+        .as_ref()
+        .and_then(|material| MATERIAL.albedo_texture.value(material));
+    let (shape, mut loaded) = shape(table, &name, normals, picture.is_some())?;
     let changes_shape = loaded.animation.is_some();
-    let mut materials = loaded.materials;
-    let mut mesh = loaded.mesh;
-    if let Some(material) = MATERIAL_SECTION.table(table)? {
-        override_materials(&mut materials, &mut mesh, &material)?;
+    if let Some(material) = &material {
+        override_materials(&mut loaded, material)?;
+        if let Some(picture) = picture {
+            let is_white = MATERIAL.albedo.value(material).is_none();
+            Laid::on(shape, &mut loaded).lay(&picture, is_white)?;
+        }
     }
+    let mesh = loaded.mesh;
     // A mirror turns each triangle's winding; turning it back keeps the outside outside.
     let mirrored = anchor_from_object.matrix3.determinant() < 0.0;
     let mesh = if mirrored {
-        mesh.with_winding_reversed()
+        Arc::new(Arc::unwrap_or_clone(mesh).with_winding_reversed())
     } else {
         mesh
     };
@@ -302,7 +324,7 @@ fn object(
         shape,
         mesh,
         mesh_report: loaded.report,
-        materials,
+        materials: loaded.materials,
         material_names: loaded.material_names,
         textures: loaded.textures,
         notes: loaded.notes,
@@ -333,14 +355,10 @@ pub fn anchor_index(on: &Value, anchors: &[Anchor]) -> Result<usize, SceneError>
 
 /// Each key that the scene gives replaces that of every material of the mesh, with the picture that says it and, of the
 /// colour, the corners' colours.
-fn override_materials(
-    materials: &mut [Material],
-    mesh: &mut Mesh,
-    table: &Table,
-) -> Result<(), SceneError> {
+fn override_materials(loaded: &mut LoadedMesh, table: &Table) -> Result<(), SceneError> {
     let albedo = MATERIAL.albedo.read(table)?;
     let roughness = MATERIAL.roughness.read(table)?;
-    for material in materials {
+    for material in &mut loaded.materials {
         if let Some(albedo) = albedo {
             material.albedo = albedo;
             material.maps.color = None;
@@ -350,8 +368,8 @@ fn override_materials(
             material.maps.roughness = None;
         }
     }
-    if albedo.is_some() {
-        for look in &mut mesh.looks {
+    if albedo.is_some() && !loaded.mesh.looks.is_empty() {
+        for look in &mut Arc::make_mut(&mut loaded.mesh).looks {
             look.color = Vec3::ONE.extend(look.color.w);
         }
     }

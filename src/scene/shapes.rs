@@ -161,11 +161,12 @@ impl ShapeKind {
     }
 }
 
-/// Reads the one shape that a thing has.
+/// Reads the one shape that a thing has; a mesh's texture coordinates are kept if that is asked for.
 pub fn shape(
     table: &Table,
     name: &str,
     normals: Normals,
+    keeps_coordinates: bool,
 ) -> Result<(ShapeKind, LoadedMesh), SceneError> {
     let allowed = ShapeKind::ALL.map(ShapeKind::key).join(", ");
     let mut given = ShapeKind::ALL
@@ -187,6 +188,7 @@ pub fn shape(
             normals,
             up: SHAPE.up.read(table)?,
             fit_m: SHAPE.fit_m.read(table)?,
+            keeps_coordinates,
         };
         let loaded = mesh_file::load(&value, SHAPE.mesh.takes, reading, wanted.as_ref())?;
         return Ok((kind, loaded));

@@ -1,6 +1,6 @@
 //! A scene as the floors below take it: what reflects light, what hides it, and the room around.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, UVec2, Vec3};
 
 use super::{Object, ProbeScene, Scene, SplitLight};
 use crate::geometry::bounds::Bounds;
@@ -11,6 +11,23 @@ use crate::shafts::casters::Occluder;
 use crate::shafts::patches::RoomTriangle;
 use crate::shafts::placed_probe::PlacedProbe;
 use crate::shafts::room::{Room, RoomOptions};
+
+/// One place of a triangle is looked at for so many texels that it covers, in no more rows than these.
+const TEXELS_A_PLACE: f32 = 16.0;
+const MOST_ROWS: usize = 64;
+
+/// Barycentric coordinates of the middles of the like triangles that a triangle is cut into by so many rows.
+fn middles(rows: usize) -> impl Iterator<Item = [f32; 3]> {
+    let place = move |a: usize, b: usize, third: f32| {
+        let [a, b] = [a, b].map(|at| (at as f32 + third) / rows as f32);
+        [a, b, 1.0 - a - b]
+    };
+    (0..rows).flat_map(move |a| {
+        let upright = (0..rows - a).map(move |b| place(a, b, 1.0 / 3.0));
+        let turned = (0..rows - a - 1).map(move |b| place(a, b, 2.0 / 3.0));
+        upright.chain(turned)
+    })
+}
 
 impl Object {
     /// The positions of its mesh, or of a coarser one, in its anchor's space.
@@ -50,8 +67,17 @@ impl Object {
         }
     }
 
-    /// Mean diffuse reflectance of a triangle: its material's, its picture's in its middle and halfway to its corners,
-    /// and its corners' colours.
+    /// Whether what it reflects differs from place to place by more than its materials.
+    pub fn is_pictured(&self) -> bool {
+        let mut materials = self.materials.iter();
+        let mut looks = self.mesh.looks.iter();
+        !self.mesh.corner_looks.is_empty()
+            && (materials.any(|material| material.maps.color.is_some())
+                || looks.any(|look| look.color.truncate() != Vec3::ONE))
+    }
+
+    /// Mean diffuse reflectance of a triangle: its material's, its picture's in its middle and halfway to its corners (at more
+    /// places where it covers many texels), and its corners' colours.
     ///
     /// # Panics
     /// If there is no such triangle.
@@ -73,13 +99,18 @@ impl Object {
             });
             picture * look.color.truncate().as_dvec3()
         };
-        let places = [
-            [1.0 / 3.0; 3],
-            [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0],
-            [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0],
-            [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0],
-        ];
-        material.albedo * places.map(at).into_iter().sum::<DVec3>() / 4.0
+        let texels = texture.map_or(0.0, |(map, texture)| {
+            let [a, b, c] = looks.map(|look| {
+                let uv = look.uv[map.uv_set as usize & 1];
+                let place = map.picture_from_corner.transform_point2(uv);
+                place * UVec2::from_array(texture.size_px).as_vec2()
+            });
+            (b - a).perp_dot(c - a).abs() / 2.0
+        });
+        let rows = ((texels / TEXELS_A_PLACE).sqrt() as usize).clamp(2, MOST_ROWS);
+        let places = middles(rows);
+        let count = (rows * rows) as f64;
+        material.albedo * places.map(at).sum::<DVec3>() / count
     }
 
     /// The mean of [`Object::albedo`] over each material's surface.
@@ -125,11 +156,7 @@ impl Object {
 impl Scene {
     /// What of a scene with a probe its room's light depends on.
     pub fn room<'a>(&self, probe: &'a ProbeScene) -> Room<'a> {
-        let standing = || {
-            self.phantoms
-                .iter()
-                .filter(|object| object.visible && object.anchor == 0)
-        };
+        let standing = || self.standing_phantoms();
         let mut triangles: Vec<RoomTriangle> = Vec::new();
         for (piece, object) in (0..).zip(standing()) {
             triangles.extend(object.reflectors().map(|reflector| RoomTriangle {
@@ -174,6 +201,12 @@ impl Scene {
                 .map(|light| light.light)
                 .collect(),
         }
+    }
+
+    /// The phantoms that are parts of a room, in the order of its pieces.
+    pub fn standing_phantoms(&self) -> impl Iterator<Item = &Object> {
+        let phantoms = self.phantoms.iter();
+        phantoms.filter(|object| object.visible && object.anchor == 0)
     }
 
     /// The boxes around the visible virtual things that stand in the world.

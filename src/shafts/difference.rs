@@ -6,7 +6,9 @@ use std::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 
 use super::intensity_transfers::{SETS, intensity_transfers, set_of};
+use super::light_of_room::PatchLight;
 use super::luminance;
+use super::patches::RoomPatch;
 use super::room_transport::RoomTransport;
 
 /// A way to take what virtual things hide of a room's light out of the video.
@@ -22,6 +24,27 @@ pub enum Difference {
     Encoded,
 }
 
+/// The terms in which light is taken out of the video.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Terms<'a> {
+    /// The way.
+    pub difference: Difference,
+    /// For each of a room's first pieces whether a picture says what it reflects: as radiance its light is that of a surface
+    /// which reflects all, for whoever draws it to multiply it by the picture.
+    pub pictured: &'a [bool],
+}
+
+impl Terms<'_> {
+    /// What a patch reflects in these terms.
+    pub fn reflectance(&self, patch: &RoomPatch, light: &PatchLight) -> Vec3 {
+        let is_pictured = self.pictured.get(patch.piece as usize) == Some(&true);
+        match is_pictured && self.difference == Difference::Subtract {
+            true => Vec3::ONE,
+            false => light.albedo,
+        }
+    }
+}
+
 /// Some vertices' light, and what each of some sources gives to it: rows of as many as there are sources.
 pub struct Given {
     /// For each vertex.
@@ -34,18 +57,13 @@ pub struct Given {
 
 impl Given {
     /// Irradiance in other terms.
-    pub fn in_terms_of(
-        self,
-        difference: Difference,
-        room: &RoomTransport,
-        vertices: &[u32],
-    ) -> Self {
-        if difference == Difference::Ratio {
+    pub fn in_terms_of(self, terms: Terms<'_>, room: &RoomTransport, vertices: &[u32]) -> Self {
+        if terms.difference == Difference::Ratio {
             return self;
         }
-        let reflectances = reflectances(room, vertices);
+        let reflectances = reflectances(terms, room, vertices);
         let radiance = self.into_radiance(&reflectances);
-        match difference {
+        match terms.difference {
             Difference::Encoded => radiance.into_levels(),
             Difference::Ratio | Difference::Subtract => radiance,
         }
@@ -84,12 +102,12 @@ impl Given {
 }
 
 /// What each vertex reflects: the mean of its patches.
-fn reflectances(room: &RoomTransport, vertices: &[u32]) -> Vec<Vec3> {
+fn reflectances(terms: Terms<'_>, room: &RoomTransport, vertices: &[u32]) -> Vec<Vec3> {
     let mut sums = vec![(Vec3::ZERO, 0.0); vertices.len()];
     for (patch, light) in room.patches.patches.iter().zip(&room.light) {
         for vertex in patch.vertices {
             if let Ok(row) = vertices.binary_search(&vertex) {
-                sums[row].0 += light.albedo;
+                sums[row].0 += terms.reflectance(patch, light);
                 sums[row].1 += 1.0;
             }
         }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::bounding::Aabb;
 use super::casters::PlacedCasters;
-use super::difference::{Difference, Given};
+use super::difference::{Given, Terms};
 use super::patches::{PatchVertex, RoomPatch};
 use super::receiver_patches::{ReceiverInputs, ReceiverPatches};
 use super::room_transport::RoomTransport;
@@ -26,7 +26,7 @@ const MOST_ADDED: f32 = 4.0;
 
 /// The number of shadows that there may be, and the way to take them out of the video.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ShadowOptions {
+pub struct ShadowOptions<'a> {
     /// Sources that get a shadow, at most; `None`: all.
     pub sources: Option<u32>,
     /// Side of a source's map, pixels.
@@ -34,7 +34,7 @@ pub struct ShadowOptions {
     /// Side of the largest atlas that can be drawn, pixels.
     pub largest_atlas_px: u32,
     /// In which terms light is taken out of the video.
-    pub difference: Difference,
+    pub terms: Terms<'a>,
 }
 
 /// The part of a room's light that the casters hide where they are, and what they reflect.
@@ -55,7 +55,7 @@ pub struct HiddenLight {
 
 impl HiddenLight {
     /// Of casters in a room.
-    pub fn new(room: &RoomTransport, placed: &PlacedCasters, options: &ShadowOptions) -> Self {
+    pub fn new(room: &RoomTransport, placed: &PlacedCasters, options: &ShadowOptions<'_>) -> Self {
         let affected = Affected::new(room, placed);
         let weighed = affected.weighed(room, placed);
         let (tiling, chosen, sources) = mapped_sources(room, placed, &affected, &weighed, options);
@@ -68,7 +68,7 @@ impl HiddenLight {
             by_source: given(room, vertices, &chosen, &affected.may_be_hidden),
             source_count: chosen.len(),
         }
-        .in_terms_of(options.difference, room, vertices);
+        .in_terms_of(options.terms, room, vertices);
         let transfers: Vec<[u32; 2]> = given.by_source.into_iter().map(packed).collect();
         let (surfels, lost_nearby) = reflected(room, placed, &affected, &weighed);
         let receivers = ReceiverInputs {
@@ -79,7 +79,7 @@ impl HiddenLight {
             transfers: &transfers,
             surfels: &surfels,
             lost_nearby: &lost_nearby,
-            difference: options.difference,
+            terms: options.terms,
         }
         .receivers(&affected.patches);
         let light = given.light.into_iter();
@@ -164,7 +164,7 @@ fn mapped_sources(
     placed: &PlacedCasters,
     affected: &Affected,
     weighed: &[WeighedSource],
-    options: &ShadowOptions,
+    options: &ShadowOptions<'_>,
 ) -> (Tiling, Vec<Representative>, Vec<MappedSource>) {
     let (ball, count) = (&placed.ball, options.sources);
     let count = count.map_or(usize::MAX, |count| count as usize);

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::bounding::Aabb;
 use super::casters::PlacedCasters;
-use super::difference::Difference;
+use super::difference::{Difference, Terms};
 use super::intensity_transfers::encoded;
 use super::room_transport::RoomTransport;
 use super::selection::LEAST_WEIGHT;
@@ -57,7 +57,7 @@ pub struct ReceiverInputs<'a> {
     /// Irradiance that each vertex loses from patches among the casters.
     pub lost_nearby: &'a [Vec3],
     /// In which terms light is taken out of the video.
-    pub difference: Difference,
+    pub terms: Terms<'a>,
 }
 
 /// The patches that receive a shadow, or light that the casters reflect.
@@ -136,8 +136,9 @@ impl ReceiverInputs<'_> {
     /// The parts of a patch that casters reflect light on to, if any of it shows.
     fn add_reflected(&self, patch: usize, rows: [u32; 3], to: &mut ReceiverPatches) {
         let room = self.room;
-        let albedo = room.light[patch].albedo;
+        let light = &room.light[patch];
         let patch = &room.patches.patches[patch];
+        let albedo = self.terms.reflectance(patch, light);
         let places = room.patches.corners(patch);
         let normal = room.patches.normal(patch);
         let lost = rows.map(|row| self.lost_nearby[row as usize]);
@@ -173,7 +174,7 @@ impl ReceiverInputs<'_> {
                 .map(|vertex| room.irradiance[vertex as usize]);
             of[0] * a + of[1] * b + of[2] * (1.0 - a - b)
         };
-        let in_terms = |index: usize| match (self.difference, corners[index].irradiance) {
+        let in_terms = |index: usize| match (self.terms.difference, corners[index].irradiance) {
             (Difference::Ratio, reflected) => reflected,
             (Difference::Subtract, reflected) => shown(reflected),
             // The paper has shadows alone; without what the casters reflect they are far too dark.

@@ -96,7 +96,7 @@ pub fn object(name: &str, mesh: Mesh, albedo: DVec3, world_from_object: DAffine3
     Object {
         name: name.to_owned(),
         shape: ShapeKind::Mesh,
-        mesh,
+        mesh: Arc::new(mesh),
         mesh_report: MeshReport::default(),
         materials: vec![Material::matt(albedo)],
         material_names: Vec::new(),

@@ -16,8 +16,11 @@ use gnomon::app::input::mailbox::Taken;
 use gnomon::app::live::TrackingPlan;
 use gnomon::app::live::adding::{WantedShape, WantedThing};
 use gnomon::app::live::beginning::Opening;
-use gnomon::app::live::command::{Clicks, RecordingCommand, SceneCommand, Selected};
+use gnomon::app::live::command::{
+    Clicks, Commands, LiveCommand, RecordingCommand, SceneCommand, Selected,
+};
 use gnomon::app::live::meters::Sample;
+use gnomon::app::live::panel::Panel;
 use gnomon::app::live::pipeline::{Pipeline, PipelineInput};
 use gnomon::app::live::session::LiveSession;
 use gnomon::app::live::views::ViewMode;
@@ -471,6 +474,154 @@ fn what_is_added_is_read_beside_the_picture_and_drawn_copied_and_renamed() {
     run_until(&mut session, &state, "the missing file is told", is_told);
     assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
     for _ in 0..4 {
+        session.edit_scene(SceneCommand::Undo, &state);
+    }
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), before);
+}
+
+/// What is to be added by a file.
+fn model(path: PathBuf) -> SceneCommand {
+    SceneCommand::Add(WantedThing {
+        is_real: false,
+        shape: WantedShape::Model(path),
+        on: None,
+    })
+}
+
+/// A sheet of so many squares a side, large enough to take a while.
+fn large_model(path: &Path, squares: u32) {
+    use std::fmt::Write as _;
+    let mut text = String::new();
+    let at = |column: u32, row: u32| row * (squares + 1) + column + 1;
+    for (row, column) in (0..=squares).flat_map(|row| (0..=squares).map(move |it| (row, it))) {
+        let [x, y] = [column, row].map(|it| f64::from(it) * 0.1 / f64::from(squares));
+        let z = 0.01 * ((40.0 * x).sin() + (50.0 * y).cos());
+        writeln!(text, "v {x:.6} {y:.6} {z:.6}").unwrap();
+    }
+    for (row, column) in (0..squares).flat_map(|row| (0..squares).map(move |it| (row, it))) {
+        let [a, b] = [at(column, row), at(column + 1, row)];
+        let [c, d] = [at(column + 1, row + 1), at(column, row + 1)];
+        writeln!(text, "f {a} {b} {c} {d}").unwrap();
+    }
+    std::fs::write(path, text).unwrap();
+}
+
+#[test]
+fn pictures_go_on_while_a_large_model_is_read_and_it_can_be_given_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = lamp_in(folder.path());
+    let before = std::fs::read_to_string(&path).unwrap();
+    let file = folder.path().join("sheet.obj");
+    large_model(&file, 350);
+    let mut session = open(&path, folder.path(), true);
+    let state = WindowState::new();
+    run_until(&mut session, &state, "the scene is drawn", |session| {
+        session.picture().is_some() && session.is_settled()
+    });
+    session.edit_scene(model(file.clone()), &state);
+    let mut frames = std::collections::BTreeSet::new();
+    let mut stages = Vec::new();
+    let mut longest = Duration::ZERO;
+    let read = |session: &LiveSession| {
+        let mut models = session.models_being_read();
+        models.next().map(|(name, stage)| (name.to_owned(), stage))
+    };
+    while let Some((name, stage)) = read(&session) {
+        assert_eq!(name, "sheet");
+        if stages.last() != Some(&stage) {
+            stages.push(stage);
+        }
+        let began = Instant::now();
+        step(&mut session, &state);
+        longest = longest.max(began.elapsed());
+        frames.extend(session.picture().map(|picture| picture.frame.index));
+    }
+    eprintln!("{} pictures, the longest wait {longest:?}", frames.len());
+    // (Nobody looks at each moment.)
+    assert!(frames.len() >= 3, "{frames:?} while {stages:?}");
+    assert!(stages.is_sorted() && stages.len() >= 2, "{stages:?}");
+    let things = |session: &LiveSession| session.scene().unwrap().virtuals.len();
+    assert_eq!(things(&session), 2);
+    session.edit_scene(SceneCommand::Undo, &state);
+
+    session.edit_scene(model(file), &state);
+    let (name, _) = read(&session).unwrap();
+    session.edit_scene(SceneCommand::GiveUpReading(name), &state);
+    assert_eq!(read(&session), None);
+    for _ in 0..200 {
+        step(&mut session, &state);
+    }
+    assert_eq!(things(&session), 1);
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), before);
+}
+
+#[test]
+fn files_that_are_dropped_become_things_or_are_told_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = lamp_in(folder.path());
+    let place = |name: &str| folder.path().join(name);
+    let triangle = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0.05\nf 1 2 3\n";
+    let good = [
+        "a chair's \"best\" #1, größer.obj",
+        "two.obj",
+        "two.stl.obj",
+    ];
+    for name in good {
+        std::fs::write(place(name), triangle).unwrap();
+    }
+    for name in ["broken.glb", "film.mp4", "other.toml", "chair.mtl"] {
+        std::fs::write(place(name), "nothing of the kind").unwrap();
+    }
+    std::fs::create_dir(place("models")).unwrap();
+    let before = std::fs::read_to_string(&path).unwrap();
+    let mut session = open(&path, folder.path(), true);
+    let state = WindowState::new();
+    run_until(&mut session, &state, "the scene is drawn", |session| {
+        session.picture().is_some() && session.is_settled()
+    });
+    let drop = |session: &mut LiveSession, names: &[&str]| {
+        let files: Vec<PathBuf> = names.iter().map(|name| place(name)).collect();
+        let mut commands = Commands::default();
+        Panel::default().add_dropped(files.iter().map(PathBuf::as_path), &mut commands);
+        for command in commands {
+            if let LiveCommand::Scene(command) = command {
+                session.edit_scene(command, &state);
+            }
+        }
+    };
+    // What is none is told at once, or when it is read, and changes nothing.
+    for (name, said) in [
+        ("film.mp4", "is a video, no model"),
+        ("other.toml", "a scene is opened with gnomon live"),
+        ("chair.mtl", "belongs to a model"),
+        ("models", "is a folder"),
+        ("broken.glb", "broken.glb"),
+        ("gone.obj", "gone.obj"),
+    ] {
+        drop(&mut session, &[name]);
+        run_until(&mut session, &state, name, |session| {
+            let shown = session.notices.shown(session.now_secs());
+            shown
+                .iter()
+                .any(|(_, text)| text.contains(said) && text.contains(name))
+        });
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), before, "{name}");
+    }
+    // Several at once, whatever they are called.
+    drop(&mut session, &good);
+    run_until(&mut session, &state, "all are there", |session| {
+        session.scene().unwrap().virtuals.len() == 1 + good.len()
+    });
+    let written = Scene::load(&path).unwrap();
+    let names: Vec<&str> = written.virtuals.iter().map(|it| it.name.as_str()).collect();
+    for name in ["a chair_s _best_ #1_ größer", "two", "two.stl"] {
+        assert!(names.contains(&name), "{names:?}");
+    }
+    let text = std::fs::read_to_string(&path).unwrap();
+    for comment in before.lines().filter_map(|line| line.split_once('#')) {
+        assert!(text.contains(comment.1), "{}", comment.1);
+    }
+    for _ in good {
         session.edit_scene(SceneCommand::Undo, &state);
     }
     assert_eq!(std::fs::read_to_string(&path).unwrap(), before);

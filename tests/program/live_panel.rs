@@ -1,18 +1,22 @@
 //! The panel of the live window, driven as a person does: what is clicked and dragged becomes what is asked for.
 
+use std::path::Path;
+use std::sync::mpsc::channel;
+
 use eframe::egui::accesskit::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use gnomon::app::authoring::Edit;
+use gnomon::app::live::adding::{WantedShape, WantedThing};
 use gnomon::app::live::command::{
-    Clicks, LiveCommand, Overlay, RecordingCommand, SceneCommand, Selected, WindowCommand,
+    Clicks, Commands, LiveCommand, Overlay, RecordingCommand, SceneCommand, Selected, WindowCommand,
 };
 use gnomon::app::live::meters::Meters;
 use gnomon::app::live::panel::{Facts, Panel};
 use gnomon::app::live::views::ViewMode;
 use gnomon::app::live::window_state::WindowState;
 use gnomon::light::Light;
-use gnomon::scene::{Placement, Scene, Shortcut};
+use gnomon::scene::{LoadStage, Placement, Scene, Shortcut};
 
 /// A panel on a scene, and all that was asked for.
 struct Desk {
@@ -20,6 +24,7 @@ struct Desk {
     scene: Option<Scene>,
     state: WindowState,
     commands: Vec<LiveCommand>,
+    reading: Vec<(&'static str, LoadStage)>,
 }
 
 fn desk(scene: Option<Scene>, selected: Option<Selected>) -> Harness<'static, Desk> {
@@ -32,6 +37,7 @@ fn desk(scene: Option<Scene>, selected: Option<Selected>) -> Harness<'static, De
         scene,
         state,
         commands: Vec::new(),
+        reading: Vec::new(),
     };
     Harness::builder()
         .with_size([330.0, 1400.0])
@@ -51,6 +57,7 @@ fn desk(scene: Option<Scene>, selected: Option<Selected>) -> Harness<'static, De
                     camera: "a camera",
                     adapter: "an adapter",
                     records: [false, true],
+                    reading: desk.reading.clone(),
                     clicks: None,
                 };
                 let commands = desk.panel.show(ui, &facts, &desk.state);
@@ -226,4 +233,60 @@ fn shortcuts_are_switched_where_volumes_are_looked_at() {
             Shortcut::Scissors
         ))]
     );
+}
+
+#[test]
+fn a_model_that_is_read_is_shown_and_can_be_stopped() {
+    let mut harness = desk(Some(lamp()), None);
+    harness.state_mut().reading = vec![("chair", LoadStage::Unpacking)];
+    // (The bar moves on by itself for as long as it is there.)
+    harness.run_steps(2);
+    harness.get_by_label_contains("chair unpacks triangles and pictures");
+    harness.state_mut().commands.clear();
+    harness.get_by_label("stop").click();
+    harness.run_steps(2);
+    let stop = SceneCommand::GiveUpReading("chair".to_owned());
+    assert_eq!(harness.state().commands, [LiveCommand::Scene(stop)]);
+}
+
+fn added(path: &str) -> LiveCommand {
+    LiveCommand::Scene(SceneCommand::Add(WantedThing {
+        is_real: false,
+        shape: WantedShape::Model(path.into()),
+        on: None,
+    }))
+}
+
+#[test]
+fn what_the_system_s_dialog_gives_is_asked_for_once() {
+    let mut harness = desk(Some(lamp()), None);
+    let (giver, chosen) = channel();
+    harness.state_mut().panel.await_dialog(chosen);
+    harness.run();
+    assert_eq!(harness.state().commands, []);
+    giver.send(Some("/models/a chair's.glb".into())).unwrap();
+    harness.run();
+    harness.run();
+    assert_eq!(harness.state().commands, [added("/models/a chair's.glb")]);
+    // One that is closed without a file, and one that has come to grief.
+    harness.state_mut().commands.clear();
+    for answer in [Some(None), None] {
+        let (giver, chosen) = channel();
+        harness.state_mut().panel.await_dialog(chosen);
+        if let Some(answer) = answer {
+            giver.send(answer).unwrap();
+        }
+        drop(giver);
+        harness.run();
+    }
+    assert_eq!(harness.state().commands, []);
+}
+
+#[test]
+fn each_file_that_is_dropped_is_asked_for() {
+    let mut commands = Commands::default();
+    let files = ["/a/duck.glb", "", "/a/b c/x.obj"].map(Path::new);
+    Panel::default().add_dropped(files, &mut commands);
+    let commands: Vec<LiveCommand> = commands.into_iter().collect();
+    assert_eq!(commands, [added("/a/duck.glb"), added("/a/b c/x.obj")]);
 }

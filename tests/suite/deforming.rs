@@ -2,6 +2,7 @@
 //! the same triangles as a thing that keeps its shape.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::{DAffine3, DVec2, DVec3};
 use gnomon::app::truth::FACES_AWAY;
@@ -247,7 +248,7 @@ fn frozen(scene: &Scene, time_s: f64) -> Scene {
     let mut frozen = scene.shaped_at(time_s).into_owned();
     for thing in frozen.phantoms.iter_mut().chain(&mut frozen.virtuals) {
         thing.animation = None;
-        thing.mesh.held.clear();
+        Arc::make_mut(&mut thing.mesh).held.clear();
     }
     frozen
 }

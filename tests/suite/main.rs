@@ -8,6 +8,7 @@
 mod common;
 
 mod accuracy;
+mod albedo_texture;
 mod animation;
 mod architecture;
 mod authoring;

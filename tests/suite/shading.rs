@@ -14,6 +14,7 @@ use gnomon::light::{Light, Material, irradiance, reflectance};
 use gnomon::render::{Layers, Renderer, Shown};
 use gnomon::scene::{Object, Scene};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 const SIZE_PX: [u32; 2] = [480, 360];
 const AMBIENT: f64 = 0.1;
@@ -385,8 +386,9 @@ fn pictures_and_colors_multiply_the_material() {
                 .extend(1.0),
             ..CornerLook::default()
         };
-        sphere.mesh.looks = sphere.mesh.positions.iter().map(corner).collect();
-        sphere.mesh.corner_looks.clone_from(&sphere.mesh.triangles);
+        let mesh = Arc::make_mut(&mut sphere.mesh);
+        mesh.looks = mesh.positions.iter().map(corner).collect();
+        mesh.corner_looks.clone_from(&mesh.triangles);
         // The normal map leans towards u by x and towards v by y, of -1 to 1.
         let bent = |normal: DVec3| {
             let along_u = normal.cross(DVec3::new(0.3, 0.5, 0.8)).normalize();
@@ -765,4 +767,92 @@ fn undistorted_as_by_rays(distortion: Distortion) {
     eprintln!("{untouched} pixels, moved by up to {moved:.2} px, worst {worst:.2} levels");
     assert!(untouched > 20_000 && moved > 1.0);
     assert!(worst <= 1.0, "{worst} levels");
+}
+
+/// What a material sends of light 1 from everywhere to a camera at some angle from its normal.
+fn reflected_of_everywhere(material: &Material, cos_camera: f64) -> DVec3 {
+    const STEPS: u32 = 240;
+    let to_camera = DVec3::new((1.0 - cos_camera * cos_camera).sqrt(), 0.0, cos_camera);
+    let mut sum = DVec3::ZERO;
+    for index in 0..STEPS * STEPS {
+        let [down, around] =
+            [index / STEPS, index % STEPS].map(|at| (f64::from(at) + 0.5) / f64::from(STEPS));
+        // Even in the square of the sine: the cosine is in it.
+        let (sine, cosine) = (2.0 * PI * around).sin_cos();
+        let radius = down.sqrt();
+        let to_light = DVec3::new(radius * cosine, radius * sine, (1.0 - down).sqrt());
+        sum += reflectance(material, DVec3::Z, to_light, to_camera);
+    }
+    sum * PI / f64::from(STEPS * STEPS)
+}
+
+/// Of ambient light and lamps.
+fn hold_in_ambient_light(name: &str, material: &Material, samples: u32, lights: &[Light]) {
+    const RADIANCE: f64 = 0.5;
+    let mut scene = sphere_scene(*material, lights.to_vec());
+    scene.ambient_radiance = DVec3::splat(RADIANCE);
+    scene.shadows.samples = samples;
+    let steps = 40;
+    let of_everywhere: Vec<DVec3> = (0..=steps)
+        .map(|step| reflected_of_everywhere(material, f64::from(step.max(1)) / f64::from(steps)))
+        .collect();
+    let (picture, _) = render(
+        &scene,
+        PERFECT_LENS,
+        sphere_camera(),
+        grey_frame(SIZE_PX).rgba,
+    );
+    let eye = sphere_camera().inverse().translation;
+    let mut worst = 0.0_f64;
+    for (index, point, normal) in sphere_points(lights) {
+        let place = normal.dot((eye - point).normalize()) * f64::from(steps);
+        let low = (place as usize).min(steps as usize - 1);
+        let ambient = of_everywhere[low].lerp(of_everywhere[low + 1], place - low as f64);
+        let expected = RADIANCE * ambient + expected_radiance(material, lights, point, normal);
+        for channel in 0..3 {
+            let level = f64::from(picture[4 * index + channel]);
+            worst = worst.max((level - srgb_levels(expected[channel])).abs());
+        }
+    }
+    eprintln!("{name}, {samples} samples: worst {worst:.2} levels");
+    assert!(worst <= 3.0, "{name}, {samples} samples: {worst} levels");
+}
+
+#[test]
+fn what_is_glossy_mirrors_the_ambient_light_as_its_brdf_says() {
+    let layered = |metallic, roughness, albedo| Material {
+        roughness: Some(roughness),
+        metallic,
+        ..Material::matt(albedo)
+    };
+    for (name, material) in [
+        ("metal", layered(1.0, 0.3, ALBEDO)),
+        ("rough metal", layered(1.0, 0.8, ALBEDO)),
+        ("half metal", layered(0.5, 0.4, ALBEDO)),
+        ("dielectric", layered(0.0, 0.3, ALBEDO)),
+    ] {
+        hold_in_ambient_light(name, &material, 4, &[]);
+        let lamp = sun([-0.5, 0.6, -1.0], [0.3, 0.3, 0.3]);
+        // One light and one sample are shaded straight into the picture.
+        hold_in_ambient_light(name, &material, 1, &[lamp]);
+    }
+}
+
+/// The white furnace: a mirror that takes nothing away is as bright as all around it.
+#[test]
+fn a_white_metal_ball_vanishes_in_constant_light() {
+    let material = Material {
+        roughness: Some(0.05),
+        metallic: 1.0,
+        ..Material::matt(DVec3::ONE)
+    };
+    let mut scene = sphere_scene(material, vec![]);
+    scene.ambient_radiance = DVec3::splat(0.5);
+    let frame = grey_frame(SIZE_PX).rgba;
+    let (picture, _) = render(&scene, PERFECT_LENS, sphere_camera(), frame);
+    let points = sphere_points(&[]);
+    for &(index, ..) in &points {
+        let off = (linear_of_level(picture[4 * index]) / 0.5 - 1.0).abs();
+        assert!(off < 0.02, "{off}");
+    }
 }

@@ -24,6 +24,7 @@ class Thing:
     casts: bool
     mesh: Path | None = None
     rect_m: list | None = None
+    fit_m: float | None = None
 
 
 @dataclass
@@ -121,7 +122,7 @@ def read_scene(path):
                 raise SceneError(f"{path}: {thing['name']} stands on \"{on}\"; there are {', '.join(scene.anchors)}")
             scene.things.append(Thing(thing["name"], kind == "phantom", on, place, albedo, material.get("roughness"),
                                       thing.get("casts", True), find(thing["mesh"]) if "mesh" in thing else None,
-                                      thing.get("rect_m")))
+                                      thing.get("rect_m"), thing.get("fit_m")))
     scene.lights = tree.get("light", [])
     scene.ambient = rgb(tree.get("ambient", {}).get("radiance", 0))
     if probe := tree.get("probe"):

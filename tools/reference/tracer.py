@@ -15,6 +15,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from gltf_file import read_parts
 from scene_file import SceneError
 
 mi.set_variant("llvm_ad_rgb")
@@ -58,14 +59,62 @@ def has_normals(path):
         return any(line.startswith("vn ") for line in file)
 
 
-def shape(thing, world_from_anchor):
+def shapes(thing, world_from_anchor):
+    """All that a thing is made of, each with a name."""
     place = world_from_anchor @ thing.anchor_from_object
+    if thing.mesh is not None and thing.mesh.suffix.lower() in (".glb", ".gltf"):
+        if thing.real or thing.albedo or thing.roughness:
+            raise SceneError(f"{thing.name}: glTF is known here of virtual things alone, without a material")
+        parts = read_parts(thing.mesh, thing.fit_m)
+        return {f"{thing.name} {number}": part_of_model(f"{thing.name} {number}", part, place)
+                for number, part in enumerate(parts)}
+    if thing.fit_m is not None:
+        raise SceneError(f"{thing.name}: fit_m is known here of glTF alone")
     if thing.rect_m is not None:
         made = rectangle(thing.rect_m, place)
     else:
         flat = thing.real or not has_normals(thing.mesh)
         made = {"type": "obj", "filename": str(thing.mesh), "to_world": matrix(place), "face_normals": flat}
-    return {**made, "bsdf": surface(thing)}
+    return {thing.name: {**made, "bsdf": surface(thing)}}
+
+
+def picture(values):
+    """A texture of linear numbers."""
+    bitmap = mi.Bitmap(np.ascontiguousarray(values, np.float32))
+    return {"type": "bitmap", "bitmap": bitmap, "raw": True}
+
+
+def surface_of_model(material):
+    """Disney's principled material, whose dielectric and metal are those of glTF; its roughness is squared likewise."""
+    made = {"type": "principled", "base_color": picture(material.color), "roughness": picture(np.maximum(material.roughness, 0.1)),
+            "metallic": picture(material.metallic), "specular": 0.5}
+    if material.normal is not None:
+        made = {"type": "normalmap", "normalmap": picture(material.normal), "inner": made}
+    made = {"type": "twosided", "inner": made}
+    if material.opacity is not None:
+        made = {"type": "mask", "opacity": picture(material.opacity), "inner": made}
+    return made
+
+
+def part_of_model(name, part, place):
+    properties = mi.Properties()
+    properties["bsdf"] = mi.load_dict(surface_of_model(part.material))
+    if part.material.emission.any():
+        properties["emitter"] = mi.load_dict({"type": "area", "radiance": picture(part.material.emission)})
+    made = mi.Mesh(name, len(part.positions), len(part.triangles), has_vertex_normals=part.normals is not None,
+                   has_vertex_texcoords=part.uv is not None, props=properties)
+    values = mi.traverse(made)
+    positions = part.positions @ place[:3, :3].T + place[:3, 3]
+    values["vertex_positions"] = np.ascontiguousarray(positions, np.float32).ravel()
+    values["faces"] = np.ascontiguousarray(part.triangles, np.uint32).ravel()
+    if part.normals is not None:
+        normals = part.normals @ np.linalg.inv(place[:3, :3])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
+        values["vertex_normals"] = np.ascontiguousarray(normals, np.float32).ravel()
+    if part.uv is not None:
+        values["vertex_texcoords"] = np.ascontiguousarray(part.uv, np.float32).ravel()
+    values.update()
+    return made
 
 
 def dictionary(family):
@@ -176,10 +225,10 @@ class Set:
             frame = moment.world_from_anchor.get(thing.anchor)
             if frame is None:
                 continue
-            made = shape(thing, frame)
-            (self.real if thing.real else self.virtual)[thing.name] = made
+            made = shapes(thing, frame)
+            (self.real if thing.real else self.virtual).update(made)
             if thing.casts:
-                casting[thing.real][thing.name] = made
+                casting[thing.real].update(made)
         for number, marker in enumerate(scene.markers):
             if marker.anchor in moment.world_from_anchor:
                 self.real[f"print {number}"] = print_of(marker, moment.world_from_anchor[marker.anchor])
@@ -214,7 +263,10 @@ def radiance(camera, scene, camera_from_world, samples, seed, distorted):
     """Linear RGB, box-filtered over each pixel."""
     width, height = camera.size_px
     pixels = width * height
-    integrator = mi.load_dict({"type": "path", "max_depth": 5, "rr_depth": 100})
+    # (`path` would take what is half clear for opaque on the way to a lamp. What is clear counts as a bounce.)
+    clear = any("mask" in str(shape.bsdf()).lower()[:40] for shape in scene.shapes())
+    kind = {"type": "volpath", "max_depth": 12} if clear else {"type": "path", "max_depth": 5}
+    integrator = mi.load_dict({**kind, "rr_depth": 100})
     total = np.zeros((pixels, 3))
     part = max(1, min(samples, BATCH // pixels))
     parts = math.ceil(samples / part)
@@ -236,14 +288,30 @@ def centres(camera, camera_from_world):
     return rays(camera, camera_from_world, mi.Float(pixel % width), mi.Float(pixel // width), False)
 
 
+def opaque_hit(scene, seen):
+    """What is first met that is more opaque than clear; its distance counts from where the ray began."""
+    hit = scene.ray_intersect(seen)
+    if not any("mask" in str(shape.bsdf()).lower()[:40] for shape in scene.shapes()):
+        return hit
+    origin = seen.o
+    for _ in range(12):
+        clear = hit.bsdf(seen).eval_null_transmission(hit).x > 0.5
+        clear &= hit.is_valid()
+        ray = mi.RayDifferential3f(hit.spawn_ray(seen.d))
+        beyond = scene.ray_intersect(ray, clear)
+        hit[clear] = beyond
+    hit.t = dr.select(hit.is_valid(), dr.norm(hit.p - origin), dr.inf)
+    return hit
+
+
 def roles_and_shadows(camera, stage, camera_from_world):
     """What is seen at each pixel's centre, and for each light who takes it away there."""
     width, height = camera.size_px
     seen = centres(camera, camera_from_world)
     # (What is asked is worked out when it is read: the scenes must live as long.)
     whole, alone = stage.with_virtual(), stage.virtual_alone()
-    hit = whole.ray_intersect(seen)
-    nearest = alone.ray_intersect(seen) if stage.virtual else None
+    hit = opaque_hit(whole, seen)
+    nearest = opaque_hit(alone, seen) if stage.virtual else None
     valid = np.array(hit.is_valid())
     seeming = np.zeros_like(valid)
     if nearest is not None:

@@ -9,7 +9,7 @@ use super::watch::{KnownText, OutsideChange, SceneWatch};
 use super::written::{Unfit, placement_of, touched_by, with_edit};
 use crate::app::files::output_error::OutputError;
 use crate::app::files::picture_files::write_text;
-use crate::scene::{ModelCache, Placement, Scene, SceneError};
+use crate::scene::{Loading, ModelCache, Placement, Scene, SceneError};
 
 /// What an outside change is called in the history.
 const OUTSIDE: &str = "change of the file from outside";
@@ -62,9 +62,17 @@ impl SceneDocument {
     /// # Errors
     /// The first mistake in it.
     pub fn open(path: &Path) -> Result<Self, SceneError> {
+        Self::open_telling(path, Loading::default())
+    }
+
+    /// The same, telling `loading` how far its models are.
+    ///
+    /// # Errors
+    /// The first mistake in it.
+    pub fn open_telling(path: &Path, loading: Loading) -> Result<Self, SceneError> {
         let text = Scene::read_text(path)?;
         let models = ModelCache::default();
-        let reading = Scene::read_with(path, &text, &models);
+        let reading = Scene::read_with(path, &text, &models.telling(loading));
         Ok(Self {
             models,
             path: path.to_owned(),
@@ -152,17 +160,18 @@ impl SceneDocument {
     }
 
     /// Reads on another thread what an edit would give, so that [`commit`](Self::commit) finds its models read. `done` gets the
-    /// scene that it gives, or its mistake.
+    /// scene that it gives, or its mistake; `loading` tells how far it is.
     ///
     /// # Errors
     /// The edit does not fit the scene.
     pub fn read_ahead(
         &self,
         edit: &Edit,
+        loading: Loading,
         done: impl FnOnce(Result<Scene, EditError>) + Send + 'static,
     ) -> Result<(), EditError> {
         let text = with_edit(&self.text, &self.scene, edit)?;
-        let (path, models) = (self.path.clone(), self.models.clone());
+        let (path, models) = (self.path.clone(), self.models.telling(loading));
         std::thread::spawn(move || {
             let reading = Scene::read_with(&path, &text, &models);
             done(reading.scene.map_err(EditError::from));

@@ -1,5 +1,7 @@
 //! What a person can change in a scene, and what becomes of the scene before it is written.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use crate::light::Light;
@@ -223,7 +225,8 @@ fn thing_of<'a>(scene: &'a mut Scene, name: &str) -> Option<&'a mut Object> {
 fn place(object: &mut Object, placement: &Placement) {
     let placed = placement.anchor_from_object();
     if placed.matrix3.determinant() * object.anchor_from_object.matrix3.determinant() < 0.0 {
-        object.mesh = std::mem::take(&mut object.mesh).with_winding_reversed();
+        let mesh = Arc::unwrap_or_clone(std::mem::take(&mut object.mesh));
+        object.mesh = Arc::new(mesh.with_winding_reversed());
     }
     object.anchor_from_object = placed;
 }

@@ -1,6 +1,7 @@
 //! The table that shadow programs are compared on, with a caster that turns in every frame: a plane, a box, a lamp.
 
 use std::f32::consts::TAU;
+use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DVec2, DVec3, Vec3};
 
@@ -153,7 +154,7 @@ fn object(name: &str, mesh: Mesh, albedo: DVec3, anchor: usize, position_m: DVec
     Object {
         name: name.to_owned(),
         shape: ShapeKind::Mesh,
-        mesh,
+        mesh: Arc::new(mesh),
         mesh_report,
         materials: vec![Material::matt(albedo)],
         material_names: Vec::new(),

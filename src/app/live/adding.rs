@@ -148,6 +148,32 @@ fn file_from(folder: &Path, file: &Path) -> String {
         .into_owned()
 }
 
+/// Why a file that somebody chose or dropped is no model, as far as its name and place tell; `None`: it may be one.
+pub fn no_model(file: &Path) -> Option<String> {
+    let shown = file.display();
+    if file.to_str().is_none() {
+        return Some(format!(
+            "{shown}: its name is not UTF-8 text, which a scene's file has to be; rename it"
+        ));
+    }
+    if file.is_dir() {
+        return Some(format!("{shown} is a folder; add the model's file in it"));
+    }
+    let extension = file.extension().and_then(|extension| extension.to_str());
+    match extension.unwrap_or_default().to_lowercase().as_str() {
+        "toml" => Some(format!(
+            "{shown} is no model; a scene is opened with gnomon live"
+        )),
+        "mp4" | "mov" | "mkv" | "avi" | "webm" | "m4v" => Some(format!(
+            "{shown} is a video, no model; what is played is the scene's [camera] source"
+        )),
+        "mtl" | "bin" => Some(format!(
+            "{shown} belongs to a model; add that one's own file (.obj, .gltf)"
+        )),
+        _ => None,
+    }
+}
+
 /// What a model whose numbers cannot be metres on a table is scaled to: its longest side, metres. `None`: it may be so large.
 pub fn fit_m(thing: &Object) -> Option<f64> {
     const LARGEST_M: f64 = 1.0;

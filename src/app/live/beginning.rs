@@ -9,7 +9,8 @@ use crate::app::authoring::SceneDocument;
 use crate::app::files::job_files::JobFiles;
 use crate::app::files::result_kind::ResultKind;
 use crate::app::input::live_input::LiveInput;
-use crate::scene::CameraSettings;
+use crate::app::stages::progress::Progress;
+use crate::scene::{CameraSettings, Loading};
 
 /// A scene or a camera that was read, before anything is opened.
 pub struct Opening {
@@ -25,7 +26,9 @@ impl Opening {
     /// # Errors
     /// A scene or a calibration that cannot be read.
     pub fn scene(path: &Path) -> Result<Self> {
-        let document = SceneDocument::open(path)?;
+        let loading = Loading::default();
+        let open = || SceneDocument::open_telling(path, loading.clone());
+        let document = Progress::of_models(&loading, open)?;
         let camera = document.scene().camera.clone();
         Self::with(Some(document), camera)
     }

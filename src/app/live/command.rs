@@ -44,6 +44,8 @@ pub enum SceneCommand {
     RemoveSelected,
     /// Put a thing into the scene.
     Add(WantedThing),
+    /// Read a model that is to be put there no further, by the name that it would have.
+    GiveUpReading(String),
     /// Put the selected thing into the scene once more.
     DuplicateSelected,
     /// Call a thing otherwise.

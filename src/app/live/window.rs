@@ -146,6 +146,7 @@ impl LiveWindow {
             camera: &camera,
             adapter,
             records: session.records(),
+            reading: session.models_being_read().collect(),
             clicks: session
                 .clicks()
                 .map(|clicks| (clicks.pairs_px().len(), clicks.vertex().is_some())),
@@ -326,12 +327,8 @@ impl LiveWindow {
             let hovers = !input.raw.hovered_files.is_empty();
             (hovers, input.raw.dropped_files.clone())
         });
-        for file in dropped {
-            let path = file.path();
-            if !path.as_os_str().is_empty() {
-                self.panel.add_model(path.to_owned(), &mut commands);
-            }
-        }
+        let files = dropped.iter().map(|file| file.path());
+        self.panel.add_dropped(files, &mut commands);
         if hovers {
             let painter = ctx.debug_painter();
             painter.rect_filled(area, 0.0, Color32::from_black_alpha(140));

@@ -30,6 +30,7 @@ pub fn copy_folder(kind: FileKind) -> Option<&'static str> {
         FileKind::Mesh => Some("models"),
         FileKind::RoomMesh => Some("room"),
         FileKind::Probe => Some("probe"),
+        FileKind::Picture => Some("pictures"),
         FileKind::Dictionary => Some("markers"),
         FileKind::Bundles => Some("bundles"),
     }
@@ -157,6 +158,10 @@ impl Copies<'_> {
                 };
                 self.put(format!("{own_name}.{extension}"), &bytes)?
             }
+            FileKind::Picture => {
+                let name = format!("{own_name}{}", needed_extension(&named.path));
+                self.put(name, &read(&named.path)?)?
+            }
             FileKind::Dictionary => self.put(format!("{own_name}.yml"), &read(&named.path)?)?,
             FileKind::Bundles => self.put(format!("{own_name}.yaml"), &read(&named.path)?)?,
             FileKind::Recording | FileKind::Calibration => return Ok(None),
@@ -219,12 +224,7 @@ impl Copies<'_> {
     /// Copies a picture unless that is done already; its name in the mesh's folder.
     fn copy_picture(&self, picture: &Path, folder: &str, pictures: &OwnNames) -> Result<String> {
         let (number, is_new) = pictures.number(picture);
-        // TGA alone is known by its name.
-        let is_tga = picture
-            .extension()
-            .is_some_and(|it| it.eq_ignore_ascii_case("tga"));
-        let extension = if is_tga { ".tga" } else { "" };
-        let name = format!("picture-{number}{extension}");
+        let name = format!("picture-{number}{}", needed_extension(picture));
         if is_new {
             self.put(format!("{folder}/{name}"), &read(picture)?)?;
         }
@@ -234,6 +234,15 @@ impl Copies<'_> {
     fn put(&self, name: String, bytes: &[u8]) -> Result<String> {
         write_new(&self.session.join(&name), bytes)?;
         Ok(name)
+    }
+}
+
+/// What a copied picture's name has to end in for it to be read again: TGA alone is known by its name.
+fn needed_extension(picture: &Path) -> &'static str {
+    let extension = picture.extension();
+    match extension.is_some_and(|it| it.eq_ignore_ascii_case("tga")) {
+        true => ".tga",
+        false => "",
     }
 }
 
@@ -333,10 +342,13 @@ mod tests {
         fs::write(home.join("tags.yaml"), tags).unwrap();
         let probe = config("../recordings/room/probe.hdr");
         fs::copy(probe, home.join("probe.hdr")).unwrap();
+        let cloth = image::RgbImage::new(2, 2);
+        cloth.save(home.join("cloth.png")).unwrap();
         fs::create_dir(home.join("take")).unwrap();
         let text = "[camera]\nsource = \"take\"\ncalibration = \"lens.toml\"\n[tracking]\ndetector = \"aruco\"\n\
             [[board]]\nname = \"b\"\nfamily = \"board.yml\"\nbundle = \"tags.yaml\"\n\
             [[marker]]\nname = \"m\"\nfamily = \"marker.yml\"\nid = 1\nsize_m = 0.04\n\
+            [table]\nrect_m = [0, 0, 1, 1]\nalbedo_texture = \"cloth.png\"\n\
             [[phantom]]\nname = \"p\"\nmesh = \"phantom.obj\"\n[[virtual]]\nname = \"v\"\nmesh = \"virtual.obj\"\n\
             [probe]\nimage = \"probe.hdr\"\nroom = [\"floor.obj\", \"wall.obj\"]\n[[room]]\nmesh = \"shelf.obj\"\n";
         let scene = home.join("scene.toml");
@@ -361,12 +373,15 @@ mod tests {
         copy_scene(&scene, &session).unwrap();
         fs::remove_dir_all(&home).unwrap();
         let copy = Scene::load(&session.join(SCENE_NAME)).unwrap();
-        assert_eq!((copy.anchors.len(), copy.phantoms.len()), (2, 1));
+        assert_eq!((copy.anchors.len(), copy.phantoms.len()), (2, 2));
         assert_eq!(copy.probe.map(|probe| probe.room.len()), Some(3));
         // Folders that an older session is known by.
         let mut folders: Vec<&str> = copy_folders().collect();
         folders.sort_unstable();
-        assert_eq!(folders, ["bundles", "markers", "models", "probe", "room"]);
+        assert_eq!(
+            folders,
+            ["bundles", "markers", "models", "pictures", "probe", "room"]
+        );
     }
 
     #[test]
@@ -410,6 +425,33 @@ mod tests {
         ] {
             assert!(written.contains(comment), "{comment}: {written}");
         }
+    }
+
+    #[test]
+    fn a_picture_that_a_scene_lays_on_its_table_goes_along() {
+        let folder = tempfile::tempdir().unwrap();
+        let picture = |name: &str, grey: u8| {
+            let picture = image::RgbImage::from_pixel(2, 1, image::Rgb([grey; 3]));
+            picture.save(folder.path().join(name)).unwrap();
+        };
+        picture("cloth.png", 188);
+        picture("a sheet.tga", 255);
+        let scene = folder.path().join("scene.toml");
+        let text = "[camera]\nsource = \"webcam:0\"\n[[marker]]\nname = \"m\"\nid = 0\nsize_m = 0.05\n\
+                    [table]\nrect_m = [0, 0, 1, 1]\nalbedo_texture = \"cloth.png\"  # linen\n\
+                    [[phantom]]\nname = \"p\"\nrect_m = [0.2, 0.3]\nmaterial = { albedo_texture = \"a sheet.tga\" }\n";
+        fs::write(&scene, text).unwrap();
+        let session = folder.path().join("session");
+        fs::create_dir(&session).unwrap();
+        copy_scene(&scene, &session).unwrap();
+        fs::remove_file(folder.path().join("cloth.png")).unwrap();
+        fs::remove_file(folder.path().join("a sheet.tga")).unwrap();
+        let copied = session.join(SCENE_NAME);
+        let copy = Scene::load(&copied).unwrap();
+        let albedos = copy.phantoms.iter().map(|phantom| phantom.albedo(0).x);
+        let percent: Vec<f64> = albedos.map(|albedo| (albedo * 100.0).round()).collect();
+        assert_eq!(percent, [50.0, 100.0]);
+        assert!(fs::read_to_string(&copied).unwrap().contains("# linen"));
     }
 
     #[test]

@@ -1,6 +1,12 @@
 //! Progress bars with what is done and time left; shown only where stderr is a terminal.
 
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread;
+use std::time::Duration;
+
 use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::scene::{LoadStage, Loading};
 
 /// A progress bar that counts frames, or measurements.
 pub struct Progress(ProgressBar);
@@ -25,6 +31,30 @@ impl Progress {
     pub fn of_measurements(count: usize) -> Self {
         let bar = ProgressBar::new(count as u64);
         Self::styled(bar, "{bar:40} {pos}/{len}  {msg}  {elapsed} so far")
+    }
+
+    /// Shows how far models are while `work` reads them.
+    pub fn of_models<T>(loading: &Loading, work: impl FnOnce() -> T) -> T {
+        const PERIOD: Duration = Duration::from_millis(100);
+        let bar = Self::styled(ProgressBar::new_spinner(), "{spinner} {msg}  {elapsed}");
+        if bar.0.is_hidden() {
+            return work();
+        }
+        thread::scope(|scope| {
+            let (done, waits) = channel::<()>();
+            scope.spawn(move || {
+                while waits.recv_timeout(PERIOD) == Err(RecvTimeoutError::Timeout) {
+                    if loading.stage() > LoadStage::Waiting {
+                        bar.tell(&loading.in_words());
+                        bar.0.tick();
+                    }
+                }
+                bar.finish();
+            });
+            let worked = work();
+            drop(done);
+            worked
+        })
     }
 
     fn styled(bar: ProgressBar, template: &str) -> Self {

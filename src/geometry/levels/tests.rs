@@ -1,5 +1,6 @@
 use super::*;
-use crate::geometry::mesh::RawTriangle;
+use crate::geometry::mesh::{RawLooks, RawTriangle};
+use glam::{Vec2, Vec4};
 use std::f32::consts::{PI, TAU};
 
 fn raw(vertices: [u32; 3], material: u32) -> RawTriangle {
@@ -308,6 +309,92 @@ fn smooth_surfaces_keep_their_normals_and_materials_their_parts() {
         }
         assert!((areas[0] / areas[1] - 1.0).abs() < 0.1, "{areas:?}");
     }
+}
+
+/// A torus whose picture has a seam both ways round.
+fn pictured_torus(columns: u32, rows: u32) -> (Mesh, impl Fn(Vec2) -> DVec3) {
+    let place = |uv: Vec2| {
+        let ((sin_u, cos_u), (sin_v, cos_v)) = (turn(uv.x), turn(uv.y));
+        let radius = 1.0 + 0.4 * cos_v;
+        Vec3::new(radius * cos_u, radius * sin_u, 0.4 * sin_v)
+    };
+    let uv =
+        |column: u32, row: u32| Vec2::new(column as f32 / columns as f32, row as f32 / rows as f32);
+    let at = |column: u32, row: u32| row * (columns + 1) + column;
+    let (mut positions, mut looks) = (Vec::new(), RawLooks::default());
+    for (row, column) in (0..=rows).flat_map(|row| (0..=columns).map(move |column| (row, column))) {
+        positions.push(place(uv(column, row)));
+        looks.looks.push(CornerLook {
+            uv: [uv(column, row), Vec2::ZERO],
+            ..CornerLook::default()
+        });
+    }
+    let mut triangles = Vec::new();
+    for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+        let [a, b] = [at(column, row), at(column + 1, row)];
+        let [c, d] = [at(column + 1, row + 1), at(column, row + 1)];
+        for corners in [[a, b, c], [a, c, d]] {
+            triangles.push(raw(corners, 0));
+            looks.corners.push(corners);
+        }
+    }
+    let mesh = Mesh::weld_with_looks(&positions, &triangles, &looks, 1.0).0;
+    (mesh, move |uv| place(uv).as_dvec3())
+}
+
+#[test]
+fn a_picture_keeps_its_seams_and_slides_no_farther_than_is_said() {
+    let (mesh, place) = pictured_torus(80, 40);
+    assert!(mesh.closed_and_consistent());
+    let sag_m = 1.4 * (1.0 - (std::f64::consts::PI / 80.0).cos())
+        + 0.4 * (1.0 - (std::f64::consts::PI / 40.0).cos());
+    let levels = levels(&mesh);
+    assert!(levels.len() >= 4, "{}", levels.len());
+    for level in &levels {
+        assert!(level.mesh.closed_and_consistent());
+        let mut most_m: f64 = 0.0;
+        for (corners, looks) in corners(&level.mesh).zip(&level.mesh.corner_looks) {
+            let uv = looks.map(|look| level.mesh.looks[look as usize].uv[0]);
+            for (i, j) in (0..=4_u32).flat_map(|i| (0..=4 - i).map(move |j| (i, j))) {
+                let [x, y] = [i, j].map(|part| part as f32 / 4.0);
+                let shown = uv[0] + (uv[1] - uv[0]) * x + (uv[2] - uv[0]) * y;
+                let [x, y] = [x, y].map(f64::from);
+                let here =
+                    corners[0] + (corners[1] - corners[0]) * x + (corners[2] - corners[0]) * y;
+                most_m = most_m.max(here.distance(place(shown)));
+            }
+        }
+        let said_m = level.max_error_m;
+        assert!(
+            most_m < 1.5 * said_m + 2.0 * sag_m,
+            "{most_m}, said {said_m}"
+        );
+    }
+}
+
+/// A flat sheet whose corners have the colours of a ramp may lose them all, one of a noise none.
+#[test]
+fn colours_at_corners_are_kept() {
+    let counts = [true, false].map(|is_even| {
+        let mut next = numbers(5);
+        let flat = |u: f32, v: f32| Vec3::new(u, v, 0.0);
+        let mut mesh = patch([30, 30], 0.0, flat, |_, _| 0);
+        let color = |place: &Vec3| match is_even {
+            true => place.extend(1.0),
+            false => Vec4::new(next(), next(), next(), 1.0),
+        };
+        let colors: Vec<Vec4> = mesh.positions.iter().map(color).collect();
+        mesh.looks = colors
+            .into_iter()
+            .map(|color| CornerLook {
+                color,
+                ..CornerLook::default()
+            })
+            .collect();
+        mesh.corner_looks = mesh.triangles.clone();
+        levels(&mesh).len()
+    });
+    assert!(counts[0] >= 3 && counts[1] == 0, "{counts:?}");
 }
 
 #[test]

@@ -186,7 +186,6 @@ impl Environment {
             wgpu::BindingResource::Sampler(&self.sampler),
             wgpu::BindingResource::TextureView(&mirrored.view),
             wgpu::BindingResource::Sampler(&mirrored.sampler),
-            wgpu::BindingResource::TextureView(&mirrored.layer_albedo),
         ];
         let group = gpu.bind_group(
             &ENVIRONMENT_GROUP,

@@ -22,7 +22,6 @@ pub(super) const ENVIRONMENT_GROUP: GroupLayout = GroupLayout {
         sampler(6),
         filtered(7),
         sampler(8),
-        filtered(9),
     ],
 };
 

@@ -4,15 +4,17 @@
 //! What depends on where things are in the world is worked out when they move, not when the camera does.
 
 pub(super) mod data;
+mod pictured;
 mod pipelines;
 
 use glam::{DAffine3, DVec3, Vec3};
 
 use crate::geometry::bounds::Bounds;
 use crate::geometry::reach::{self, PixelRect};
-use crate::scene::{Difference, ProbeScene, Scene, ShaftSettings};
+use crate::scene::{Difference, Object, ProbeScene, Scene, ShaftSettings};
 use crate::shafts::bounding::Aabb;
 use crate::shafts::casters::{PlacedCasters, ShaftCasters};
+use crate::shafts::difference::Terms;
 use crate::shafts::hidden_light::{HiddenLight, ShadowOptions};
 use crate::shafts::patches::RoomPatch;
 use crate::shafts::receiver_patches::ReflectedCorner;
@@ -39,11 +41,14 @@ use super::surfaces::SurfaceKinds;
 use super::technique::{FrameContext, TechniquePasses};
 use super::volumes::set_scissor;
 use data::ShaftFrame;
+use pictured::Pictured;
 use pipelines::{Pipelines, SHAFT_GROUP};
 
 /// The technique that shades all of a room's light by shafts.
 pub(super) struct ShaftsAlone {
     shafts: Shafts,
+    /// The real things whose pictures count: where radiance is taken away, and there are some.
+    pictured: Option<Pictured>,
     sums: LightSums,
 }
 
@@ -53,6 +58,8 @@ pub(super) struct Shafts {
     /// Of the room that `room` is the transport of.
     surfaces_key: u64,
     settings: ShaftSettings,
+    /// For each standing phantom whether a picture says what it reflects.
+    is_pictured: Vec<bool>,
     casters: ShaftCasters,
     pipelines: Pipelines,
     maps: MapAtlas,
@@ -152,6 +159,7 @@ impl Shafts {
             environment: MirroredProbe::new(device, &gpu.queue, environment),
             world_from_anchor: Vec::new(),
             hidden: None,
+            is_pictured: scene.standing_phantoms().map(Object::is_pictured).collect(),
             settings,
             surfaces_key,
             room,
@@ -198,7 +206,10 @@ impl Shafts {
             sources: self.settings.sources,
             map_px: self.settings.map_px,
             largest_atlas_px: gpu.device.limits().max_texture_dimension_2d,
-            difference: self.settings.difference,
+            terms: Terms {
+                difference: self.settings.difference,
+                pictured: &self.is_pictured,
+            },
         };
         let hidden = HiddenLight::new(&self.room, placed, &options);
         self.maps.resize(&gpu.device, hidden.tiling);
@@ -238,7 +249,6 @@ impl Shafts {
             wgpu::BindingResource::Sampler(&self.sampler),
             wgpu::BindingResource::TextureView(&self.environment.view),
             wgpu::BindingResource::Sampler(&self.environment.sampler),
-            wgpu::BindingResource::TextureView(&self.environment.layer_albedo),
         ];
         gpu.bind_group(&SHAFT_GROUP, buffers.into_iter().chain(textures))
     }
@@ -383,8 +393,11 @@ enum Receivers {
 impl ShaftsAlone {
     /// Around a room's light.
     pub fn new(gpu: &Gpu, scene: &Scene, background: &Background, shafts: Shafts) -> Self {
-        let shader = composite(scene.shadows.shafts.difference);
+        let difference = scene.shadows.shafts.difference;
+        let counts = difference == Difference::Subtract;
+        let shader = composite(difference);
         Self {
+            pictured: counts.then(|| Pictured::new(gpu, scene)).flatten(),
             sums: LightSums::new(gpu, background, scene.shadows.samples, shader),
             shafts,
         }
@@ -432,6 +445,9 @@ impl TechniquePasses for ShaftsAlone {
         let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
         self.shafts
             .draw_light(&mut pass, gpu_scene, pixels, Receivers::Shadowed);
+        if let Some(pictured) = &self.pictured {
+            pictured.multiply(&mut pass, gpu_scene);
+        }
         drop(pass);
         self.sums.composite(passes, frame);
     }

@@ -24,7 +24,6 @@ pub(super) const SHAFT_GROUP: GroupLayout = GroupLayout {
         sampler(6),
         filtered(7),
         sampler(8),
-        filtered(9),
     ],
 };
 

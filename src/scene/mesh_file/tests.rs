@@ -8,7 +8,7 @@ fn read_text(path: &Path, text: &str, normals: Normals) -> Result<LoadedMesh, Sc
         path,
         text.into(),
         (MeshReading::plain(normals), None),
-        &|_| (),
+        (&|_| (), &|_| Ok(())),
     )
 }
 
@@ -119,9 +119,14 @@ fn models_are_turned_upright_and_fitted() {
             fit_m,
             ..MeshReading::plain(SMOOTH)
         };
-        read(Path::new("a.obj"), text.into(), (reading, None), &|_| ())
-            .unwrap()
-            .mesh
+        read(
+            Path::new("a.obj"),
+            text.into(),
+            (reading, None),
+            (&|_| (), &|_| Ok(())),
+        )
+        .unwrap()
+        .mesh
     };
     assert_eq!(read(Some(Up::Z), None), read(None, None));
     let upright = read(Some(Up::Y), Some(0.2));

@@ -53,7 +53,7 @@ fn load(added: &str) -> Result<Scene, SceneError> {
 }
 
 fn in_anchor(object: &Object) -> Mesh {
-    let mut mesh = object.mesh.clone();
+    let mut mesh = Mesh::clone(&object.mesh);
     for position in &mut mesh.positions {
         *position = object
             .anchor_from_object

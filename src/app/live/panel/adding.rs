@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, channel};
 
-use eframe::egui::{Button, ComboBox, Ui};
+use eframe::egui::{Button, ComboBox, ProgressBar, Ui};
 
 use crate::app::live::adding::{WantedShape, WantedThing};
 use crate::app::live::command::{Commands, SceneCommand};
-use crate::scene::Scene;
+use crate::scene::{LoadStage, Scene};
 
 /// Names of files that models have.
 const MODELS: [&str; 5] = ["glb", "gltf", "obj", "ply", "stl"];
@@ -20,7 +20,29 @@ pub struct Adding {
     on: Option<String>,
     file: String,
     /// Where the system's dialog tells of a file.
-    dialog: Option<Receiver<Option<PathBuf>>>,
+    pub(super) dialog: Option<Receiver<Option<PathBuf>>>,
+}
+
+/// Shows how far models are that are on their way into the scene.
+pub fn being_read(ui: &mut Ui, reading: &[(&str, LoadStage)], commands: &mut Commands) {
+    for (name, stage) in reading {
+        ui.horizontal(|ui| {
+            let text = format!("{name} {}", stage.in_words());
+            ui.add(
+                ProgressBar::new(stage.part())
+                    .desired_width(220.0)
+                    .text(text)
+                    .animate(true),
+            );
+            if ui
+                .button("stop")
+                .on_hover_text("read it no further")
+                .clicked()
+            {
+                commands.push(SceneCommand::GiveUpReading((*name).to_owned()));
+            }
+        });
+    }
 }
 
 impl Adding {

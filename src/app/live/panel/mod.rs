@@ -11,6 +11,7 @@ mod times;
 mod tracking;
 
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::Receiver;
 
 use eframe::egui::{CollapsingHeader, ScrollArea, Ui};
 
@@ -20,7 +21,7 @@ use super::frame_tracker::TrackedPicture;
 use super::meters::Meters;
 use super::views::ViewMode;
 use super::window_state::WindowState;
-use crate::scene::{Placement, Scene, Shortcut, Shortcuts};
+use crate::scene::{LoadStage, Placement, Scene, Shortcut, Shortcuts};
 use adding::Adding;
 use editing::Editing;
 use first_use::FirstUse;
@@ -55,6 +56,8 @@ pub struct Facts<'a> {
     pub adapter: &'a str,
     /// Whether a session and a video are being recorded.
     pub records: [bool; 2],
+    /// The models that are being read: what they will be called, and how far they are.
+    pub reading: Vec<(&'a str, LoadStage)>,
     /// Where a light is being found in the picture: pairs that were clicked, and whether a shadow is to be clicked next.
     pub clicks: Option<(usize, bool)>,
 }
@@ -69,9 +72,25 @@ pub struct Panel {
 }
 
 impl Panel {
-    /// A model that was dropped on the picture, as what was chosen for the next thing.
-    pub fn add_model(&self, path: PathBuf, commands: &mut Commands) {
-        self.adding.add(WantedShape::Model(path), commands);
+    /// Files that were dropped on the picture: each a model, as what was chosen for the next thing.
+    pub fn add_dropped<'a>(
+        &self,
+        files: impl IntoIterator<Item = &'a Path>,
+        commands: &mut Commands,
+    ) {
+        // (What has no path is no file of this machine.)
+        let named = files
+            .into_iter()
+            .filter(|file| !file.as_os_str().is_empty());
+        for file in named {
+            self.adding
+                .add(WantedShape::Model(file.to_owned()), commands);
+        }
+    }
+
+    /// The system's dialog is open from now on; what is chosen in it comes here.
+    pub fn await_dialog(&mut self, chosen: Receiver<Option<PathBuf>>) {
+        self.adding.dialog = Some(chosen);
     }
 
     /// Shows it: what is asked for.
@@ -89,6 +108,7 @@ impl Panel {
                 if let Some(scene) = facts.scene {
                     section(ui, "Things", true, |ui| {
                         self.adding.show(ui, scene, &mut commands);
+                        adding::being_read(ui, &facts.reading, &mut commands);
                         let fields = (&mut *editing, &mut self.things);
                         things::show(ui, (scene, facts.placement), look, fields, &mut commands);
                     });

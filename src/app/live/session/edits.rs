@@ -48,6 +48,7 @@ impl LiveSession {
                 None => {}
             },
             SceneCommand::Add(wanted) => self.add(&wanted),
+            SceneCommand::GiveUpReading(name) => self.give_up_reading(&name),
             SceneCommand::DuplicateSelected => {
                 if let Some(Selected::Thing(name)) = &state.selected {
                     self.duplicate(name);

@@ -6,12 +6,12 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use glam::DVec3;
 
-use super::super::adding::{self, WantedThing, allowed_name, free_name, free_place};
+use super::super::adding::{self, WantedShape, WantedThing, allowed_name, free_name, free_place};
 use super::super::command::Selected;
 use super::LiveSession;
 use crate::app::authoring::{Edit, EditError, NewForm, NewThing};
 use crate::app::window::notices::Weight;
-use crate::scene::Scene;
+use crate::scene::{LoadStage, Loading, Scene};
 
 /// How far beside a thing its copy stands, metres.
 const COPY_BESIDE: DVec3 = DVec3::new(0.06, 0.0, 0.0);
@@ -19,13 +19,13 @@ const COPY_BESIDE: DVec3 = DVec3::new(0.06, 0.0, 0.0);
 /// A model that is being read.
 pub(super) struct ReadAhead {
     thing: NewThing,
+    loading: Loading,
     given: Receiver<Result<Scene, EditError>>,
 }
 
 impl LiveSession {
     /// Adds a thing, at once or when its model is read.
     pub(super) fn add(&mut self, wanted: &WantedThing) {
-        let wake = Arc::clone(&self.wake);
         let Some(scene) = self.scene.open_mut() else {
             return self.tell(Weight::Trouble, "There is no scene yet to add anything to.");
         };
@@ -34,23 +34,63 @@ impl LiveSession {
         // (What is being read has its name already.)
         let is_read = |name: &str| scene.reading.iter().any(|other| other.thing.name == name);
         let thing = wanted.in_scene(document.scene(), folder, is_read);
-        if !matches!(thing.form, NewForm::Mesh { .. }) {
-            return self.add_thing(thing);
+        match &wanted.shape {
+            WantedShape::Model(file) => match adding::no_model(file) {
+                None => self.read(thing),
+                Some(reason) => self.tell(Weight::Trouble, reason),
+            },
+            _ => self.add_thing(thing),
         }
+    }
+
+    /// Begins to read a thing's model beside the picture.
+    fn read(&mut self, thing: NewThing) {
+        let wake = Arc::clone(&self.wake);
+        let Some(scene) = self.scene.open_mut() else {
+            return;
+        };
         let (giver, given) = channel();
-        let read = document.read_ahead(&Edit::AddThing(thing.clone()), move |read| {
-            // (Nobody waits for it where the window has closed meanwhile.)
-            _ = giver.send(read);
-            wake();
-        });
+        let loading = Loading::default();
+        let edit = Edit::AddThing(thing.clone());
+        let read = scene
+            .document
+            .read_ahead(&edit, loading.clone(), move |read| {
+                // (Nobody waits for it where the window has closed meanwhile.)
+                _ = giver.send(read);
+                wake();
+            });
         match read {
-            Ok(()) => {
-                let text = format!("Reading \"{}\" …", thing.name);
-                scene.reading.push(ReadAhead { thing, given });
-                self.tell(Weight::Done, text);
-            }
+            Ok(()) => scene.reading.push(ReadAhead {
+                thing,
+                loading,
+                given,
+            }),
             Err(error) => self.tell(Weight::Trouble, error.to_string()),
         }
+    }
+
+    /// The models that are being read: what they will be called, and how far they are.
+    pub fn models_being_read(&self) -> impl Iterator<Item = (&str, LoadStage)> {
+        let reading = self
+            .scene
+            .open()
+            .into_iter()
+            .flat_map(|scene| &scene.reading);
+        reading.map(|reading| (reading.thing.name.as_str(), reading.loading.stage()))
+    }
+
+    /// Reads a model no further.
+    pub(super) fn give_up_reading(&mut self, name: &str) {
+        let Some(scene) = self.scene.open_mut() else {
+            return;
+        };
+        scene.reading.retain(|reading| {
+            let stays = reading.thing.name != name;
+            if !stays {
+                reading.loading.give_up();
+            }
+            stays
+        });
     }
 
     /// Adds what has been read.
@@ -87,6 +127,9 @@ impl LiveSession {
                             wanted * 100.0
                         );
                         self.tell(Weight::Trouble, text);
+                        // What is scaled is another model: it is read beside the picture, too.
+                        self.read(thing);
+                        continue;
                     }
                     self.place_again(&mut thing);
                     self.add_thing(thing);
