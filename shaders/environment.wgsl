@@ -4,6 +4,9 @@
 //!include "light_sums.wgsl"
 //!include "depth_moments.wgsl"
 //!include "mirrored.wgsl"
+//!if HARMONIC_GLOSS
+//!include "harmonic_gloss.wgsl"
+//!end
 
 struct EnvironmentFrame {
     world_from_camera: mat4x4f,
@@ -263,6 +266,10 @@ fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: boo
     var taken = vec3f(0.0);
     var whole_gloss = vec3f(1e-6);
     var taken_gloss = vec3f(0.0);
+//!if HARMONIC_GLOSS
+    let direction = reflect(-to_camera, normal);
+    let exponent = phong_exponent(max(look.roughness, 0.01));
+//!end
     let point = vec4f(point_in_world, 1.0);
     for (var index = 0u; index < frame.region_count; index++) {
         let region = region(index);
@@ -271,19 +278,32 @@ fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: boo
         if cosine <= 0.0 {
             continue;
         }
-        let arriving = region.irradiance * (cosine * self_visibility(sampled, index));
+        let seen = self_visibility(sampled, index);
+        let arriving = region.irradiance * (cosine * seen);
         let hidden = 1.0 - left_by(0u, frame.caster_count, index, region, point, sampled.thing);
-        let gloss = arriving * lobe(look.roughness, normal, toward, to_camera, region.spread);
         whole += arriving;
         taken += arriving * hidden;
+//!if HARMONIC_GLOSS
+        // Equation 15, which knows no cosine.
+        taken_gloss += region.irradiance * (seen * hidden * phong_lobe(exponent, direction, toward));
+//!else
+        let gloss = arriving * lobe(look.roughness, normal, toward, to_camera, region.spread);
         whole_gloss += gloss;
         taken_gloss += gloss * hidden;
+//!end
     }
     // The paper takes off what is hidden (equation 3). A part of what arrives is never more than all of it, whatever the few
     // regions miss.
     let subtracted = max(surface.indirect - taken, vec3f(0.0));
     let scaled = surface.indirect * (1.0 - taken / max(whole, vec3f(1e-6)));
     let arriving = select(scaled, subtracted, BY_PLANES);
+//!if HARMONIC_GLOSS
+    if GLOSSY && look.roughness > 0.0 {
+        let mean = max(mean_over_lobe(sampled, exponent) - taken_gloss, vec3f(0.0));
+        let radiance = radiance_of_layers(look, max(dot(normal, to_camera), 1e-3), diffuse_below(look, arriving), mean);
+        return LightSums(vec4f(0.0), vec4f(radiance, 1.0));
+    }
+//!end
     let left = 1.0 - taken_gloss / whole_gloss;
     return LightSums(vec4f(0.0), vec4f(radiance_in_probe(look, normal, to_camera, arriving, left), 1.0));
 }

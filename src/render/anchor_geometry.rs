@@ -156,25 +156,47 @@ pub(super) struct AnchorGeometry {
     pub things: Vec<AnchoredModel>,
 }
 
-/// Coarser versions of meshes, which take long to make: each with the mesh that it is of.
+/// Other versions of meshes, which take long to make: each with the mesh that it is of.
 #[derive(Default)]
-pub(super) struct KnownLevels(Vec<(Mesh, Vec<Level>)>);
+pub(super) struct KnownLevels {
+    coarser: Vec<(Mesh, Vec<Level>)>,
+    /// In place of their meshes, without coarser ones.
+    finer: Vec<(Mesh, Mesh)>,
+}
 
 impl KnownLevels {
-    /// The coarser versions of a mesh, made where they are not known.
-    fn of(&mut self, mesh: &Mesh) -> &[Level] {
-        let known = self.0.iter().position(|(known, _)| known == mesh);
-        let index = known.unwrap_or_else(|| {
-            self.0.push((mesh.clone(), levels(mesh)));
-            self.0.len() - 1
-        });
-        &self.0[index].1
+    /// Some are drawn as finer ones.
+    pub fn with_finer(finer: Vec<(Mesh, Mesh)>) -> Self {
+        Self {
+            finer,
+            ..Self::default()
+        }
     }
 
-    /// Those that are known.
-    pub fn known(&self, mesh: &Mesh) -> &[Level] {
-        let known = self.0.iter().find(|(known, _)| known == mesh);
-        known.map_or(&[], |(_, levels)| levels)
+    /// What a mesh is drawn as, and that's coarser versions, made where they are not known.
+    fn of<'a>(&'a mut self, mesh: &'a Mesh, with_levels: bool) -> (&'a Mesh, &'a [Level]) {
+        if let Some((_, finer)) = self.finer.iter().find(|(known, _)| known == mesh) {
+            return (finer, &[]);
+        }
+        if !with_levels {
+            return (mesh, &[]);
+        }
+        let known = self.coarser.iter().position(|(known, _)| known == mesh);
+        let index = known.unwrap_or_else(|| {
+            self.coarser.push((mesh.clone(), levels(mesh)));
+            self.coarser.len() - 1
+        });
+        (mesh, &self.coarser[index].1)
+    }
+
+    /// What a mesh is drawn as, the finest first.
+    pub fn drawn<'a>(&'a self, mesh: &'a Mesh) -> impl Iterator<Item = &'a Mesh> {
+        let finer = self.finer.iter().find(|(known, _)| known == mesh);
+        let finest = finer.map_or(mesh, |(_, finer)| finer);
+        let coarser = self.coarser.iter().find(|(known, _)| known == mesh);
+        let coarser = coarser.filter(|_| finer.is_none());
+        let coarser = coarser.into_iter().flat_map(|(_, levels)| levels);
+        std::iter::once(finest).chain(coarser.map(|level| &level.mesh))
     }
 }
 
@@ -209,10 +231,7 @@ impl AnchorGeometry {
                     let with_levels = coarsest_px > 0.0
                         && object.animation.is_none()
                         && !scene.shadows.without.has(Shortcut::Levels);
-                    let coarser = match with_levels {
-                        true => known.of(&object.mesh),
-                        false => &[],
-                    };
+                    let drawn = known.of(&object.mesh, with_levels);
                     let before = objects.iter().take(index);
                     shared.first_material =
                         before.map(|object| object.materials.len() as u32).sum();
@@ -220,7 +239,7 @@ impl AnchorGeometry {
                         Role::Real => index,
                         Role::Virtual => scene.phantoms.len() + index,
                     } as u32;
-                    let thing = thing(gpu, (role, tie), object, coarser, &mut shared);
+                    let thing = thing(gpu, (role, tie), object, drawn, &mut shared);
                     geometry.things.extend(thing);
                 }
                 if shared.triangles.is_empty() {
@@ -263,11 +282,11 @@ fn thing(
     gpu: &Gpu,
     (role, tie): (Role, Option<usize>),
     object: &Object,
-    coarser: &[Level],
+    (mesh, coarser): (&Mesh, &[Level]),
     shared: &mut SharedCorners,
 ) -> Option<AnchoredModel> {
     let scale = largest_scale(&object.anchor_from_object);
-    let itself = (&object.mesh, [0.0; 3]);
+    let itself = (mesh, [0.0; 3]);
     let coarser = coarser.iter().map(|level| {
         let lengths_m = [level.max_error_m, level.mean_error_m, level.largest_facet_m];
         (&level.mesh, lengths_m)

@@ -379,7 +379,7 @@ impl Turning {
     fn precomputed(&self) -> (f64, f64) {
         let torus = &self.stage.scene.virtuals[0];
         let space = OwnSpace::new(&torus.anchor_from_object);
-        let surface = OwnSurface::new(&torus.mesh, std::iter::empty(), &space);
+        let surface = OwnSurface::new(&torus.mesh, std::iter::once(&torus.mesh), &space);
         let (occlusions, ms) = Stopwatch::time(|| surface.self_occlusions());
         let bytes = occlusions.len() * size_of::<SelfOcclusion>();
         (ms / 1e3, bytes as f64 / 1e3)

@@ -4,6 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DMat3, DVec4, Mat4, Vec3, Vec4};
 use wgpu::util::DeviceExt as _;
 
+use crate::environment::glossy::EnvironmentMatrix;
 use crate::environment::occlusion_map::OcclusionMap;
 use crate::environment::reflected::DiscNode;
 use crate::environment::self_occlusion::{VISIBILITIES, VISIBILITY_DEGREE};
@@ -121,6 +122,25 @@ pub(super) fn receiver_texels(
         let scale = f64::from(u8::from(is_open));
         let rows = basis.as_chunks::<4>().0.iter();
         texels.extend(rows.map(|row| words(DVec4::from_array(*row).as_vec4() * scale as f32)));
+    }
+    texels
+}
+
+/// For each thing what the environment makes of its visibility, a texel for each entry; `world_from_own` says how it stands.
+pub(super) fn gloss_texels(
+    matrix: &EnvironmentMatrix,
+    world_from_own: impl Iterator<Item = Option<DMat3>>,
+) -> Vec<[u32; 4]> {
+    let mut texels = Vec::new();
+    for turn in world_from_own {
+        match turn {
+            Some(turn) => {
+                let entries = matrix.seen_by(turn);
+                let entries = entries.as_flattened().iter();
+                texels.extend(entries.map(|entry| words(entry.as_vec3().extend(0.0))));
+            }
+            None => texels.extend([[0; 4]; VISIBILITIES * VISIBILITIES]),
+        }
     }
     texels
 }

@@ -12,10 +12,14 @@ mod pipelines;
 use glam::DAffine3;
 
 use crate::environment::distant_light::DistantLight;
+use crate::environment::finer;
+use crate::environment::glossy::EnvironmentMatrix;
 use crate::environment::placed::PlacedScene;
+use crate::environment::self_occlusion::OwnSpace;
 use crate::environment::sky::Sky;
 use crate::environment::thing::Thing;
 use crate::geometry::bounds::Bounds;
+use crate::geometry::mesh::Mesh;
 use crate::geometry::reach::{self, PixelRect};
 use crate::light::Light;
 use crate::light::probe::Probe;
@@ -31,7 +35,9 @@ use super::mirrored_probe::MirroredProbe;
 use super::passes::Passes;
 use super::precomputation::Precomputation;
 use casting::Casting;
-use data::{EnvironmentFrame, disc_texels, map_texels, receiver_texels, region_texels, table};
+use data::{
+    EnvironmentFrame, disc_texels, gloss_texels, map_texels, receiver_texels, region_texels, table,
+};
 use own_light::OwnLight;
 use pipelines::{ENVIRONMENT_GROUP, Pipelines};
 
@@ -48,6 +54,8 @@ pub(super) struct Environment {
     /// The node that it turns with.
     anchor: usize,
     distant: DistantLight,
+    /// The light as the paper's glossy things take it; `None`: none are drawn its way.
+    gloss: Option<EnvironmentMatrix>,
     /// By their numbers in the scene, phantoms first; `None`: not there.
     things: Vec<Option<Thing>>,
     /// Where light is summed up by corners.
@@ -97,7 +105,9 @@ impl Environment {
             EnvironmentMethod::Penumbrae | EnvironmentMethod::Maps => None,
         };
         let kinds = gpu_scene.kinds;
+        let is_by_harmonics = kinds.glossy && settings.method == EnvironmentMethod::Maps;
         Self {
+            gloss: is_by_harmonics.then(|| EnvironmentMatrix::new(&rest.0, rest.1)),
             distant: DistantLight::new(&rest.0, rest.1, settings.regions as usize),
             rest,
             anchor: probe.anchor,
@@ -159,6 +169,13 @@ impl Environment {
                 receiver_texels(thing, anchor_from_own, world_from_anchor, regions, open)
             })
             .collect();
+        let turns = (0..self.things.len()).map(|number| {
+            let anchor = self.things[number].as_ref()?.anchor;
+            let pose = world_from_anchor[anchor]?;
+            Some(pose.matrix3 * self.own_light.anchor_from_own(number))
+        });
+        let gloss = self.gloss.as_ref();
+        let gloss = gloss.map_or(Vec::new(), |matrix| gloss_texels(matrix, turns));
         let flat = |texels: Vec<[[u32; 4]; 5]>| texels.into_flattened();
         let tables = [
             table(
@@ -174,6 +191,7 @@ impl Environment {
                 &flat(discs.nodes.iter().map(disc_texels).collect()),
             ),
         ];
+        let gloss = table(gpu, "gloss", &gloss);
         let maps = gpu.buffer(
             "occlusion maps",
             bytemuck::cast_slice(&maps),
@@ -187,6 +205,7 @@ impl Environment {
             wgpu::BindingResource::TextureView(&mirrored.view),
             wgpu::BindingResource::Sampler(&mirrored.sampler),
             wgpu::BindingResource::TextureView(&mirrored.layer_albedo),
+            wgpu::BindingResource::TextureView(&gloss),
         ];
         let group = gpu.bind_group(
             &ENVIRONMENT_GROUP,
@@ -234,6 +253,28 @@ fn lit_by_corners(scene: &Scene, is_real_gathered: bool) -> Vec<Option<&Object>>
     real.chain(virtuals).collect()
 }
 
+/// The meshes whose light is worked out at corners and that have too few of these, each with a finer one; of phantoms only where
+/// no rays tell their light.
+pub(super) fn finer_meshes(
+    scene: &Scene,
+    precomputation: &dyn Precomputation,
+) -> Vec<(Mesh, Mesh)> {
+    let is_real_gathered = scene.shadows.environment.method == EnvironmentMethod::Rays;
+    let objects = lit_by_corners(scene, is_real_gathered);
+    let mut finer: Vec<(Mesh, Mesh)> = Vec::new();
+    for object in objects.into_iter().flatten() {
+        let mesh = &object.mesh;
+        if object.animation.is_some() || finer.iter().any(|(known, _)| known == mesh) {
+            continue;
+        }
+        let cuts = precomputation.cuts(mesh, &OwnSpace::new(&object.anchor_from_object));
+        if !cuts.is_empty() {
+            finer.push((mesh.clone(), finer::finer(mesh, &cuts)));
+        }
+    }
+    finer
+}
+
 /// They as light from afar meets them.
 fn things(scene: &Scene) -> Vec<Option<Thing>> {
     let real = scene.real_occluders();
@@ -262,6 +303,9 @@ impl BroadLight for Environment {
             self.rest = (rest.into_owned(), probe.exposure);
             let (rest, exposure) = (&self.rest.0, self.rest.1);
             self.distant = DistantLight::new(rest, exposure, self.settings.regions as usize);
+            if let Some(gloss) = &mut self.gloss {
+                *gloss = EnvironmentMatrix::new(rest, exposure);
+            }
             self.mirrored = None;
             if let Some(final_gather) = &mut self.final_gather {
                 final_gather.set_sky(|rays| Sky::new(rest, exposure, rays));

@@ -13,16 +13,17 @@ use crate::scene::EnvironmentMethod;
 pub(super) const ENVIRONMENT_GROUP: GroupLayout = GroupLayout {
     label: "environment",
     entries: &[
-        uniform(0, wgpu::ShaderStages::FRAGMENT, false),
-        words(1),
-        words(2),
-        words(3),
-        words(4),
+        uniform(0, wgpu::ShaderStages::VERTEX_FRAGMENT, false),
+        words(1, wgpu::ShaderStages::FRAGMENT),
+        words(2, wgpu::ShaderStages::FRAGMENT),
+        words(3, wgpu::ShaderStages::FRAGMENT),
+        words(4, wgpu::ShaderStages::FRAGMENT),
         filtered(5),
         sampler(6),
         filtered(7),
         sampler(8),
         filtered(9),
+        words(10, wgpu::ShaderStages::VERTEX),
     ],
 };
 
@@ -67,10 +68,14 @@ impl Pipelines {
             targets: vec![untouched(format), untouched(format)],
             ..described("ambient_on_real")
         };
+        let mut on_virtual = described("light_on_virtual");
+        if kinds.glossy && method == EnvironmentMethod::Maps {
+            on_virtual.flags.push("HARMONIC_GLOSS");
+        }
         Self {
             depth_of_real: Sided::new(gpu, &depth_alone),
             light_on_real: with_occlusion(described("light_on_real")),
-            light_on_virtual: with_occlusion(kinds.of_virtual(described("light_on_virtual"))),
+            light_on_virtual: with_occlusion(kinds.of_virtual(on_virtual)),
         }
     }
 }
