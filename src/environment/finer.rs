@@ -187,3 +187,90 @@ fn is_between(found: &Transfer, corners: &[Transfer; 3], weights: [f32; 3]) -> b
     // The square of a cosine over the hemisphere.
     squares.sum::<f64>() < OFF * OFF * 2.0 * PI / 3.0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::mesh::RawTriangle;
+    use glam::{DAffine3, DMat3};
+
+    fn welded(positions: &[Vec3], triangles: &[[u32; 3]]) -> Mesh {
+        let raw = triangles.iter().map(|&vertices| RawTriangle {
+            vertices,
+            normals: [None; 3],
+            material: 0,
+        });
+        Mesh::weld(positions, &raw.collect::<Vec<_>>(), 0.0).0
+    }
+
+    /// A floor and a wall, open at their backs.
+    fn corner() -> Mesh {
+        let positions = [
+            Vec3::ZERO,
+            Vec3::X,
+            Vec3::new(1.0, 1.0, 0.0),
+            Vec3::Y,
+            Vec3::Z,
+            Vec3::new(0.0, 1.0, 1.0),
+        ];
+        welded(&positions, &[[0, 1, 2], [0, 2, 3], [0, 3, 5], [0, 5, 4]])
+    }
+
+    /// How far transfer between the corners of a mesh is off what rays find, at places on the floor, root mean square as a part of
+    /// what a place has from which nothing is hidden.
+    fn off(mesh: &Mesh, whole: &Mesh) -> f64 {
+        let space = OwnSpace::new(&DAffine3::IDENTITY);
+        let looking = Looking {
+            space: &space,
+            rays: OwnRays::new(whole, &space),
+            size: space.size(whole),
+            directions: directions(RAYS),
+            normal_matrix: DMat3::IDENTITY,
+        };
+        let (mut squares, mut count) = (0.0, 0.0);
+        for (number, triangle) in mesh.triangles.iter().enumerate() {
+            let normals = mesh.corner_normals[number];
+            let corners = [0, 1, 2].map(|it| (mesh.positions[triangle[it] as usize], normals[it]));
+            if normals[0].z < 0.9 {
+                continue;
+            }
+            let [a, b, c] = corners.map(|(place, _)| place);
+            let area = f64::from((b - a).cross(c - a).length());
+            let ends = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+            let ends = ends.map(|weights| looking.transfer(&corners, weights));
+            for step in 0..12 {
+                let (u, v) = ((step as f32 * 0.618) % 1.0, (step as f32 + 0.5) / 12.0);
+                let weights = [1.0 - u.sqrt(), u.sqrt() * (1.0 - v), u.sqrt() * v];
+                let found = looking.transfer(&corners, weights);
+                let far = (0..TRANSFERS).map(|index| {
+                    let between: f32 = (0..3).map(|end| ends[end][index] * weights[end]).sum();
+                    f64::from(found[index] - between).powi(2)
+                });
+                squares += area * far.sum::<f64>();
+                count += area;
+            }
+        }
+        (squares / count / (2.0 * PI / 3.0)).sqrt()
+    }
+
+    #[test]
+    fn between_the_corners_of_a_finer_mesh_is_what_rays_find() {
+        let whole = corner();
+        let space = OwnSpace::new(&DAffine3::IDENTITY);
+        let cuts = cuts(&whole, &space, &|| true).expect("nobody stops it");
+        let finer = finer(&whole, &cuts);
+        let [before, after] = [&whole, &finer].map(|mesh| off(mesh, &whole));
+        assert!(after < OFF && after < 0.3 * before, "{before} {after}");
+        assert!(finer.triangles.len() < 1000, "{}", finer.triangles.len());
+        assert_eq!(super::cuts(&whole, &space, &|| false), None);
+    }
+
+    #[test]
+    fn what_hides_nothing_from_itself_is_left_whole() {
+        let (positions, triangles) = crate::geometry::cuboid::cuboid(Vec3::ZERO, Vec3::ONE);
+        let cube = welded(&positions, &triangles);
+        let space = OwnSpace::new(&DAffine3::from_rotation_x(0.4));
+        assert!(is_coarse(&cube, &space));
+        assert_eq!(cuts(&cube, &space, &|| true), Some(Cuts::new()));
+    }
+}

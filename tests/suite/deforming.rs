@@ -468,7 +468,7 @@ fn edits_are_followed_from_frame_to_frame_while_an_animation_plays() {
     let environment = |method| {
         let mut scene = in_a_recording("room", &models);
         let ball =
-            "[[virtual]]\nname = \"ball\"\nsphere_m = 0.03\nposition_m = [-0.05, -0.03, 0.02]\n";
+            "[[virtual]]\nname = \"further\"\nsphere_m = 0.03\nposition_m = [-0.05, -0.03, 0.02]\n";
         let file = project_file("config/room.toml");
         let text = std::fs::read_to_string(&file).expect("a scene that ships");
         let with_ball = Scene::parse(&file, &format!("{text}\n{ball}")).expect("a scene");

@@ -5,7 +5,7 @@ use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::geometry::ray_caster::RayCaster;
 use gnomon::light::probe::Probe;
 use gnomon::render::{Layers, REAL, Shown, VIRTUAL};
-use gnomon::scene::{Anchor, EnvironmentMethod, Object, ProbeScene, Scene, Technique};
+use gnomon::scene::{Anchor, EnvironmentMethod, Grouping, Object, ProbeScene, Scene, Technique};
 
 use crate::common::shapes::{cuboid, rectangle, sphere};
 use crate::common::{Picture, Stage, flat_mesh, look_at, object, scene};
@@ -222,6 +222,34 @@ fn black_boxes_take_of_a_table_what_the_sum_over_the_probe_says() {
         by_penumbrae < by_maps && by_maps < 0.08,
         "the paper's way {by_maps}, ours {by_penumbrae}"
     );
+}
+
+/// Two slabs, one close behind the other as most of the light comes, and a post beside them.
+fn stacked() -> Scene {
+    let at = |x: f64, y: f64, z: f64| DAffine3::from_translation(DVec3::new(x, y, z));
+    let slab = |name, place| black_box(name, [-0.05, -0.05, 0.0], [0.05, 0.05, 0.006], place);
+    under_sky(
+        0,
+        Vec::new(),
+        vec![
+            slab("upper", at(0.01, 0.0, 0.075)),
+            slab("lower", at(0.0, 0.0, 0.055)),
+        ],
+    )
+}
+
+#[test]
+fn things_close_behind_each_other_hide_light_once() {
+    let off = |method: EnvironmentMethod, grouping: Grouping| {
+        let mut scene = stacked();
+        scene.shadows.environment.method = method;
+        scene.shadows.environment.grouping = grouping;
+        off_exact(&scene)[0]
+    };
+    let [maps, penumbrae] = [EnvironmentMethod::Maps, EnvironmentMethod::Penumbrae]
+        .map(|method| [Grouping::Apart, Grouping::Together].map(|grouping| off(method, grouping)));
+    assert!(maps[1] < maps[0], "maps {maps:?}, penumbrae {penumbrae:?}");
+    println!("maps {maps:?}, penumbrae {penumbrae:?}");
 }
 
 #[test]

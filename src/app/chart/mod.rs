@@ -6,6 +6,8 @@ mod compositing;
 mod displacement;
 mod drawing;
 mod environment;
+mod environment_gloss;
+mod environment_pictures;
 mod family;
 mod figure;
 mod footage;
@@ -74,12 +76,13 @@ trait AnyChart {
 }
 
 /// All charts, in the order in which they are made and read.
-fn all() -> [Box<dyn AnyChart>; 13] {
+fn all() -> [Box<dyn AnyChart>; 14] {
     [
         Box::new(tracking::Tracking),
         Box::new(footage::Footage),
         Box::new(shadows::Shadows),
         Box::new(environment::EnvironmentChart),
+        Box::new(environment_pictures::EnvironmentPictures),
         Box::new(pictures::PicturesChart),
         Box::new(moved::Moved),
         Box::new(compositing::Compositing),

@@ -101,10 +101,10 @@ pub(super) fn disc_texels(node: &DiscNode) -> [[u32; 4]; 5] {
     ]
 }
 
-/// For a thing its middle, and for each region the harmonics in its direction as the thing sees it: turning the thing
+/// For a thing its middle and the number of its group, and for each region the harmonics in its direction as the thing sees it: turning the thing
 /// turns them. `anchor_from_own` says how its anchor is turned from it, `open` which regions the table leaves open.
 pub(super) fn receiver_texels(
-    thing: Option<&Thing>,
+    (thing, group): (Option<&Thing>, u32),
     anchor_from_own: DMat3,
     world_from_anchor: &[Option<DAffine3>],
     regions: &[Region],
@@ -115,7 +115,7 @@ pub(super) fn receiver_texels(
         return vec![[0; 4]; 1 + VISIBILITIES / 4 * regions.len()];
     };
     let center = pose.transform_point3(thing.ball.center.as_dvec3());
-    let mut texels = vec![words(center.as_vec3().extend(0.0))];
+    let mut texels = vec![words(center.as_vec3().extend(group as f32))];
     let turn = (pose.matrix3 * anchor_from_own).transpose();
     for (region, &is_open) in regions.iter().zip(open) {
         let basis = basis((turn * region.toward).normalize(), VISIBILITY_DEGREE);

@@ -79,6 +79,8 @@ pub(super) struct Environment {
 /// What depends on where things are.
 struct Placed {
     maps: wgpu::Buffer,
+    /// The tile, the number among the maps, and the caster of each draw.
+    draws: Vec<(u32, u32, usize)>,
     group: wgpu::BindGroup,
     disc_count: u32,
     /// Boxes around all things, in the world.
@@ -117,7 +119,7 @@ impl Environment {
                 gpu_scene,
                 precomputation,
             ),
-            pipelines: Pipelines::new(gpu, scene.shadows.samples, kinds, settings.method),
+            pipelines: Pipelines::new(gpu, scene.shadows.samples, kinds, &settings),
             final_gather,
             casting: None,
             frame: gpu.device.create_buffer(&wgpu::BufferDescriptor {
@@ -157,7 +159,8 @@ impl Environment {
         let discs = scene.reflecting();
         self.own_light
             .write(gpu, gpu_scene, &scene, &bounds, &discs);
-        let maps = casting.maps(&scene, &self.distant);
+        let maps = casting.maps(&scene, &self.distant, self.things.len());
+        let (seen_by, draws) = casting.draws(&maps);
         let regions = &self.distant.regions;
         let open = scene.open_regions(self.things.len());
         let receivers = self.things.iter().zip(open.chunks(regions.len().max(1)));
@@ -166,7 +169,8 @@ impl Environment {
             .flat_map(|(number, (thing, open))| {
                 let anchor_from_own = self.own_light.anchor_from_own(number);
                 let thing = thing.as_ref();
-                receiver_texels(thing, anchor_from_own, world_from_anchor, regions, open)
+                let of_thing = (thing, maps.group_of[number]);
+                receiver_texels(of_thing, anchor_from_own, world_from_anchor, regions, open)
             })
             .collect();
         let turns = (0..self.things.len()).map(|number| {
@@ -183,7 +187,11 @@ impl Environment {
                 "regions",
                 &regions.iter().flat_map(region_texels).collect::<Vec<_>>(),
             ),
-            table(gpu, "maps", &flat(maps.iter().map(map_texels).collect())),
+            table(
+                gpu,
+                "maps",
+                &flat(maps.all.iter().map(map_texels).collect()),
+            ),
             table(gpu, "receivers", &receivers),
             table(
                 gpu,
@@ -194,7 +202,7 @@ impl Environment {
         let gloss = table(gpu, "gloss", &gloss);
         let maps = gpu.buffer(
             "occlusion maps",
-            bytemuck::cast_slice(&maps),
+            bytemuck::cast_slice(&seen_by),
             wgpu::BufferUsages::STORAGE,
         );
         let tables = tables.iter().map(wgpu::BindingResource::TextureView);
@@ -213,6 +221,7 @@ impl Environment {
         );
         Placed {
             maps,
+            draws,
             group,
             disc_count: discs.nodes.len() as u32,
             bounds,
@@ -225,7 +234,7 @@ impl Environment {
         self.own_light.place(gpu, gpu_scene);
         let casting = self.casting.take().unwrap_or_else(|| {
             let region_count = self.distant.regions.len();
-            Casting::new(gpu, &self.things, region_count, self.settings.map_px)
+            Casting::new(gpu, &self.things, region_count, &self.settings)
         });
         let mirrored = self.mirrored.take().unwrap_or_else(|| {
             let (rest, exposure) = &self.rest;
@@ -385,7 +394,7 @@ impl BroadLight for Environment {
         let Some(casting) = &self.casting else {
             return;
         };
-        casting.draw(gpu, passes, &placed.maps);
+        casting.draw(gpu, passes, &placed.maps, &placed.draws);
         placed.are_maps_drawn = true;
     }
 
