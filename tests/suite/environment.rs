@@ -248,8 +248,8 @@ fn things_close_behind_each_other_hide_light_once() {
     };
     let [maps, penumbrae] = [EnvironmentMethod::Maps, EnvironmentMethod::Penumbrae]
         .map(|method| [Grouping::Apart, Grouping::Together].map(|grouping| off(method, grouping)));
-    assert!(maps[1] < maps[0], "maps {maps:?}, penumbrae {penumbrae:?}");
-    println!("maps {maps:?}, penumbrae {penumbrae:?}");
+    assert!(maps[1] < 0.95 * maps[0], "maps {maps:?}");
+    assert!(penumbrae[1] < 0.7 * penumbrae[0], "penumbrae {penumbrae:?}");
 }
 
 #[test]
