@@ -243,6 +243,51 @@ mod tests {
         );
     }
 
+    /// Keeps what it saw, and stops what it sees after some.
+    struct Counting {
+        seen: std::sync::Mutex<Vec<usize>>,
+        most: usize,
+    }
+
+    impl Onlooker for Counting {
+        fn sees(&self, done: usize, _of: usize) -> bool {
+            let mut seen = self.seen.lock().unwrap();
+            seen.push(done);
+            seen.len() <= self.most
+        }
+    }
+
+    #[test]
+    fn an_onlooker_sees_all_points_done_and_what_it_stops_is_not_kept() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let scene = Scene::load(&root.join("config/lamp.toml")).unwrap();
+        let house = scene.phantoms.iter().find(|it| it.name == "house");
+        let (house, torus) = (&house.unwrap().mesh, &scene.virtuals[0].mesh);
+        let space = OwnSpace::new(&glam::DAffine3::IDENTITY);
+        let surface = OwnSurface::new(torus, std::iter::once(torus), &space);
+        let folder = tempfile::tempdir().unwrap();
+        let folder = Some(folder.path().to_owned());
+        let [points, edges] = [self_occlusions(folder.clone()), cuts_of_meshes(folder)];
+        let onlooker = |most: usize| Counting {
+            seen: Default::default(),
+            most,
+        };
+        let stops = onlooker(3);
+        occlusions(&surface, &points, &stops);
+        assert_eq!(points.read::<Vec<f32>>(surface.kept_as()), None);
+        assert!(finer::is_coarse(house, &space));
+        assert_eq!(cuts(house, &space, &edges, &onlooker(0)), Cuts::new());
+        assert_eq!(edges.read::<Cuts>(space.key(house)), None);
+        let looks_on = onlooker(usize::MAX);
+        let all = occlusions(&surface, &points, &looks_on);
+        let seen = looks_on.seen.into_inner().unwrap();
+        assert_eq!(seen.last(), Some(&all.len()));
+        assert!(seen.len() > 10 && seen.iter().all(|&done| done <= all.len()));
+        assert!(points.read::<Vec<f32>>(surface.kept_as()).is_some());
+        let found = cuts(house, &space, &edges, &onlooker(usize::MAX));
+        assert_eq!(edges.read(space.key(house)), Some(found));
+    }
+
     #[test]
     fn a_room_is_read_as_it_was_kept_and_damage_is_worked_out_again() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));

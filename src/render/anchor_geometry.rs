@@ -173,7 +173,7 @@ impl KnownLevels {
         }
     }
 
-    /// What a mesh is drawn as, and that's coarser versions, made where they are not known.
+    /// What a mesh is drawn as, and coarser versions of that, made where they are not known.
     fn of<'a>(&'a mut self, mesh: &'a Mesh, with_levels: bool) -> (&'a Mesh, &'a [Level]) {
         if let Some((_, finer)) = self.finer.iter().find(|(known, _)| known == mesh) {
             return (finer, &[]);

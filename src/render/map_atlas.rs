@@ -36,6 +36,7 @@ const FINER_GROUP: GroupLayout = GroupLayout {
 };
 
 /// Triangles that are drawn into a tile.
+#[derive(Clone)]
 pub(super) struct MapDraw {
     pub tile: u32,
     /// Number of how it sees them.

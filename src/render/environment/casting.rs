@@ -183,14 +183,22 @@ impl Casting {
     }
 
     /// How all maps are drawn: what their shader reads, and the draws.
-    pub fn draws(&self, maps: &Maps) -> (Vec<OcclusionMap>, Vec<(u32, u32, usize)>) {
+    pub fn draws(&self, maps: &Maps) -> (Vec<OcclusionMap>, Vec<MapDraw>) {
         let own = self.casters.len() * self.region_count;
         let mut seen_by = maps.all[..own].to_vec();
-        let mut draws: Vec<(u32, u32, usize)> = (0..own)
-            .map(|tile| (tile as u32, tile as u32, tile / self.region_count))
+        let mut draws: Vec<MapDraw> = (0..own)
+            .map(|tile| MapDraw {
+                tile: tile as u32,
+                seen_by: tile as u32,
+                corners: self.ranges[tile / self.region_count].clone(),
+            })
             .collect();
         for &(member, tile, map) in &maps.members {
-            draws.push((tile, seen_by.len() as u32, member));
+            draws.push(MapDraw {
+                tile,
+                seen_by: seen_by.len() as u32,
+                corners: self.ranges[member].clone(),
+            });
             seen_by.push(map);
         }
         (seen_by, draws)
@@ -202,13 +210,9 @@ impl Casting {
         gpu: &Gpu,
         passes: &mut Passes<'_>,
         seen_by: &wgpu::Buffer,
-        draws: &[(u32, u32, usize)],
+        draws: &[MapDraw],
     ) {
-        let draws = draws.iter().map(|&(tile, seen_by, caster)| MapDraw {
-            tile,
-            seen_by,
-            corners: self.ranges[caster].clone(),
-        });
+        let draws = draws.iter().cloned();
         self.atlas
             .draw(gpu, passes, seen_by, &self.triangles, draws);
     }

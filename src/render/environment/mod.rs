@@ -31,6 +31,7 @@ use super::deforming::DeformingThing;
 use super::final_gather::FinalGather;
 use super::gpu::Gpu;
 use super::gpu_scene::{DrawnLight, GpuScene};
+use super::map_atlas::MapDraw;
 use super::mirrored_probe::MirroredProbe;
 use super::passes::Passes;
 use super::precomputation::Precomputation;
@@ -79,8 +80,7 @@ pub(super) struct Environment {
 /// What depends on where things are.
 struct Placed {
     maps: wgpu::Buffer,
-    /// The tile, the number among the maps, and the caster of each draw.
-    draws: Vec<(u32, u32, usize)>,
+    draws: Vec<MapDraw>,
     group: wgpu::BindGroup,
     disc_count: u32,
     /// Boxes around all things, in the world.
@@ -173,13 +173,6 @@ impl Environment {
                 receiver_texels(of_thing, anchor_from_own, world_from_anchor, regions, open)
             })
             .collect();
-        let turns = (0..self.things.len()).map(|number| {
-            let anchor = self.things[number].as_ref()?.anchor;
-            let pose = world_from_anchor[anchor]?;
-            Some(pose.matrix3 * self.own_light.anchor_from_own(number))
-        });
-        let gloss = self.gloss.as_ref();
-        let gloss = gloss.map_or(Vec::new(), |matrix| gloss_texels(matrix, turns));
         let flat = |texels: Vec<[[u32; 4]; 5]>| texels.into_flattened();
         let tables = [
             table(
@@ -199,7 +192,7 @@ impl Environment {
                 &flat(discs.nodes.iter().map(disc_texels).collect()),
             ),
         ];
-        let gloss = table(gpu, "gloss", &gloss);
+        let gloss = self.gloss_table(gpu, world_from_anchor);
         let maps = gpu.buffer(
             "occlusion maps",
             bytemuck::cast_slice(&seen_by),
@@ -227,6 +220,18 @@ impl Environment {
             bounds,
             are_maps_drawn: false,
         }
+    }
+
+    /// What the environment makes of each thing's visibility, where that is how gloss is drawn.
+    fn gloss_table(&self, gpu: &Gpu, world_from_anchor: &[Option<DAffine3>]) -> wgpu::TextureView {
+        let turns = (0..self.things.len()).map(|number| {
+            let anchor = self.things[number].as_ref()?.anchor;
+            let pose = world_from_anchor[anchor]?;
+            Some(pose.matrix3 * self.own_light.anchor_from_own(number))
+        });
+        let gloss = self.gloss.as_ref();
+        let texels = gloss.map_or(Vec::new(), |matrix| gloss_texels(matrix, turns));
+        table(gpu, "gloss", &texels)
     }
 
     /// Places all anew where things or compact lights are elsewhere than before.
