@@ -4,6 +4,9 @@
 //!include "light_sums.wgsl"
 //!include "depth_moments.wgsl"
 //!include "mirrored.wgsl"
+//!if HARMONIC_GLOSS
+//!include "harmonic_gloss.wgsl"
+//!end
 
 struct EnvironmentFrame {
     world_from_camera: mat4x4f,
@@ -32,7 +35,7 @@ struct Region {
 @group(2) @binding(1) var region_table: texture_2d<u32>;
 // Five for each map, of which each caster has as many as there are regions.
 @group(2) @binding(2) var map_table: texture_2d<u32>;
-// For each thing one with its middle, and four for each region: the harmonics in its direction as the thing sees it, or nothing
+// For each thing one with its middle and the number of its group of casters or 0, and four for each region: the harmonics in its direction as the thing sees it, or nothing
 // where what throws no shadow (the table) hides it.
 @group(2) @binding(3) var receiver_table: texture_2d<u32>;
 // Five for each node of a tree: each group, then what is in it.
@@ -67,6 +70,8 @@ fn disc_words(index: u32, part: u32) -> vec4u {
 
 // Set when the shader is built: whether a thing's shadow on another is as wide as at the other's middle, as in the paper.
 override BY_PLANES: bool = false;
+// Set when the shader is built: whether casters near each other hide light as one, as in the paper (section 4.2.3).
+override GROUPED: bool = false;
 // A group is seen as one disc from so many of its radii (reflected.rs).
 const SEEN_AS_ONE: f32 = 4.0;
 // Part of a pixel's light below which what is taken from it is left.
@@ -84,7 +89,7 @@ fn hidden(number: u32, region: Region, point: vec4f, receiver: u32) -> f32 {
         return 0.0;
     }
     let words = map_words(number, 4u);
-    if words.w == receiver {
+    if (words.w & 0xffffu) == receiver {
         return 0.0;
     }
     let depth_row = bitcast<vec4f>(map_words(number, 2u));
@@ -151,11 +156,24 @@ fn self_visibility(sampled: SampledSurface, index: u32) -> f32 {
     return clamp(recovered(vec3f(sum), vec3f(1.0), sampled.one).x, 0.0, 1.0);
 }
 
-// What of a region's light the casters from one to another leave to a place.
+// What of a region's light the casters from one to another leave to a place: of groups and of single ones the product.
 fn left_by(first: u32, end: u32, index: u32, region: Region, point: vec4f, receiver: u32) -> f32 {
     var left = 1.0;
     for (var caster = first; caster < end; caster++) {
-        left *= 1.0 - hidden(caster * frame.region_count + index, region, point, receiver);
+        var map = caster;
+        if GROUPED {
+            let whose = map_words(caster * frame.region_count, 4u).w;
+            let group = (whose >> 16u) & 0x7fffu;
+            // (Members of one group hide from each other by themselves.)
+            let own = u32(receiver_row(receiver * (1u + 4u * frame.region_count)).w);
+            if group != 0u && group != own {
+                if (whose >> 31u) == 0u {
+                    continue;
+                }
+                map = frame.caster_count + group - 1u;
+            }
+        }
+        left *= 1.0 - hidden(map * frame.region_count + index, region, point, receiver);
     }
     return left;
 }
@@ -263,6 +281,10 @@ fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: boo
     var taken = vec3f(0.0);
     var whole_gloss = vec3f(1e-6);
     var taken_gloss = vec3f(0.0);
+//!if HARMONIC_GLOSS
+    let direction = reflect(-to_camera, normal);
+    let exponent = phong_exponent(max(look.roughness, 0.01));
+//!end
     let point = vec4f(point_in_world, 1.0);
     for (var index = 0u; index < frame.region_count; index++) {
         let region = region(index);
@@ -271,19 +293,32 @@ fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: boo
         if cosine <= 0.0 {
             continue;
         }
-        let arriving = region.irradiance * (cosine * self_visibility(sampled, index));
+        let seen = self_visibility(sampled, index);
+        let arriving = region.irradiance * (cosine * seen);
         let hidden = 1.0 - left_by(0u, frame.caster_count, index, region, point, sampled.thing);
-        let gloss = arriving * lobe(look.roughness, normal, toward, to_camera, region.spread);
         whole += arriving;
         taken += arriving * hidden;
+//!if HARMONIC_GLOSS
+        // Equation 15, which knows no cosine.
+        taken_gloss += region.irradiance * (seen * hidden * phong_lobe(exponent, direction, toward));
+//!else
+        let gloss = arriving * lobe(look.roughness, normal, toward, to_camera, region.spread);
         whole_gloss += gloss;
         taken_gloss += gloss * hidden;
+//!end
     }
     // The paper takes off what is hidden (equation 3). A part of what arrives is never more than all of it, whatever the few
     // regions miss.
     let subtracted = max(surface.indirect - taken, vec3f(0.0));
     let scaled = surface.indirect * (1.0 - taken / max(whole, vec3f(1e-6)));
     let arriving = select(scaled, subtracted, BY_PLANES);
+//!if HARMONIC_GLOSS
+    if GLOSSY && look.roughness > 0.0 {
+        let mean = max(mean_over_lobe(sampled, exponent) - taken_gloss, vec3f(0.0));
+        let radiance = radiance_all_around(look, max(dot(normal, to_camera), 1e-3), arriving, mean);
+        return LightSums(vec4f(0.0), vec4f(radiance, 1.0));
+    }
+//!end
     let left = 1.0 - taken_gloss / whole_gloss;
     return LightSums(vec4f(0.0), vec4f(radiance_in_probe(look, normal, to_camera, arriving, left), 1.0));
 }

@@ -14,7 +14,7 @@ struct OcclusionMap {
     range_m: f32,
     // Side of the tile, texels.
     tile_px: f32,
-    // Number of the thing.
+    // Number of the thing, and of its group.
     thing: u32,
 }
 

@@ -31,6 +31,13 @@ struct SampledSurface {
     // Number of the thing.
     @location(19) @interpolate(flat) thing: u32,
 //!end
+//!if HARMONIC_GLOSS
+    // What is mirrored, degree by degree (harmonic_gloss.wgsl).
+    @location(20) @interpolate(perspective, centroid) degree_0: vec3f,
+    @location(21) @interpolate(perspective, centroid) degree_1: vec3f,
+    @location(22) @interpolate(perspective, centroid) degree_2: vec3f,
+    @location(23) @interpolate(perspective, centroid) degree_3: vec3f,
+//!end
 }
 
 //!if OCCLUSION
@@ -50,6 +57,9 @@ fn place_sampled(corner: SurfaceCorner, occlusion: OcclusionCorner, @builtin(ver
 fn place_sampled(corner: SurfaceCorner, @builtin(vertex_index) index: u32) -> SampledSurface {
 //!end
     let placed = placed(corner);
+//!if HARMONIC_GLOSS
+    let degrees = mirrored_degrees(placed, occlusion);
+//!end
     return SampledSurface(
         placed.clip,
         placed.point_in_camera,
@@ -75,6 +85,12 @@ fn place_sampled(corner: SurfaceCorner, @builtin(vertex_index) index: u32) -> Sa
         occlusion.visibility_2,
         occlusion.visibility_3,
         occlusion.thing,
+//!end
+//!if HARMONIC_GLOSS
+        degrees.degree_0,
+        degrees.degree_1,
+        degrees.degree_2,
+        degrees.degree_3,
 //!end
     );
 }

@@ -4,8 +4,12 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::environment::self_occlusion::{OwnSurface, SelfOcclusion};
+use bytemuck::Zeroable as _;
+
+use crate::environment::finer::{self, Cuts};
+use crate::environment::self_occlusion::{OwnSpace, OwnSurface, SelfOcclusion};
 use crate::geometry::camera::Intrinsics;
+use crate::geometry::mesh::Mesh;
 use crate::light::Light;
 use crate::render::{Gpu, Precomputation, RenderError, Renderer};
 use crate::scene::Scene;
@@ -49,17 +53,56 @@ fn self_occlusions(folder: Option<PathBuf>) -> DiskCache {
     }
 }
 
-/// What is in the user's folders, or is put there.
-#[derive(Debug, Clone, Copy)]
-pub struct KeptOnDisk;
+/// Where things' meshes are made finer, in a folder.
+fn cuts_of_meshes(folder: Option<PathBuf>) -> DiskCache {
+    DiskCache {
+        folder,
+        extension: "cuts",
+        version: 1,
+        most_bytes: 1 << 24,
+        most_files: 64,
+    }
+}
 
-impl Precomputation for KeptOnDisk {
+/// Who is told how far something has come that takes long.
+pub trait Onlooker: Sync {
+    /// So many points of so many are done. Returns whether it is to go on.
+    fn sees(&self, done: usize, of: usize) -> bool;
+}
+
+/// Nobody.
+pub struct NoOnlooker;
+
+impl Onlooker for NoOnlooker {
+    fn sees(&self, _done: usize, _of: usize) -> bool {
+        true
+    }
+}
+
+/// What is in the user's folders, or is put there. Where an onlooker stops it, it gives anything that does: what is made of that is
+/// not to be drawn.
+struct KeptOnDisk<'a>(&'a dyn Onlooker);
+
+impl Precomputation for KeptOnDisk<'_> {
     fn transport(&self, room: &Room<'_>) -> RoomTransport {
         ready_room(room).transport
     }
 
     fn self_occlusions(&self, surface: &OwnSurface) -> Vec<SelfOcclusion> {
-        occlusions(surface, &self_occlusions(folder("self-occlusion")))
+        occlusions(surface, &self_occlusions(folder("self-occlusion")), self.0)
+    }
+
+    fn cuts(&self, mesh: &Mesh, space: &OwnSpace) -> Cuts {
+        // (Most meshes are fine enough, which is seen at once.)
+        match finer::is_coarse(mesh, space) {
+            true => cuts(
+                mesh,
+                space,
+                &cuts_of_meshes(folder("self-occlusion")),
+                self.0,
+            ),
+            false => Cuts::new(),
+        }
     }
 }
 
@@ -72,7 +115,20 @@ pub fn renderer(
     scene: &Scene,
     intrinsics: Intrinsics,
 ) -> Result<Renderer, RenderError> {
-    Renderer::with_precomputation(gpu, scene, intrinsics, &KeptOnDisk)
+    watched_renderer(gpu, scene, intrinsics, &NoOnlooker)
+}
+
+/// The same, which somebody looks on at, and may stop; the renderer then is of no use.
+///
+/// # Errors
+/// A picture larger than the adapter can hold, or a device that failed.
+pub fn watched_renderer(
+    gpu: Arc<Gpu>,
+    scene: &Scene,
+    intrinsics: Intrinsics,
+    onlooker: &dyn Onlooker,
+) -> Result<Renderer, RenderError> {
+    Renderer::with_precomputation(gpu, scene, intrinsics, &KeptOnDisk(onlooker))
 }
 
 /// A room's transport from the user's folder, or worked out and put there.
@@ -109,14 +165,35 @@ fn consistent(transport: RoomTransport, compact: &[Light]) -> Option<RoomTranspo
         .then(|| transport.with_caster(compact))
 }
 
-fn occlusions(surface: &OwnSurface, cache: &DiskCache) -> Vec<SelfOcclusion> {
+fn cuts(mesh: &Mesh, space: &OwnSpace, cache: &DiskCache, onlooker: &dyn Onlooker) -> Cuts {
+    let key = space.key(mesh);
+    let known: Option<Cuts> = cache.read(key);
+    known.unwrap_or_else(|| {
+        let cuts = finer::cuts(mesh, space, &|| onlooker.sees(0, 0));
+        if let Some(cuts) = &cuts {
+            cache.keep(key, cuts);
+        }
+        cuts.unwrap_or_default()
+    })
+}
+
+fn occlusions(
+    surface: &OwnSurface,
+    cache: &DiskCache,
+    onlooker: &dyn Onlooker,
+) -> Vec<SelfOcclusion> {
     let known: Option<Vec<f32>> = cache.read(surface.kept_as());
     let known = known.and_then(|numbers| {
         let occlusions = bytemuck::try_cast_slice(&numbers).ok()?.to_vec();
         (occlusions.len() == surface.point_count()).then_some(occlusions)
     });
     known.unwrap_or_else(|| {
-        let occlusions = surface.self_occlusions();
+        let count = surface.point_count();
+        let occlusions = surface.self_occlusions_while(&|done| onlooker.sees(done, count));
+        onlooker.sees(count, count);
+        let Some(occlusions) = occlusions else {
+            return vec![SelfOcclusion::zeroed(); count];
+        };
         let numbers: &[f32] = bytemuck::cast_slice(&occlusions);
         cache.keep(surface.kept_as(), &numbers);
         occlusions
@@ -140,9 +217,13 @@ mod tests {
         let kept = || fs::read_dir(folder.path()).unwrap().count();
         let surface = |scale: glam::DVec3, turned: f64| {
             let place = glam::DAffine3::from_rotation_x(turned) * glam::DAffine3::from_scale(scale);
-            OwnSurface::new(&torus.mesh, std::iter::empty(), &OwnSpace::new(&place))
+            OwnSurface::new(
+                &torus.mesh,
+                std::iter::once(&torus.mesh),
+                &OwnSpace::new(&place),
+            )
         };
-        let first = occlusions(&surface(glam::DVec3::ONE, 0.3), &cache);
+        let first = occlusions(&surface(glam::DVec3::ONE, 0.3), &cache, &NoOnlooker);
         assert_eq!(
             (first.len(), kept()),
             (surface(glam::DVec3::ONE, 0.0).point_count(), 1)
@@ -150,13 +231,61 @@ mod tests {
         let turned = surface(glam::DVec3::splat(2.0), 1.3);
         let path = cache.path(turned.kept_as()).unwrap();
         let as_kept = fs::read(&path).unwrap();
-        assert!(occlusions(&turned, &cache) == first && kept() == 1);
+        assert!(occlusions(&turned, &cache, &NoOnlooker) == first && kept() == 1);
         assert!(turned.self_occlusions() == first);
         // Another form is another thing; damage is worked out again.
         let squeezed = surface(glam::DVec3::new(1.0, 1.0, 0.5), 0.3);
-        assert!(occlusions(&squeezed, &cache) != first && kept() == 2);
+        assert!(occlusions(&squeezed, &cache, &NoOnlooker) != first && kept() == 2);
         fs::write(&path, &as_kept[..100]).unwrap();
-        assert!(occlusions(&turned, &cache) == first && fs::read(&path).unwrap() == as_kept);
+        assert!(
+            occlusions(&turned, &cache, &NoOnlooker) == first
+                && fs::read(&path).unwrap() == as_kept
+        );
+    }
+
+    /// Keeps what it saw, and stops what it sees after some.
+    struct Counting {
+        seen: std::sync::Mutex<Vec<usize>>,
+        most: usize,
+    }
+
+    impl Onlooker for Counting {
+        fn sees(&self, done: usize, _of: usize) -> bool {
+            let mut seen = self.seen.lock().unwrap();
+            seen.push(done);
+            seen.len() <= self.most
+        }
+    }
+
+    #[test]
+    fn an_onlooker_sees_all_points_done_and_what_it_stops_is_not_kept() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let scene = Scene::load(&root.join("config/lamp.toml")).unwrap();
+        let house = scene.phantoms.iter().find(|it| it.name == "house");
+        let (house, torus) = (&house.unwrap().mesh, &scene.virtuals[0].mesh);
+        let space = OwnSpace::new(&glam::DAffine3::IDENTITY);
+        let surface = OwnSurface::new(torus, std::iter::once(torus), &space);
+        let folder = tempfile::tempdir().unwrap();
+        let folder = Some(folder.path().to_owned());
+        let [points, edges] = [self_occlusions(folder.clone()), cuts_of_meshes(folder)];
+        let onlooker = |most: usize| Counting {
+            seen: Default::default(),
+            most,
+        };
+        let stops = onlooker(3);
+        occlusions(&surface, &points, &stops);
+        assert_eq!(points.read::<Vec<f32>>(surface.kept_as()), None);
+        assert!(finer::is_coarse(house, &space));
+        assert_eq!(cuts(house, &space, &edges, &onlooker(0)), Cuts::new());
+        assert_eq!(edges.read::<Cuts>(space.key(house)), None);
+        let looks_on = onlooker(usize::MAX);
+        let all = occlusions(&surface, &points, &looks_on);
+        let seen = looks_on.seen.into_inner().unwrap();
+        assert_eq!(seen.last(), Some(&all.len()));
+        assert!(seen.len() > 10 && seen.iter().all(|&done| done <= all.len()));
+        assert!(points.read::<Vec<f32>>(surface.kept_as()).is_some());
+        let found = cuts(house, &space, &edges, &onlooker(usize::MAX));
+        assert_eq!(edges.read(space.key(house)), Some(found));
     }
 
     #[test]

@@ -3,6 +3,9 @@
 
 pub mod distant_light;
 pub mod final_gather;
+pub mod finer;
+pub mod glossy;
+pub mod groups;
 pub mod occlusion_map;
 pub mod placed;
 pub mod reflected;

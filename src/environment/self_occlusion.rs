@@ -3,6 +3,7 @@
 
 use std::f64::consts::PI;
 use std::hash::{DefaultHasher, Hasher as _};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
@@ -24,6 +25,8 @@ pub const TRANSFERS: usize = count(TRANSFER_DEGREE);
 pub const VISIBILITIES: usize = count(VISIBILITY_DEGREE);
 /// Rays from a corner, half of them above its surface.
 const RAYS: usize = 512;
+/// Points that are worked out at a stretch.
+const CHUNK: usize = 32;
 
 /// Rays start this part of a thing's size off its surface.
 const START_OFFSET: f64 = 1e-4;
@@ -73,6 +76,18 @@ impl OwnSpace {
         }
     }
 
+    /// The size of a mesh here: of the box around it, from corner to corner.
+    pub fn size(&self, mesh: &Mesh) -> f64 {
+        let places = mesh.positions.iter();
+        let bounds = Bounds::around(places.map(|&position| self.place(position).as_dvec3()));
+        bounds.map_or(0.0, |bounds| (bounds.high - bounds.low).length())
+    }
+
+    /// A place of the file's space in the own one.
+    pub fn place(&self, position: Vec3) -> Vec3 {
+        (self.own_from_object * position.as_dvec3()).as_vec3()
+    }
+
     /// What all of a mesh's self-occlusion depends on here.
     pub fn key(&self, mesh: &Mesh) -> u64 {
         let mut hasher = DefaultHasher::new();
@@ -95,26 +110,29 @@ pub struct OwnSurface {
     /// For each corner of each triangle, those of coarser levels too, its point.
     pub point_of_corner: Vec<usize>,
     points: Vec<(DVec3, DVec3)>,
+    rays: OwnRays,
+}
+
+/// Rays from a thing's surface against itself, in its own space.
+pub(super) struct OwnRays {
     caster: RayCaster,
     offset: f64,
 }
 
 impl OwnSurface {
-    /// Of a thing's mesh and its coarser versions in their order.
-    pub fn new<'a>(
-        mesh: &'a Mesh,
-        coarser: impl Iterator<Item = &'a Mesh>,
-        space: &OwnSpace,
-    ) -> Self {
+    /// Of a thing's mesh, and the meshes that it is drawn as, in their order.
+    pub fn new<'a>(mesh: &Mesh, drawn: impl Iterator<Item = &'a Mesh>, space: &OwnSpace) -> Self {
         let linear = space.own_from_object;
         let normal_matrix = linear.inverse().transpose();
-        let place = |position: Vec3| (linear * position.as_dvec3()).as_vec3();
         let mut corners: Vec<(Vec3, Vec3)> = Vec::new();
-        for level in std::iter::once(mesh).chain(coarser) {
+        for level in drawn {
             for (triangle, normals) in level.triangles.iter().zip(&level.corner_normals) {
                 corners.extend(triangle.iter().zip(normals).map(|(&index, normal)| {
                     let normal = (normal_matrix * normal.as_dvec3()).normalize_or_zero();
-                    (place(level.positions[index as usize]), normal.as_vec3())
+                    (
+                        space.place(level.positions[index as usize]),
+                        normal.as_vec3(),
+                    )
                 }));
             }
         }
@@ -122,19 +140,11 @@ impl OwnSurface {
             .map(|triangle| [0, 1, 2].map(|corner| 3 * triangle + corner))
             .collect();
         let (points, point_of_corner) = corner_points(&corners, &triangles);
-        let own: Vec<[Vec3; 3]> = mesh
-            .triangles
-            .iter()
-            .map(|triangle| triangle.map(|index| place(mesh.positions[index as usize])))
-            .collect();
-        let bounds = Bounds::around(own.iter().flatten().map(|corner| corner.as_dvec3()));
-        let size = bounds.map_or(0.0, |bounds| (bounds.high - bounds.low).length());
         Self {
             key: space.key(mesh),
             point_of_corner,
             points,
-            caster: RayCaster::new(&own),
-            offset: size * START_OFFSET,
+            rays: OwnRays::new(mesh, space),
         }
     }
 
@@ -153,16 +163,70 @@ impl OwnSurface {
         self.self_occlusions_by(RAYS)
     }
 
+    /// The same, as long as `goes_on` says yes, which is told how many points are done; `None` where it said no.
+    pub fn self_occlusions_while(
+        &self,
+        goes_on: &(dyn Fn(usize) -> bool + Sync),
+    ) -> Option<Vec<SelfOcclusion>> {
+        let rays = directions(RAYS);
+        let done = AtomicUsize::new(0);
+        let of_chunk = |points: &[(DVec3, DVec3)]| {
+            let before = done.fetch_add(points.len(), Ordering::Relaxed);
+            goes_on(before).then(|| self.of_points(points, &rays))
+        };
+        let chunks = self.points.par_chunks(CHUNK).map(of_chunk);
+        let chunks: Option<Vec<Vec<SelfOcclusion>>> = chunks.collect();
+        Some(chunks?.into_iter().flatten().collect())
+    }
+
     /// The same by another number of rays from each point, half of them above its surface.
     pub fn self_occlusions_by(&self, ray_count: usize) -> Vec<SelfOcclusion> {
-        let rays: Vec<(DVec3, Vec<f64>)> = sphere(ray_count)
-            .map(|direction| (direction, basis(direction, TRANSFER_DEGREE)))
-            .collect();
-        let of_point = |&(place, normal): &(DVec3, DVec3)| {
-            let start = (place + normal * self.offset).as_vec3();
-            occlusion(start, normal, &rays, &self.caster)
-        };
-        self.points.par_iter().map(of_point).collect()
+        let rays = directions(ray_count);
+        let chunks = self.points.par_chunks(CHUNK);
+        chunks
+            .flat_map_iter(|points| self.of_points(points, &rays))
+            .collect()
+    }
+
+    fn of_points(
+        &self,
+        points: &[(DVec3, DVec3)],
+        rays: &[(DVec3, Vec<f64>)],
+    ) -> Vec<SelfOcclusion> {
+        let of_point = |&(place, normal): &(DVec3, DVec3)| self.rays.occlusion(place, normal, rays);
+        points.iter().map(of_point).collect()
+    }
+}
+
+/// So many directions, each with its harmonics.
+pub(super) fn directions(count: usize) -> Vec<(DVec3, Vec<f64>)> {
+    let directions = sphere(count);
+    directions
+        .map(|direction| (direction, basis(direction, TRANSFER_DEGREE)))
+        .collect()
+}
+
+impl OwnRays {
+    /// Of a thing's mesh.
+    pub fn new(mesh: &Mesh, space: &OwnSpace) -> Self {
+        let place = |index: u32| space.place(mesh.positions[index as usize]);
+        let triangles = mesh.triangles.iter().map(|triangle| triangle.map(place));
+        let own: Vec<[Vec3; 3]> = triangles.collect();
+        Self {
+            caster: RayCaster::new(&own),
+            offset: space.size(mesh) * START_OFFSET,
+        }
+    }
+
+    /// The self-occlusion of a place with a unit normal, by rays in directions with their harmonics.
+    pub fn occlusion(
+        &self,
+        place: DVec3,
+        normal: DVec3,
+        rays: &[(DVec3, Vec<f64>)],
+    ) -> SelfOcclusion {
+        let start = (place + normal * self.offset).as_vec3();
+        occlusion(start, normal, rays, &self.caster)
     }
 }
 

@@ -12,6 +12,7 @@ pub mod coincidence;
 pub mod corner_points;
 pub mod counting;
 pub mod cuboid;
+pub mod cut_edges;
 pub mod homography;
 pub mod least_squares;
 pub mod lens;

@@ -31,7 +31,7 @@ pub fn subdivided(
         for [a, b, c] in open {
             match [is_cut(a, b), is_cut(b, c), is_cut(c, a)] {
                 [false, false, false] => whole.push([a, b, c]),
-                cut => cut_triangle([a, b, c], cut, &mut parts),
+                cut => cut_triangle([a, b, c], cut, &|(place, _)| place, &mut middle, &mut parts),
             }
         }
         open = parts;
@@ -43,7 +43,16 @@ pub fn subdivided(
     whole
 }
 
-fn cut_triangle([a, b, c]: [Corner; 3], cut: [bool; 3], parts: &mut Vec<[Corner; 3]>) {
+/// Appends the parts of a triangle of which some edges (from the first corner to the second, and so on) are halved; `place` says
+/// where a corner is, `middle` gives the corner between two.
+pub(super) fn cut_triangle<C: Copy>(
+    [a, b, c]: [C; 3],
+    cut: [bool; 3],
+    place: &impl Fn(C) -> Vec3,
+    middle: &mut impl FnMut(C, C) -> C,
+    parts: &mut Vec<[C; 3]>,
+) {
+    let squared = |from: C, to: C| place(from).distance_squared(place(to));
     match cut {
         [true, true, true] => {
             let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
@@ -56,14 +65,16 @@ fn cut_triangle([a, b, c]: [Corner; 3], cut: [bool; 3], parts: &mut Vec<[Corner;
         [false, true, true] => {
             let (bc, ca) = (middle(b, c), middle(c, a));
             parts.push([ca, bc, c]);
-            match a.0.distance_squared(bc.0) < b.0.distance_squared(ca.0) {
+            match squared(a, bc) < squared(b, ca) {
                 true => parts.extend([[a, b, bc], [a, bc, ca]]),
                 false => parts.extend([[a, b, ca], [b, bc, ca]]),
             }
         }
         [false, false, false] => parts.push([a, b, c]),
         // The others are these, turned.
-        [first, second, third] => cut_triangle([b, c, a], [second, third, first], parts),
+        [first, second, third] => {
+            cut_triangle([b, c, a], [second, third, first], place, middle, parts);
+        }
     }
 }
 

@@ -123,8 +123,9 @@ impl Accumulated {
             _ => {
                 let lit = surfaces.lit.of(gpu_scene.light_kind(whole));
                 gpu_scene.draw_surfaces(pass, &lit.reaching_real, Role::Real, whole, pixels);
+                let mut counted = pixels;
                 for piece in pieces {
-                    self.draw_piece(pass, frame, piece);
+                    counted = self.draw_piece(pass, frame, piece, counted);
                 }
             }
         }
@@ -134,7 +135,9 @@ impl Accumulated {
     fn draw_sharp(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>, piece: usize) {
         let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
         let (lit, volumes) = (self.lit(frame, piece), &self.volumes);
-        if gpu_scene.count_volumes(pass, volumes, Among::All, Role::Real, piece, pixels) {
+        let among = Among::All;
+        let reached = gpu_scene.count_volumes(pass, volumes, among, Role::Real, piece, pixels);
+        if !reached.is_empty() {
             volumes.keep(pass, Role::Real, pixels);
         }
         let drawn = DrawnLight::Piece(piece);
@@ -143,12 +146,20 @@ impl Accumulated {
         gpu_scene.draw_virtuals_facing(pass, &lit.on_virtual, piece, pixels);
     }
 
-    /// Draws one of several pieces of a light, of which all has reached the real surfaces already.
-    fn draw_piece(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>, piece: usize) {
-        self.draw_hidden(pass, frame, piece);
+    /// Draws one of several pieces of a light, of which all has reached the real surfaces already. The stencil is 0 but in the
+    /// pixels `counted`; returns where it is not afterwards.
+    fn draw_piece(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        frame: &FrameContext<'_>,
+        piece: usize,
+        counted: PixelRect,
+    ) -> PixelRect {
+        let counted = self.draw_hidden(pass, frame, piece, counted);
         let (on_virtual, pixels) = (&self.lit(frame, piece).on_virtual, frame.bounds.pixels);
         let gpu_scene = frame.gpu_scene;
         gpu_scene.draw_virtuals_facing(pass, on_virtual, piece, pixels);
+        counted
     }
 
     /// The pipelines of a piece.
@@ -157,38 +168,58 @@ impl Accumulated {
         self.surfaces.lit.of(kind)
     }
 
-    /// Draws what is hidden of a piece from real surfaces, which all of it has reached.
-    fn draw_hidden(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>, piece: usize) {
+    /// Draws what is hidden of a piece from real surfaces, which all of it has reached; pixels as in `draw_piece`.
+    fn draw_hidden(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        frame: &FrameContext<'_>,
+        piece: usize,
+        counted: PixelRect,
+    ) -> PixelRect {
         let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
         let (lit, volumes) = (self.lit(frame, piece), &self.volumes);
-        volumes.forget(pass, pixels);
-        if gpu_scene.count_volumes(pass, volumes, Among::All, Role::Real, piece, pixels) {
-            volumes.keep(pass, Role::Real, pixels);
+        if !counted.is_empty() {
+            volumes.forget(pass, counted);
+        }
+        let among = Among::All;
+        let reached = gpu_scene.count_volumes(pass, volumes, among, Role::Real, piece, pixels);
+        if !reached.is_empty() {
+            volumes.keep(pass, Role::Real, reached);
             gpu_scene.draw_surfaces(
                 pass,
                 &lit.kept_from_real,
                 Role::Real,
                 DrawnLight::HiddenPiece(piece),
-                pixels,
+                reached,
             );
         }
-        self.draw_taken(pass, frame, piece);
+        reached.union(self.draw_taken(pass, frame, piece))
     }
 
-    /// Draws what virtual things take of a piece from real surfaces; what real ones hide of it is known.
-    fn draw_taken(&self, pass: &mut wgpu::RenderPass<'_>, frame: &FrameContext<'_>, piece: usize) {
+    /// Draws what virtual things take of a piece from real surfaces; what real ones hide of it is known. Returns where they can.
+    fn draw_taken(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        frame: &FrameContext<'_>,
+        piece: usize,
+    ) -> PixelRect {
         let (gpu_scene, pixels) = (frame.gpu_scene, frame.bounds.pixels);
         let (lit, volumes) = (self.lit(frame, piece), &self.volumes);
         let among = Among::LitByReal;
-        if gpu_scene.count_volumes(pass, volumes, among, Role::Virtual, piece, pixels) {
+        let reached = gpu_scene.count_volumes(pass, volumes, among, Role::Virtual, piece, pixels);
+        if !reached.is_empty() {
+            // (The stencil is 0 elsewhere.)
+            set_scissor(pass, reached);
             gpu_scene.draw_surfaces(
                 pass,
                 &lit.hidden_from_real,
                 Role::Real,
                 DrawnLight::Piece(piece),
-                pixels,
+                reached,
             );
         }
+        set_scissor(pass, pixels);
+        reached
     }
 }
 

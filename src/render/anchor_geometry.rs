@@ -157,34 +157,55 @@ pub(super) struct AnchorGeometry {
     pub things: Vec<AnchoredModel>,
 }
 
-/// Coarser versions of meshes, which take long to make: each with the mesh that it is of.
+/// Other versions of meshes, which take long to make: each with the mesh that it is of.
 #[derive(Default)]
-pub(super) struct KnownLevels(Vec<(Arc<Mesh>, Vec<Level>)>);
+pub(super) struct KnownLevels {
+    coarser: Vec<(Arc<Mesh>, Vec<Level>)>,
+    /// In place of their meshes, without coarser ones.
+    finer: Vec<(Arc<Mesh>, Mesh)>,
+}
 
 impl KnownLevels {
-    /// The coarser versions of a mesh, made where they are not known.
-    fn of(&mut self, mesh: &Arc<Mesh>) -> &[Level] {
-        let index = self.position(mesh).unwrap_or_else(|| {
-            self.0.push((Arc::clone(mesh), levels(mesh)));
-            self.0.len() - 1
+    /// Some are drawn as finer ones.
+    pub fn with_finer(finer: Vec<(Arc<Mesh>, Mesh)>) -> Self {
+        Self {
+            finer,
+            ..Self::default()
+        }
+    }
+
+    /// What a mesh is drawn as, and coarser versions of that, made where they are not known.
+    fn of<'a>(&'a mut self, mesh: &'a Arc<Mesh>, with_levels: bool) -> (&'a Mesh, &'a [Level]) {
+        if let Some(index) = position(&self.finer, mesh) {
+            return (&self.finer[index].1, &[]);
+        }
+        if !with_levels {
+            return (mesh, &[]);
+        }
+        let index = position(&self.coarser, mesh).unwrap_or_else(|| {
+            self.coarser.push((Arc::clone(mesh), levels(mesh)));
+            self.coarser.len() - 1
         });
-        &self.0[index].1
+        (mesh, &self.coarser[index].1)
     }
 
-    /// (To compare large meshes takes longer than a frame.)
-    fn position(&self, mesh: &Arc<Mesh>) -> Option<usize> {
-        let same = |(known, _): &(Arc<Mesh>, _)| Arc::ptr_eq(known, mesh);
-        let like = |(known, _): &(Arc<Mesh>, _)| known == mesh;
-        let all = &self.0;
-        all.iter()
-            .position(same)
-            .or_else(|| all.iter().position(like))
+    /// What a mesh is drawn as, the finest first.
+    pub fn drawn<'a>(&'a self, mesh: &'a Arc<Mesh>) -> impl Iterator<Item = &'a Mesh> {
+        let finer = position(&self.finer, mesh).map(|index| &self.finer[index].1);
+        let coarser = position(&self.coarser, mesh).filter(|_| finer.is_none());
+        let levels = coarser.map_or(&[][..], |index| &self.coarser[index].1);
+        std::iter::once(finer.unwrap_or(mesh)).chain(levels.iter().map(|level| &level.mesh))
     }
+}
 
-    /// Those that are known.
-    pub fn known(&self, mesh: &Arc<Mesh>) -> &[Level] {
-        self.position(mesh).map_or(&[], |index| &self.0[index].1)
-    }
+/// Where a mesh is in a list. (To compare large meshes takes longer than a frame.)
+fn position<T>(known: &[(Arc<Mesh>, T)], mesh: &Arc<Mesh>) -> Option<usize> {
+    let same = |(known, _): &(Arc<Mesh>, T)| Arc::ptr_eq(known, mesh);
+    let like = |(known, _): &(Arc<Mesh>, T)| known == mesh;
+    known
+        .iter()
+        .position(same)
+        .or_else(|| known.iter().position(like))
 }
 
 impl AnchorGeometry {
@@ -218,10 +239,7 @@ impl AnchorGeometry {
                     let with_levels = coarsest_px > 0.0
                         && object.animation.is_none()
                         && !scene.shadows.without.has(Shortcut::Levels);
-                    let coarser = match with_levels {
-                        true => known.of(&object.mesh),
-                        false => &[],
-                    };
+                    let drawn = known.of(&object.mesh, with_levels);
                     let before = objects.iter().take(index);
                     shared.first_material =
                         before.map(|object| object.materials.len() as u32).sum();
@@ -229,7 +247,7 @@ impl AnchorGeometry {
                         Role::Real => index,
                         Role::Virtual => scene.phantoms.len() + index,
                     } as u32;
-                    let thing = thing(gpu, (role, tie), object, coarser, &mut shared);
+                    let thing = thing(gpu, (role, tie), object, drawn, &mut shared);
                     geometry.things.extend(thing);
                 }
                 if shared.triangles.is_empty() {
@@ -272,11 +290,11 @@ fn thing(
     gpu: &Gpu,
     (role, tie): (Role, Option<usize>),
     object: &Object,
-    coarser: &[Level],
+    (mesh, coarser): (&Mesh, &[Level]),
     shared: &mut SharedCorners,
 ) -> Option<AnchoredModel> {
     let scale = largest_scale(&object.anchor_from_object);
-    let itself = (object.mesh.as_ref(), [0.0; 3]);
+    let itself = (mesh, [0.0; 3]);
     let coarser = coarser.iter().map(|level| {
         let lengths_m = [level.max_error_m, level.mean_error_m, level.largest_facet_m];
         (&level.mesh, lengths_m)

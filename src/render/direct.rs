@@ -165,12 +165,12 @@ impl Direct {
         pass.set_bind_group(2, &frame.background.group, &[]);
         let volumes = &self.volumes;
         let by_real = gpu_scene.count_volumes(pass, volumes, Among::All, Role::Real, 0, pixels);
-        if by_real {
+        if !by_real.is_empty() {
             volumes.keep(pass, Role::Real, pixels);
         }
         let lit = Among::LitByReal;
         let by_virtual = gpu_scene.count_volumes(pass, volumes, lit, Role::Virtual, 0, pixels);
-        if by_virtual {
+        if !by_virtual.is_empty() {
             gpu_scene.draw_surfaces(
                 pass,
                 &self.hidden_on_real,
@@ -179,7 +179,7 @@ impl Direct {
                 pixels,
             );
         }
-        if (by_real || by_virtual) && !bounds.virtuals.is_empty() {
+        if !by_real.union(by_virtual).is_empty() && !bounds.virtuals.is_empty() {
             set_scissor(pass, bounds.virtuals);
             pass.set_bind_group(3, &self.ambient_group, &[]);
             for (own, pipeline) in (0..).zip(&self.shadow_on_virtual) {

@@ -112,12 +112,18 @@ pub(super) struct GpuScene {
 }
 
 impl GpuScene {
-    pub fn new(gpu: &Gpu, scene: &Scene, intrinsics: Intrinsics, lit_by: LitBy) -> Self {
+    /// Meshes that have another in `known_levels` are drawn as that.
+    pub fn new(
+        gpu: &Gpu,
+        scene: &Scene,
+        intrinsics: Intrinsics,
+        lit_by: LitBy,
+        mut known_levels: KnownLevels,
+    ) -> Self {
         let device = &gpu.device;
         let lights = scene.outlined_lights();
         let view_count = scene.node_count() + scene.virtuals.len();
         let views = UniformRow::new::<AnchorView>(device, "views", view_count);
-        let mut known_levels = KnownLevels::default();
         let AnchorGeometry { batches, things } = AnchorGeometry::new(gpu, scene, &mut known_levels);
         let looks = scene.virtuals.iter().any(needs_looks);
         let glossy = scene.virtuals.iter().any(|object| {
@@ -321,12 +327,9 @@ impl GpuScene {
         }
     }
 
-    /// The coarser versions of a thing's mesh, in their order.
-    pub fn coarser_meshes(&self, mesh: &Arc<Mesh>) -> impl Iterator<Item = &Mesh> {
-        self.known_levels
-            .known(mesh)
-            .iter()
-            .map(|level| &level.mesh)
+    /// What a thing's mesh is drawn as, the finest first.
+    pub fn drawn_meshes<'a>(&'a self, mesh: &'a Arc<Mesh>) -> impl Iterator<Item = &'a Mesh> {
+        self.known_levels.drawn(mesh)
     }
 
     /// All batches' corners as values: what they are of, their anchor, and they.

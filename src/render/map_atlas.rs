@@ -35,6 +35,16 @@ const FINER_GROUP: GroupLayout = GroupLayout {
     entries: &[texels(0, false)],
 };
 
+/// Triangles that are drawn into a tile.
+#[derive(Clone)]
+pub(super) struct MapDraw {
+    pub tile: u32,
+    /// Number of how it sees them.
+    pub seen_by: u32,
+    /// Their corners.
+    pub corners: Range<u32>,
+}
+
 /// The atlas, and how it is drawn.
 pub(super) struct MapAtlas {
     tiling: Tiling,
@@ -90,15 +100,14 @@ impl MapAtlas {
         true
     }
 
-    /// Draws into each of `count` tiles the casters' triangles that it sees, as a range of corners for each.
+    /// Draws the casters' triangles into tiles.
     pub fn draw(
         &self,
         gpu: &Gpu,
         passes: &mut Passes<'_>,
         seen_by: &wgpu::Buffer,
-        count: u32,
         casters: &wgpu::Buffer,
-        seen: impl Fn(u32) -> Range<u32>,
+        draws: impl Iterator<Item = MapDraw>,
     ) {
         let level = |level| {
             self.atlas.create_view(&wgpu::TextureViewDescriptor {
@@ -122,11 +131,11 @@ impl MapAtlas {
         pass.set_bind_group(0, &group, &[]);
         pass.set_vertex_buffer(0, casters.slice(..));
         let side = self.tiling.tile_px;
-        for index in 0..count {
-            let [x, y] = self.tiling.corner_px(index);
+        for draw in draws {
+            let [x, y] = self.tiling.corner_px(draw.tile);
             pass.set_viewport(x as f32, y as f32, side as f32, side as f32, 0.0, 1.0);
             pass.set_scissor_rect(x, y, side, side);
-            pass.draw(seen(index), index..index + 1);
+            pass.draw(draw.corners, draw.seen_by..draw.seen_by + 1);
         }
         drop(pass);
         for coarser in 1..self.tiling.levels() {

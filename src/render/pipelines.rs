@@ -43,14 +43,17 @@ pub(super) const fn texels(binding: u32, multisampled: bool) -> wgpu::BindGroupL
     texture(binding, false, multisampled)
 }
 
-/// Entry of a texture of whole numbers that fragments read texel by texel.
-pub(super) const fn words(binding: u32) -> wgpu::BindGroupLayoutEntry {
+/// Entry of a texture of whole numbers that is read texel by texel.
+pub(super) const fn words(
+    binding: u32,
+    visibility: wgpu::ShaderStages,
+) -> wgpu::BindGroupLayoutEntry {
     let ty = wgpu::BindingType::Texture {
         sample_type: wgpu::TextureSampleType::Uint,
         view_dimension: wgpu::TextureViewDimension::D2,
         multisampled: false,
     };
-    entry(binding, wgpu::ShaderStages::FRAGMENT, ty)
+    entry(binding, visibility, ty)
 }
 
 /// Entry of a texture that fragments read through a filtering sampler.

@@ -1,6 +1,8 @@
 //! What a renderer works out before its first frame and what takes seconds: somebody may know it already.
 
-use crate::environment::self_occlusion::{OwnSurface, SelfOcclusion};
+use crate::environment::finer::{Cuts, cuts};
+use crate::environment::self_occlusion::{OwnSpace, OwnSurface, SelfOcclusion};
+use crate::geometry::mesh::Mesh;
 use crate::shafts::room::Room;
 use crate::shafts::room_transport::RoomTransport;
 
@@ -9,6 +11,11 @@ pub trait Precomputation {
     /// A room's transport of light.
     fn transport(&self, room: &Room<'_>) -> RoomTransport {
         room.transport()
+    }
+
+    /// Where a mesh is made finer for what it hides from itself.
+    fn cuts(&self, mesh: &Mesh, space: &OwnSpace) -> Cuts {
+        cuts(mesh, space, &|| true).unwrap_or_default()
     }
 
     /// What a thing hides from itself, for each of its points.

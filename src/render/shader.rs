@@ -11,7 +11,7 @@ macro_rules! files {
 }
 
 /// All files under `shaders/`.
-const FILES: [(&str, &str); 30] = files![
+const FILES: [(&str, &str); 31] = files![
     "area_lights.wgsl",
     "background.wgsl",
     "common.wgsl",
@@ -23,6 +23,7 @@ const FILES: [(&str, &str); 30] = files![
     "fade.wgsl",
     "final_gather.wgsl",
     "fullscreen.wgsl",
+    "harmonic_gloss.wgsl",
     "layer_albedo.wgsl",
     "layers.wgsl",
     "light_sums.wgsl",
@@ -199,18 +200,22 @@ mod tests {
         };
         for (name, _) in FILES.iter().filter(|(name, _)| !includes(name)) {
             // (Always built with it.)
-            let always = match *name {
-                "environment.wgsl" => Some("OCCLUSION"),
-                _ => None,
+            let always: &[&[&str]] = match *name {
+                "environment.wgsl" => &[&["OCCLUSION"], &["OCCLUSION", "HARMONIC_GLOSS"]],
+                _ => &[&[]],
             };
-            for flags in [
+            let flags = [
                 &[][..],
                 &["MULTISAMPLED"],
                 &["ENCODED"],
                 &["MULTISAMPLED", "ENCODED"],
                 &["LOOKS"],
-            ] {
-                let flags: Vec<&str> = flags.iter().copied().chain(always).collect();
+            ];
+            for (flags, always) in flags
+                .iter()
+                .flat_map(|it| always.iter().map(move |a| (it, a)))
+            {
+                let flags: Vec<&str> = flags.iter().chain(*always).copied().collect();
                 let text = source(name, &flags).unwrap();
                 assert_eq!(error(name, &text), None, "{flags:?}");
             }

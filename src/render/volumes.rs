@@ -285,35 +285,36 @@ impl Volumes {
         groups: [&wgpu::BindGroup; 2],
         within: PixelRect,
         counted: impl Iterator<Item = CountedVolume<'a>>,
-    ) -> bool {
+    ) -> PixelRect {
         let counters = match among {
             Among::All => &self.among_all,
             Among::LitByReal => &self.among_lit,
         };
         let counted: Vec<CountedVolume<'_>> = counted.collect();
+        let has_parts = |counted: &&CountedVolume<'_>| !counted.volume.parts.is_empty();
+        let scissors = counted.iter().filter(has_parts).map(|it| it.scissor);
+        let reached = scissors.fold(PixelRect::NONE, PixelRect::union);
         let mut layers = 0;
-        let mut any = false;
         // What is counted apart comes first, so that the rest is left as a number.
         for apart in [true, false] {
             for counted in &counted {
                 let parts = counted.volume.parts.iter();
                 for part in parts.filter(|part| part.counted_apart == apart) {
                     if layers + part.layers > MOST_LAYERS {
-                        self.keep(pass, role, within);
+                        self.keep(pass, role, reached);
                         layers = 0;
                     }
                     layers += part.layers;
-                    any = true;
                     counters.draw(pass, groups, counted, part);
                 }
             }
             if apart && layers > 0 {
-                self.keep(pass, role, within);
+                self.keep(pass, role, reached);
                 layers = 0;
             }
         }
         set_scissor(pass, within);
-        any
+        reached
     }
 
     /// Leaves a stencil of zeros.

@@ -84,8 +84,8 @@ pub use ranges::{Digits, Numbers, Whole};
 pub use raw_model::ClipInfo;
 pub use reference::reference;
 pub use shadows::{
-    EnvironmentMethod, EnvironmentSettings, ShadowChange, ShadowSettings, ShadowTechnique,
-    ShaftSettings, Technique, VolumeCounting,
+    EnvironmentMethod, EnvironmentSettings, Grouping, ShadowChange, ShadowSettings,
+    ShadowTechnique, ShaftSettings, Technique, VolumeCounting,
 };
 pub use shapes::ShapeKind;
 pub use shortcuts::{Shortcut, Shortcuts};

@@ -185,6 +185,19 @@ settings! {
     regions: u32, Whole::between(1, 256) => Is(64);
     /// Side of the map of a thing as a region sees it, pixels.
     map_px: u32, Whole::one_of("side of maps", &[16, 32, 64, 128, 256, 512]) => Is(128);
+    besides {
+        /// Whether things near each other hide light as one; no key of a scene file.
+        grouping: Grouping => Grouping::Together;
+    }
+}
+
+/// Whether things near each other hide an environment's light as one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Grouping {
+    /// Each by itself: several leave the product of what each leaves.
+    Apart,
+    /// Those near each other share a map.
+    Together,
 }
 
 /// `[environment]`.

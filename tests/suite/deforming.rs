@@ -8,9 +8,10 @@ use glam::{DAffine3, DVec2, DVec3};
 use gnomon::app::truth::FACES_AWAY;
 use gnomon::app::truth::ray_cast::{GRAZES, View};
 use gnomon::geometry::camera::{Distortion, Intrinsics};
+use gnomon::light::probe::Probe;
 use gnomon::light::{Light, Material};
 use gnomon::render::{Layers, REAL, Renderer, Shown, VIRTUAL, VIRTUAL_HIDES};
-use gnomon::scene::{Scene, Shortcut, Shortcuts};
+use gnomon::scene::{EnvironmentMethod, Scene, Shortcut, Shortcuts};
 use serde_json::Value;
 
 use crate::common::composite::Expected;
@@ -423,4 +424,90 @@ fn an_edit_is_followed_in_the_shape_of_the_moment() {
     let mut faster = scene.clone();
     faster.virtuals[0].animation.as_mut().expect("one").speed = 2.0;
     assert!(!renderer.follow(&faster));
+}
+
+#[test]
+fn edits_are_followed_from_frame_to_frame_while_an_animation_plays() {
+    let models = Models::new();
+    type Edit<'a> = (&'a str, &'a dyn Fn(&mut Scene));
+    let edits: [Edit<'_>; 6] = [
+        ("moved", &|scene| {
+            let last = scene.virtuals.last_mut().expect("a thing");
+            last.anchor_from_object.translation.x += 0.03;
+        }),
+        ("turned", &|scene| {
+            let last = scene.virtuals.last_mut().expect("a thing");
+            let place = last.anchor_from_object;
+            last.anchor_from_object = place * DAffine3::from_rotation_z(0.7);
+        }),
+        ("hidden", &|scene| {
+            scene.virtuals.last_mut().expect("a thing").visible = false;
+        }),
+        ("shown", &|scene| {
+            scene.virtuals.last_mut().expect("a thing").visible = true;
+        }),
+        ("brightened", &|scene| {
+            scene
+                .lights
+                .iter_mut()
+                .for_each(|light| brighten(&mut light.light));
+            scene
+                .probe
+                .iter_mut()
+                .for_each(|probe| probe.exposure *= 1.4);
+        }),
+        ("light turned", &|scene| {
+            if let Some(probe) = &mut scene.probe {
+                let [width, height] = probe.probe.size_px();
+                let mut pixels = probe.probe.pixels().to_vec();
+                let rows = pixels.chunks_mut(width);
+                rows.for_each(|row| row.rotate_right(width / 5));
+                probe.probe = Probe::new([width, height], pixels).expect("pixels");
+            }
+        }),
+    ];
+    let environment = |method| {
+        let mut scene = in_a_recording("room", &models);
+        let ball =
+            "[[virtual]]\nname = \"further\"\nsphere_m = 0.03\nposition_m = [-0.05, -0.03, 0.02]\n";
+        let file = project_file("config/room.toml");
+        let text = std::fs::read_to_string(&file).expect("a scene that ships");
+        let with_ball = Scene::parse(&file, &format!("{text}\n{ball}")).expect("a scene");
+        let mut ball = with_ball.virtuals.last().expect("the ball").clone();
+        ball.anchor = 0;
+        scene.virtuals.push(ball);
+        scene.shadows.technique = gnomon::scene::Technique::Environment;
+        scene.shadows.environment.method = method;
+        scene.shadows.ambient_samples = 64;
+        scene
+    };
+    let scenes = [
+        ("lamps", scene(&models.all(), lights())),
+        ("rays", environment(EnvironmentMethod::Rays)),
+        ("maps", environment(EnvironmentMethod::Maps)),
+    ];
+    for (name, mut scene) in scenes {
+        let mut renderer = Stage::of_scene(scene.clone()).renderer(CAMERA);
+        draw(&mut renderer, &scene, camera(), 0.1);
+        for (step, (what, edit)) in edits.iter().enumerate() {
+            let time_s = 0.2 + 0.1 * step as f64;
+            edit(&mut scene);
+            assert!(renderer.follow(&scene), "{name}: {what}: not followed");
+            let seen = |renderer: &mut Renderer| {
+                // Where something has just moved, light is gathered finely from the next frame on.
+                draw(renderer, &scene, camera(), time_s);
+                draw(renderer, &scene, camera(), time_s)
+            };
+            let found = seen(&mut renderer);
+            let expected = seen(&mut Stage::of_scene(scene.clone()).renderer(CAMERA));
+            assert_eq!(apart(&found, &expected), 0, "{name}: {what}");
+        }
+    }
+}
+
+fn brighten(light: &mut Light) {
+    match light {
+        Light::Point { intensity, .. } => *intensity *= 1.5,
+        Light::Directional { irradiance, .. } => *irradiance *= 1.5,
+    }
 }

@@ -5,12 +5,12 @@ use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::geometry::ray_caster::RayCaster;
 use gnomon::light::probe::Probe;
 use gnomon::render::{Layers, REAL, Shown, VIRTUAL};
-use gnomon::scene::{Anchor, EnvironmentMethod, Object, ProbeScene, Scene, Technique};
+use gnomon::scene::{Anchor, EnvironmentMethod, Grouping, Object, ProbeScene, Scene, Technique};
 
 use crate::common::shapes::{cuboid, rectangle, sphere};
 use crate::common::{Picture, Stage, flat_mesh, look_at, object, scene};
 
-const CAMERA: Intrinsics = Intrinsics {
+pub(crate) const CAMERA: Intrinsics = Intrinsics {
     size_px: [120, 90],
     focal_px: DVec2::splat(130.0),
     center_px: DVec2::new(59.5, 44.5),
@@ -37,7 +37,7 @@ fn sky(turned: usize) -> Probe {
     Probe::new(PROBE_PX, pixels.collect()).expect("pixels")
 }
 
-fn probe_scene(probe: Probe) -> ProbeScene {
+pub(crate) fn probe_scene(probe: Probe) -> ProbeScene {
     ProbeScene {
         image: "sky.hdr".into(),
         probe,
@@ -51,7 +51,7 @@ fn probe_scene(probe: Probe) -> ProbeScene {
 }
 
 /// A table, and what stands on it, under the sky.
-fn under_sky(turned: usize, phantoms: Vec<Object>, virtuals: Vec<Object>) -> Scene {
+pub(crate) fn under_sky(turned: usize, phantoms: Vec<Object>, virtuals: Vec<Object>) -> Scene {
     let table = rectangle([-1.0, -1.0], [1.0, 1.0]);
     let table = flat_mesh(table.positions, table.triangles);
     let mut table = object("table", table, DVec3::splat(0.0), DAffine3::IDENTITY);
@@ -67,7 +67,7 @@ fn under_sky(turned: usize, phantoms: Vec<Object>, virtuals: Vec<Object>) -> Sce
     scene
 }
 
-fn black_box(name: &str, low: [f32; 3], high: [f32; 3], place: DAffine3) -> Object {
+pub(crate) fn black_box(name: &str, low: [f32; 3], high: [f32; 3], place: DAffine3) -> Object {
     let soup = cuboid(low, high);
     object(
         name,
@@ -78,7 +78,10 @@ fn black_box(name: &str, low: [f32; 3], high: [f32; 3], place: DAffine3) -> Obje
 }
 
 /// The gain of each pixel, and what is there.
-fn gains(scene: &Scene, camera_from_world: DAffine3) -> (Vec<[f32; 3]>, Vec<u8>, Picture) {
+pub(crate) fn gains(
+    scene: &Scene,
+    camera_from_world: DAffine3,
+) -> (Vec<[f32; 3]>, Vec<u8>, Picture) {
     let mut renderer = Stage::of_scene(scene.clone()).renderer(CAMERA);
     renderer.draw(&[Some(camera_from_world)], Shown::Composite);
     let picture = Picture::new(renderer.read_picture().expect("a picture"));
@@ -86,7 +89,7 @@ fn gains(scene: &Scene, camera_from_world: DAffine3) -> (Vec<[f32; 3]>, Vec<u8>,
     (layers.gain, layers.role, picture)
 }
 
-fn triangles(object: &Object) -> Vec<[Vec3; 3]> {
+pub(crate) fn triangles(object: &Object) -> Vec<[Vec3; 3]> {
     let positions = object.positions_in_anchor(&object.mesh);
     let corners = object.mesh.triangles.iter();
     corners
@@ -101,7 +104,7 @@ fn caster(objects: &[Object]) -> RayCaster {
 }
 
 /// Green irradiance of a place from all pixels that nothing of `casters` hides.
-fn exact(probe: &Probe, place: DVec3, normal: DVec3, casters: &[&RayCaster]) -> f64 {
+pub(crate) fn exact(probe: &Probe, place: DVec3, normal: DVec3, casters: &[&RayCaster]) -> f64 {
     let [width, _] = probe.size_px();
     let start = (place + normal * 1e-5).as_vec3();
     let pixels = probe.pixels().iter().enumerate();
@@ -135,7 +138,7 @@ fn on_table(index: usize, camera_from_world: &DAffine3) -> DVec3 {
     eye - way * (eye.z / way.z)
 }
 
-fn camera() -> DAffine3 {
+pub(crate) fn camera() -> DAffine3 {
     look_at(DVec3::new(0.1, -0.5, 0.45), DVec3::new(0.0, 0.02, 0.0))
 }
 
@@ -219,6 +222,34 @@ fn black_boxes_take_of_a_table_what_the_sum_over_the_probe_says() {
         by_penumbrae < by_maps && by_maps < 0.08,
         "the paper's way {by_maps}, ours {by_penumbrae}"
     );
+}
+
+/// Two slabs, one close behind the other as most of the light comes, and a post beside them.
+fn stacked() -> Scene {
+    let at = |x: f64, y: f64, z: f64| DAffine3::from_translation(DVec3::new(x, y, z));
+    let slab = |name, place| black_box(name, [-0.05, -0.05, 0.0], [0.05, 0.05, 0.006], place);
+    under_sky(
+        0,
+        Vec::new(),
+        vec![
+            slab("upper", at(0.01, 0.0, 0.075)),
+            slab("lower", at(0.0, 0.0, 0.055)),
+        ],
+    )
+}
+
+#[test]
+fn things_close_behind_each_other_hide_light_once() {
+    let off = |method: EnvironmentMethod, grouping: Grouping| {
+        let mut scene = stacked();
+        scene.shadows.environment.method = method;
+        scene.shadows.environment.grouping = grouping;
+        off_exact(&scene)[0]
+    };
+    let [maps, penumbrae] = [EnvironmentMethod::Maps, EnvironmentMethod::Penumbrae]
+        .map(|method| [Grouping::Apart, Grouping::Together].map(|grouping| off(method, grouping)));
+    assert!(maps[1] < 0.95 * maps[0], "maps {maps:?}");
+    assert!(penumbrae[1] < 0.7 * penumbrae[0], "penumbrae {penumbrae:?}");
 }
 
 #[test]

@@ -19,6 +19,7 @@ mod counting;
 mod deforming;
 mod detail;
 mod environment;
+mod environment_corners;
 mod figures;
 mod final_gather;
 mod gltf;

@@ -9,6 +9,7 @@ use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::environment_gloss::GlossyThing;
 use super::family::Chart;
 use super::figure::{Axis, Figure, FigurePanel, Point, Series, pareto_front};
 use super::lab::Lab;
@@ -18,6 +19,7 @@ use super::shots::{Shots, grey_frame, mean};
 use crate::app::precomputed;
 use crate::app::stages::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
+use crate::capture::linear::linear;
 use crate::environment::self_occlusion::{OwnSpace, OwnSurface, SelfOcclusion};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::ray_caster::RayCaster;
@@ -48,6 +50,8 @@ pub struct EnvironmentRow {
     gain_rms: Option<f64>,
     /// Against the sum over the same regions, as lights without a size.
     gain_rms_of_regions: Option<f64>,
+    /// Of glossy ones: what they mirror against rays over all of the probe, as a part of what they mirror.
+    gloss_rms: Option<f64>,
     /// What the thing hides from itself: to work out, and to keep.
     precomputed_s: Option<f64>,
     precomputed_kb: Option<f64>,
@@ -71,6 +75,8 @@ const SIZE_PX: [u32; 2] = [512, 512];
 const PROBE_PX: [usize; 2] = [64, 32];
 /// Every so many pixels the gain is held against the sums.
 const LOOKED_AT: usize = 131;
+/// And every so many what is mirrored.
+const GLOSS_LOOKED_AT: usize = 37;
 
 /// A method and its numbers.
 struct Way {
@@ -139,6 +145,7 @@ impl Way {
             residual_virtual: None,
             gain_rms: None,
             gain_rms_of_regions: None,
+            gloss_rms: None,
             precomputed_s: None,
             precomputed_kb: None,
         }
@@ -157,7 +164,8 @@ impl Chart for EnvironmentChart {
         width), the same maps with a penumbra at each pixel (labels: regions), and rays (labels: samples). `sky`: the recording \
         under a low sun, against its path-traced truth. The others: a black torus that turns in every frame over a black table, \
         512 x 512 pixels, all light broad; the error of the gain against the sum over all of the probe's pixels by rays, and, \
-        in the table alone, against the sum over the same regions. `precomputed`: what the torus hides from itself.";
+        in the table alone, against the sum over the same regions. What the glossy ones mirror is held against GGX's lobe over all of \
+        the probe by rays: maps are the paper's Phong lobe over 16 harmonics, all others GGX's over the filtered probe. `precomputed`: what the torus hides from itself.";
     type Row = EnvironmentRow;
 
     fn inputs(&self, lab: &Lab<'_>) -> Result<Vec<PathBuf>> {
@@ -201,8 +209,12 @@ impl Chart for EnvironmentChart {
             }),
         ];
         let of_turning: [Metric; 1] = [("error of the gain, rms", |row| row.gain_rms)];
+        let of_gloss: [Metric; 1] = [("error of what is mirrored", |row| row.gloss_rms)];
         let mut panels = Vec::new();
-        let turning = TURNING.iter().map(|(name, _, _)| (*name, &of_turning[..]));
+        let turning = TURNING.iter().flat_map(|(name, _, is_glossy)| {
+            let gloss = is_glossy.then_some((*name, &of_gloss[..]));
+            std::iter::once((*name, &of_turning[..])).chain(gloss)
+        });
         for (stage, metrics) in std::iter::once((SKY, &of_recording[..])).chain(turning) {
             for &(name, value) in metrics {
                 panels.push(panel(rows, stage, name, value));
@@ -344,6 +356,7 @@ impl Turning {
                 frames_ms.push(frame_ms(&mut renderer, &self.stage.poses(frames - frame))?);
             }
             let layers = renderer.layers()?;
+            let gloss_rms = self.gloss_rms(&layers.role, &renderer.read_picture()?);
             let places = self.places(&layers.role);
             let all = all.get_or_insert_with(|| self.gains(&places, &pixels(&self.probe)));
             let of_regions = regions(&self.probe, way.regions as usize);
@@ -366,6 +379,7 @@ impl Turning {
             rows.push(EnvironmentRow {
                 gain_rms: off(all),
                 gain_rms_of_regions: off(&of_regions),
+                gloss_rms: gloss_rms.map(rounded),
                 precomputed_s: Some(rounded(precomputed_s)),
                 precomputed_kb: Some(rounded(precomputed_kb)),
                 // (The first one makes what is made once.)
@@ -375,11 +389,37 @@ impl Turning {
         Ok(Some(rows))
     }
 
+    /// How far what the torus mirrors is off, as a part of it, root mean square; `None` where it is matt. (The table below it is
+    /// mirrored as the probe has it, in the truth too.)
+    fn gloss_rms(&self, role: &[u8], picture: &[u8]) -> Option<f64> {
+        let stage = &self.stage;
+        let torus = &stage.scene.virtuals[0];
+        torus.materials[0].roughness?;
+        let poses = stage.poses(0);
+        let world_from_camera = poses[0]?.inverse();
+        let thing = GlossyThing {
+            object: torus,
+            world_from_anchor: world_from_camera * poses[torus.anchor]?,
+            intrinsics: stage.intrinsics,
+            world_from_camera,
+        };
+        let exposure = stage.scene.probe.as_ref()?.exposure;
+        let truth = thing.radiances(role, GLOSS_LOOKED_AT, &pixels(&self.probe));
+        let [mut squares, mut whole] = [0.0; 2];
+        for (index, radiance) in truth {
+            // (What is brighter than white is white.)
+            let radiance = (exposure * radiance).min(1.0);
+            squares += (f64::from(linear(picture[4 * index + 1])) - radiance).powi(2);
+            whole += radiance * radiance;
+        }
+        Some((squares / whole).sqrt())
+    }
+
     /// What the torus hides from itself: seconds to work out, kB to keep.
     fn precomputed(&self) -> (f64, f64) {
         let torus = &self.stage.scene.virtuals[0];
         let space = OwnSpace::new(&torus.anchor_from_object);
-        let surface = OwnSurface::new(&torus.mesh, std::iter::empty(), &space);
+        let surface = OwnSurface::new(&torus.mesh, std::iter::once(torus.mesh.as_ref()), &space);
         let (occlusions, ms) = Stopwatch::time(|| surface.self_occlusions());
         let bytes = occlusions.len() * size_of::<SelfOcclusion>();
         (ms / 1e3, bytes as f64 / 1e3)

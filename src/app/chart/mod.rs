@@ -6,6 +6,8 @@ mod compositing;
 mod displacement;
 mod drawing;
 mod environment;
+mod environment_gloss;
+mod environment_pictures;
 mod family;
 mod figure;
 mod footage;
@@ -75,12 +77,13 @@ trait AnyChart {
 }
 
 /// All charts, in the order in which they are made and read.
-fn all() -> [Box<dyn AnyChart>; 15] {
+fn all() -> [Box<dyn AnyChart>; 16] {
     [
         Box::new(tracking::Tracking),
         Box::new(footage::Footage),
         Box::new(shadows::Shadows),
         Box::new(environment::EnvironmentChart),
+        Box::new(environment_pictures::EnvironmentPictures),
         Box::new(pictures::ShadowPictures),
         Box::new(pictures::SourcePictures),
         Box::new(moved::Moved),

@@ -1,7 +1,8 @@
 //! What is drawn, and by which renderer. What takes long (a scene's coarser levels, the light its surroundings throw
 //! back, pipelines) is made in a thread of its own while the renderer at hand goes on, as far as it can follow.
 
-use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
@@ -9,6 +10,7 @@ use super::false_colour;
 use super::frame_tracker::TrackedPicture;
 use super::views::ViewMode;
 use crate::app::input::mailbox::{Mailbox, Taken};
+use crate::app::precomputed::{Onlooker, watched_renderer};
 use crate::app::window::Wake;
 use crate::geometry::camera::Intrinsics;
 use crate::render::{Gpu, RenderError, Renderer, Shown};
@@ -19,6 +21,27 @@ use crate::scene::{Scene, Shortcuts};
 struct RendererOrder {
     scene: Arc<Scene>,
     intrinsics: Intrinsics,
+}
+
+/// How far the renderer to come is with what things hide from themselves.
+struct Preparing {
+    /// Points that are done, and all of them; 0 where nothing is worked out.
+    done_of: Mutex<[usize; 2]>,
+    is_over: AtomicBool,
+    wake: Wake,
+}
+
+impl Onlooker for Preparing {
+    fn sees(&self, done: usize, of: usize) -> bool {
+        let mut known = self.done_of.lock().unwrap_or_else(PoisonError::into_inner);
+        *known = match done < of {
+            true => [done.max(known[0]), of],
+            false => [0; 2],
+        };
+        drop(known);
+        (self.wake)();
+        !self.is_over.load(Ordering::Relaxed)
+    }
 }
 
 struct Made {
@@ -34,6 +57,7 @@ pub struct SceneCanvas {
     current: Option<(RendererOrder, Renderer)>,
     orders: Arc<Mailbox<RendererOrder>>,
     made: Arc<Mailbox<Made>>,
+    preparing: Arc<Preparing>,
     /// Shortcuts that are switched off.
     without: Shortcuts,
     /// Whether a renderer for the scene as it is has yet to come.
@@ -46,17 +70,24 @@ impl SceneCanvas {
     pub fn new(gpu: Arc<Gpu>, scene: Arc<Scene>, wake: Wake) -> Self {
         let orders: Arc<Mailbox<RendererOrder>> = Arc::default();
         let made: Arc<Mailbox<Made>> = Arc::default();
+        let preparing = Arc::new(Preparing {
+            done_of: Mutex::default(),
+            is_over: AtomicBool::new(false),
+            wake: wake.clone(),
+        });
         let maker = {
             let (gpu, orders, made) = (Arc::clone(&gpu), Arc::clone(&orders), Arc::clone(&made));
+            let preparing = Arc::clone(&preparing);
             thread::spawn(move || {
                 // Cores of its own to share: work for the frame at hand must not wait behind that for a renderer to come.
                 let cores = rayon::ThreadPoolBuilder::new().build().ok();
                 while let Some(order) = orders.take() {
                     let make = || {
-                        crate::app::precomputed::renderer(
+                        watched_renderer(
                             Arc::clone(&gpu),
                             &order.scene,
                             order.intrinsics,
+                            preparing.as_ref(),
                         )
                     };
                     let renderer = match &cores {
@@ -76,6 +107,7 @@ impl SceneCanvas {
             current: None,
             orders,
             made,
+            preparing,
             without: Shortcuts::NONE,
             awaits: false,
             maker: Some(maker),
@@ -124,6 +156,13 @@ impl SceneCanvas {
     /// Whether the scene is shown as well as can be, or a better renderer has yet to come.
     pub fn is_settled(&self) -> bool {
         !self.awaits
+    }
+
+    /// The part that is done, 0 to 1, of what takes the renderer to come longest; `None` where it takes no time.
+    pub fn preparing(&self) -> Option<f32> {
+        let known = self.preparing.done_of.lock();
+        let [done, of] = *known.unwrap_or_else(PoisonError::into_inner);
+        (of > 0).then(|| done as f32 / of as f32)
     }
 
     /// Takes a better renderer if one is ready; tells whether.
@@ -245,6 +284,7 @@ impl Drop for SceneCanvas {
     fn drop(&mut self) {
         self.orders.close();
         self.made.close();
+        self.preparing.is_over.store(true, Ordering::Relaxed);
         if let Some(maker) = self.maker.take() {
             // A panic in it has been told on stderr.
             _ = maker.join();

@@ -276,6 +276,11 @@ impl LiveSession {
         self.canvas.is_settled()
     }
 
+    /// The part that is done, 0 to 1, of what takes a scene's renderer longest to make; `None` where nothing of it is made.
+    pub fn preparing(&self) -> Option<f32> {
+        self.canvas.preparing()
+    }
+
     /// The frame that was drawn last.
     pub fn picture(&self) -> Option<&TrackedPicture> {
         self.picture.drawn().map(|picture| &picture.tracked)

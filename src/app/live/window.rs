@@ -7,7 +7,7 @@ use std::time::Duration;
 use anyhow::Result;
 use eframe::egui::{
     Align2, Area, CentralPanel, Color32, Context, FontId, Frame, Grid, Id, PointerButton, Pos2,
-    Rect, Response, RichText, Sense, Ui, Vec2, ViewportCommand,
+    ProgressBar, Rect, Response, RichText, Sense, Ui, Vec2, ViewportCommand,
 };
 use glam::DAffine3;
 
@@ -37,6 +37,7 @@ use crate::scene::SceneLight;
 /// The window looks at the world at least this often, even when no frame comes.
 const PULSE: Duration = Duration::from_millis(200);
 const PANEL_WIDTH: f32 = 330.0;
+const PROGRESS_WIDTH: f32 = 330.0;
 const TROUBLE: Color32 = Color32::from_rgb(255, 190, 90);
 const RECORDING: Color32 = Color32::from_rgb(235, 60, 50);
 
@@ -284,7 +285,8 @@ impl LiveWindow {
     fn notices(&self, ctx: &Context, area: Rect) {
         let shown = self.session.notices.shown(self.session.now_secs());
         let [session, video] = self.session.records();
-        if shown.is_empty() && !session && !video && !self.state.holds {
+        let preparing = self.session.preparing();
+        if shown.is_empty() && !session && !video && !self.state.holds && preparing.is_none() {
             return;
         }
         let place = area.left_top() + Vec2::splat(10.0);
@@ -297,6 +299,14 @@ impl LiveWindow {
                     boxed(
                         ui,
                         RichText::new("held: the picture stands still").color(TROUBLE),
+                    );
+                }
+                if let Some(part) = preparing {
+                    let text = "working out what things hide from themselves";
+                    ui.add(
+                        ProgressBar::new(part)
+                            .desired_width(PROGRESS_WIDTH)
+                            .text(text),
                     );
                 }
                 for (recording, what) in [(session, "the camera"), (video, "the composite")] {

@@ -2,6 +2,7 @@
 
 pub(crate) mod budget_words;
 pub(crate) mod known_camera;
+pub(crate) mod preparing;
 pub(crate) mod progress;
 pub mod report;
 pub(crate) mod source;

@@ -27,6 +27,12 @@ impl Progress {
         Self::styled(bar, template)
     }
 
+    /// Counts points of things.
+    pub fn of_points(count: usize) -> Self {
+        let template = "{bar:40} {pos}/{len} points: what things hide from themselves  {eta} left";
+        Self::styled(ProgressBar::new(count as u64), template)
+    }
+
     /// Counts the measurements of charts, of which there are `count`.
     pub fn of_measurements(count: usize) -> Self {
         let bar = ProgressBar::new(count as u64);
@@ -73,6 +79,11 @@ impl Progress {
     /// One more is done.
     pub fn advance(&self) {
         self.0.inc(1);
+    }
+
+    /// So many are done.
+    pub fn reach(&self, done: usize) {
+        self.0.set_position(done as u64);
     }
 
     /// Takes the bar away.

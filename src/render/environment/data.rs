@@ -4,6 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DMat3, DVec4, Mat4, Vec3, Vec4};
 use wgpu::util::DeviceExt as _;
 
+use crate::environment::glossy::EnvironmentMatrix;
 use crate::environment::occlusion_map::OcclusionMap;
 use crate::environment::reflected::DiscNode;
 use crate::environment::self_occlusion::{VISIBILITIES, VISIBILITY_DEGREE};
@@ -100,10 +101,10 @@ pub(super) fn disc_texels(node: &DiscNode) -> [[u32; 4]; 5] {
     ]
 }
 
-/// For a thing its middle, and for each region the harmonics in its direction as the thing sees it: turning the thing
+/// For a thing its middle and the number of its group, and for each region the harmonics in its direction as the thing sees it: turning the thing
 /// turns them. `anchor_from_own` says how its anchor is turned from it, `open` which regions the table leaves open.
 pub(super) fn receiver_texels(
-    thing: Option<&Thing>,
+    (thing, group): (Option<&Thing>, u32),
     anchor_from_own: DMat3,
     world_from_anchor: &[Option<DAffine3>],
     regions: &[Region],
@@ -114,13 +115,32 @@ pub(super) fn receiver_texels(
         return vec![[0; 4]; 1 + VISIBILITIES / 4 * regions.len()];
     };
     let center = pose.transform_point3(thing.ball.center.as_dvec3());
-    let mut texels = vec![words(center.as_vec3().extend(0.0))];
+    let mut texels = vec![words(center.as_vec3().extend(group as f32))];
     let turn = (pose.matrix3 * anchor_from_own).transpose();
     for (region, &is_open) in regions.iter().zip(open) {
         let basis = basis((turn * region.toward).normalize(), VISIBILITY_DEGREE);
         let scale = f64::from(u8::from(is_open));
         let rows = basis.as_chunks::<4>().0.iter();
         texels.extend(rows.map(|row| words(DVec4::from_array(*row).as_vec4() * scale as f32)));
+    }
+    texels
+}
+
+/// For each thing what the environment makes of its visibility, a texel for each entry; `world_from_own` says how it stands.
+pub(super) fn gloss_texels(
+    matrix: &EnvironmentMatrix,
+    world_from_own: impl Iterator<Item = Option<DMat3>>,
+) -> Vec<[u32; 4]> {
+    let mut texels = Vec::new();
+    for turn in world_from_own {
+        match turn {
+            Some(turn) => {
+                let entries = matrix.seen_by(turn);
+                let entries = entries.as_flattened().iter();
+                texels.extend(entries.map(|entry| words(entry.as_vec3().extend(0.0))));
+            }
+            None => texels.extend([[0; 4]; VISIBILITIES * VISIBILITIES]),
+        }
     }
     texels
 }

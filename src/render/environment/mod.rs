@@ -9,13 +9,19 @@ mod data;
 mod own_light;
 mod pipelines;
 
+use std::sync::Arc;
+
 use glam::DAffine3;
 
 use crate::environment::distant_light::DistantLight;
+use crate::environment::finer;
+use crate::environment::glossy::EnvironmentMatrix;
 use crate::environment::placed::PlacedScene;
+use crate::environment::self_occlusion::OwnSpace;
 use crate::environment::sky::Sky;
 use crate::environment::thing::Thing;
 use crate::geometry::bounds::Bounds;
+use crate::geometry::mesh::Mesh;
 use crate::geometry::reach::{self, PixelRect};
 use crate::light::Light;
 use crate::light::probe::Probe;
@@ -27,11 +33,14 @@ use super::deforming::DeformingThing;
 use super::final_gather::FinalGather;
 use super::gpu::Gpu;
 use super::gpu_scene::{DrawnLight, GpuScene};
+use super::map_atlas::MapDraw;
 use super::mirrored_probe::MirroredProbe;
 use super::passes::Passes;
 use super::precomputation::Precomputation;
 use casting::Casting;
-use data::{EnvironmentFrame, disc_texels, map_texels, receiver_texels, region_texels, table};
+use data::{
+    EnvironmentFrame, disc_texels, gloss_texels, map_texels, receiver_texels, region_texels, table,
+};
 use own_light::OwnLight;
 use pipelines::{ENVIRONMENT_GROUP, Pipelines};
 
@@ -48,6 +57,8 @@ pub(super) struct Environment {
     /// The node that it turns with.
     anchor: usize,
     distant: DistantLight,
+    /// The light as the paper's glossy things take it; `None`: none are drawn its way.
+    gloss: Option<EnvironmentMatrix>,
     /// By their numbers in the scene, phantoms first; `None`: not there.
     things: Vec<Option<Thing>>,
     /// Where light is summed up by corners.
@@ -71,6 +82,7 @@ pub(super) struct Environment {
 /// What depends on where things are.
 struct Placed {
     maps: wgpu::Buffer,
+    draws: Vec<MapDraw>,
     group: wgpu::BindGroup,
     disc_count: u32,
     /// Boxes around all things, in the world.
@@ -97,7 +109,9 @@ impl Environment {
             EnvironmentMethod::Penumbrae | EnvironmentMethod::Maps => None,
         };
         let kinds = gpu_scene.kinds;
+        let is_by_harmonics = kinds.glossy && settings.method == EnvironmentMethod::Maps;
         Self {
+            gloss: is_by_harmonics.then(|| EnvironmentMatrix::new(&rest.0, rest.1)),
             distant: DistantLight::new(&rest.0, rest.1, settings.regions as usize),
             rest,
             anchor: probe.anchor,
@@ -107,7 +121,7 @@ impl Environment {
                 gpu_scene,
                 precomputation,
             ),
-            pipelines: Pipelines::new(gpu, scene.shadows.samples, kinds, settings.method),
+            pipelines: Pipelines::new(gpu, scene.shadows.samples, kinds, &settings),
             final_gather,
             casting: None,
             frame: gpu.device.create_buffer(&wgpu::BufferDescriptor {
@@ -147,7 +161,8 @@ impl Environment {
         let discs = scene.reflecting();
         self.own_light
             .write(gpu, gpu_scene, &scene, &bounds, &discs);
-        let maps = casting.maps(&scene, &self.distant);
+        let maps = casting.maps(&scene, &self.distant, self.things.len());
+        let (seen_by, draws) = casting.draws(&maps);
         let regions = &self.distant.regions;
         let open = scene.open_regions(self.things.len());
         let receivers = self.things.iter().zip(open.chunks(regions.len().max(1)));
@@ -156,7 +171,8 @@ impl Environment {
             .flat_map(|(number, (thing, open))| {
                 let anchor_from_own = self.own_light.anchor_from_own(number);
                 let thing = thing.as_ref();
-                receiver_texels(thing, anchor_from_own, world_from_anchor, regions, open)
+                let of_thing = (thing, maps.group_of[number]);
+                receiver_texels(of_thing, anchor_from_own, world_from_anchor, regions, open)
             })
             .collect();
         let flat = |texels: Vec<[[u32; 4]; 5]>| texels.into_flattened();
@@ -166,7 +182,11 @@ impl Environment {
                 "regions",
                 &regions.iter().flat_map(region_texels).collect::<Vec<_>>(),
             ),
-            table(gpu, "maps", &flat(maps.iter().map(map_texels).collect())),
+            table(
+                gpu,
+                "maps",
+                &flat(maps.all.iter().map(map_texels).collect()),
+            ),
             table(gpu, "receivers", &receivers),
             table(
                 gpu,
@@ -174,9 +194,10 @@ impl Environment {
                 &flat(discs.nodes.iter().map(disc_texels).collect()),
             ),
         ];
+        let gloss = self.gloss_table(gpu, world_from_anchor);
         let maps = gpu.buffer(
             "occlusion maps",
-            bytemuck::cast_slice(&maps),
+            bytemuck::cast_slice(&seen_by),
             wgpu::BufferUsages::STORAGE,
         );
         let tables = tables.iter().map(wgpu::BindingResource::TextureView);
@@ -186,6 +207,7 @@ impl Environment {
             wgpu::BindingResource::Sampler(&self.sampler),
             wgpu::BindingResource::TextureView(&mirrored.view),
             wgpu::BindingResource::Sampler(&mirrored.sampler),
+            wgpu::BindingResource::TextureView(&gloss),
         ];
         let group = gpu.bind_group(
             &ENVIRONMENT_GROUP,
@@ -193,6 +215,7 @@ impl Environment {
         );
         Placed {
             maps,
+            draws,
             group,
             disc_count: discs.nodes.len() as u32,
             bounds,
@@ -200,12 +223,24 @@ impl Environment {
         }
     }
 
+    /// What the environment makes of each thing's visibility, where that is how gloss is drawn.
+    fn gloss_table(&self, gpu: &Gpu, world_from_anchor: &[Option<DAffine3>]) -> wgpu::TextureView {
+        let turns = (0..self.things.len()).map(|number| {
+            let anchor = self.things[number].as_ref()?.anchor;
+            let pose = world_from_anchor[anchor]?;
+            Some(pose.matrix3 * self.own_light.anchor_from_own(number))
+        });
+        let gloss = self.gloss.as_ref();
+        let texels = gloss.map_or(Vec::new(), |matrix| gloss_texels(matrix, turns));
+        table(gpu, "gloss", &texels)
+    }
+
     /// Places all anew where things or compact lights are elsewhere than before.
     fn follow_poses(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene) -> Option<()> {
         self.own_light.place(gpu, gpu_scene);
         let casting = self.casting.take().unwrap_or_else(|| {
             let region_count = self.distant.regions.len();
-            Casting::new(gpu, &self.things, region_count, self.settings.map_px)
+            Casting::new(gpu, &self.things, region_count, &self.settings)
         });
         let mirrored = self.mirrored.take().unwrap_or_else(|| {
             let (rest, exposure) = &self.rest;
@@ -231,6 +266,28 @@ fn lit_by_corners(scene: &Scene, is_real_gathered: bool) -> Vec<Option<&Object>>
     let virtuals = scene.virtuals.iter();
     let virtuals = virtuals.map(|object| Some(object).filter(|it| it.visible));
     real.chain(virtuals).collect()
+}
+
+/// The meshes whose light is worked out at corners and that have too few of these, each with a finer one; of phantoms only where
+/// no rays tell their light.
+pub(super) fn finer_meshes(
+    scene: &Scene,
+    precomputation: &dyn Precomputation,
+) -> Vec<(Arc<Mesh>, Mesh)> {
+    let is_real_gathered = scene.shadows.environment.method == EnvironmentMethod::Rays;
+    let objects = lit_by_corners(scene, is_real_gathered);
+    let mut finer: Vec<(Arc<Mesh>, Mesh)> = Vec::new();
+    for object in objects.into_iter().flatten() {
+        let mesh = &object.mesh;
+        if object.animation.is_some() || finer.iter().any(|(known, _)| known == mesh) {
+            continue;
+        }
+        let cuts = precomputation.cuts(mesh, &OwnSpace::new(&object.anchor_from_object));
+        if !cuts.is_empty() {
+            finer.push((Arc::clone(mesh), finer::finer(mesh, &cuts)));
+        }
+    }
+    finer
 }
 
 /// They as light from afar meets them.
@@ -261,6 +318,9 @@ impl BroadLight for Environment {
             self.rest = (rest.into_owned(), probe.exposure);
             let (rest, exposure) = (&self.rest.0, self.rest.1);
             self.distant = DistantLight::new(rest, exposure, self.settings.regions as usize);
+            if let Some(gloss) = &mut self.gloss {
+                *gloss = EnvironmentMatrix::new(rest, exposure);
+            }
             self.mirrored = None;
             if let Some(final_gather) = &mut self.final_gather {
                 final_gather.set_sky(|rays| Sky::new(rest, exposure, rays));
@@ -340,7 +400,7 @@ impl BroadLight for Environment {
         let Some(casting) = &self.casting else {
             return;
         };
-        casting.draw(gpu, passes, &placed.maps);
+        casting.draw(gpu, passes, &placed.maps, &placed.draws);
         placed.are_maps_drawn = true;
     }
 

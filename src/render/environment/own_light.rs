@@ -78,8 +78,8 @@ impl OwnLight {
         let of_thing = |object: &Option<&Object>| {
             let object = (*object)?;
             let space = OwnSpace::new(&object.anchor_from_object);
-            let coarser = gpu_scene.coarser_meshes(&object.mesh);
-            let surface = OwnSurface::new(&object.mesh, coarser, &space);
+            let drawn = gpu_scene.drawn_meshes(&object.mesh);
+            let surface = OwnSurface::new(&object.mesh, drawn, &space);
             Some(OwnLitThing {
                 own: Arc::new(OwnOcclusion {
                     key: surface.key,
@@ -181,7 +181,7 @@ impl OwnLight {
             return;
         };
         let space = OwnSpace::new(&object.anchor_from_object);
-        let surface = OwnSurface::new(&object.mesh, std::iter::empty(), &space);
+        let surface = OwnSurface::new(&object.mesh, std::iter::once(object.mesh.as_ref()), &space);
         let [fewest, most] = RAYS_OF_A_POINT;
         let rays = (RAYS_OF_A_FRAME / surface.point_count().max(1)).clamp(fewest, most);
         thing.own = Arc::new(OwnOcclusion {

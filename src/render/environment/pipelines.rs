@@ -7,21 +7,22 @@ use super::super::pipelines::{
 };
 use super::super::surfaces::{Sided, SurfaceKinds, surface_description};
 use super::super::uniforms::GEOMETRY_GROUPS;
-use crate::scene::EnvironmentMethod;
+use crate::scene::{EnvironmentMethod, EnvironmentSettings, Grouping};
 
 /// Group 2 of environment.wgsl.
 pub(super) const ENVIRONMENT_GROUP: GroupLayout = GroupLayout {
     label: "environment",
     entries: &[
-        uniform(0, wgpu::ShaderStages::FRAGMENT, false),
-        words(1),
-        words(2),
-        words(3),
-        words(4),
+        uniform(0, wgpu::ShaderStages::VERTEX_FRAGMENT, false),
+        words(1, wgpu::ShaderStages::FRAGMENT),
+        words(2, wgpu::ShaderStages::FRAGMENT),
+        words(3, wgpu::ShaderStages::FRAGMENT),
+        words(4, wgpu::ShaderStages::FRAGMENT),
         filtered(5),
         sampler(6),
         filtered(7),
         sampler(8),
+        words(9, wgpu::ShaderStages::VERTEX),
     ],
 };
 
@@ -36,7 +37,13 @@ pub(super) struct Pipelines {
 }
 
 impl Pipelines {
-    pub fn new(gpu: &Gpu, samples: u32, kinds: SurfaceKinds, method: EnvironmentMethod) -> Self {
+    pub fn new(
+        gpu: &Gpu,
+        samples: u32,
+        kinds: SurfaceKinds,
+        settings: &EnvironmentSettings,
+    ) -> Self {
+        let method = settings.method;
         let format = gpu.light_format;
         let described = |fragment| PipelineDescription {
             shader: "environment.wgsl",
@@ -47,6 +54,10 @@ impl Pipelines {
                 ("GLOSSY", f64::from(kinds.glossy)),
                 ("MULTISAMPLED", f64::from(samples > 1)),
                 ("BY_PLANES", f64::from(method == EnvironmentMethod::Maps)),
+                (
+                    "GROUPED",
+                    f64::from(settings.grouping == Grouping::Together),
+                ),
             ],
             groups: [GEOMETRY_GROUPS[0], GEOMETRY_GROUPS[1], ENVIRONMENT_GROUP]
                 .map(Some)
@@ -66,10 +77,14 @@ impl Pipelines {
             targets: vec![untouched(format), untouched(format)],
             ..described("ambient_on_real")
         };
+        let mut on_virtual = described("light_on_virtual");
+        if kinds.glossy && method == EnvironmentMethod::Maps {
+            on_virtual.flags.push("HARMONIC_GLOSS");
+        }
         Self {
             depth_of_real: Sided::new(gpu, &depth_alone),
             light_on_real: with_occlusion(described("light_on_real")),
-            light_on_virtual: with_occlusion(kinds.of_virtual(described("light_on_virtual"))),
+            light_on_virtual: with_occlusion(kinds.of_virtual(on_virtual)),
         }
     }
 }

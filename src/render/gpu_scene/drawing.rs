@@ -164,7 +164,7 @@ impl GpuScene {
         role: Role,
         piece: usize,
         within: PixelRect,
-    ) -> bool {
+    ) -> PixelRect {
         let groups = [&self.view_group, self.casters.light_group()];
         let (things, insides) = (&self.things, &self.insides);
         let slot = self.slot(piece);

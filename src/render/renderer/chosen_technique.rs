@@ -1,10 +1,11 @@
 //! The technique that draws a renderer's shadows, with all that it alone needs.
 
 use super::super::accumulated::Accumulated;
+use super::super::anchor_geometry::KnownLevels;
 use super::super::background::Background;
 use super::super::combined::Combined;
 use super::super::direct::Direct;
-use super::super::environment::Environment;
+use super::super::environment::{Environment, finer_meshes};
 use super::super::final_gather::FinalGather;
 use super::super::gpu::Gpu;
 use super::super::gpu_scene::GpuScene;
@@ -40,7 +41,8 @@ impl ChosenTechnique {
     ) -> (Self, GpuScene) {
         match (scene.chosen_technique().0, &scene.probe) {
             (ShadowTechnique::Shafts | ShadowTechnique::Both, Some(probe)) => {
-                let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Room);
+                let gpu_scene =
+                    GpuScene::new(gpu, scene, intrinsics, LitBy::Room, KnownLevels::default());
                 let kinds = gpu_scene.kinds;
                 let shafts = Shafts::new(gpu, scene, probe, kinds, precomputation);
                 let technique = match gpu_scene.light_count() {
@@ -57,7 +59,8 @@ impl ChosenTechnique {
                 (technique, gpu_scene)
             }
             (ShadowTechnique::Environment, Some(probe)) => {
-                let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Room);
+                let finer = KnownLevels::with_finer(finer_meshes(scene, precomputation));
+                let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Room, finer);
                 let (samples, kinds) = (scene.shadows.samples, gpu_scene.kinds);
                 let broad = Environment::new(gpu, scene, probe, &gpu_scene, precomputation);
                 let compact = Accumulated::new(gpu, background, samples, kinds, First::DepthAlone);
@@ -66,7 +69,13 @@ impl ChosenTechnique {
             }
             // (No scene that was read has shafts or an environment without a probe.)
             (_, _) => {
-                let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Lights);
+                let gpu_scene = GpuScene::new(
+                    gpu,
+                    scene,
+                    intrinsics,
+                    LitBy::Lights,
+                    KnownLevels::default(),
+                );
                 let (samples, kinds) = (scene.shadows.samples, gpu_scene.kinds);
                 // (A lamp that moves along may be lost, and one of some size has soft shadows.)
                 let is_plain = |light: &SceneLight| light.anchor == 0 && !light.light.has_size();

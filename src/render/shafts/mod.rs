@@ -31,7 +31,7 @@ use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
 use super::gpu_scene::{DrawnLight, GpuScene};
 use super::light_sums::{BY_GAIN, CompositeShader, LightSums};
-use super::map_atlas::MapAtlas;
+use super::map_atlas::{MapAtlas, MapDraw};
 use super::mirrored_probe::MirroredProbe;
 use super::passes::Passes;
 use super::precomputation::Precomputation;
@@ -262,9 +262,12 @@ impl Shafts {
             gpu,
             passes,
             &hidden.sources,
-            hidden.source_count,
             &hidden.casters,
-            |_| 0..hidden.caster_vertices,
+            (0..hidden.source_count).map(|source| MapDraw {
+                tile: source,
+                seen_by: source,
+                corners: 0..hidden.caster_vertices,
+            }),
         );
         hidden.is_drawn = true;
     }

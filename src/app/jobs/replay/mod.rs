@@ -30,6 +30,7 @@ use crate::app::input::mirror_watch::MirrorWatch;
 use crate::app::input::sightings::Sightings;
 use crate::app::scene_warnings;
 use crate::app::stages::budget_words::budget_words;
+use crate::app::stages::preparing;
 use crate::app::stages::report::Report;
 use crate::app::stages::source::{self, CalibrationNamed};
 use crate::app::stages::stats::{Stats, detector_in_words, peak_memory_mib};
@@ -100,7 +101,7 @@ pub fn replay(request: &ReplayRequest, stop: &AtomicBool) -> Result<Report> {
         ),
     };
     let drawing = (request.out.is_some() || request.sheet.is_some())
-        .then(|| ReplayDrawing::open(request, &scene, &source, intrinsics))
+        .then(|| ReplayDrawing::open(request, &scene, &source, intrinsics, stop))
         .transpose()?;
     if drawing.is_none() && request.poses.is_none() && request.stats.is_none() {
         bail!("nothing to do: give --out, --sheet, --poses or --stats");
@@ -220,10 +221,11 @@ impl ReplayDrawing {
         scene: &Scene,
         source: &FrameSource,
         intrinsics: Intrinsics,
+        stop: &AtomicBool,
     ) -> Result<Self> {
         let gpu = Arc::new(Gpu::open(request.adapter.as_deref())?);
         talk::say(format_args!("drawing on {}", gpu.description()));
-        let renderer = crate::app::precomputed::renderer(Arc::clone(&gpu), scene, intrinsics)?;
+        let renderer = preparing::renderer(Arc::clone(&gpu), scene, intrinsics, stop)?;
         let sink = request
             .out
             .as_ref()
