@@ -187,17 +187,30 @@ settings! {
     map_px: u32, Whole::one_of("side of maps", &[16, 32, 64, 128, 256, 512]) => Is(128);
     besides {
         /// Whether things near each other hide light as one; no key of a scene file.
-        grouping: Grouping => Grouping::Together;
+        grouping: Grouping => Grouping::ByMethod;
     }
 }
 
 /// Whether things near each other hide an environment's light as one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Grouping {
+    /// With the paper's maps alone: a penumbra by the pixel is nearer to the truth without, where things lie beside each other.
+    ByMethod,
     /// Each by itself: several leave the product of what each leaves.
     Apart,
     /// Those near each other share a map.
     Together,
+}
+
+impl EnvironmentSettings {
+    /// Whether things near each other share a map.
+    pub fn is_grouped(&self) -> bool {
+        match self.grouping {
+            Grouping::ByMethod => self.method == EnvironmentMethod::Maps,
+            Grouping::Apart => false,
+            Grouping::Together => true,
+        }
+    }
 }
 
 /// `[environment]`.

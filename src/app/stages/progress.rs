@@ -29,7 +29,7 @@ impl Progress {
 
     /// Counts points of things.
     pub fn of_points(count: usize) -> Self {
-        let template = "{bar:40} {pos}/{len} points: what things hide from themselves  {eta} left";
+        let template = "{bar:30} {pos}/{len} points of self-shadows  {eta} left";
         Self::styled(ProgressBar::new(count as u64), template)
     }
 

@@ -11,7 +11,7 @@ use crate::environment::occlusion_map::{A_GROUP, OcclusionMap};
 use crate::environment::placed::PlacedScene;
 use crate::environment::thing::Thing;
 use crate::geometry::bounds::Bounds;
-use crate::scene::{EnvironmentSettings, Grouping};
+use crate::scene::EnvironmentSettings;
 use crate::shafts::bounding::Ball;
 use crate::shafts::shadow_atlas::Tiling;
 
@@ -65,7 +65,7 @@ impl Casting {
             casters.push(number);
         }
         let largest_px = gpu.device.limits().max_texture_dimension_2d;
-        let is_grouped = settings.grouping == Grouping::Together;
+        let is_grouped = settings.is_grouped();
         // (A group has two members at least.)
         let most_groups = if is_grouped { casters.len() / 2 } else { 0 };
         let tiles = (casters.len() + most_groups) * region_count;

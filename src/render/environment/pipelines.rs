@@ -7,7 +7,7 @@ use super::super::pipelines::{
 };
 use super::super::surfaces::{Sided, SurfaceKinds, surface_description};
 use super::super::uniforms::GEOMETRY_GROUPS;
-use crate::scene::{EnvironmentMethod, EnvironmentSettings, Grouping};
+use crate::scene::{EnvironmentMethod, EnvironmentSettings};
 
 /// Group 2 of environment.wgsl.
 pub(super) const ENVIRONMENT_GROUP: GroupLayout = GroupLayout {
@@ -54,10 +54,7 @@ impl Pipelines {
                 ("GLOSSY", f64::from(kinds.glossy)),
                 ("MULTISAMPLED", f64::from(samples > 1)),
                 ("BY_PLANES", f64::from(method == EnvironmentMethod::Maps)),
-                (
-                    "GROUPED",
-                    f64::from(settings.grouping == Grouping::Together),
-                ),
+                ("GROUPED", f64::from(settings.is_grouped())),
             ],
             groups: [GEOMETRY_GROUPS[0], GEOMETRY_GROUPS[1], ENVIRONMENT_GROUP]
                 .map(Some)
