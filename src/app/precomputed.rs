@@ -219,7 +219,7 @@ mod tests {
             let place = glam::DAffine3::from_rotation_x(turned) * glam::DAffine3::from_scale(scale);
             OwnSurface::new(
                 &torus.mesh,
-                std::iter::once(&torus.mesh),
+                std::iter::once(torus.mesh.as_ref()),
                 &OwnSpace::new(&place),
             )
         };
@@ -264,7 +264,7 @@ mod tests {
         let house = scene.phantoms.iter().find(|it| it.name == "house");
         let (house, torus) = (&house.unwrap().mesh, &scene.virtuals[0].mesh);
         let space = OwnSpace::new(&glam::DAffine3::IDENTITY);
-        let surface = OwnSurface::new(torus, std::iter::once(torus), &space);
+        let surface = OwnSurface::new(torus, std::iter::once(torus.as_ref()), &space);
         let folder = tempfile::tempdir().unwrap();
         let folder = Some(folder.path().to_owned());
         let [points, edges] = [self_occlusions(folder.clone()), cuts_of_meshes(folder)];
