@@ -65,7 +65,7 @@ settings! {
     corrected_bits: u32, Whole::between(0, 3) => Is(1);
     /// libapriltag: detections with a smaller decision margin are dropped.
     min_margin: f64, Numbers::between(0.0, 255.0) => Is(20.0);
-    /// libapriltag: threads of the search.
+    /// OpenCV: threads of the search. (libapriltag has one: with more it may crash.)
     threads: u32, Whole::between(1, 64) => Is(1);
     /// Where markers are looked for.
     search: SearchArea => Is(SearchArea::Near);

@@ -119,7 +119,6 @@ impl BorderSearch {
                 settings.decimation as f32,
                 settings.blur_px as f32,
                 settings.library_edges,
-                settings.threads as i32,
             )
         };
         let raw = NonNull::new(raw)
@@ -269,7 +268,6 @@ unsafe extern "C" {
         decimation: f32,
         blur_px: f32,
         refines_edges: bool,
-        threads: i32,
     ) -> *mut RawDetector;
     fn gnomon_apriltag_add_family(
         detector: *mut RawDetector,

@@ -86,8 +86,7 @@ void gnomon_apriltag_destroy(struct gnomon_apriltag *self) {
     free(self);
 }
 
-struct gnomon_apriltag *gnomon_apriltag_create(float decimation, float blur_px, bool refines_edges,
-                                               int32_t threads) {
+struct gnomon_apriltag *gnomon_apriltag_create(float decimation, float blur_px, bool refines_edges) {
     struct gnomon_apriltag *self = calloc(1, sizeof *self);
     if (!self) return NULL;
     self->detector = apriltag_detector_create();
@@ -99,7 +98,9 @@ struct gnomon_apriltag *gnomon_apriltag_create(float decimation, float blur_px, 
     self->detector->quad_sigma = blur_px;
     // The library refines every quadrilateral, marker or not; refine.rs those that decode.
     self->detector->refine_edges = refines_edges;
-    self->detector->nthreads = threads;
+    // With more the library makes workers in the first search, which read its list of tasks while that is still being written
+    // and jump to where it was: a crash in one of some hundred first searches.
+    self->detector->nthreads = 1;
     return self;
 }
 

@@ -580,3 +580,25 @@ fn blurring_leaves_the_picture_alone_and_threads_change_nothing() {
     let moved = std::thread::spawn(move || detector.detect(&grey, CAMERA.size_px).unwrap());
     assert_eq!(moved.join().unwrap(), first);
 }
+
+/// libapriltag's own threads crash in one of some hundred first searches, where there are more of them than cores.
+#[test]
+fn many_first_searches_at_once() {
+    let noise: Vec<u8> = (0..320_u32 * 240)
+        .map(|at| (at.wrapping_mul(2_654_435_761) >> 24) as u8)
+        .collect();
+    let on_three = TrackingSettings {
+        threads: 3,
+        ..TrackingSettings::default()
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..8 {
+            scope.spawn(|| {
+                for _ in 0..60 {
+                    let mut detector = Detector::new(&on_three, &[Family::TAG36H11]).unwrap();
+                    detector.detect(&noise, [320, 240]).unwrap();
+                }
+            });
+        }
+    });
+}

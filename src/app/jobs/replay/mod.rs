@@ -140,20 +140,9 @@ pub fn replay(request: &ReplayRequest, stop: &AtomicBool) -> Result<Report> {
     if let Some(failure) = failure {
         return Err(failure);
     }
-    let mut remarks = Vec::new();
-    let render = run.tally.log.summary().remove("render");
-    if let (Some(controller), Some(times)) = (&run.controller, render) {
-        remarks.push(budget_words(controller, times.p95_ms));
-    }
-    if run.tally.lost[0] > 0 {
-        remarks.push(format!(
-            "the world's anchor was not found in {} of them; there the video is shown alone",
-            run.tally.lost[0]
-        ));
-    }
     Ok(Report::new(
         format!("{} frames, {} drawn", run.tally.frames, run.drawn),
-        remarks,
+        run.remarks(),
         &scene.anchors,
         (&ended, &mut run.tally),
         scene.camera.mirror,
@@ -256,6 +245,22 @@ struct ReplayRun<'a> {
 }
 
 impl ReplayRun<'_> {
+    /// What there is to say of the whole.
+    fn remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        let render = self.tally.log.summary().remove("render");
+        if let (Some(controller), Some(times)) = (&self.controller, render) {
+            remarks.push(budget_words(controller, times.p95_ms));
+        }
+        if self.tally.lost[0] > 0 {
+            remarks.push(format!(
+                "the world's anchor was not found in {} of them; there the video is shown alone",
+                self.tally.lost[0]
+            ));
+        }
+        remarks
+    }
+
     /// Capture → tracking → rendering (here) → writing.
     fn all_frames(
         &mut self,
