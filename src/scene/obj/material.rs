@@ -73,10 +73,10 @@ impl Converter {
                 set_map(&mut material, map, &mtl, found);
             }
         }
-        if let Some(color) = material.maps.color {
-            if let Some((at, message)) = self.cover(&mut material, color, &mtl) {
-                notes.add_at(library.0, library.1, at, message);
-            }
+        if let Some(color) = material.maps.color
+            && let Some((at, message)) = self.cover(&mut material, color, &mtl)
+        {
+            notes.add_at(library.0, library.1, at, message);
         }
         GivenMaterial {
             name: mtl.name,
