@@ -18,11 +18,22 @@ pub(super) fn cameras(text: &str) -> Result<Vec<(String, UncheckedCalibration)>,
         .collect()
 }
 
+/// What to say of a text file that is not COLMAP's.
+fn other_text() -> String {
+    "of text files COLMAP's cameras.txt, whose lines are CAMERA_ID MODEL WIDTH HEIGHT PARAMS[], and ROS's ost.txt are read; \
+     write other programs' numbers as size_px, focal_px, center_px and distortion into a .toml"
+        .to_owned()
+}
+
 fn camera(line: &str) -> Result<(String, UncheckedCalibration), String> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let [id, model, width, height, ref parameters @ ..] = words[..] else {
-        return Err("COLMAP's cameras.txt has CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]".to_owned());
+        return Err(other_text());
     };
+    // (SLAM's and KITTI's text files begin with numbers alone.)
+    if model.parse::<f64>().is_ok() {
+        return Err(other_text());
+    }
     let side = |word: &str| {
         let side = word
             .parse::<u32>()

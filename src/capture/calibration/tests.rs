@@ -304,6 +304,10 @@ fn colmaps_cameras_are_read() {
             "PINHOLE has fx, fy, cx, cy, not 3 numbers",
         ),
         ("1 PINHOLE 640", "CAMERA_ID MODEL WIDTH HEIGHT"),
+        (
+            "500 500 320 240 0.01 -0.1 0 0",
+            "as size_px, focal_px, center_px and distortion",
+        ),
         ("1 PINHOLE 640 480 615 613 320 x", "'x' is no number"),
         ("", "there is no camera in it"),
     ] {
