@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use super::AnyChart;
 use super::lab::Lab;
-use super::sheet::{Sheet, SheetPart, changed_part};
+use super::sheet::{ENLARGED, Sheet, SheetPart, changed_part};
 use super::shots::Shots;
 use crate::app::files::picture_files::write_rgb_png;
 use crate::app::stages::progress::Progress;
@@ -110,6 +110,7 @@ impl AnyChart for EnvironmentPictures {
         let (size_px, rgba) = Sheet {
             title: "What an environment cannot show",
             reading: "Left the failure, in the middle what answers it, right the path-traced truth.",
+            enlarged: ENLARGED,
             rows,
         }
         .paint()?;

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::AnyChart;
 use super::lab::Lab;
 use super::measured::{rounded, to_csv};
-use super::sheet::{Sheet, SheetPart, changed_part};
+use super::sheet::{ENLARGED, Sheet, SheetPart, changed_part};
 use super::shots::Shots;
 use crate::app::files::picture_files::{write_rgb_png, write_text};
 use crate::app::stages::progress::Progress;
@@ -149,6 +149,7 @@ impl AnyChart for Moved {
         let (size_px, rgba) = Sheet {
             title: "Things that move in a room's light",
             reading: "Above: what is left of the light where the shadow is darkest. Below: the ball's brightness beside the house.",
+            enlarged: ENLARGED,
             rows: sheet,
         }
         .paint()?;

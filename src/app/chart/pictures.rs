@@ -7,7 +7,7 @@ use anyhow::Result;
 use super::AnyChart;
 use super::lab::Lab;
 use super::shadows::with_sources;
-use super::sheet::{Cell, Sheet, changed_part};
+use super::sheet::{Cell, ENLARGED, Sheet, changed_part};
 use super::shots::{Shot, Shots, mean};
 use crate::app::files::picture_files::write_rgb_png;
 use crate::app::stages::progress::Progress;
@@ -52,8 +52,8 @@ impl AnyChart for ShadowPictures {
     }
 
     fn make(&self, lab: &Lab<'_>, out: &Path, progress: &Progress) -> Result<bool> {
-        let title = "Shadows beside the truth";
-        make_sheet(self, title, qualities, lab, out, progress)
+        let head = ("Shadows beside the truth", ENLARGED);
+        make_sheet(self, head, qualities, lab, out, progress)
     }
 }
 
@@ -78,15 +78,19 @@ impl AnyChart for SourcePictures {
     }
 
     fn make(&self, lab: &Lab<'_>, out: &Path, progress: &Progress) -> Result<bool> {
-        let title = "Soft shadows by 10, 20, 50 and all sources beside the truth";
-        make_sheet(self, title, by_sources, lab, out, progress)
+        let head = (
+            "Soft shadows by 10, 20, 50 and all sources beside the truth",
+            1,
+        );
+        make_sheet(self, head, by_sources, lab, out, progress)
     }
 }
 
-/// A pair of rows for each recording that is drawn in any way; whether it was made to its end.
+/// A pair of rows for each recording that is drawn in any way; whether it was made to its end. `enlarged`: each pixel becomes a square
+/// of so many.
 fn make_sheet(
     chart: &dyn AnyChart,
-    title: &'static str,
+    (title, enlarged): (&'static str, usize),
     ways: fn(&Scene) -> Ways,
     lab: &Lab<'_>,
     out: &Path,
@@ -127,6 +131,7 @@ fn make_sheet(
     let (size_px, rgba) = Sheet {
         title,
         reading: "Above each picture the time of a frame and the rms error of its shadows; below it its error, four times stronger.",
+        enlarged,
         rows,
     }
     .paint()?;
@@ -143,7 +148,11 @@ fn qualities(scene: &Scene) -> Ways {
     };
     match scene.chosen_technique().0 {
         ShadowTechnique::Environment => environment_ways(scene),
-        technique if technique.has_shafts() => by_sources(scene),
+        technique if technique.has_shafts() => {
+            let ways = by_sources(scene).into_iter();
+            ways.map(|(name, scene)| (format!("{name} sources"), scene))
+                .collect()
+        }
         _ => {
             let qualities = Quality::BY_NAME.into_iter();
             let technique = scene.shadows.technique;
@@ -162,7 +171,7 @@ fn qualities(scene: &Scene) -> Ways {
 fn by_sources(scene: &Scene) -> Ways {
     let with = |sources: Option<u32>| {
         let name = sources.map_or("all".to_owned(), |count| count.to_string());
-        Some((format!("{name} sources"), with_sources(scene, sources)?))
+        Some((name, with_sources(scene, sources)?))
     };
     SOURCES.into_iter().filter_map(with).collect()
 }

@@ -6,8 +6,8 @@ use plotters::prelude::DrawingBackend;
 use super::canvas::{ChartCanvas, Drawing, INK, PIXELS_PER_UNIT, TextAnchor, bitmap};
 use crate::app::truth::LinearPicture;
 
-/// Each pixel is drawn as a square of so many.
-const ENLARGED: usize = 2;
+/// Each pixel is drawn as a square of so many, as a rule.
+pub const ENLARGED: usize = 2;
 /// Around what the virtual things change, pixels.
 const MARGIN_PX: usize = 16;
 /// Changes of fewer levels are none.
@@ -31,6 +31,8 @@ pub struct Sheet {
     pub title: &'static str,
     /// How to read it.
     pub reading: &'static str,
+    /// Each pixel is drawn as a square of so many.
+    pub enlarged: usize,
     /// From the top.
     pub rows: Vec<Vec<Cell>>,
 }
@@ -94,9 +96,9 @@ impl SheetPart {
 
 impl Cell {
     /// Width and height on the sheet, in its units.
-    fn size(&self) -> [f64; 2] {
+    fn size(&self, enlarged: usize) -> [f64; 2] {
         self.size_px
-            .map(|px| (px * ENLARGED) as f64 / PIXELS_PER_UNIT)
+            .map(|px| (px * enlarged) as f64 / PIXELS_PER_UNIT)
     }
 }
 
@@ -111,9 +113,13 @@ impl Sheet {
             let mut x = GAP;
             for cell in row {
                 placed.push(([x, y], cell));
-                x += cell.size()[0] + GAP;
+                x += cell.size(self.enlarged)[0] + GAP;
             }
-            y += row.iter().map(|cell| cell.size()[1]).fold(0.0, f64::max) + GAP;
+            y += row
+                .iter()
+                .map(|cell| cell.size(self.enlarged)[1])
+                .fold(0.0, f64::max)
+                + GAP;
         }
         placed
     }
@@ -126,9 +132,10 @@ impl Sheet {
         let (size_px, mut rgba) = bitmap(self)?;
         for (corner, cell) in self.placed() {
             let [left, top] = corner.map(|at| (at * PIXELS_PER_UNIT).round() as usize);
-            let [width, height] = cell.size_px.map(|px| px * ENLARGED);
+            let [width, height] = cell.size_px.map(|px| px * self.enlarged);
             for (row, column) in (0..height).flat_map(|row| (0..width).map(move |c| (row, c))) {
-                let pixel = cell.rgb[row / ENLARGED * cell.size_px[0] + column / ENLARGED];
+                let pixel =
+                    cell.rgb[row / self.enlarged * cell.size_px[0] + column / self.enlarged];
                 let at = 4 * ((top + row) * size_px[0] as usize + left + column);
                 rgba[at..at + 3].copy_from_slice(&pixel);
             }
@@ -140,7 +147,7 @@ impl Sheet {
 impl Drawing for Sheet {
     fn size(&self) -> [f64; 2] {
         let ends = self.placed().into_iter().map(|([x, y], cell)| {
-            let [width, height] = cell.size();
+            let [width, height] = cell.size(self.enlarged);
             [x + width, y + height]
         });
         let far = ends.fold([0.0_f64; 2], |far, end| {
