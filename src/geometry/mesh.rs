@@ -293,37 +293,30 @@ impl Mesh {
     }
 
     pub(super) fn without_unused_positions(mut self) -> Self {
-        let mut new_index = vec![u32::MAX; self.positions.len()];
-        let mut kept = Vec::with_capacity(self.positions.len());
-        for index in self.triangles.iter_mut().flatten() {
-            let old = *index as usize;
-            if new_index[old] == u32::MAX {
-                new_index[old] = kept.len() as u32;
-                kept.push(self.positions[old]);
-            }
-            *index = new_index[old];
-        }
-        self.positions = kept;
+        self.positions = used(&self.positions, self.triangles.as_flattened_mut());
+        self
+    }
+
+    /// Leaves out the looks that no corner has.
+    pub(super) fn without_unused_looks(mut self) -> Self {
+        self.looks = used(&self.looks, self.corner_looks.as_flattened_mut());
         self
     }
 }
 
-impl Mesh {
-    /// Leaves out the looks that no corner has.
-    pub(super) fn without_unused_looks(mut self) -> Self {
-        let mut new_index = vec![u32::MAX; self.looks.len()];
-        let mut kept = Vec::new();
-        for index in self.corner_looks.iter_mut().flatten() {
-            let old = *index as usize;
-            if new_index[old] == u32::MAX {
-                new_index[old] = kept.len() as u32;
-                kept.push(self.looks[old]);
-            }
-            *index = new_index[old];
+/// The values that indices name, in the order in which they are first named; the indices are made to fit.
+fn used<T: Copy>(values: &[T], indices: &mut [u32]) -> Vec<T> {
+    let mut new_index = vec![u32::MAX; values.len()];
+    let mut kept = Vec::new();
+    for index in indices {
+        let old = *index as usize;
+        if new_index[old] == u32::MAX {
+            new_index[old] = kept.len() as u32;
+            kept.push(values[old]);
         }
-        self.looks = kept;
-        self
+        *index = new_index[old];
     }
+    kept
 }
 
 /// Where the normal of a face's corner comes from; `raw` is the triangle that the face was.
