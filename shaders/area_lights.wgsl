@@ -18,21 +18,25 @@ struct Incidence {
 }
 
 fn incidence(light: CameraLight, point: vec3f, normal: vec3f) -> Incidence {
+    return incidence_of(LIGHT_KIND, light, point, normal);
+}
+
+fn incidence_of(kind: u32, light: CameraLight, point: vec3f, normal: vec3f) -> Incidence {
     let to_light = light.place_in_camera.xyz - point * light.place_in_camera.w;
     let distance_squared = max(dot(to_light, to_light), 1e-12);
     let direction = to_light * inverseSqrt(distance_squared);
     let falloff = select(1.0, 1.0 / distance_squared, light.place_in_camera.w > 0.0);
     let cosine = dot(normal, direction);
-    if LIGHT_KIND == PLAIN {
+    if kind == PLAIN {
         return Incidence(direction, light.power.rgb * falloff * max(cosine, 0.0), 0.0);
     }
     // Irradiance over what the light gives to a surface that faces it.
     var mean_cosine = max(cosine, 0.0);
     var sine_squared = min(light.power.w * light.power.w * falloff, 1.0);
-    if LIGHT_KIND == SPOT {
+    if kind == SPOT {
         let ramp = clamp(-dot(direction, light.axis_in_camera.xyz) * light.half_width.x + light.half_width.y, 0.0, 1.0);
         mean_cosine *= ramp * ramp;
-    } else if LIGHT_KIND == RECT {
+    } else if kind == RECT {
         let area = 4.0 * length(light.half_width.xyz) * length(light.half_height.xyz);
         let ahead = max(-dot(direction, light.axis_in_camera.xyz), 0.0);
         sine_squared = min(area * ahead * falloff / PI, 1.0);

@@ -4,6 +4,7 @@
 //!include "light_sums.wgsl"
 //!include "depth_moments.wgsl"
 //!include "mirrored.wgsl"
+//!include "tables.wgsl"
 //!if HARMONIC_GLOSS
 //!include "harmonic_gloss.wgsl"
 //!end
@@ -28,8 +29,6 @@ struct Region {
     spread: f32,
 }
 
-// The tables are textures of words (data.rs): Mesa's software driver reads a texel ten times as fast as it reads a storage
-// buffer at a place that it does not know to be the same for all pixels.
 @group(2) @binding(0) var<uniform> frame: EnvironmentFrame;
 // Two texels for each region.
 @group(2) @binding(1) var region_table: texture_2d<u32>;
@@ -42,13 +41,6 @@ struct Region {
 @group(2) @binding(4) var disc_table: texture_2d<u32>;
 @group(2) @binding(5) var atlas: texture_2d<f32>;
 @group(2) @binding(6) var atlas_sampler: sampler;
-
-// Texels in a row of a table.
-const TABLE_WIDTH: u32 = 1024u;
-
-fn place_in_table(number: u32) -> vec2u {
-    return vec2u(number % TABLE_WIDTH, number / TABLE_WIDTH);
-}
 
 fn region(index: u32) -> Region {
     let first = bitcast<vec4f>(textureLoad(region_table, place_in_table(2u * index), 0));
@@ -320,7 +312,7 @@ fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: boo
     }
 //!end
     let left = 1.0 - taken_gloss / whole_gloss;
-    return LightSums(vec4f(0.0), vec4f(radiance_in_probe(look, normal, to_camera, arriving, left), 1.0));
+    return LightSums(vec4f(0.0), vec4f(radiance_in_probe(surface.clip.xy, look, normal, to_camera, arriving, left), 1.0));
 }
 
 // The share of a region in what a glossy layer mirrors: the GGX distribution, as much wider as the region is.

@@ -3,6 +3,31 @@
 // Over the square roots of the cosine to the camera and of roughness (light::layer_albedo).
 @group(0) @binding(1) var layer_albedo: texture_2d<f32>;
 @group(0) @binding(2) var layer_sampler: sampler;
+// What rays have met for the lobe of the surface that is seen in a pixel, its mean radiance (reflections.wgsl). a: 1 where that is
+// known, 0 where no such surface covers the pixel's middle, -1 where the lobe is too broad and weak to show it.
+@group(0) @binding(3) var reflections: texture_2d<f32>;
+
+// What the layer mirrors in a pixel: what rays have met, or `otherwise`.
+fn reflected_or(at: vec2f, otherwise: vec3f) -> vec3f {
+    let size = vec2i(textureDimensions(reflections));
+    // (No rays are followed in this scene.)
+    if !GLOSSY || size.x == 1 {
+        return otherwise;
+    }
+    let pixel = vec2i(at);
+    let own = textureLoad(reflections, pixel, 0);
+    if own.a != 0.0 {
+        return select(otherwise, own.rgb, own.a > 0.0);
+    }
+    // An edge of the surface beside the pixel's middle mirrors what it does in the pixels beside it.
+    var sum = vec4f(0.0);
+    for (var y = -1; y <= 1; y++) {
+        for (var x = -1; x <= 1; x++) {
+            sum += max(textureLoad(reflections, clamp(pixel + vec2i(x, y), vec2i(0), size - 1), 0), vec4f(0.0));
+        }
+    }
+    return select(otherwise, sum.rgb / max(sum.a, 1.0), sum.a > 0.0);
+}
 
 // Radiance of a virtual surface in light that no lamp sends. `arriving`: irradiance of what lies below the layer; `around`: mean
 // radiance where the layer mirrors it (Karis 2013: it is multiplied by what the layer reflects of light from everywhere).

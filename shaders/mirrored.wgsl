@@ -3,13 +3,13 @@
 @group(2) @binding(7) var environment: texture_2d<f32>;
 @group(2) @binding(8) var environment_sampler: sampler;
 
-// Radiance of a virtual surface in a probe's light. `arriving`: irradiance of what lies below its glossy layer; `left`: part of
-// what the layer mirrors that nothing hides.
-fn radiance_in_probe(look: Look, normal: vec3f, to_camera: vec3f, arriving: vec3f, left: vec3f) -> vec3f {
+// Radiance of a virtual surface in a probe's light, seen in a pixel. `arriving`: irradiance of what lies below its glossy layer;
+// `left`: part of what the layer mirrors that nothing hides.
+fn radiance_in_probe(at: vec2f, look: Look, normal: vec3f, to_camera: vec3f, arriving: vec3f, left: vec3f) -> vec3f {
     let cos_camera = max(dot(normal, to_camera), 1e-3);
     var around = vec3f(0.0);
     if GLOSSY && look.roughness > 0.0 {
-        around = lobe_mean(reflect(-to_camera, normal), look.roughness) * left;
+        around = reflected_or(at, lobe_mean(reflect(-to_camera, normal), look.roughness) * left);
     }
     return radiance_all_around(look, cos_camera, arriving, around);
 }

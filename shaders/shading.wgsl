@@ -66,11 +66,12 @@ fn look(surface: Surface, outside: bool) -> Look {
 //!end
 }
 
-// Radiance of a virtual surface without lights. What its layer mirrors is as bright as what arrives is on the average: the
-// ambient light with what hides it taken off, and what things around reflect.
+// Radiance of a virtual surface without lights. Where no rays were followed, what its layer mirrors is as bright as what arrives is
+// on the average: the ambient light with what hides it taken off, and what things around reflect.
 fn ambient_radiance(surface: Surface, look: Look) -> vec3f {
     let cos_camera = max(dot(look.normal, normalize(-surface.point_in_camera)), 1e-3);
-    return radiance_all_around(look, cos_camera, surface.indirect, surface.indirect / PI);
+    let around = reflected_or(surface.clip.xy, surface.indirect / PI);
+    return radiance_all_around(look, cos_camera, surface.indirect, around);
 }
 
 @vertex

@@ -198,7 +198,7 @@ fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: boo
     let to_camera = normalize(frame.world_from_camera[3].xyz - point_in_world);
     // What hides light hides it from the layer as well; more is not known of where it comes from.
     let left = arriving / max(surface.indirect, vec3f(1e-6));
-    return LightSums(vec4f(0.0), vec4f(radiance_in_probe(look, normal, to_camera, arriving, left), 1.0));
+    return LightSums(vec4f(0.0), vec4f(radiance_in_probe(surface.clip.xy, look, normal, to_camera, arriving, left), 1.0));
 }
 
 // For what is drawn into depth alone.

@@ -16,6 +16,31 @@ pub struct RayCaster {
     hierarchy: Option<Bvh2>,
 }
 
+/// A box of the hierarchy, for those who follow rays elsewhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TreeBox {
+    /// Its lowest corner.
+    pub low: Vec3,
+    /// Its highest.
+    pub high: Vec3,
+    /// What is in it.
+    pub content: BoxContent,
+}
+
+/// What a box of the hierarchy has in it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BoxContent {
+    /// Two boxes: that of this number and the next.
+    Boxes(usize),
+    /// So many triangles, from a place in [`RayCaster::triangle_order`] on.
+    Triangles {
+        /// The place.
+        first: usize,
+        /// How many.
+        count: usize,
+    },
+}
+
 /// Where a ray first meets a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
@@ -44,6 +69,29 @@ impl RayCaster {
             triangles,
             hierarchy,
         }
+    }
+
+    /// The boxes of the hierarchy, of which the first has all others in it; none without triangles.
+    pub fn boxes(&self) -> impl ExactSizeIterator<Item = TreeBox> {
+        let nodes = self.hierarchy.as_ref().map_or(&[][..], |tree| &tree.nodes);
+        nodes.iter().map(|node| {
+            let (first, count) = (node.first_index as usize, node.prim_count as usize);
+            TreeBox {
+                low: node.aabb().min.into(),
+                high: node.aabb().max.into(),
+                content: match count {
+                    0 => BoxContent::Boxes(first),
+                    _ => BoxContent::Triangles { first, count },
+                },
+            }
+        })
+    }
+
+    /// The triangles' indices in the order in which the boxes have them.
+    pub fn triangle_order(&self) -> impl ExactSizeIterator<Item = usize> {
+        let tree = self.hierarchy.as_ref();
+        let order = tree.map_or(&[][..], |tree| &tree.primitive_indices);
+        order.iter().map(|&index| index as usize)
     }
 
     /// The first triangle within `reach` along a ray, if any; both sides of a triangle are hit.

@@ -11,6 +11,7 @@ use super::deforming::DeformingThing;
 use super::gpu::Gpu;
 use super::gpu_clock::GpuSpan;
 use super::gpu_scene::GpuScene;
+use super::mirrored_probe::MirroredProbe;
 use super::passes::Passes;
 use super::screen_bounds::ScreenBounds;
 use super::shown::Shown;
@@ -30,6 +31,9 @@ pub(super) trait BroadLight: Send {
 
     /// Works out what is hidden where things are now. Returns the pixels that it can change, `None` if none.
     fn update(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene) -> Option<PixelRect>;
+
+    /// What glossy things mirror of it.
+    fn mirrored(&self) -> Option<&MirroredProbe>;
 
     /// Draws its maps where they are not drawn yet.
     fn draw_maps(&mut self, gpu: &Gpu, passes: &mut Passes<'_>);
@@ -83,6 +87,10 @@ impl TechniquePasses for Combined {
             Shown::Composite => self.broad.update(gpu, gpu_scene),
         };
         gpu_scene.cast_shadows(gpu, shown, broad.unwrap_or(PixelRect::NONE))
+    }
+
+    fn mirrored(&self) -> Option<&MirroredProbe> {
+        self.broad.mirrored()
     }
 
     fn draw(&mut self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) {

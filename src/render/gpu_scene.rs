@@ -21,6 +21,7 @@ use super::anchor_geometry::{
     AnchorGeometry, AnchoredModel, BatchCorners, Corners, KnownLevels, ModelLevel, Role,
     SurfaceBatch,
 };
+use super::attachments::texture;
 use super::casters::Casters;
 use super::detail::{chosen_levels, widest_penumbra_px};
 use super::gpu::Gpu;
@@ -31,6 +32,7 @@ use super::light_piece::LitBy;
 use super::lights::Lights;
 use super::materials::{materials_group, needs_looks};
 use super::mirrored_probe::LayerAlbedo;
+use super::reflections::{self, REFLECTIONS_FORMAT};
 use super::screen_bounds::{ScreenBounds, screen_bounds};
 use super::shown::Shown;
 use super::surfaces::SurfaceKinds;
@@ -101,6 +103,8 @@ pub(super) struct GpuScene {
     /// The camera as what stands on each anchor meets it, and after that as each virtual thing does.
     views: UniformRow,
     view_group: wgpu::BindGroup,
+    /// What glossy surfaces mirror; one texel where no rays are followed for that.
+    reflections: wgpu::Texture,
     camera_from_anchor: Vec<Option<DAffine3>>,
     /// Where things stand and which are there: phantoms, then virtual ones.
     standing: Vec<(DAffine3, bool)>,
@@ -131,6 +135,20 @@ impl GpuScene {
             materials.any(|material| material.roughness.is_some())
         });
         let layer_albedo = LayerAlbedo::new(device, &gpu.queue, glossy);
+        let reflections = texture(
+            device,
+            "reflections",
+            if reflections::are_followed(scene) {
+                intrinsics.size_px
+            } else {
+                [1; 2]
+            },
+            REFLECTIONS_FORMAT,
+            1,
+            wgpu::TextureUsages::TEXTURE_BINDING
+                | wgpu::TextureUsages::RENDER_ATTACHMENT
+                | wgpu::TextureUsages::COPY_DST,
+        );
         let light_kinds = lights.iter().map(|light| LightKind::of(&light.light));
         let light_kinds = light_kinds.collect();
         Self {
@@ -157,8 +175,12 @@ impl GpuScene {
                     views.binding(),
                     wgpu::BindingResource::TextureView(&layer_albedo.view),
                     wgpu::BindingResource::Sampler(&layer_albedo.sampler),
+                    wgpu::BindingResource::TextureView(
+                        &reflections.create_view(&Default::default()),
+                    ),
                 ],
             ),
+            reflections,
             camera_from_anchor: vec![None; scene.node_count()],
             lights: Lights::new(gpu, lights),
             kinds: SurfaceKinds {
@@ -204,6 +226,16 @@ impl GpuScene {
     pub fn set_unseen(&mut self, node: Option<usize>) {
         self.unseen = node;
         self.casters.set_unseen(node);
+    }
+
+    /// The node on which all casts shadows, but is not seen.
+    pub fn unseen(&self) -> Option<usize> {
+        self.unseen
+    }
+
+    /// What surfaces' shaders read of what they mirror (layer_albedo.wgsl).
+    pub fn reflections(&self) -> &wgpu::Texture {
+        &self.reflections
     }
 
     /// Number of lights.

@@ -34,9 +34,14 @@ impl LightKind {
         }
     }
 
+    /// Its number in area_lights.wgsl.
+    pub fn number(self) -> u8 {
+        self as u8
+    }
+
     /// The `override` of area_lights.wgsl that says it.
     pub fn constant(self) -> (&'static str, f64) {
-        ("LIGHT_KIND", f64::from(self as u8))
+        ("LIGHT_KIND", f64::from(self.number()))
     }
 }
 

@@ -31,6 +31,11 @@ impl<'a> Passes<'a> {
         }
     }
 
+    /// What is recorded from here on is not timed.
+    pub fn stop_clock(&mut self) {
+        self.clock = None;
+    }
+
     /// Begins a pass that draws into colour targets, and depth and stencil.
     pub fn begin(
         &mut self,
@@ -40,6 +45,7 @@ impl<'a> Passes<'a> {
         depth_stencil: Option<wgpu::RenderPassDepthStencilAttachment<'_>>,
     ) -> wgpu::RenderPass<'_> {
         self.names.push(name);
+        let part = part.filter(|_| self.clock.is_some());
         self.spans
             .extend(part.filter(|part| part.begins).map(|part| part.span));
         let colors: Vec<Option<wgpu::RenderPassColorAttachment<'_>>> =

@@ -32,9 +32,10 @@ use super::passes::{Passes, RecordedPasses};
 use super::precomputation::{Afresh, Precomputation};
 use super::quality_controller::{QualityController, Setting};
 use super::readback::Readback;
+use super::reflections::Reflections;
 use super::screen_bounds::ScreenBounds;
 use super::shown::Shown;
-use super::technique::FrameContext;
+use super::technique::{FrameContext, TechniquePasses};
 use super::translucent::Translucent;
 use chosen_technique::ChosenTechnique;
 
@@ -46,6 +47,8 @@ pub struct Renderer {
     gpu_scene: GpuScene,
     background: Background,
     technique: ChosenTechnique,
+    /// Where anything shows what it mirrors.
+    reflections: Option<Reflections>,
     /// Keeps to the scene's frame budget, if it has one.
     quality_controller: Option<QualityController>,
     picture: wgpu::Texture,
@@ -163,6 +166,7 @@ impl Renderer {
         let made_for = Shape::of(scene, &scene.outlined_lights());
         Ok(Self {
             technique,
+            reflections: Reflections::new(&gpu, scene, &gpu_scene),
             quality_controller: QualityController::new(scene, made_for.technique),
             picture: texture(
                 device,
@@ -211,6 +215,9 @@ impl Renderer {
             self.made_for == Shape::of(scene, &lights) && self.technique.passes_mut().follow(scene);
         if follows {
             self.gpu_scene.follow(&self.gpu, scene, lights);
+            if let Some(reflections) = &mut self.reflections {
+                reflections.follow(scene);
+            }
             self.layers = layers;
             self.deforming = deforming(scene);
             self.deform(|_| true);
@@ -251,6 +258,9 @@ impl Renderer {
         if !news.is_empty() {
             let technique = self.technique.passes_mut();
             technique.deform(&self.gpu, &mut self.gpu_scene, &news);
+            if let Some(reflections) = &mut self.reflections {
+                reflections.deform(&news);
+            }
         }
     }
 
@@ -353,7 +363,10 @@ impl Renderer {
                 picture: &picture,
                 bounds,
             };
-            technique.draw(&mut passes, &frame);
+            match &mut self.reflections {
+                Some(reflections) => draw_mirroring(technique, reflections, &mut passes, &frame),
+                None => technique.draw(&mut passes, &frame),
+            }
         }
         let RecordedPasses {
             mut encoder,
@@ -415,5 +428,26 @@ impl Renderer {
         self.clock
             .as_ref()
             .map_or(Ok(GpuTimes::default()), |clock| clock.read(&self.gpu))
+    }
+}
+
+/// Draws a frame without reflections, and then what mirrors it once more.
+fn draw_mirroring(
+    technique: &mut dyn TechniquePasses,
+    reflections: &mut Reflections,
+    passes: &mut Passes<'_>,
+    frame: &FrameContext<'_>,
+) {
+    reflections.begin(passes, frame);
+    technique.draw(passes, frame);
+    // (A span of the clock is one of passes that come once.)
+    passes.stop_clock();
+    if reflections.draw(passes, frame, technique.mirrored()) {
+        let bounds = frame.bounds.of_virtuals();
+        let again = FrameContext {
+            bounds: &bounds,
+            ..*frame
+        };
+        technique.draw(passes, &again);
     }
 }

@@ -36,6 +36,14 @@ pub(super) struct ShadowReach {
 }
 
 impl ScreenBounds {
+    /// The same where virtual things can be, and nothing else.
+    pub fn of_virtuals(&self) -> Self {
+        Self {
+            pixels: self.virtuals,
+            ..self.clone()
+        }
+    }
+
     /// Where the passes make no difference between things and shadows.
     pub fn pixels_alone(pixels: PixelRect) -> Self {
         Self {

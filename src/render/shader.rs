@@ -11,7 +11,7 @@ macro_rules! files {
 }
 
 /// All files under `shaders/`.
-const FILES: [(&str, &str); 31] = files![
+const FILES: [(&str, &str); 35] = files![
     "area_lights.wgsl",
     "background.wgsl",
     "common.wgsl",
@@ -27,19 +27,23 @@ const FILES: [(&str, &str); 31] = files![
     "layer_albedo.wgsl",
     "layers.wgsl",
     "light_sums.wgsl",
+    "linear_picture.wgsl",
     "mapped_source.wgsl",
     "materials.wgsl",
     "mirrored.wgsl",
     "occlusion_maps.wgsl",
     "partly_covered.wgsl",
     "pixel_sums.wgsl",
+    "ray_trees.wgsl",
     "real_albedo.wgsl",
+    "reflections.wgsl",
     "sampled_surface.wgsl",
     "shading.wgsl",
     "shaft_maps.wgsl",
     "shaft_mips.wgsl",
     "shafts.wgsl",
     "surfaces.wgsl",
+    "tables.wgsl",
     "translucent.wgsl",
     "video.wgsl",
     "volumes.wgsl",

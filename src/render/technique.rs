@@ -4,12 +4,14 @@ use super::background::Background;
 use super::deforming::DeformingThing;
 use super::gpu::Gpu;
 use super::gpu_scene::GpuScene;
+use super::mirrored_probe::MirroredProbe;
 use super::passes::Passes;
 use super::screen_bounds::ScreenBounds;
 use super::shown::Shown;
 use crate::scene::Scene;
 
 /// A frame that is being drawn.
+#[derive(Clone, Copy)]
 pub(super) struct FrameContext<'a> {
     pub gpu: &'a Gpu,
     pub gpu_scene: &'a GpuScene,
@@ -40,6 +42,11 @@ pub(super) trait TechniquePasses {
         gpu_scene: &mut GpuScene,
         shown: Shown,
     ) -> Option<ScreenBounds>;
+
+    /// What glossy things mirror where they mirror nothing that stands around them; `None`: the ambient light.
+    fn mirrored(&self) -> Option<&MirroredProbe> {
+        None
+    }
 
     /// Draws virtual things and shadows over the video.
     fn draw(&mut self, passes: &mut Passes<'_>, frame: &FrameContext<'_>);

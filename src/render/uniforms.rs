@@ -9,7 +9,7 @@ use crate::geometry::lens;
 use crate::geometry::shadow_volume::LightPlace;
 use crate::light::{Light, Shape, spot_ramp};
 
-use super::pipelines::{GroupLayout, filtered, sampler, uniform};
+use super::pipelines::{GroupLayout, filtered, sampler, texels, uniform};
 
 /// Nearest depth that is drawn, metres. Reversed floating depth keeps its precision however near this is.
 pub(super) const NEAR_M: f32 = 1e-3;
@@ -194,13 +194,15 @@ impl Lens {
     }
 }
 
-/// Group 0 where geometry is drawn: an [`AnchorView`], and what a glossy layer mirrors of light from everywhere.
+/// Group 0 where geometry is drawn: an [`AnchorView`], what a glossy layer mirrors of light from everywhere, and what rays have met
+/// for it.
 pub(super) const VIEW_GROUP: GroupLayout = GroupLayout {
     label: "view",
     entries: &[
         uniform(0, wgpu::ShaderStages::VERTEX_FRAGMENT, true),
         filtered(1),
         sampler(2),
+        texels(3, false),
     ],
 };
 
@@ -265,6 +267,7 @@ impl UniformRow {
 mod tests {
     use super::*;
     use crate::render::materials::{MapOnGpu, MaterialOnGpu};
+    use crate::render::reflections::ReflectionFrame;
     use crate::render::shader;
     use crate::render::shafts::data::ShaftFrame;
     use crate::shafts::shadow_atlas::MappedSource;
@@ -360,6 +363,19 @@ mod tests {
             world_from_camera,
             moving_irradiance,
             source_count
+        );
+        let reflections = shader::source("reflections.wgsl", &[]).unwrap();
+        assert_twins!(
+            &reflections,
+            ReflectionFrame,
+            clip_from_camera,
+            light_from_camera,
+            ambient,
+            thing_count,
+            light_count,
+            has_probe,
+            focal_px,
+            padding
         );
         let video = shader::source("video.wgsl", &[]).unwrap();
         assert_twins!(

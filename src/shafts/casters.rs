@@ -52,7 +52,7 @@ impl Occluder<'_> {
     /// its shape has all of them: each frame would take as long to simplify as it takes to draw many.
     pub fn simplified(&self) -> Vec<([Vec3; 3], Vec3)> {
         if self.deforms {
-            return self.with_albedos(self.mesh);
+            return self.whole();
         }
         let size = Aabb::around(self.mesh.positions.iter().copied()).diagonal();
         let shape = self.mesh.without_looks();
@@ -63,14 +63,19 @@ impl Occluder<'_> {
         self.with_albedos(&coarse_enough.map_or(shape, |level| level.mesh))
     }
 
-    /// The same in its anchor's space.
+    /// All its triangles in its own space, with their albedos.
+    pub fn whole(&self) -> Vec<([Vec3; 3], Vec3)> {
+        self.with_albedos(self.mesh)
+    }
+
+    /// Its simplified triangles in its anchor's space.
     pub fn simplified_in_anchor(&self) -> Vec<([Vec3; 3], Vec3)> {
         self.in_anchor(self.simplified())
     }
 
     /// All its triangles in its anchor's space, with their albedos.
     pub fn whole_in_anchor(&self) -> Vec<([Vec3; 3], Vec3)> {
-        self.in_anchor(self.with_albedos(self.mesh))
+        self.in_anchor(self.whole())
     }
 
     fn with_albedos(&self, mesh: &Mesh) -> Vec<([Vec3; 3], Vec3)> {

@@ -2,7 +2,6 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DMat3, DVec4, Mat4, Vec3, Vec4};
-use wgpu::util::DeviceExt as _;
 
 use crate::environment::glossy::EnvironmentMatrix;
 use crate::environment::occlusion_map::OcclusionMap;
@@ -12,7 +11,7 @@ use crate::environment::thing::Thing;
 use crate::light::harmonics::basis;
 use crate::light::regions::Region;
 
-use super::super::gpu::Gpu;
+use super::super::tables::{with_word, words};
 
 /// A frame's part of group 2: the twin of `EnvironmentFrame` in environment.wgsl.
 #[repr(C)]
@@ -23,46 +22,6 @@ pub(super) struct EnvironmentFrame {
     pub caster_count: u32,
     pub real_caster_count: u32,
     pub disc_count: u32,
-}
-
-/// Texels in a row of a table: `TABLE_WIDTH` in environment.wgsl.
-const TABLE_WIDTH: usize = 1024;
-
-/// A texture of four words a texel, rows of [`TABLE_WIDTH`].
-pub(super) fn table(gpu: &Gpu, label: &str, texels: &[[u32; 4]]) -> wgpu::TextureView {
-    let rows = texels.len().div_ceil(TABLE_WIDTH).max(1);
-    let mut padded = texels.to_vec();
-    padded.resize(rows * TABLE_WIDTH, [0; 4]);
-    let texture = gpu.device.create_texture_with_data(
-        &gpu.queue,
-        &wgpu::TextureDescriptor {
-            label: Some(label),
-            size: wgpu::Extent3d {
-                width: TABLE_WIDTH as u32,
-                height: rows as u32,
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rgba32Uint,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        },
-        wgpu::util::TextureDataOrder::LayerMajor,
-        bytemuck::cast_slice(&padded),
-    );
-    texture.create_view(&Default::default())
-}
-
-fn words(values: Vec4) -> [u32; 4] {
-    values.to_array().map(f32::to_bits)
-}
-
-/// A texel of three numbers and a word.
-fn with_word(values: Vec3, word: u32) -> [u32; 4] {
-    let [x, y, z] = values.to_array().map(f32::to_bits);
-    [x, y, z, word]
 }
 
 /// Two texels.

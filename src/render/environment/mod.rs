@@ -37,9 +37,10 @@ use super::map_atlas::MapDraw;
 use super::mirrored_probe::MirroredProbe;
 use super::passes::Passes;
 use super::precomputation::Precomputation;
+use super::tables::table;
 use casting::Casting;
 use data::{
-    EnvironmentFrame, disc_texels, gloss_texels, map_texels, receiver_texels, region_texels, table,
+    EnvironmentFrame, disc_texels, gloss_texels, map_texels, receiver_texels, region_texels,
 };
 use own_light::OwnLight;
 use pipelines::{ENVIRONMENT_GROUP, Pipelines};
@@ -355,6 +356,10 @@ impl BroadLight for Environment {
         if let Some(final_gather) = &mut self.final_gather {
             final_gather.deform(things);
         }
+    }
+
+    fn mirrored(&self) -> Option<&MirroredProbe> {
+        self.mirrored.as_ref()
     }
 
     fn update(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene) -> Option<PixelRect> {

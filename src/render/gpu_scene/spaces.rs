@@ -48,9 +48,14 @@ impl GpuScene {
         }
     }
 
-    /// The lights that cast shadow volumes and shine, in that space.
+    /// The lights that cast shadow volumes and shine, in the world.
+    pub fn shining(&self) -> Vec<Light> {
+        self.lights.shining()
+    }
+
+    /// They in the space that light from afar is known in.
     pub fn shining_in_light(&self) -> Vec<Light> {
-        let shining = self.lights.shining();
+        let shining = self.shining();
         match self.light_from_world() {
             Some(light_from_world) if self.light_anchor != 0 => {
                 let lights = shining.iter();

@@ -102,7 +102,7 @@ impl Renderer {
     }
 
     /// The factor that the picture's own samples put on the video: what the picture was made of lies where it was drawn.
-    fn read_gain(&self) -> Result<Vec<[f32; 3]>, RenderError> {
+    fn read_gain(&mut self) -> Result<Vec<[f32; 3]>, RenderError> {
         let bounds = self
             .bounds
             .as_ref()
@@ -130,6 +130,10 @@ impl Renderer {
             bounds,
         };
         let mut passes = Passes::new(gpu, None);
+        if self.reflections.is_some() {
+            // What was drawn last is what mirrors, alone.
+            self.technique.passes_mut().draw(&mut passes, &frame);
+        }
         let gain = loaded(&gain, wgpu::LoadOp::Clear(wgpu::Color::WHITE));
         self.technique.passes().draw_gain(&mut passes, &frame, gain);
         let readback = Readback::new(&gpu.device, self.size_px, 16);

@@ -362,6 +362,10 @@ impl BroadLight for Shafts {
         self.world_from_anchor.clear();
     }
 
+    fn mirrored(&self) -> Option<&MirroredProbe> {
+        Some(&self.environment)
+    }
+
     fn update(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene) -> Option<PixelRect> {
         self.update(gpu, gpu_scene)
     }
@@ -436,6 +440,10 @@ impl TechniquePasses for ShaftsAlone {
     }
 
     /// Gibson et al. 2003, section 7, in as few passes over the pixels as there are: one.
+    fn mirrored(&self) -> Option<&MirroredProbe> {
+        self.shafts.mirrored()
+    }
+
     fn draw(&mut self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) {
         self.shafts.draw_maps(frame.gpu, passes);
         let mut pass = passes.begin(

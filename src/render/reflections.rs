@@ -1,0 +1,377 @@
+//! What glossy virtual things mirror of real and virtual things around them, whatever the technique: the frame is drawn, rays are
+//! followed from each glossy pixel, and what mirrors is drawn again with what they have met.
+//!
+//! What a ray meets is as bright as the picture has it, where the camera sees that place too. So what is mirrored has the video's own
+//! colours, the shadows of virtual things in it, and needs no model but of shapes.
+//! Reads the picture without and with virtual things, and the scene's triangles. Writes what layer_albedo.wgsl reads.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DMat3, Mat4, Vec3};
+
+use crate::geometry::camera::Intrinsics;
+use crate::geometry::reach::PixelRect;
+use crate::scene::{EnvironmentMethod, Object, Scene, ShadowTechnique};
+
+use super::anchor_geometry::Role;
+use super::attachments::{cleared, depth_stencil, kept, target, texture};
+use super::deforming::DeformingThing;
+use super::gpu::Gpu;
+use super::gpu_scene::{DrawnLight, GpuScene};
+use super::mirrored_probe::MirroredProbe;
+use super::passes::Passes;
+use super::pipelines::{
+    GroupLayout, PipelineDescription, filtered, overwritten, sampler, texels, uniform, words,
+};
+use super::ray_trees::RayTrees;
+use super::surfaces::{Sided, surface_description};
+use super::technique::FrameContext;
+use super::uniforms::{GEOMETRY_GROUPS, NEAR_M};
+use super::volumes::set_scissor;
+
+/// Format of what is mirrored.
+pub(super) const REFLECTIONS_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+const DEPTHS_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Float;
+/// Levels of the pictures that are mirrored.
+const LEVELS: u32 = 7;
+/// A dielectric rougher than this shows nothing of what it mirrors: `ROUGHEST_DIELECTRIC` of reflections.wgsl.
+const ROUGHEST_DIELECTRIC: f64 = 0.5;
+
+const REFLECTION_GROUP: GroupLayout = GroupLayout {
+    label: "reflections",
+    entries: &[
+        uniform(0, wgpu::ShaderStages::FRAGMENT, false),
+        words(1, wgpu::ShaderStages::FRAGMENT),
+        words(2, wgpu::ShaderStages::FRAGMENT),
+        texels(3, false),
+        filtered(4),
+        filtered(5),
+        sampler(6),
+        filtered(7),
+        sampler(8),
+    ],
+};
+
+const PICTURE_GROUP: GroupLayout = GroupLayout {
+    label: "picture",
+    entries: &[texels(0, false)],
+};
+
+/// The twin of `ReflectionFrame` in reflections.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(super) struct ReflectionFrame {
+    pub clip_from_camera: Mat4,
+    pub light_from_camera: Mat4,
+    pub ambient: Vec3,
+    pub thing_count: u32,
+    pub light_count: u32,
+    pub has_probe: u32,
+    pub focal_px: f32,
+    pub padding: u32,
+}
+
+/// Pipelines and pictures of the passes.
+pub(super) struct Reflections {
+    trees: RayTrees,
+    ambient: Vec3,
+    depth_of_real: Sided,
+    depth_of_virtual: Sided,
+    mirror: Sided,
+    linear: wgpu::RenderPipeline,
+    halve: wgpu::RenderPipeline,
+    frame: wgpu::Buffer,
+    recorded: LinearPicture,
+    shown: LinearPicture,
+    depths: wgpu::TextureView,
+    depth_stencil: wgpu::TextureView,
+    /// What is copied to where the surfaces' shaders read it, which cannot be drawn into meanwhile.
+    mirrored: wgpu::Texture,
+    sampler: wgpu::Sampler,
+    /// In place of a probe, where there is none.
+    no_probe: MirroredProbe,
+}
+
+/// A picture in linear light with its coarser levels.
+struct LinearPicture {
+    view: wgpu::TextureView,
+    levels: Vec<wgpu::TextureView>,
+}
+
+/// Whether rays are followed for a scene's glossy things.
+pub(super) fn are_followed(scene: &Scene) -> bool {
+    // (The paper's way of drawing gloss is there to be compared with.)
+    let is_papers = scene.chosen_technique().0 == ShadowTechnique::Environment
+        && scene.shadows.environment.method == EnvironmentMethod::Maps;
+    scene.shadows.reflections && !is_papers && scene.virtuals.iter().any(mirrors)
+}
+
+/// Whether a thing shows what it mirrors.
+fn mirrors(object: &Object) -> bool {
+    let mut materials = object.materials.iter();
+    materials.any(|material| {
+        let roughness = material.roughness;
+        roughness
+            .is_some_and(|roughness| roughness <= ROUGHEST_DIELECTRIC || material.metallic > 0.0)
+    })
+}
+
+impl Reflections {
+    /// `None` where nothing shows what it mirrors.
+    pub fn new(gpu: &Gpu, scene: &Scene, gpu_scene: &GpuScene) -> Option<Self> {
+        if !are_followed(scene) {
+            return None;
+        }
+        let device = &gpu.device;
+        let size_px = gpu_scene.intrinsics().size_px;
+        let kinds = gpu_scene.kinds;
+        let described = |fragment, groups: Vec<Option<GroupLayout>>, target| PipelineDescription {
+            shader: "reflections.wgsl",
+            vertex: "place",
+            fragment,
+            constants: vec![("GLOSSY", 1.0)],
+            groups,
+            targets: vec![target],
+            ..surface_description(gpu, None)
+        };
+        let depth = |write_mask| wgpu::ColorTargetState {
+            write_mask,
+            ..DEPTHS_FORMAT.into()
+        };
+        let geometry = || GEOMETRY_GROUPS.map(Some).to_vec();
+        let depth_of_virtual = described(
+            "depth_of_surface",
+            geometry(),
+            depth(wgpu::ColorWrites::GREEN),
+        );
+        let mut mirror = described(
+            "mirror",
+            [geometry(), vec![Some(REFLECTION_GROUP)]].concat(),
+            overwritten(REFLECTIONS_FORMAT),
+        );
+        if let Some(state) = &mut mirror.depth_stencil {
+            state.depth_compare = Some(wgpu::CompareFunction::Equal);
+            state.depth_write_enabled = Some(false);
+        }
+        let fullscreen = |shader, fragment| {
+            gpu.pipeline(&PipelineDescription {
+                shader,
+                fragment,
+                groups: vec![Some(PICTURE_GROUP)],
+                targets: vec![overwritten(REFLECTIONS_FORMAT)],
+                ..Default::default()
+            })
+        };
+        let read = wgpu::TextureUsages::TEXTURE_BINDING;
+        let none = wgpu::TextureUsages::empty();
+        Some(Self {
+            trees: RayTrees::new(gpu, scene),
+            ambient: scene.ambient_radiance.as_vec3(),
+            depth_of_real: Sided::both(
+                gpu,
+                &described(
+                    "depth_of_surface",
+                    geometry(),
+                    depth(wgpu::ColorWrites::RED),
+                ),
+            ),
+            depth_of_virtual: Sided::both(gpu, &kinds.of_virtual(depth_of_virtual)),
+            mirror: Sided::both(gpu, &kinds.of_virtual(mirror)),
+            linear: fullscreen("linear_picture.wgsl", "linear"),
+            halve: fullscreen("shaft_mips.wgsl", "halve"),
+            frame: device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("reflections"),
+                size: size_of::<ReflectionFrame>() as u64,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }),
+            recorded: LinearPicture::new(device, "linear video", size_px),
+            shown: LinearPicture::new(device, "linear picture", size_px),
+            depths: target(device, "depths", size_px, DEPTHS_FORMAT, 1, read),
+            depth_stencil: target(
+                device,
+                "reflections' depth and stencil",
+                size_px,
+                gpu.depth_format,
+                1,
+                none,
+            ),
+            mirrored: texture(
+                device,
+                "mirrored",
+                size_px,
+                REFLECTIONS_FORMAT,
+                1,
+                wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            ),
+            sampler: device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("mirrored picture"),
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                mipmap_filter: wgpu::MipmapFilterMode::Linear,
+                ..Default::default()
+            }),
+            no_probe: MirroredProbe::new(device, &gpu.queue, None),
+        })
+    }
+
+    /// Takes another state of the same scene: things elsewhere, shown or hidden.
+    pub fn follow(&mut self, scene: &Scene) {
+        self.trees.follow(scene);
+    }
+
+    /// Takes note of things that have another shape now.
+    pub fn deform(&mut self, things: &[&DeformingThing]) {
+        for thing in things {
+            self.trees.deform(thing);
+        }
+    }
+
+    /// Keeps the video, which is all that the picture shows so far; no ray has met anything yet.
+    pub fn begin(&self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) {
+        let reflections = frame.gpu_scene.reflections();
+        let reflections = reflections.create_view(&Default::default());
+        drop(passes.begin("no reflections", None, &[cleared(&reflections)], None));
+        self.keep(passes, frame, &self.recorded);
+    }
+
+    /// Follows rays from all glossy virtual surfaces of the picture, which shows them without reflections. Returns whether any was
+    /// to be followed. `probe` is what is mirrored where a ray meets nothing.
+    pub fn draw(
+        &mut self,
+        passes: &mut Passes<'_>,
+        frame: &FrameContext<'_>,
+        probe: Option<&MirroredProbe>,
+    ) -> bool {
+        let (gpu, gpu_scene) = (frame.gpu, frame.gpu_scene);
+        let within = frame.bounds.virtuals;
+        let camera_from_world = gpu_scene.camera_from_anchor().first().copied().flatten();
+        let Some(camera_from_world) = camera_from_world.filter(|_| !within.is_empty()) else {
+            return false;
+        };
+        self.keep(passes, frame, &self.shown);
+        let whole = PixelRect::whole(gpu_scene.intrinsics().size_px);
+        self.draw_depths(passes, gpu_scene, whole);
+        let trees = self.trees.table(gpu).clone();
+        let lights = gpu_scene.shining();
+        let placed = self.trees.placed(
+            gpu,
+            gpu_scene.camera_from_anchor(),
+            gpu_scene.unseen(),
+            (&lights, &camera_from_world),
+        );
+        let light_from_camera = gpu_scene
+            .camera_from_light()
+            .map_or(DMat3::IDENTITY, |pose| pose.matrix3.transpose());
+        let uniform = ReflectionFrame {
+            clip_from_camera: gpu_scene.intrinsics().clip_from_camera(NEAR_M),
+            light_from_camera: Mat4::from_mat3(light_from_camera.as_mat3()),
+            ambient: self.ambient,
+            thing_count: placed.thing_count,
+            light_count: placed.light_count,
+            has_probe: u32::from(probe.is_some()),
+            focal_px: focal_px(gpu_scene.intrinsics()),
+            padding: 0,
+        };
+        gpu.queue
+            .write_buffer(&self.frame, 0, bytemuck::bytes_of(&uniform));
+        let probe = probe.unwrap_or(&self.no_probe);
+        let view = wgpu::BindingResource::TextureView;
+        let group = gpu.bind_group(
+            &REFLECTION_GROUP,
+            [
+                self.frame.as_entire_binding(),
+                view(&trees),
+                view(&placed.table),
+                view(&self.depths),
+                view(&self.recorded.view),
+                view(&self.shown.view),
+                wgpu::BindingResource::Sampler(&self.sampler),
+                view(&probe.view),
+                wgpu::BindingResource::Sampler(&probe.sampler),
+            ],
+        );
+        let mirrored = self.mirrored.create_view(&Default::default());
+        let mut pass = passes.begin(
+            "reflections",
+            None,
+            &[cleared(&mirrored)],
+            Some(kept(&self.depth_stencil)),
+        );
+        set_scissor(&mut pass, within);
+        pass.set_bind_group(2, &group, &[]);
+        let light = DrawnLight::Whole(0);
+        gpu_scene.draw_surfaces(&mut pass, &self.mirror, Role::Virtual, light, within);
+        drop(pass);
+        let to = gpu_scene.reflections();
+        passes
+            .note("reflections to surfaces")
+            .copy_texture_to_texture(self.mirrored.as_image_copy(), to.as_image_copy(), to.size());
+        true
+    }
+
+    /// Draws which surfaces the camera sees how far off.
+    fn draw_depths(&self, passes: &mut Passes<'_>, gpu_scene: &GpuScene, whole: PixelRect) {
+        let mut pass = passes.begin(
+            "depths",
+            None,
+            &[cleared(&self.depths)],
+            Some(depth_stencil(&self.depth_stencil, true, false)),
+        );
+        for (role, pipelines) in [
+            (Role::Real, &self.depth_of_real),
+            (Role::Virtual, &self.depth_of_virtual),
+        ] {
+            gpu_scene.draw_surfaces(&mut pass, pipelines, role, DrawnLight::Whole(0), whole);
+        }
+    }
+
+    /// Takes the picture as it is, and makes its coarser levels.
+    fn keep(&self, passes: &mut Passes<'_>, frame: &FrameContext<'_>, to: &LinearPicture) {
+        let mut from = (frame.picture, &self.linear);
+        for level in &to.levels {
+            let (finer, pipeline) = from;
+            let finer = wgpu::BindingResource::TextureView(finer);
+            let group = frame.gpu.bind_group(&PICTURE_GROUP, [finer]);
+            let mut pass = passes.begin("linear picture", None, &[cleared(level)], None);
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &group, &[]);
+            pass.draw(0..3, 0..1);
+            drop(pass);
+            from = (level, &self.halve);
+        }
+    }
+}
+
+impl LinearPicture {
+    fn new(device: &wgpu::Device, label: &str, [width, height]: [u32; 2]) -> Self {
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d {
+                width,
+                height,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: LEVELS.min(width.max(height).ilog2() + 1),
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: REFLECTIONS_FORMAT,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        });
+        let level = |level| {
+            texture.create_view(&wgpu::TextureViewDescriptor {
+                base_mip_level: level,
+                mip_level_count: Some(1),
+                ..Default::default()
+            })
+        };
+        Self {
+            view: texture.create_view(&Default::default()),
+            levels: (0..texture.mip_level_count()).map(level).collect(),
+        }
+    }
+}
+
+fn focal_px(intrinsics: &Intrinsics) -> f32 {
+    intrinsics.focal_px.x as f32
+}
