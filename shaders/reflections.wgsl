@@ -19,15 +19,19 @@ struct ReflectionFrame {
 }
 
 @group(2) @binding(0) var<uniform> frame: ReflectionFrame;
+// Those that shine, and of each in the last number of its axis what it is.
+@group(2) @binding(10) var<storage, read> lamps: array<CameraLight>;
 // Depth of the real surface that is seen, and of the virtual one before it, metres; 0 where there is none.
 @group(2) @binding(3) var depths: texture_2d<f32>;
-// The video and the picture as it is without reflections, linear; each level is the mean of four of the finer.
+// The video, the picture as it is without reflections, and the part of that which is not virtual (a: how much that is), linear;
+// each level is the mean of four of the finer.
 @group(2) @binding(4) var recorded: texture_2d<f32>;
 @group(2) @binding(5) var shown: texture_2d<f32>;
+@group(2) @binding(9) var shown_real: texture_2d<f32>;
 @group(2) @binding(6) var picture_sampler: sampler;
 
-// Rays of a lobe that is wider than a pixel's own.
-const RAYS: u32 = 16u;
+// Set when the shader is built: rays of a lobe that one cannot stand for.
+override RAYS: u32 = 16u;
 // Below this roughness one ray is enough: the picture's own levels blur it.
 const SHARP: f32 = 0.03;
 // A dielectric rougher than this shows nothing of what it mirrors beside what lies below its layer.
@@ -55,29 +59,31 @@ fn mirror(surface: Surface, @builtin(front_facing) outside: bool) -> @location(0
     let normal = normalize(look.normal + to_camera * max(1e-3 - dot(look.normal, to_camera), 0.0));
     let origin = point + normal * (OFF_SURFACE * point.z);
     let cos_camera = dot(normal, to_camera);
-    if alpha < SHARP {
-        let radiance = radiance_along(Ray(origin, reflect(-to_camera, normal)), 4.0 * PI * alpha * alpha);
-        return vec4f(radiance, 1.0);
-    }
     let across = normalize(to_camera - normal * cos_camera + any_across(normal) * 1e-4);
     let frame_of_surface = mat3x3f(across, cross(normal, across), normal);
     let view_direction = vec3f(sqrt(max(1.0 - cos_camera * cos_camera, 0.0)), 0.0, cos_camera);
     let masked = smith(alpha, cos_camera);
+    // (There is one place in this shader where rays are followed: a driver puts all that it takes into each.)
+    let is_sharp = alpha < SHARP;
+    let rays = select(RAYS, 1u, is_sharp);
     var sum = vec4f(0.0);
-    for (var index = 0u; index < RAYS; index++) {
-        let halfway = visible_normal(view_direction, alpha, sequence(index));
+    for (var index = 0u; index < rays; index++) {
+        var halfway = vec3f(0.0, 0.0, 1.0);
+        if !is_sharp {
+            halfway = visible_normal(view_direction, alpha, sequence(index));
+        }
         let direction = reflect(-view_direction, halfway);
-        if direction.z <= 1e-3 {
+        if direction.z <= 1e-3 && !is_sharp {
             continue;
         }
         // Where as many rays come as the lobe sends light, each counts by what the way out leaves of it.
-        let out = smith(alpha, direction.z);
+        let out = smith(alpha, max(direction.z, 1e-3));
         let weight = out / (masked + out - masked * out);
         let spread = halfway.z * halfway.z * (alpha * alpha - 1.0) + 1.0;
         let density = alpha * alpha / (PI * spread * spread) * masked / (4.0 * cos_camera);
-        let solid_angle = 1.0 / (f32(RAYS) * density);
-        let radiance = radiance_along(Ray(origin, frame_of_surface * direction), solid_angle);
-        sum += vec4f(radiance, 1.0) * weight;
+        // (One ray stands for what the lobe is as wide as at its middle.)
+        let solid_angle = select(1.0 / (f32(RAYS) * density), 4.0 * PI * alpha * alpha, is_sharp);
+        sum += vec4f(radiance_along(Ray(origin, frame_of_surface * direction), solid_angle), 1.0) * weight;
     }
     return vec4f(sum.rgb / max(sum.a, 1e-6), 1.0);
 }
@@ -118,22 +124,34 @@ fn radiance_along(ray: Ray, solid_angle: f32) -> vec3f {
     let at = clip.xy / max(clip.w, 1e-6) * vec2f(0.5, -0.5) + 0.5;
     let width_px = hit.distance * sqrt(solid_angle / PI) * frame.focal_px / max(place.z, 1e-6);
     let level = log2(max(2.0 * width_px, 1.0));
+    // What is seen of it: of a virtual thing where there is enough to tell its colour, of a real one with what the video shows behind
+    // virtual things, without the shadows of such.
+    var part = vec4f(0.0);
+    var video = vec3f(0.0);
+    let is_real = is_real(hit);
     if clip.w > 0.0 && all(at > vec2f(0.0)) && all(at < vec2f(1.0)) {
         let size = vec2f(textureDimensions(depths));
+        // (The linear pictures are larger, so that each level is half as large as the finer.)
+        let in_picture = at * size / vec2f(textureDimensions(shown));
         let seen = textureLoad(depths, vec2i(at * size), 0).xy;
-        let is_virtual_seen = seen.y > 0.0;
-        let depth = select(seen.y, seen.x, is_real(hit));
-        if abs(depth - place.z) < SAME_DEPTH * place.z {
-            if !(is_real(hit) && is_virtual_seen) {
-                return textureSampleLevel(shown, picture_sampler, at, level).rgb;
+        if abs(select(seen.y, seen.x, is_real) - place.z) < SAME_DEPTH * place.z {
+            part = textureSampleLevel(shown_real, picture_sampler, in_picture, level);
+            if is_real {
+                video = textureSampleLevel(recorded, picture_sampler, in_picture, level).rgb;
+            } else {
+                let whole = textureSampleLevel(shown, picture_sampler, in_picture, level).rgb;
+                part = select(vec4f(0.0), vec4f(max(whole - part.rgb, vec3f(0.0)) / (1.0 - part.a), 1.0), part.a < 0.9);
             }
-            // A virtual thing stands before it, and the video shows it all the same, without the shadows of such.
-            let light = light_at(place, normal);
-            let left = light.beside_all / max(light.beside_real, vec3f(1e-6));
-            return textureSampleLevel(recorded, picture_sampler, at, level).rgb * left;
         }
     }
-    return hit_albedo(hit) / PI * light_at(place, normal).beside_all;
+    if part.a > 0.999 {
+        return part.rgb;
+    }
+    let is_in_video = any(video > vec3f(0.0));
+    let light = light_at(place, normal, is_in_video);
+    let modelled = hit_albedo(hit) / PI * light.beside_all;
+    let otherwise = select(modelled, video * light.beside_all / max(light.beside_real, vec3f(1e-6)), is_in_video);
+    return part.rgb + (1.0 - part.a) * otherwise;
 }
 
 // Radiance from where no ray meets anything, over a lobe.
@@ -144,40 +162,38 @@ fn from_afar(direction: vec3f, roughness: f32) -> vec3f {
     return lobe_mean((frame.light_from_camera * vec4f(direction, 0.0)).xyz, clamp(roughness, 0.0, 1.0));
 }
 
-// Irradiance of a place, about: of the light from everywhere as if nothing hid it, and of lights beside what hides them.
+// Irradiance of a place, about: of the light from everywhere as if nothing hid it, and of lights beside what hides them, of real
+// things (where that is asked for) and of all.
 struct LightAt {
     beside_real: vec3f,
     beside_all: vec3f,
 }
 
-fn light_at(place: vec3f, normal: vec3f) -> LightAt {
+fn light_at(place: vec3f, normal: vec3f, is_real_asked: bool) -> LightAt {
     let broad = PI * from_afar(normal, 1.0);
     var light = LightAt(broad, broad);
     let origin = place + normal * (OFF_SURFACE * max(place.z, 0.1));
     for (var index = 0u; index < frame.light_count; index++) {
-        let row = 4u * frame.thing_count + 5u * index;
-        let axis = placed_row(row + 2u);
-        let lamp = CameraLight(
-            placed_row(row),
-            placed_row(row + 1u),
-            vec4f(axis.xyz, 0.0),
-            placed_row(row + 3u),
-            placed_row(row + 4u),
-        );
-        let arriving = incidence_of(u32(axis.w), lamp, place, normal).irradiance;
+        let lamp = lamps[index];
+        let arriving = incidence_of(u32(lamp.axis_in_camera.w), lamp, place, normal).irradiance;
         if all(arriving <= vec3f(0.0)) {
             continue;
         }
         let way = lamp.place_in_camera.xyz - origin * lamp.place_in_camera.w;
         let reach = select(1e6, length(way), lamp.place_in_camera.w > 0.0);
         let ray = Ray(origin, normalize(way));
-        if first_hit(ray, reach, frame.thing_count, CASTS | IS_REAL, 0u, true).triangle != 0u {
-            continue;
+        // Beside real things first and then beside virtual ones, or beside all at once.
+        var is_open = true;
+        for (var step = select(1u, 0u, is_real_asked); step < 2u && is_open; step++) {
+            let real = select(0u, IS_REAL, is_real_asked);
+            let is_of_real = step == 0u;
+            is_open = first_hit(ray, reach, frame.thing_count, CASTS | select(0u, real, is_of_real), select(real, 0u, is_of_real), true)
+                .triangle == 0u;
+            if is_open && is_of_real {
+                light.beside_real += arriving;
+            }
         }
-        light.beside_real += arriving;
-        if first_hit(ray, reach, frame.thing_count, CASTS, IS_REAL, true).triangle == 0u {
-            light.beside_all += arriving;
-        }
+        light.beside_all += select(vec3f(0.0), arriving, is_open);
     }
     return light;
 }

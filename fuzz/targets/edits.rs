@@ -62,6 +62,7 @@ fn edits(scene: &Scene) -> Vec<Edit> {
             thing: thing.clone(),
             albedo: Some(DVec3::splat(0.25)),
             roughness: Some(0.5),
+            metallic: Some(0.75),
         },
         Edit::Animate {
             thing: thing.clone(),

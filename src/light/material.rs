@@ -8,7 +8,8 @@ pub struct Material {
     /// Diffuse reflectance of what is no metal, and a metal's reflectance seen head-on: linear RGB in [0, 1]. It is
     /// multiplied with the corners' colours.
     pub albedo: DVec3,
-    /// α of the GGX layer of a dielectric, or of a metal, in (0, 1]; `None`: Lambert alone.
+    /// α of the GGX layer of a dielectric, or of a metal, in (0, 1]; `None`: Lambert alone, or a metal's usual one
+    /// ([`Material::layer_roughness`]).
     pub roughness: Option<f64>,
     /// Part that is metal, 0 to 1.
     pub metallic: f64,
@@ -24,6 +25,9 @@ pub struct Material {
     pub maps: Maps,
 }
 
+/// α of a metal of which nothing says how rough it is: half of it, squared, as programs begin with.
+const METAL_ROUGHNESS: f64 = 0.25;
+
 impl Material {
     /// Lambert alone.
     pub const fn matt(albedo: DVec3) -> Self {
@@ -37,6 +41,12 @@ impl Material {
             shading: Shading::Lit,
             maps: Maps::NONE,
         }
+    }
+
+    /// α of its layer; `None`: it has none. A metal always has one.
+    pub fn layer_roughness(&self) -> Option<f64> {
+        let of_metal = (self.metallic > 0.0).then_some(METAL_ROUGHNESS);
+        self.roughness.or(of_metal)
     }
 
     /// Whether albedo and roughness alone say how it looks.

@@ -264,7 +264,7 @@ pub fn spot_ramp(inner_rad: f64, outer_rad: f64) -> [f64; 2] {
 pub fn reflectance(material: &Material, normal: DVec3, to_light: DVec3, to_camera: DVec3) -> DVec3 {
     let diffuse = material.albedo / PI;
     let cos_light = normal.dot(to_light);
-    let Some(alpha) = material.roughness.filter(|_| cos_light > 0.0) else {
+    let Some(alpha) = material.layer_roughness().filter(|_| cos_light > 0.0) else {
         return diffuse;
     };
     let cos_camera = normal.dot(to_camera).max(1e-3);

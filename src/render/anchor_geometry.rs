@@ -559,7 +559,7 @@ pub(super) fn corners(object: &Object, mesh: &Mesh) -> Vec<SurfaceCorner> {
                     .normalize_or_zero()
                     .as_vec3(),
                 albedo: material.albedo.as_vec3(),
-                roughness: material.roughness.unwrap_or(0.0) as f32,
+                roughness: material.layer_roughness().unwrap_or(0.0) as f32,
             })
         })
         .collect()

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use super::device_failure::{DeviceFailure, without_a_panic};
 use super::error::RenderError;
+use super::file_limit;
 use super::pipelines::{GroupLayout, PipelineCache, PipelineDescription};
 
 /// An opened adapter.
@@ -87,6 +88,9 @@ impl Gpu {
             adapter: info.name.clone(),
             reason,
         };
+        if let Some(complaint) = file_limit::complaint(&info, file_limit::of_process()) {
+            return Err(unusable(complaint));
+        }
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("gnomon"),
             required_features: features,

@@ -32,7 +32,7 @@ use super::light_piece::LitBy;
 use super::lights::Lights;
 use super::materials::{materials_group, needs_looks};
 use super::mirrored_probe::LayerAlbedo;
-use super::reflections::{self, REFLECTIONS_FORMAT};
+use super::mirroring::{REFLECTIONS_FORMAT, are_followed};
 use super::screen_bounds::{ScreenBounds, screen_bounds};
 use super::shown::Shown;
 use super::surfaces::SurfaceKinds;
@@ -132,13 +132,13 @@ impl GpuScene {
         let looks = scene.virtuals.iter().any(needs_looks);
         let glossy = scene.virtuals.iter().any(|object| {
             let mut materials = object.materials.iter();
-            materials.any(|material| material.roughness.is_some())
+            materials.any(|material| material.layer_roughness().is_some())
         });
         let layer_albedo = LayerAlbedo::new(device, &gpu.queue, glossy);
         let reflections = texture(
             device,
             "reflections",
-            if reflections::are_followed(scene) {
+            if are_followed(scene) {
                 intrinsics.size_px
             } else {
                 [1; 2]

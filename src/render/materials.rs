@@ -131,7 +131,7 @@ fn on_gpu<'a>(
     };
     MaterialOnGpu {
         albedo: material.albedo.as_vec3().to_array(),
-        roughness: material.roughness.unwrap_or(0.0) as f32,
+        roughness: material.layer_roughness().unwrap_or(0.0) as f32,
         emission: material.emission.as_vec3().to_array(),
         metallic: material.metallic as f32,
         opacity: match material.coverage {

@@ -1,25 +1,28 @@
 //! Rays against the scene's things on the GPU: a tree of boxes for each thing, in its own space, and where things and lights are
 //! in a frame, as tables that ray_trees.wgsl reads.
 
+use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, Vec3, Vec4};
 
+use crate::geometry::bounds::Bounds;
+use crate::geometry::camera::Intrinsics;
 use crate::geometry::ray_caster::{BoxContent, RayCaster};
-use crate::light::Light;
+use crate::geometry::reach::{self, PixelRect};
+use crate::geometry::solid::holes;
 use crate::scene::{Object, Scene};
 use crate::shafts::casters::Occluder;
 
 use super::anchor_geometry::Role;
 use super::deforming::DeformingThing;
 use super::gpu::Gpu;
-use super::light_kind::LightKind;
+use super::mirroring::mirrors;
 use super::tables::{most_texels, table, with_word, words};
-use super::uniforms::CameraLight;
 
 /// Texels of a node, and of a triangle.
 const NODE_TEXELS: usize = 2;
 const TRIANGLE_TEXELS: usize = 3;
-/// Texels of a thing in a frame: `first_hit` of ray_trees.wgsl.
-const THING_TEXELS: usize = 4;
+/// Bits of a place in a stack's word: `PLACE_BITS` of ray_trees.wgsl.
+const PLACE_BITS: u32 = 24;
 /// What has more triangles than this is simplified.
 const MOST_TRIANGLES: usize = 65_536;
 
@@ -28,12 +31,27 @@ const IS_REAL: u32 = 1;
 const IS_SOLID: u32 = 2;
 const CASTS: u32 = 4;
 
+/// A thing in a frame: the twin of `TracedThing` in ray_trees.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(super) struct TracedThing {
+    pub own_from_camera: [Vec4; 3],
+    pub low: Vec3,
+    pub what: u32,
+    pub high: Vec3,
+    pub root: u32,
+}
+
 /// A thing that rays may meet.
-struct TracedThing {
+struct TreedThing {
     caster: RayCaster,
     /// In the thing's own space, each with its albedo, as the caster has them.
     triangles: Vec<([Vec3; 3], Vec3)>,
     what: u32,
+    /// Whether it shows what it mirrors.
+    mirrors: bool,
+    /// Around it, in its own space; `None` without triangles.
+    bounds: Option<Bounds>,
     visible: bool,
     anchor: usize,
     anchor_from_object: DAffine3,
@@ -41,27 +59,20 @@ struct TracedThing {
 
 /// The trees of all things, the real ones first.
 pub(super) struct RayTrees {
-    things: Vec<TracedThing>,
-    /// Of each thing the number of its first node in the table.
+    things: Vec<TreedThing>,
+    /// Of each thing the word with which a stack begins.
     roots: Vec<u32>,
     /// `None`: a thing has changed its shape.
     table: Option<wgpu::TextureView>,
     most_triangles: usize,
 }
 
-/// Things and lights where they are in a frame.
-pub(super) struct PlacedTrees {
-    pub table: wgpu::TextureView,
-    pub thing_count: u32,
-    pub light_count: u32,
-}
-
-impl TracedThing {
+impl TreedThing {
     fn new(object: &Object, role: Role, most_triangles: usize) -> Self {
         let occluder = object.occluder();
         let triangles = triangles(&occluder, most_triangles);
-        let is_solid = object.animation.is_none()
-            && crate::geometry::solid::holes(&object.mesh).is_some_and(|holes| holes.is_empty());
+        let is_solid =
+            object.animation.is_none() && holes(&object.mesh).is_some_and(|holes| holes.is_empty());
         let flag = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
         let corners: Vec<[Vec3; 3]> = triangles.iter().map(|(corners, _)| *corners).collect();
         Self {
@@ -70,10 +81,32 @@ impl TracedThing {
             what: flag(role == Role::Real, IS_REAL)
                 | flag(is_solid, IS_SOLID)
                 | flag(object.casts, CASTS),
+            mirrors: role == Role::Virtual && mirrors(object),
+            bounds: Bounds::around(corners.iter().flatten().map(|corner| corner.as_dvec3())),
             visible: object.visible,
             anchor: object.anchor,
             anchor_from_object: object.anchor_from_object,
         }
+    }
+
+    /// Where it is in the camera's space, if it is there and seen.
+    fn camera_from_own(
+        &self,
+        camera_from_anchor: &[Option<DAffine3>],
+        unseen: Option<usize>,
+    ) -> Option<DAffine3> {
+        let pose = camera_from_anchor.get(self.anchor).copied().flatten()?;
+        let is_there = self.visible && unseen != Some(self.anchor) && self.bounds.is_some();
+        is_there.then(|| pose * self.anchor_from_object)
+    }
+
+    /// The word with which a stack begins, where its nodes and triangles begin there.
+    fn root(&self, begins: (usize, usize)) -> u32 {
+        let root = self.caster.boxes().next();
+        root.map_or(0, |root| {
+            let (first, count) = content(root.content, begins);
+            (first | count << PLACE_BITS) as u32
+        })
     }
 
     /// Appends its nodes, which count from `first_node`, and its triangles, which begin at a texel of the whole table.
@@ -84,12 +117,7 @@ impl TracedThing {
         triangles: &mut Vec<[u32; 4]>,
     ) {
         for node in self.caster.boxes() {
-            let (first, count) = match node.content {
-                BoxContent::Boxes(first) => (first_node + first, 0),
-                BoxContent::Triangles { first, count } => {
-                    (first_triangle + TRIANGLE_TEXELS * first, count)
-                }
-            };
+            let (first, count) = content(node.content, (first_node, first_triangle));
             nodes.push(with_word(node.low, first as u32));
             nodes.push(with_word(node.high, count as u32));
         }
@@ -99,6 +127,14 @@ impl TracedThing {
             triangles.push(words((b - a).extend(albedo.y)));
             triangles.push(words((c - a).extend(albedo.z)));
         }
+    }
+}
+
+/// Where what is in a box begins (a node's number, a triangle's texel), and how many triangles these are.
+fn content(content: BoxContent, (first_node, first_triangle): (usize, usize)) -> (usize, usize) {
+    match content {
+        BoxContent::Boxes(first) => (first_node + first, 0),
+        BoxContent::Triangles { first, count } => (first_triangle + TRIANGLE_TEXELS * first, count),
     }
 }
 
@@ -116,12 +152,13 @@ impl RayTrees {
         let things: Vec<(&Object, Role)> = objects(scene).collect();
         // (A tree has fewer than two nodes for each triangle.)
         let texels = 2 * NODE_TEXELS + TRIANGLE_TEXELS;
-        let fitting = most_texels(gpu) / texels / things.len().max(1);
+        let most_texels = most_texels(gpu).min(1 << PLACE_BITS);
+        let fitting = most_texels / texels / things.len().max(1);
         let most_triangles = MOST_TRIANGLES.min(fitting);
         let things = things.into_iter();
         Self {
             things: things
-                .map(|(object, role)| TracedThing::new(object, role, most_triangles))
+                .map(|(object, role)| TreedThing::new(object, role, most_triangles))
                 .collect(),
             roots: Vec::new(),
             table: None,
@@ -140,9 +177,25 @@ impl RayTrees {
     /// Takes note of a thing that has another shape now.
     pub fn deform(&mut self, deforming: &DeformingThing) {
         if let Some(thing) = self.things.get_mut(deforming.number) {
-            *thing = TracedThing::new(&deforming.object, deforming.role, self.most_triangles);
+            *thing = TreedThing::new(&deforming.object, deforming.role, self.most_triangles);
             self.table = None;
         }
+    }
+
+    /// Where in the picture things can be that show what they mirror.
+    pub fn mirroring_pixels(
+        &self,
+        camera_from_anchor: &[Option<DAffine3>],
+        unseen: Option<usize>,
+        intrinsics: &Intrinsics,
+    ) -> PixelRect {
+        let mirroring = self.things.iter().filter(|thing| thing.mirrors);
+        let places = mirroring.filter_map(|thing| {
+            let camera_from_own = thing.camera_from_own(camera_from_anchor, unseen)?;
+            let corners = thing.bounds?.corners();
+            Some(reach::covered(&corners, &camera_from_own, intrinsics))
+        });
+        places.fold(PixelRect::NONE, PixelRect::union)
     }
 
     /// The trees, as they are now.
@@ -156,7 +209,7 @@ impl RayTrees {
             for thing in things {
                 let first_node = nodes.len() / NODE_TEXELS;
                 let first_triangle = NODE_TEXELS * node_count + triangles.len();
-                roots.push(first_node as u32);
+                roots.push(thing.root((first_node, first_triangle)));
                 thing.write((first_node, first_triangle), &mut nodes, &mut triangles);
             }
             nodes.append(&mut triangles);
@@ -164,51 +217,32 @@ impl RayTrees {
         })
     }
 
-    /// The things that are there but for those on a node that is not seen, and the lights (world space), of a frame whose trees
-    /// were asked for.
+    /// The things that are there but for those on a node that is not seen, of a frame whose trees were asked for.
     pub fn placed(
         &self,
-        gpu: &Gpu,
         camera_from_anchor: &[Option<DAffine3>],
         unseen: Option<usize>,
-        (lights, camera_from_world): (&[Light], &DAffine3),
-    ) -> PlacedTrees {
-        let mut texels = Vec::new();
-        for (thing, &root) in self.things.iter().zip(&self.roots) {
-            let pose = camera_from_anchor.get(thing.anchor).copied().flatten();
-            let is_there = thing.visible && unseen != Some(thing.anchor);
-            let Some(pose) = pose.filter(|_| is_there && !thing.triangles.is_empty()) else {
-                continue;
-            };
-            let own_from_camera = (pose * thing.anchor_from_object).inverse();
+    ) -> Vec<TracedThing> {
+        let things = self.things.iter().zip(&self.roots);
+        let placed = things.filter_map(|(thing, &root)| {
+            let camera_from_own = thing.camera_from_own(camera_from_anchor, unseen)?;
+            let own_from_camera = camera_from_own.inverse();
             let rows = own_from_camera.matrix3.transpose();
             let shift = own_from_camera.translation;
-            texels.extend([
-                words(rows.x_axis.extend(shift.x).as_vec4()),
-                words(rows.y_axis.extend(shift.y).as_vec4()),
-                words(rows.z_axis.extend(shift.z).as_vec4()),
-                [root, thing.what, 0, 0],
-            ]);
-        }
-        let thing_count = texels.len() / THING_TEXELS;
-        texels.extend(lights.iter().flat_map(|light| {
-            let kind = LightKind::of(light).number();
-            let light = CameraLight::new(light, camera_from_world);
-            let axis: Vec4 = light.axis_in_camera.with_w(kind as f32);
-            [
-                light.place_in_camera,
-                light.power,
-                axis,
-                light.half_width,
-                light.half_height,
-            ]
-            .map(words)
-        }));
-        PlacedTrees {
-            table: table(gpu, "placed things", &texels),
-            thing_count: thing_count as u32,
-            light_count: lights.len() as u32,
-        }
+            let bounds = thing.bounds?;
+            Some(TracedThing {
+                own_from_camera: [
+                    rows.x_axis.extend(shift.x).as_vec4(),
+                    rows.y_axis.extend(shift.y).as_vec4(),
+                    rows.z_axis.extend(shift.z).as_vec4(),
+                ],
+                low: bounds.low.as_vec3(),
+                what: thing.what,
+                high: bounds.high.as_vec3(),
+                root,
+            })
+        });
+        placed.collect()
     }
 }
 

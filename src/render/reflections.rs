@@ -6,54 +6,60 @@
 //! Reads the picture without and with virtual things, and the scene's triangles. Writes what layer_albedo.wgsl reads.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DMat3, Mat4, Vec3};
+use glam::{DAffine3, DMat3, Mat4, Vec3};
 
-use crate::geometry::camera::Intrinsics;
 use crate::geometry::reach::PixelRect;
-use crate::scene::{EnvironmentMethod, Object, Scene, ShadowTechnique};
+use crate::light::Light;
+use crate::scene::Scene;
 
 use super::anchor_geometry::Role;
 use super::attachments::{cleared, depth_stencil, kept, target, texture};
 use super::deforming::DeformingThing;
 use super::gpu::Gpu;
 use super::gpu_scene::{DrawnLight, GpuScene};
+use super::light_kind::LightKind;
 use super::mirrored_probe::MirroredProbe;
+use super::mirroring::{REFLECTIONS_FORMAT, are_followed};
 use super::passes::Passes;
 use super::pipelines::{
-    GroupLayout, PipelineDescription, filtered, overwritten, sampler, texels, uniform, words,
+    GroupLayout, PipelineDescription, filtered, overwritten, sampler, storage, texels, uniform,
+    words,
 };
 use super::ray_trees::RayTrees;
 use super::surfaces::{Sided, surface_description};
 use super::technique::FrameContext;
-use super::uniforms::{GEOMETRY_GROUPS, NEAR_M};
+use super::uniforms::{CameraLight, GEOMETRY_GROUPS, NEAR_M};
 use super::volumes::set_scissor;
 
-/// Format of what is mirrored.
-pub(super) const REFLECTIONS_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 const DEPTHS_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Float;
 /// Levels of the pictures that are mirrored.
 const LEVELS: u32 = 7;
-/// A dielectric rougher than this shows nothing of what it mirrors: `ROUGHEST_DIELECTRIC` of reflections.wgsl.
-const ROUGHEST_DIELECTRIC: f64 = 0.5;
 
 const REFLECTION_GROUP: GroupLayout = GroupLayout {
     label: "reflections",
     entries: &[
         uniform(0, wgpu::ShaderStages::FRAGMENT, false),
         words(1, wgpu::ShaderStages::FRAGMENT),
-        words(2, wgpu::ShaderStages::FRAGMENT),
+        storage(2, wgpu::ShaderStages::FRAGMENT),
         texels(3, false),
         filtered(4),
         filtered(5),
         sampler(6),
         filtered(7),
         sampler(8),
+        filtered(9),
+        storage(10, wgpu::ShaderStages::FRAGMENT),
     ],
 };
 
 const PICTURE_GROUP: GroupLayout = GroupLayout {
     label: "picture",
     entries: &[texels(0, false)],
+};
+
+const REAL_PART_GROUP: GroupLayout = GroupLayout {
+    label: "real part of the picture",
+    entries: &[texels(0, false), texels(1, false)],
 };
 
 /// The twin of `ReflectionFrame` in reflections.wgsl.
@@ -78,10 +84,12 @@ pub(super) struct Reflections {
     depth_of_virtual: Sided,
     mirror: Sided,
     linear: wgpu::RenderPipeline,
+    linear_real: wgpu::RenderPipeline,
     halve: wgpu::RenderPipeline,
     frame: wgpu::Buffer,
     recorded: LinearPicture,
     shown: LinearPicture,
+    shown_real: LinearPicture,
     depths: wgpu::TextureView,
     depth_stencil: wgpu::TextureView,
     /// What is copied to where the surfaces' shaders read it, which cannot be drawn into meanwhile.
@@ -97,24 +105,6 @@ struct LinearPicture {
     levels: Vec<wgpu::TextureView>,
 }
 
-/// Whether rays are followed for a scene's glossy things.
-pub(super) fn are_followed(scene: &Scene) -> bool {
-    // (The paper's way of drawing gloss is there to be compared with.)
-    let is_papers = scene.chosen_technique().0 == ShadowTechnique::Environment
-        && scene.shadows.environment.method == EnvironmentMethod::Maps;
-    scene.shadows.reflections && !is_papers && scene.virtuals.iter().any(mirrors)
-}
-
-/// Whether a thing shows what it mirrors.
-fn mirrors(object: &Object) -> bool {
-    let mut materials = object.materials.iter();
-    materials.any(|material| {
-        let roughness = material.roughness;
-        roughness
-            .is_some_and(|roughness| roughness <= ROUGHEST_DIELECTRIC || material.metallic > 0.0)
-    })
-}
-
 impl Reflections {
     /// `None` where nothing shows what it mirrors.
     pub fn new(gpu: &Gpu, scene: &Scene, gpu_scene: &GpuScene) -> Option<Self> {
@@ -124,11 +114,12 @@ impl Reflections {
         let device = &gpu.device;
         let size_px = gpu_scene.intrinsics().size_px;
         let kinds = gpu_scene.kinds;
+        let rays = f64::from(scene.shadows.reflection_samples);
         let described = |fragment, groups: Vec<Option<GroupLayout>>, target| PipelineDescription {
             shader: "reflections.wgsl",
             vertex: "place",
             fragment,
-            constants: vec![("GLOSSY", 1.0)],
+            constants: vec![("GLOSSY", 1.0), ("RAYS", rays)],
             groups,
             targets: vec![target],
             ..surface_description(gpu, None)
@@ -152,11 +143,11 @@ impl Reflections {
             state.depth_compare = Some(wgpu::CompareFunction::Equal);
             state.depth_write_enabled = Some(false);
         }
-        let fullscreen = |shader, fragment| {
+        let fullscreen = |shader, fragment, group| {
             gpu.pipeline(&PipelineDescription {
                 shader,
                 fragment,
-                groups: vec![Some(PICTURE_GROUP)],
+                groups: vec![Some(group)],
                 targets: vec![overwritten(REFLECTIONS_FORMAT)],
                 ..Default::default()
             })
@@ -176,8 +167,9 @@ impl Reflections {
             ),
             depth_of_virtual: Sided::both(gpu, &kinds.of_virtual(depth_of_virtual)),
             mirror: Sided::both(gpu, &kinds.of_virtual(mirror)),
-            linear: fullscreen("linear_picture.wgsl", "linear"),
-            halve: fullscreen("shaft_mips.wgsl", "halve"),
+            linear: fullscreen("linear_picture.wgsl", "linear", PICTURE_GROUP),
+            linear_real: fullscreen("linear_picture.wgsl", "linear_real", REAL_PART_GROUP),
+            halve: fullscreen("shaft_mips.wgsl", "halve", PICTURE_GROUP),
             frame: device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("reflections"),
                 size: size_of::<ReflectionFrame>() as u64,
@@ -186,6 +178,7 @@ impl Reflections {
             }),
             recorded: LinearPicture::new(device, "linear video", size_px),
             shown: LinearPicture::new(device, "linear picture", size_px),
+            shown_real: LinearPicture::new(device, "real part of the picture", size_px),
             depths: target(device, "depths", size_px, DEPTHS_FORMAT, 1, read),
             depth_stencil: target(
                 device,
@@ -231,49 +224,68 @@ impl Reflections {
         let reflections = frame.gpu_scene.reflections();
         let reflections = reflections.create_view(&Default::default());
         drop(passes.begin("no reflections", None, &[cleared(&reflections)], None));
-        self.keep(passes, frame, &self.recorded);
+        let group = self.picture_group(frame);
+        self.keep(passes, frame.gpu, &self.recorded, (&self.linear, &group));
     }
 
-    /// Follows rays from all glossy virtual surfaces of the picture, which shows them without reflections. Returns whether any was
-    /// to be followed. `probe` is what is mirrored where a ray meets nothing.
+    fn picture_group(&self, frame: &FrameContext<'_>) -> wgpu::BindGroup {
+        let picture = wgpu::BindingResource::TextureView(frame.picture);
+        frame.gpu.bind_group(&PICTURE_GROUP, [picture])
+    }
+
+    /// Follows rays from all glossy virtual surfaces of the picture, which shows them without reflections. Returns where these can
+    /// be. `probe` is what is mirrored where a ray meets nothing.
     pub fn draw(
         &mut self,
         passes: &mut Passes<'_>,
         frame: &FrameContext<'_>,
         probe: Option<&MirroredProbe>,
-    ) -> bool {
+    ) -> PixelRect {
         let (gpu, gpu_scene) = (frame.gpu, frame.gpu_scene);
-        let within = frame.bounds.virtuals;
-        let camera_from_world = gpu_scene.camera_from_anchor().first().copied().flatten();
+        let camera_from_anchor = gpu_scene.camera_from_anchor();
+        let (intrinsics, unseen) = (gpu_scene.intrinsics(), gpu_scene.unseen());
+        let within = self
+            .trees
+            .mirroring_pixels(camera_from_anchor, unseen, intrinsics);
+        let within = within.intersection(frame.bounds.virtuals);
+        let camera_from_world = camera_from_anchor.first().copied().flatten();
         let Some(camera_from_world) = camera_from_world.filter(|_| !within.is_empty()) else {
-            return false;
+            return PixelRect::NONE;
         };
-        self.keep(passes, frame, &self.shown);
-        let whole = PixelRect::whole(gpu_scene.intrinsics().size_px);
+        let whole = PixelRect::whole(intrinsics.size_px);
         self.draw_depths(passes, gpu_scene, whole);
+        let group = self.picture_group(frame);
+        self.keep(passes, gpu, &self.shown, (&self.linear, &group));
+        let pictures = [frame.picture, &self.depths].map(wgpu::BindingResource::TextureView);
+        let group = gpu.bind_group(&REAL_PART_GROUP, pictures);
+        self.keep(passes, gpu, &self.shown_real, (&self.linear_real, &group));
         let trees = self.trees.table(gpu).clone();
-        let lights = gpu_scene.shining();
-        let placed = self.trees.placed(
-            gpu,
-            gpu_scene.camera_from_anchor(),
-            gpu_scene.unseen(),
-            (&lights, &camera_from_world),
-        );
+        let things = self.trees.placed(camera_from_anchor, unseen);
+        let lamps: Vec<CameraLight> = gpu_scene
+            .shining()
+            .iter()
+            .map(|light| lamp(light, &camera_from_world))
+            .collect();
         let light_from_camera = gpu_scene
             .camera_from_light()
             .map_or(DMat3::IDENTITY, |pose| pose.matrix3.transpose());
         let uniform = ReflectionFrame {
-            clip_from_camera: gpu_scene.intrinsics().clip_from_camera(NEAR_M),
+            clip_from_camera: intrinsics.clip_from_camera(NEAR_M),
             light_from_camera: Mat4::from_mat3(light_from_camera.as_mat3()),
             ambient: self.ambient,
-            thing_count: placed.thing_count,
-            light_count: placed.light_count,
+            thing_count: things.len() as u32,
+            light_count: lamps.len() as u32,
             has_probe: u32::from(probe.is_some()),
-            focal_px: focal_px(gpu_scene.intrinsics()),
+            focal_px: intrinsics.focal_px.x as f32,
             padding: 0,
         };
         gpu.queue
             .write_buffer(&self.frame, 0, bytemuck::bytes_of(&uniform));
+        let [things, lamps] = [
+            ("things", bytemuck::cast_slice(&things)),
+            ("lamps", bytemuck::cast_slice(&lamps)),
+        ]
+        .map(|(label, contents)| gpu.buffer(label, contents, wgpu::BufferUsages::STORAGE));
         let probe = probe.unwrap_or(&self.no_probe);
         let view = wgpu::BindingResource::TextureView;
         let group = gpu.bind_group(
@@ -281,13 +293,15 @@ impl Reflections {
             [
                 self.frame.as_entire_binding(),
                 view(&trees),
-                view(&placed.table),
+                things.as_entire_binding(),
                 view(&self.depths),
                 view(&self.recorded.view),
                 view(&self.shown.view),
                 wgpu::BindingResource::Sampler(&self.sampler),
                 view(&probe.view),
                 wgpu::BindingResource::Sampler(&probe.sampler),
+                view(&self.shown_real.view),
+                lamps.as_entire_binding(),
             ],
         );
         let mirrored = self.mirrored.create_view(&Default::default());
@@ -306,7 +320,7 @@ impl Reflections {
         passes
             .note("reflections to surfaces")
             .copy_texture_to_texture(self.mirrored.as_image_copy(), to.as_image_copy(), to.size());
-        true
+        within
     }
 
     /// Draws which surfaces the camera sees how far off.
@@ -325,33 +339,47 @@ impl Reflections {
         }
     }
 
-    /// Takes the picture as it is, and makes its coarser levels.
-    fn keep(&self, passes: &mut Passes<'_>, frame: &FrameContext<'_>, to: &LinearPicture) {
-        let mut from = (frame.picture, &self.linear);
+    /// Draws the finest level of a picture, and makes the coarser ones.
+    fn keep(
+        &self,
+        passes: &mut Passes<'_>,
+        gpu: &Gpu,
+        to: &LinearPicture,
+        (finest, group): (&wgpu::RenderPipeline, &wgpu::BindGroup),
+    ) {
+        let mut from = (finest, group.clone());
         for level in &to.levels {
-            let (finer, pipeline) = from;
-            let finer = wgpu::BindingResource::TextureView(finer);
-            let group = frame.gpu.bind_group(&PICTURE_GROUP, [finer]);
+            let (pipeline, group) = from;
             let mut pass = passes.begin("linear picture", None, &[cleared(level)], None);
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &group, &[]);
             pass.draw(0..3, 0..1);
             drop(pass);
-            from = (level, &self.halve);
+            let finer = wgpu::BindingResource::TextureView(level);
+            from = (&self.halve, gpu.bind_group(&PICTURE_GROUP, [finer]));
         }
     }
 }
 
+/// A light of the world, with what it is in the last number of its axis.
+fn lamp(light: &Light, camera_from_world: &DAffine3) -> CameraLight {
+    let mut lamp = CameraLight::new(light, camera_from_world);
+    lamp.axis_in_camera.w = f32::from(LightKind::of(light).number());
+    lamp
+}
+
 impl LinearPicture {
+    /// As large as the picture at least, so that each level has half as many texels as the finer one.
     fn new(device: &wgpu::Device, label: &str, [width, height]: [u32; 2]) -> Self {
+        let coarsest = 1 << (LEVELS - 1);
         let texture = device.create_texture(&wgpu::TextureDescriptor {
             label: Some(label),
             size: wgpu::Extent3d {
-                width,
-                height,
+                width: width.next_multiple_of(coarsest),
+                height: height.next_multiple_of(coarsest),
                 depth_or_array_layers: 1,
             },
-            mip_level_count: LEVELS.min(width.max(height).ilog2() + 1),
+            mip_level_count: LEVELS,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
             format: REFLECTIONS_FORMAT,
@@ -370,8 +398,4 @@ impl LinearPicture {
             levels: (0..texture.mip_level_count()).map(level).collect(),
         }
     }
-}
-
-fn focal_px(intrinsics: &Intrinsics) -> f32 {
-    intrinsics.focal_px.x as f32
 }

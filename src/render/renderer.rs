@@ -442,8 +442,9 @@ fn draw_mirroring(
     technique.draw(passes, frame);
     // (A span of the clock is one of passes that come once.)
     passes.stop_clock();
-    if reflections.draw(passes, frame, technique.mirrored()) {
-        let bounds = frame.bounds.of_virtuals();
+    let mirroring = reflections.draw(passes, frame, technique.mirrored());
+    if !mirroring.is_empty() {
+        let bounds = frame.bounds.only(mirroring);
         let again = FrameContext {
             bounds: &bounds,
             ..*frame

@@ -36,11 +36,12 @@ pub(super) struct ShadowReach {
 }
 
 impl ScreenBounds {
-    /// The same where virtual things can be, and nothing else.
-    pub fn of_virtuals(&self) -> Self {
+    /// The same of a part of the picture alone.
+    pub fn only(&self, pixels: PixelRect) -> Self {
         Self {
-            pixels: self.virtuals,
-            ..self.clone()
+            pixels,
+            virtuals: self.virtuals.intersection(pixels),
+            shadows: self.shadows.clone(),
         }
     }
 

@@ -267,6 +267,7 @@ impl UniformRow {
 mod tests {
     use super::*;
     use crate::render::materials::{MapOnGpu, MaterialOnGpu};
+    use crate::render::ray_trees::TracedThing;
     use crate::render::reflections::ReflectionFrame;
     use crate::render::shader;
     use crate::render::shafts::data::ShaftFrame;
@@ -376,6 +377,15 @@ mod tests {
             has_probe,
             focal_px,
             padding
+        );
+        assert_twins!(
+            &reflections,
+            TracedThing,
+            own_from_camera,
+            low,
+            what,
+            high,
+            root
         );
         let video = shader::source("video.wgsl", &[]).unwrap();
         assert_twins!(

@@ -76,6 +76,8 @@ keys! {
     albedo_texture: Option<PathBuf>, FileKind::Picture => Means(None, "what the mesh's file says");
     /// Of a GGX layer over it.
     roughness: Option<f64>, Numbers::above(0.0, 1.0) => Means(None, "what the MTL file says, else none: the surface is matt");
+    /// Part that is metal, which has albedo as the colour of what it mirrors; without a roughness it has 0.25.
+    metallic: Option<f64>, Numbers::between(0.0, 1.0) => Means(None, "what the mesh's file says, else 0");
 }
 
 keys! {
@@ -358,6 +360,7 @@ pub fn anchor_index(on: &Value, anchors: &[Anchor]) -> Result<usize, SceneError>
 fn override_materials(loaded: &mut LoadedMesh, table: &Table) -> Result<(), SceneError> {
     let albedo = MATERIAL.albedo.read(table)?;
     let roughness = MATERIAL.roughness.read(table)?;
+    let metallic = MATERIAL.metallic.read(table)?;
     for material in &mut loaded.materials {
         if let Some(albedo) = albedo {
             material.albedo = albedo;
@@ -366,6 +369,10 @@ fn override_materials(loaded: &mut LoadedMesh, table: &Table) -> Result<(), Scen
         if let Some(roughness) = roughness {
             material.roughness = Some(roughness);
             material.maps.roughness = None;
+        }
+        if let Some(metallic) = metallic {
+            material.metallic = metallic;
+            material.maps.metallic = None;
         }
     }
     if albedo.is_some() && !loaded.mesh.looks.is_empty() {

@@ -128,9 +128,9 @@ settings! {
     /// By so many rays from each point real surfaces get the ambient light, an environment's too, and what things reflect on to
     /// them; 0: virtual things hide and reflect none of that. Where things move there are fewer. Takes no part in shafts.
     ambient_samples: u32, Whole::between(0, 1024) => ByQuality { fast: 0, balanced: 256, accurate: 512 };
-    /// Glossy virtual things mirror what stands around them, by rays, as the camera sees it; without they mirror the surroundings'
-    /// light alone.
-    reflections: bool => ByQuality { fast: false, balanced: true, accurate: true };
+    /// By so many rays from each pixel glossy virtual things mirror what stands around them, as the camera sees it; smooth ones by one.
+    /// 0: they mirror the surroundings' light alone.
+    reflection_samples: u32, Whole::between(0, 256) => ByQuality { fast: 0, balanced: 16, accurate: 32 };
     /// How volumes are counted.
     counting: VolumeCounting => Is(VolumeCounting::Auto);
     /// By less than this many pixels a coarser version of a thing may move its silhouette, as the camera and the lights

@@ -329,11 +329,12 @@ mod edits {
             thing: thing.to_owned(),
             albedo: Some(DVec3::new(0.5, 0.25, 0.125)),
             roughness,
+            metallic: roughness.map(|_| 1.0),
         };
         changed_to(
             &painted("cup", Some(0.3)),
             "albedo = [0.1, 0.1, 0.8]\n",
-            "albedo = [0.5, 0.25, 0.125]\nroughness = 0.3\n",
+            "albedo = [0.5, 0.25, 0.125]\nroughness = 0.3\nmetallic = 1\n",
         );
         changed_to(
             &painted("torus", None),
@@ -523,8 +524,10 @@ mod edits {
                 );
                 for (a, b) in a.materials.iter().zip(&b.materials) {
                     assert!(near(a.albedo, b.albedo), "{what}");
+                    let (a_metal, b_metal) = (a.metallic, b.metallic);
                     let (a, b) = (a.roughness.unwrap_or(9.0), b.roughness.unwrap_or(9.0));
                     assert!((a - b).abs() < 1e-3 * a, "{what}: {a} {b}");
+                    assert!((a_metal - b_metal).abs() < 1e-3, "{what}");
                 }
                 assert_eq!(
                     (&a.mesh.positions, &a.mesh.triangles),
@@ -588,6 +591,7 @@ mod edits {
                     without: Shortcuts::NONE,
                     light_samples: [16, 64, 100][random.below(3)],
                     ambient_samples: [0, 32, 50][random.below(3)],
+                    reflection_samples: [0, 16, 20][random.below(3)],
                     technique: if random.chance(0.5) {
                         Technique::Auto
                     } else {
@@ -633,6 +637,7 @@ mod edits {
                         albedo: (random.chance(0.7))
                             .then(|| vector(random, 1.0).abs().min(DVec3::ONE)),
                         roughness: random.chance(0.5).then(|| random.between(0.1, 1.0)),
+                        metallic: random.chance(0.3).then(|| random.between(0.0, 1.0)),
                     },
                 }
             }

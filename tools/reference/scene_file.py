@@ -21,6 +21,7 @@ class Thing:
     anchor_from_object: np.ndarray
     albedo: list | None
     roughness: float | None
+    metallic: float
     casts: bool
     mesh: Path | None = None
     rect_m: list | None = None
@@ -109,7 +110,7 @@ def read_scene(path):
     world = scene.anchors[0]
     if table := tree.get("table"):
         height = affine(np.eye(3), [0, 0, table.get("height_m", 0)])
-        scene.things.append(Thing("table", True, world, height, rgb(table.get("albedo", 0.5)), None, False,
+        scene.things.append(Thing("table", True, world, height, rgb(table.get("albedo", 0.5)), None, 0.0, False,
                                   rect_m=table["rect_m"]))
     for kind in ("phantom", "virtual"):
         for thing in tree.get(kind, []):
@@ -121,7 +122,7 @@ def read_scene(path):
             if on not in scene.anchors:
                 raise SceneError(f"{path}: {thing['name']} stands on \"{on}\"; there are {', '.join(scene.anchors)}")
             scene.things.append(Thing(thing["name"], kind == "phantom", on, place, albedo, material.get("roughness"),
-                                      thing.get("casts", True), find(thing["mesh"]) if "mesh" in thing else None,
+                                      material.get("metallic", 0.0), thing.get("casts", True), find(thing["mesh"]) if "mesh" in thing else None,
                                       thing.get("rect_m"), thing.get("fit_m")))
     scene.lights = tree.get("light", [])
     scene.ambient = rgb(tree.get("ambient", {}).get("radiance", 0))

@@ -39,8 +39,12 @@ def matrix(values):
 
 def surface(thing):
     albedo = thing.albedo or [0.5] * 3
-    if thing.roughness:
-        inner = {"type": "roughplastic", "diffuse_reflectance": colour(albedo), "alpha": float(thing.roughness) ** 2}
+    if thing.metallic:
+        # (The principled material squares its roughness, and a metal that says none has 0.25 in gnomon.)
+        inner = {"type": "principled", "base_color": colour(albedo), "metallic": float(thing.metallic),
+                 "roughness": math.sqrt(thing.roughness or 0.25), "specular": 0.5}
+    elif thing.roughness:
+        inner = {"type": "roughplastic", "diffuse_reflectance": colour(albedo), "alpha": float(thing.roughness)}
     else:
         inner = {"type": "diffuse", "reflectance": colour(albedo)}
     return {"type": "twosided", "inner": inner}

@@ -72,6 +72,8 @@ pub enum Edit {
         albedo: Option<DVec3>,
         /// Of a GGX layer over it; `None`: as it is.
         roughness: Option<f64>,
+        /// Part that is metal; `None`: as it is.
+        metallic: Option<f64>,
     },
     /// What plays of a thing's model; how fast and how often go with what played before.
     Animate {
@@ -197,11 +199,13 @@ impl Edit {
                 thing,
                 albedo,
                 roughness,
+                metallic,
             } => match thing_of(scene, thing) {
                 Some(object) => {
                     for material in &mut object.materials {
                         material.albedo = albedo.unwrap_or(material.albedo);
                         material.roughness = roughness.or(material.roughness);
+                        material.metallic = metallic.unwrap_or(material.metallic);
                     }
                 }
                 None => return false,

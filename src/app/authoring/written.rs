@@ -115,9 +115,15 @@ pub fn with_edit(text: &str, scene: &Scene, edit: &Edit) -> Result<String, Unfit
             thing,
             albedo,
             roughness,
+            metallic,
         } => {
             let (siblings, index) = listed(&document, thing)?;
-            set_material(&mut spliced, siblings[index], *albedo, *roughness);
+            let parts = [
+                roughness.map(|it| new_key(&MATERIAL.roughness, &Some(it))),
+                metallic.map(|it| new_key(&MATERIAL.metallic, &Some(it))),
+            ];
+            let parts = parts.into_iter().flatten().collect();
+            set_material(&mut spliced, siblings[index], *albedo, parts);
         }
         Edit::Animate { thing, animation } => {
             let (siblings, index) = listed(&document, thing)?;
@@ -290,7 +296,7 @@ fn set_animation(spliced: &mut Spliced, thing: Body, animation: Option<&Animatio
     }
 }
 
-fn set_material(spliced: &mut Spliced, thing: Body, albedo: Option<DVec3>, roughness: Option<f64>) {
+fn set_material(spliced: &mut Spliced, thing: Body, albedo: Option<DVec3>, parts: Vec<NewKey>) {
     let key = THING.material.name;
     match bodies(thing.item(key)).first() {
         Some(&body) => {
@@ -298,16 +304,15 @@ fn set_material(spliced: &mut Spliced, thing: Body, albedo: Option<DVec3>, rough
                 let (key, digits) = (&MATERIAL.albedo, MATERIAL.albedo.takes.numbers.digits);
                 spliced.set_numbers(body, key.name, &albedo.to_array(), digits, None);
             }
-            if let Some(roughness) = roughness {
-                let (key, text) = new_key(&MATERIAL.roughness, &Some(roughness));
+            for (key, text) in parts {
                 spliced.set(body, key, text);
             }
         }
-        None if albedo.is_none() && roughness.is_none() => {}
+        None if albedo.is_none() && parts.is_empty() => {}
         None => {
             let albedo = albedo.map(|albedo| new_key(&MATERIAL.albedo, &Some(albedo)));
             let mut keys: Vec<NewKey> = albedo.into_iter().collect();
-            keys.extend(roughness.map(|it| new_key(&MATERIAL.roughness, &Some(it))));
+            keys.extend(parts);
             let pairs: Vec<String> = keys
                 .iter()
                 .map(|(key, text)| format!("{key} = {text}"))

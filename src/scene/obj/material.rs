@@ -14,9 +14,6 @@ use crate::light::Material;
 use crate::light::material::{Coverage, Map, Wrap};
 use crate::light::texture::Texture;
 
-/// α of a metal that says nothing of its roughness: half of it, squared, as programs begin with.
-const USUAL_METAL_ROUGHNESS: f64 = 0.25;
-
 /// Makes materials of what MTL files say, and reads each picture once.
 #[derive(Debug, Default)]
 pub struct Converter {
@@ -201,11 +198,8 @@ fn roughness(mtl: &MtlMaterial) -> Option<f64> {
         .shininess
         .filter(|_| is_shiny)
         .map(|shininess| (2.0 / (shininess + 2.0)).sqrt());
-    let is_metal = mtl.metallic.is_some_and(|metallic| metallic > 0.0)
-        || mtl.maps.iter().any(|map| map.role == MapRole::Metallic);
     let roughness = mtl.roughness.map(|roughness| roughness * roughness);
     let roughness = roughness.or(of_shininess);
-    let roughness = roughness.or(is_metal.then_some(USUAL_METAL_ROUGHNESS));
     roughness.map(|roughness| roughness.clamp(LEAST_ROUGHNESS, 1.0))
 }
 

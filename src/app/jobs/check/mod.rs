@@ -299,7 +299,7 @@ fn material_note(object: &Object) -> String {
             let name = object.material_names.get(index).map_or("", String::as_str);
             let mut told = format!("{name} albedo {}", vector(material.albedo));
             for (what, number) in [
-                ("roughness", material.roughness.unwrap_or(0.0)),
+                ("roughness", material.layer_roughness().unwrap_or(0.0)),
                 ("metal", material.metallic),
             ] {
                 if number > 0.0 {

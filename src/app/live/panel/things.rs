@@ -137,7 +137,7 @@ fn material(ui: &mut Ui, thing: &Object, editing: &mut Editing, commands: &mut C
         return;
     };
     let mut albedo = first.albedo.as_vec3().to_array();
-    let mut roughness = first.roughness.unwrap_or(1.0);
+    let mut roughness = first.layer_roughness().unwrap_or(1.0);
     let colour_changed = ui
         .horizontal(|ui| {
             let colour = ui.color_edit_button_rgb(&mut albedo);
@@ -152,11 +152,15 @@ fn material(ui: &mut Ui, thing: &Object, editing: &mut Editing, commands: &mut C
     let takes = &MATERIAL.roughness.takes;
     let roughness_changed =
         number(ui, "roughness (1: matt)", &mut roughness, 0.01, takes).changed();
-    if colour_changed || roughness_changed {
+    let mut metallic = first.metallic;
+    let takes = &MATERIAL.metallic.takes;
+    let metallic_changed = number(ui, "metallic", &mut metallic, 0.01, takes).changed();
+    if colour_changed || roughness_changed || metallic_changed {
         let edit = Edit::Material {
             thing: thing.name.clone(),
             albedo: colour_changed.then(|| DVec3::from_array(albedo.map(f64::from))),
             roughness: roughness_changed.then_some(roughness),
+            metallic: metallic_changed.then_some(metallic),
         };
         editing.changed(ui, edit, commands);
     }
