@@ -26,7 +26,8 @@ struct MaterialOnGpu {
     normal_scale: f32,
     occlusion_strength: f32,
     // 1 if the colour is the radiance itself.
-    unlit: u32,
+    // UNLIT, PRINCIPLED, or 0.
+    shading: u32,
     // 1 if it lets light through.
     translucent: u32,
     padding_2: u32,
@@ -192,6 +193,9 @@ fn albedo_at(number: u32, uv: vec4f, color: vec3f) -> vec3f {
 }
 
 // What the pictures make of a material; `normal` has unit length and looks out of the surface.
+const UNLIT: u32 = 1u;
+const PRINCIPLED: u32 = 2u;
+
 fn material_at(number: u32, uv: vec4f, color: vec4f, tangent: vec4f, normal: vec3f, side: f32) -> Look {
     let at = TextureCoordinates(uv, dpdx(uv), dpdy(uv));
     let material = materials[number];
@@ -213,7 +217,7 @@ fn material_at(number: u32, uv: vec4f, color: vec4f, tangent: vec4f, normal: vec
         }
     }
     let albedo = material.albedo * base.rgb;
-    let is_unlit = material.unlit != 0u;
+    let is_unlit = material.shading == UNLIT;
     let opacity = select(1.0, min(material.opacity * base.a, 1.0), material.translucent != 0u);
     // (A mirror's lobe is narrower than any light.)
     let roughness = select(0.0, max(material.roughness * rough * rough, 0.01), material.roughness > 0.0);
@@ -225,5 +229,6 @@ fn material_at(number: u32, uv: vec4f, color: vec4f, tangent: vec4f, normal: vec
         1.0 + material.occlusion_strength * (occluded - 1.0),
         select(0.0, opacity, material.opacity * base.a >= material.cutoff),
         bent * side,
+        material.shading == PRINCIPLED,
     );
 }

@@ -54,6 +54,8 @@ struct Look {
     opacity: f32,
     // Unit length, on the side that is seen.
     normal: vec3f,
+    // Whether what lies below the layer is rough itself.
+    is_principled: bool,
 }
 
 fn look(surface: Surface, outside: bool) -> Look {
@@ -62,7 +64,7 @@ fn look(surface: Surface, outside: bool) -> Look {
 //!if LOOKS
     return material_at(surface.number, surface.uv, surface.color, surface.tangent_in_camera, normal, side);
 //!else
-    return Look(surface.material.rgb, surface.material.a, 0.0, vec3f(0.0), 1.0, 1.0, normal * side);
+    return Look(surface.material.rgb, surface.material.a, 0.0, vec3f(0.0), 1.0, 1.0, normal * side, false);
 //!end
 }
 
@@ -139,20 +141,25 @@ fn reflectance(look: Look, to_light: vec3f, to_camera: vec3f) -> vec3f {
             + cos_camera * sqrt(cos_light * cos_light * (1.0 - alpha_squared) + alpha_squared));
     let specular = distribution * visibility * fresnel(dot(to_light, halfway));
     // What the layer lets in and out again; the mean keeps a white material white.
-    let let_through = (1.0 - fresnel(cos_light)) * (1.0 - fresnel(cos_camera)) / (1.0 - MEAN_FRESNEL);
-    let dielectric = diffuse * let_through + specular;
+    let out = layer_of(roughness, cos_camera);
+    let passed = let_through(layer_of(roughness, cos_light)) * let_through(out) / (1.0 - out.z);
 //!if LOOKS
+    let below = select(passed, burley(roughness, cos_light, cos_camera, dot(to_light, halfway)), look.is_principled);
+    let dielectric = diffuse * below + specular;
     let way = 1.0 - clamp(dot(to_light, halfway), 0.0, 1.0);
     let way_squared = way * way;
     let metal = look.albedo + (1.0 - look.albedo) * way_squared * way_squared * way;
     return mix(dielectric, distribution * visibility * metal, look.metallic);
 //!else
-    return dielectric;
+    return diffuse * passed + specular;
 //!end
 }
 
-// Cosine-weighted mean of `fresnel` over the hemisphere.
-const MEAN_FRESNEL: f32 = 0.04 + 0.96 / 21.0;
+// Times Lambert: what a rough surface throws back of grazing light (Burley 2012, section 5.3).
+fn burley(alpha: f32, cos_light: f32, cos_camera: f32, cos_between: f32) -> f32 {
+    let grazing = 2.0 * sqrt(alpha) * cos_between * cos_between - 0.5;
+    return (1.0 + grazing * pow(1.0 - min(cos_light, 1.0), 5.0)) * (1.0 + grazing * pow(1.0 - min(cos_camera, 1.0), 5.0));
+}
 
 // Schlick's approximation for a dielectric of index 1.5.
 fn fresnel(cosine: f32) -> f32 {

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{grazing, layer_visibility};
+use super::{HEAD_ON, grazing, layer_visibility};
 
 /// Entries along a side of the table.
 pub const SIDE: usize = 32;
@@ -14,14 +14,64 @@ pub const SIDE: usize = 32;
 const SAMPLES: usize = 128;
 
 /// For cosines to the camera (the square of what rises from entry to entry, from 0 to 1) and GGX α (likewise, row by row) factor and
-/// summand that make the part that is mirrored of what the layer mirrors head-on.
-pub static LAYER_ALBEDO: LazyLock<Vec<[f32; 2]>> = LazyLock::new(|| {
+/// summand that make the part that is mirrored of what the layer mirrors head-on; then, for the whole row, the part that a
+/// dielectric's layer mirrors of light from everywhere towards everywhere.
+pub static LAYER_ALBEDO: LazyLock<Vec<[f32; 3]>> = LazyLock::new(|| {
     let along = |index: usize| (index as f64 / (SIDE - 1) as f64).powi(2);
-    let entries = (0..SIDE * SIDE).into_par_iter();
-    entries
-        .map(|index| entry(along(index % SIDE), along(index / SIDE)))
-        .collect()
+    let rows = (0..SIDE).into_par_iter().flat_map_iter(|row| {
+        let alpha = along(row);
+        let entries = (0..SIDE).map(|column| entry(along(column), alpha));
+        let entries: Vec<[f32; 2]> = entries.collect();
+        let mean = mean_over_cosines(&entries) as f32;
+        let entries = entries.into_iter();
+        entries.map(move |[factor, summand]| [factor, summand, mean])
+    });
+    rows.collect()
 });
+
+/// What a dielectric's layer leaves of light that comes from a cosine or goes to it; of light from everywhere with `None`.
+pub(super) fn let_through(alpha: f64, cosine: Option<f64>) -> f64 {
+    let [factor, summand, mean] = between(cosine.unwrap_or(1.0), alpha);
+    match cosine {
+        Some(_) => 1.0 - (HEAD_ON * factor + summand),
+        None => 1.0 - mean,
+    }
+}
+
+/// The cosine-weighted mean of what a dielectric's layer mirrors, over a row: ∫ E 2μ dμ, where μ = t² has 2μ dμ = 4t³ dt.
+fn mean_over_cosines(row: &[[f32; 2]]) -> f64 {
+    let last = (SIDE - 1) as f64;
+    let at = |index: usize| {
+        let [factor, summand] = row[index].map(f64::from);
+        HEAD_ON * factor + summand
+    };
+    // (Exact for what is straight between entries: ∫ t³ and ∫ t⁴ over each piece.)
+    let pieces = (0..SIDE - 1).map(|index| {
+        let (from, to) = (index as f64 / last, (index + 1) as f64 / last);
+        let slope = (at(index + 1) - at(index)) * last;
+        let base = at(index) - slope * from;
+        base * (to.powi(4) - from.powi(4)) + slope * 0.8 * (to.powi(5) - from.powi(5))
+    });
+    pieces.sum()
+}
+
+/// The table between its entries, as the graphics card reads it.
+fn between(cosine: f64, alpha: f64) -> [f64; 3] {
+    let at = |value: f64| {
+        let place = value.clamp(0.0, 1.0).sqrt() * (SIDE - 1) as f64;
+        let low = (place as usize).min(SIDE - 2);
+        (low, place - low as f64)
+    };
+    let ((column, right), (row, down)) = (at(cosine), at(alpha));
+    [0, 1, 2].map(|part| {
+        let entry = |across: usize, below: usize| {
+            f64::from(LAYER_ALBEDO[(row + below) * SIDE + column + across][part])
+        };
+        let upper = entry(0, 0) * (1.0 - right) + entry(1, 0) * right;
+        let lower = entry(0, 1) * (1.0 - right) + entry(1, 1) * right;
+        upper * (1.0 - down) + lower * down
+    })
+}
 
 /// By halfway vectors as the distribution has them.
 fn entry(cos_camera: f64, alpha: f64) -> [f32; 2] {
@@ -54,27 +104,8 @@ mod tests {
     use crate::light::material::Material;
     use crate::light::reflectance;
 
-    /// As the graphics card reads it.
-    fn between(table: &[[f32; 2]], cos_camera: f64, alpha: f64) -> [f64; 2] {
-        let at = |value: f64| {
-            let place = value.sqrt() * (SIDE - 1) as f64;
-            let low = (place as usize).min(SIDE - 2);
-            (low, place - low as f64)
-        };
-        let ((column, right), (row, down)) = (at(cos_camera), at(alpha));
-        [0, 1].map(|part| {
-            let entry = |across: usize, below: usize| {
-                f64::from(table[(row + below) * SIDE + column + across][part])
-            };
-            let upper = entry(0, 0) * (1.0 - right) + entry(1, 0) * right;
-            let lower = entry(0, 1) * (1.0 - right) + entry(1, 1) * right;
-            upper * (1.0 - down) + lower * down
-        })
-    }
-
     #[test]
     fn the_table_is_what_the_brdf_reflects_of_light_from_everywhere() {
-        let table = &*LAYER_ALBEDO;
         for alpha in [0.2, 0.3, 0.55, 1.0] {
             for cos_camera in [1.0, 0.8, 0.5, 0.25] {
                 let to_camera =
@@ -97,12 +128,42 @@ mod tests {
                     sum += reflectance(&metal, DVec3::Z, to_light, to_camera);
                 }
                 let expected = sum * std::f64::consts::PI / (steps * steps) as f64;
-                let [factor, summand] = between(table, cos_camera, alpha);
+                let [factor, summand, _] = between(cos_camera, alpha);
                 let found = color * factor + summand;
                 assert!(
                     (found - expected).abs().max_element() < 0.005,
                     "{alpha} {cos_camera}: {found} {expected}"
                 );
+            }
+        }
+    }
+    /// What the layer does not mirror comes out below it: all of it, of a white body.
+    #[test]
+    fn a_white_dielectric_reflects_all_light_however_rough_its_layer_is() {
+        for alpha in [0.05, 0.3, 1.0] {
+            let white = Material {
+                roughness: Some(alpha),
+                ..Material::matt(DVec3::ONE)
+            };
+            for cos_camera in [0.9, 0.5, 0.2] {
+                let to_camera =
+                    DVec3::new((1.0_f64 - cos_camera * cos_camera).sqrt(), 0.0, cos_camera);
+                let mirrored = 1.0 - let_through(alpha, Some(cos_camera));
+                let steps = 300;
+                let mut below = 0.0;
+                for down in 0..steps {
+                    let cos_light = (1.0 - (down as f64 + 0.5) / steps as f64).sqrt();
+                    below += let_through(alpha, Some(cos_light))
+                        * let_through(alpha, Some(cos_camera))
+                        / let_through(alpha, None)
+                        / steps as f64;
+                }
+                assert!(
+                    (below + mirrored - 1.0).abs() < 2e-3,
+                    "{alpha} {cos_camera}: {below} {mirrored}"
+                );
+                let straight = reflectance(&white, DVec3::Z, DVec3::Z, to_camera);
+                assert!(straight.min_element() > 0.0);
             }
         }
     }

@@ -76,8 +76,11 @@ pub enum Coverage {
 /// What a material's colour is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shading {
-    /// A reflectance, that light makes visible.
+    /// A reflectance, that light makes visible: Lambert, in the light that the layer lets in and out.
     Lit,
+    /// The same of a surface that is rough itself, as models of metal and roughness mean it (Burley 2012, section 5.3): it
+    /// throws grazing light back the more the rougher it is.
+    Principled,
     /// The radiance itself, whatever the light (KHR_materials_unlit).
     Unlit,
 }

@@ -26,6 +26,7 @@ use std::f64::consts::PI;
 use glam::{DAffine3, DVec2, DVec3};
 
 pub use material::Material;
+use material::Shading;
 
 /// Linear RGB's parts of luminance (ITU-R BT.709).
 pub(crate) const REC_709: DVec3 = DVec3::new(0.2126, 0.7152, 0.0722);
@@ -259,8 +260,9 @@ pub fn spot_ramp(inner_rad: f64, outer_rad: f64) -> [f64; 2] {
 
 /// The BRDF of a material for unit directions to the light and to the camera, without its pictures; the twin of
 /// `reflectance` in shading.wgsl. What is no metal is Lambert under a dielectric GGX layer (Walter et al. 2007, Schlick's
-/// Fresnel term, height-correlated Smith term), coupled so that both ways of light are equal and none is made (Ashikhmin &
-/// Shirley 2000, section 3); a metal is the layer alone, in its colour.
+/// Fresnel term, height-correlated Smith term), coupled so that both ways of light are equal and none is made or lost
+/// (Kelemen & Szirmay-Kalos 2001: by what the layer mirrors of light from everywhere), or Burley's (2012), as the material says;
+/// a metal is the layer alone, in its colour.
 pub fn reflectance(material: &Material, normal: DVec3, to_light: DVec3, to_camera: DVec3) -> DVec3 {
     let diffuse = material.albedo / PI;
     let cos_light = normal.dot(to_light);
@@ -277,10 +279,21 @@ pub fn reflectance(material: &Material, normal: DVec3, to_light: DVec3, to_camer
     let way = to_light.dot(halfway);
     let metal = lobe * (material.albedo + (DVec3::ONE - material.albedo) * grazing(way));
     // What the layer lets in and out again; the mean keeps a white material white.
-    let let_through =
-        (1.0 - fresnel(cos_light)) * (1.0 - fresnel(cos_camera)) / (1.0 - MEAN_FRESNEL);
-    let dielectric = diffuse * let_through + lobe * fresnel(way);
+    let let_through = |cosine| layer_albedo::let_through(alpha, cosine);
+    let passed = let_through(Some(cos_light)) * let_through(Some(cos_camera)) / let_through(None);
+    let below = match material.shading {
+        Shading::Principled => burley(alpha, [cos_light, cos_camera], way),
+        Shading::Lit | Shading::Unlit => passed,
+    };
+    let dielectric = diffuse * below + lobe * fresnel(way);
     dielectric.lerp(metal, material.metallic)
+}
+
+/// Times Lambert: what a rough surface throws back of grazing light (Burley 2012, section 5.3).
+fn burley(alpha: f64, cosines: [f64; 2], cos_between: f64) -> f64 {
+    let at_grazing = 2.0 * alpha.sqrt() * cos_between * cos_between - 0.5;
+    let [light, camera] = cosines.map(|cosine| 1.0 + at_grazing * grazing(cosine));
+    light * camera
 }
 
 /// Height-correlated Smith term of GGX over four times both cosines.
@@ -290,12 +303,12 @@ fn layer_visibility(alpha: f64, cos_light: f64, cos_camera: f64) -> f64 {
     0.5 / (cos_light * smith(cos_camera) + cos_camera * smith(cos_light))
 }
 
-/// Cosine-weighted mean of [`fresnel`] over the hemisphere: F₀ + (1 − F₀) / 21.
-const MEAN_FRESNEL: f64 = 0.04 + 0.96 / 21.0;
+/// What a dielectric of index 1.5 mirrors head-on.
+const HEAD_ON: f64 = 0.04;
 
 /// Schlick's approximation for a dielectric of index 1.5.
 fn fresnel(cosine: f64) -> f64 {
-    0.04 + 0.96 * grazing(cosine)
+    HEAD_ON + (1.0 - HEAD_ON) * grazing(cosine)
 }
 
 /// Schlick's weight of grazing light.
@@ -316,6 +329,36 @@ mod tests {
         assert_eq!(irradiance(&lamp, DVec3::ZERO, DVec3::NEG_Z), DVec3::ZERO);
         let sun = Light::directional(DVec3::NEG_Z, DVec3::splat(3.0));
         assert!((irradiance(&sun, DVec3::splat(7.0), tilted).x - 1.8).abs() < 1e-12);
+    }
+
+    /// The values are those of Mitsuba's principled material: base colour 0.5, specular 0.5.
+    #[test]
+    fn a_principled_dielectric_is_that_of_a_path_tracer() {
+        for (roughness, cos_light, cos_camera, azimuth, expected) in [
+            (1.0, 0.2, 0.6, 0.0, 0.242),
+            (1.0, 0.1, 0.9, 0.0, 0.262),
+            (1.0, 0.5, 0.9, PI / 2.0, 0.169),
+            (0.6, 0.1, 0.3, 0.0, 0.255),
+            (0.6, 0.95, 0.6, PI, 0.177),
+            (0.3, 0.95, 0.9, 0.0, 0.161),
+            (0.3, 0.1, 0.9, PI / 2.0, 0.144),
+        ] {
+            let material = Material {
+                roughness: Some(roughness * roughness),
+                shading: Shading::Principled,
+                ..Material::matt(DVec3::splat(0.5))
+            };
+            let at = |cosine: f64, azimuth: f64| {
+                let sine = (1.0 - cosine * cosine).sqrt();
+                DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), cosine)
+            };
+            let (to_light, to_camera) = (at(cos_light, azimuth), at(cos_camera, 0.0));
+            let found = reflectance(&material, DVec3::Z, to_light, to_camera).x;
+            assert!(
+                (found - expected).abs() < 0.015 * expected,
+                "{roughness} {cos_light} {cos_camera}: {found} {expected}"
+            );
+        }
     }
 
     #[test]

@@ -55,7 +55,7 @@ pub(super) struct MaterialOnGpu {
     pub cutoff: f32,
     pub normal_scale: f32,
     pub occlusion_strength: f32,
-    pub unlit: u32,
+    pub shading: u32,
     pub translucent: u32,
     pub padding_2: u32,
     pub padding_3: u32,
@@ -145,7 +145,11 @@ fn on_gpu<'a>(
         },
         normal_scale: maps.normal_scale as f32,
         occlusion_strength: maps.occlusion_strength as f32,
-        unlit: u32::from(material.shading == Shading::Unlit),
+        shading: match material.shading {
+            Shading::Lit => 0,
+            Shading::Unlit => 1,
+            Shading::Principled => 2,
+        },
         translucent: u32::from(material.coverage == Coverage::Blend),
         maps: [
             map(maps.color, Encoding::Srgb),

@@ -60,18 +60,21 @@ pub(super) struct LayerAlbedo {
 impl LayerAlbedo {
     /// One entry of nothing where nothing is glossy.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, is_glossy: bool) -> Self {
-        let table: &[[f32; 2]] = match is_glossy {
+        let table: &[[f32; 3]] = match is_glossy {
             true => &LAYER_ALBEDO,
-            false => &[[0.0; 2]],
+            false => &[[0.0; 3]],
         };
         let side = table.len().isqrt() as u32;
-        let halves: Vec<[f16; 2]> = table.iter().map(|entry| entry.map(f16::from_f32)).collect();
+        let halves: Vec<[f16; 4]> = table
+            .iter()
+            .map(|&[factor, summand, mean]| [factor, summand, mean, 0.0].map(f16::from_f32))
+            .collect();
         Self {
             view: texture(
                 (device, queue),
                 "layer albedo",
                 ([side; 2], 1),
-                wgpu::TextureFormat::Rg16Float,
+                wgpu::TextureFormat::Rgba16Float,
                 bytemuck::cast_slice(&halves),
             ),
             sampler: device.create_sampler(&wgpu::SamplerDescriptor {

@@ -321,7 +321,7 @@ mod tests {
         assert_twins!(&volumes, CastingLight, place_in_anchor, end_in_anchor);
         let materials = shader::source("materials.wgsl", &[]).unwrap();
         let look = "struct Look { albedo: vec3f, roughness: f32, metallic: f32, emission: vec3f, occlusion: f32, \
-                    opacity: f32, normal: vec3f }\nfn unit(v: vec3f) -> vec3f { return v; }\n";
+                    opacity: f32, normal: vec3f, is_principled: bool }\nfn unit(v: vec3f) -> vec3f { return v; }\n";
         let materials = format!("{look}{materials}");
         assert_twins!(&materials, MapOnGpu, linear, offset, place, size);
         assert_twins!(
@@ -335,7 +335,7 @@ mod tests {
             cutoff,
             normal_scale,
             occlusion_strength,
-            unlit,
+            shading,
             translucent,
             padding_2,
             padding_3,

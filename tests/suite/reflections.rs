@@ -363,7 +363,7 @@ fn cos_camera([x, y]: [usize; 2]) -> f64 {
 fn reflected_of_all(roughness: f64, cosine: f64) -> f64 {
     let last = (SIDE - 1) as f64;
     let entry = |column: usize, row: usize| {
-        let [factor, summand] = LAYER_ALBEDO[row * SIDE + column];
+        let [factor, summand, _] = LAYER_ALBEDO[row * SIDE + column];
         f64::from(factor + summand)
     };
     let (u, v) = (cosine.sqrt() * last, roughness.sqrt() * last);

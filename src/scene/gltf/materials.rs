@@ -40,7 +40,7 @@ pub(super) fn material(
     };
     material.shading = match given.unlit() {
         true => Shading::Unlit,
-        false => Shading::Lit,
+        false => Shading::Principled,
     };
     let emission = DVec3::from_array(given.emissive_factor().map(f64::from))
         * f64::from(given.emissive_strength().unwrap_or(1.0));

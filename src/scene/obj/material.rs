@@ -11,7 +11,7 @@ use super::super::texture_file;
 use super::files::named_file;
 use super::mtl::{MapRole, MtlMap, MtlMaterial};
 use crate::light::Material;
-use crate::light::material::{Coverage, Map, Wrap};
+use crate::light::material::{Coverage, Map, Shading, Wrap};
 use crate::light::texture::Texture;
 
 /// Makes materials of what MTL files say, and reads each picture once.
@@ -54,6 +54,9 @@ impl Converter {
         material.metallic = mtl.metallic.unwrap_or(0.0);
         material.emission = DVec3::from_array(mtl.emission.unwrap_or_default());
         material.roughness = roughness(&mtl);
+        if mtl.roughness.is_some() || mtl.metallic.is_some() {
+            material.shading = Shading::Principled;
+        }
         if let Some(opacity) = mtl.opacity.filter(|opacity| *opacity < 1.0) {
             material.opacity = opacity;
             material.coverage = Coverage::Blend;
