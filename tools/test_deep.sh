@@ -36,7 +36,7 @@ for scene in config/*.toml; do
 done
 # All tests that draw: those of the passes, and the picture's; what tracks or reads says nothing to a GPU. Tests that let the GPU
 # fail bring a layer of their own, and the layer takes longer than one test of times allows.
-drawing=(render:: picture:: counting:: deforming:: detail:: environment:: final_gather:: motion:: probe_light:: shading:: shafts::
+drawing=(render:: picture:: counting:: deforming:: detail:: environment:: final_gather:: motion:: probe_light:: reflections:: shading:: shafts::
     sized_lights:: stability:: translucent:: volumes:: live::)
 [ $# -gt 0 ] || set -- "${drawing[@]}"
 cargo test --release --lib --test suite --test program --no-run
