@@ -29,6 +29,7 @@ mod light_kind;
 mod light_piece;
 mod light_sums;
 mod lights;
+mod linear_picture;
 mod map_atlas;
 mod materials;
 mod mirrored_probe;

@@ -18,6 +18,7 @@ use super::deforming::DeformingThing;
 use super::gpu::Gpu;
 use super::gpu_scene::{DrawnLight, GpuScene};
 use super::light_kind::LightKind;
+use super::linear_picture::{LinearPicture, LinearPictures};
 use super::mirrored_probe::MirroredProbe;
 use super::mirroring::{REFLECTIONS_FORMAT, are_followed};
 use super::passes::Passes;
@@ -26,15 +27,12 @@ use super::pipelines::{
     words,
 };
 use super::ray_trees::RayTrees;
-use super::surfaces::{Sided, surface_description};
+use super::surfaces::{Sided, SurfaceKinds, surface_description};
 use super::technique::FrameContext;
 use super::uniforms::{CameraLight, GEOMETRY_GROUPS, NEAR_M};
 use super::volumes::set_scissor;
 
 const DEPTHS_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Float;
-/// Levels of the pictures that are mirrored.
-const LEVELS: u32 = 7;
-
 const REFLECTION_GROUP: GroupLayout = GroupLayout {
     label: "reflections",
     entries: &[
@@ -50,16 +48,6 @@ const REFLECTION_GROUP: GroupLayout = GroupLayout {
         filtered(9),
         storage(10, wgpu::ShaderStages::FRAGMENT),
     ],
-};
-
-const PICTURE_GROUP: GroupLayout = GroupLayout {
-    label: "picture",
-    entries: &[texels(0, false)],
-};
-
-const REAL_PART_GROUP: GroupLayout = GroupLayout {
-    label: "real part of the picture",
-    entries: &[texels(0, false), texels(1, false)],
 };
 
 /// The twin of `ReflectionFrame` in reflections.wgsl.
@@ -80,12 +68,8 @@ pub(super) struct ReflectionFrame {
 pub(super) struct Reflections {
     trees: RayTrees,
     ambient: Vec3,
-    depth_of_real: Sided,
-    depth_of_virtual: Sided,
-    mirror: Sided,
-    linear: wgpu::RenderPipeline,
-    linear_real: wgpu::RenderPipeline,
-    halve: wgpu::RenderPipeline,
+    pipelines: Pipelines,
+    pictures: LinearPictures,
     frame: wgpu::Buffer,
     recorded: LinearPicture,
     shown: LinearPicture,
@@ -99,27 +83,21 @@ pub(super) struct Reflections {
     no_probe: MirroredProbe,
 }
 
-/// A picture in linear light with its coarser levels.
-struct LinearPicture {
-    view: wgpu::TextureView,
-    levels: Vec<wgpu::TextureView>,
+/// Pipelines of surfaces.
+struct Pipelines {
+    depth_of_real: Sided,
+    depth_of_virtual: Sided,
+    mirror: Sided,
 }
 
-impl Reflections {
-    /// `None` where nothing shows what it mirrors.
-    pub fn new(gpu: &Gpu, scene: &Scene, gpu_scene: &GpuScene) -> Option<Self> {
-        if !are_followed(scene) {
-            return None;
-        }
-        let device = &gpu.device;
-        let size_px = gpu_scene.intrinsics().size_px;
-        let kinds = gpu_scene.kinds;
-        let rays = f64::from(scene.shadows.reflection_samples);
+impl Pipelines {
+    /// With so many rays from each pixel.
+    fn new(gpu: &Gpu, kinds: SurfaceKinds, rays: u32) -> Self {
         let described = |fragment, groups: Vec<Option<GroupLayout>>, target| PipelineDescription {
             shader: "reflections.wgsl",
             vertex: "place",
             fragment,
-            constants: vec![("GLOSSY", 1.0), ("RAYS", rays)],
+            constants: vec![("GLOSSY", 1.0), ("RAYS", f64::from(rays))],
             groups,
             targets: vec![target],
             ..surface_description(gpu, None)
@@ -143,33 +121,34 @@ impl Reflections {
             state.depth_compare = Some(wgpu::CompareFunction::Equal);
             state.depth_write_enabled = Some(false);
         }
-        let fullscreen = |shader, fragment, group| {
-            gpu.pipeline(&PipelineDescription {
-                shader,
-                fragment,
-                groups: vec![Some(group)],
-                targets: vec![overwritten(REFLECTIONS_FORMAT)],
-                ..Default::default()
-            })
-        };
+        let depth_of_real = described(
+            "depth_of_surface",
+            geometry(),
+            depth(wgpu::ColorWrites::RED),
+        );
+        Self {
+            depth_of_real: Sided::both(gpu, &depth_of_real),
+            depth_of_virtual: Sided::both(gpu, &kinds.of_virtual(depth_of_virtual)),
+            mirror: Sided::both(gpu, &kinds.of_virtual(mirror)),
+        }
+    }
+}
+
+impl Reflections {
+    /// `None` where nothing shows what it mirrors.
+    pub fn new(gpu: &Gpu, scene: &Scene, gpu_scene: &GpuScene) -> Option<Self> {
+        if !are_followed(scene) {
+            return None;
+        }
+        let device = &gpu.device;
+        let size_px = gpu_scene.intrinsics().size_px;
         let read = wgpu::TextureUsages::TEXTURE_BINDING;
         let none = wgpu::TextureUsages::empty();
         Some(Self {
             trees: RayTrees::new(gpu, scene),
             ambient: scene.ambient_radiance.as_vec3(),
-            depth_of_real: Sided::both(
-                gpu,
-                &described(
-                    "depth_of_surface",
-                    geometry(),
-                    depth(wgpu::ColorWrites::RED),
-                ),
-            ),
-            depth_of_virtual: Sided::both(gpu, &kinds.of_virtual(depth_of_virtual)),
-            mirror: Sided::both(gpu, &kinds.of_virtual(mirror)),
-            linear: fullscreen("linear_picture.wgsl", "linear", PICTURE_GROUP),
-            linear_real: fullscreen("linear_picture.wgsl", "linear_real", REAL_PART_GROUP),
-            halve: fullscreen("shaft_mips.wgsl", "halve", PICTURE_GROUP),
+            pipelines: Pipelines::new(gpu, gpu_scene.kinds, scene.shadows.reflection_samples),
+            pictures: LinearPictures::new(gpu),
             frame: device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("reflections"),
                 size: size_of::<ReflectionFrame>() as u64,
@@ -224,13 +203,8 @@ impl Reflections {
         let reflections = frame.gpu_scene.reflections();
         let reflections = reflections.create_view(&Default::default());
         drop(passes.begin("no reflections", None, &[cleared(&reflections)], None));
-        let group = self.picture_group(frame);
-        self.keep(passes, frame.gpu, &self.recorded, (&self.linear, &group));
-    }
-
-    fn picture_group(&self, frame: &FrameContext<'_>) -> wgpu::BindGroup {
-        let picture = wgpu::BindingResource::TextureView(frame.picture);
-        frame.gpu.bind_group(&PICTURE_GROUP, [picture])
+        self.pictures
+            .take(frame.gpu, passes, frame.picture, &self.recorded);
     }
 
     /// Follows rays from all glossy virtual surfaces of the picture, which shows them without reflections. Returns where these can
@@ -254,17 +228,54 @@ impl Reflections {
         };
         let whole = PixelRect::whole(intrinsics.size_px);
         self.draw_depths(passes, gpu_scene, whole);
-        let group = self.picture_group(frame);
-        self.keep(passes, gpu, &self.shown, (&self.linear, &group));
-        let pictures = [frame.picture, &self.depths].map(wgpu::BindingResource::TextureView);
-        let group = gpu.bind_group(&REAL_PART_GROUP, pictures);
-        self.keep(passes, gpu, &self.shown_real, (&self.linear_real, &group));
+        self.pictures.take(gpu, passes, frame.picture, &self.shown);
+        let picture = [frame.picture, &self.depths];
+        self.pictures
+            .take_real(gpu, passes, picture, &self.shown_real);
         let trees = self.trees.table(gpu).clone();
-        let things = self.trees.placed(camera_from_anchor, unseen);
+        let group = self.group(frame, &camera_from_world, &trees, probe);
+        let mirrored = self.mirrored.create_view(&Default::default());
+        let mut pass = passes.begin(
+            "reflections",
+            None,
+            &[cleared(&mirrored)],
+            Some(kept(&self.depth_stencil)),
+        );
+        set_scissor(&mut pass, within);
+        pass.set_bind_group(2, &group, &[]);
+        let light = DrawnLight::Whole(0);
+        gpu_scene.draw_surfaces(
+            &mut pass,
+            &self.pipelines.mirror,
+            Role::Virtual,
+            light,
+            within,
+        );
+        drop(pass);
+        let to = gpu_scene.reflections();
+        passes
+            .note("reflections to surfaces")
+            .copy_texture_to_texture(self.mirrored.as_image_copy(), to.as_image_copy(), to.size());
+        within
+    }
+
+    /// All that the rays read.
+    fn group(
+        &self,
+        frame: &FrameContext<'_>,
+        camera_from_world: &DAffine3,
+        trees: &wgpu::TextureView,
+        probe: Option<&MirroredProbe>,
+    ) -> wgpu::BindGroup {
+        let (gpu, gpu_scene) = (frame.gpu, frame.gpu_scene);
+        let intrinsics = gpu_scene.intrinsics();
+        let things = self
+            .trees
+            .placed(gpu_scene.camera_from_anchor(), gpu_scene.unseen());
         let lamps: Vec<CameraLight> = gpu_scene
             .shining()
             .iter()
-            .map(|light| lamp(light, &camera_from_world))
+            .map(|light| lamp(light, camera_from_world))
             .collect();
         let light_from_camera = gpu_scene
             .camera_from_light()
@@ -288,11 +299,11 @@ impl Reflections {
         .map(|(label, contents)| gpu.buffer(label, contents, wgpu::BufferUsages::STORAGE));
         let probe = probe.unwrap_or(&self.no_probe);
         let view = wgpu::BindingResource::TextureView;
-        let group = gpu.bind_group(
+        gpu.bind_group(
             &REFLECTION_GROUP,
             [
                 self.frame.as_entire_binding(),
-                view(&trees),
+                view(trees),
                 things.as_entire_binding(),
                 view(&self.depths),
                 view(&self.recorded.view),
@@ -303,24 +314,7 @@ impl Reflections {
                 view(&self.shown_real.view),
                 lamps.as_entire_binding(),
             ],
-        );
-        let mirrored = self.mirrored.create_view(&Default::default());
-        let mut pass = passes.begin(
-            "reflections",
-            None,
-            &[cleared(&mirrored)],
-            Some(kept(&self.depth_stencil)),
-        );
-        set_scissor(&mut pass, within);
-        pass.set_bind_group(2, &group, &[]);
-        let light = DrawnLight::Whole(0);
-        gpu_scene.draw_surfaces(&mut pass, &self.mirror, Role::Virtual, light, within);
-        drop(pass);
-        let to = gpu_scene.reflections();
-        passes
-            .note("reflections to surfaces")
-            .copy_texture_to_texture(self.mirrored.as_image_copy(), to.as_image_copy(), to.size());
-        within
+        )
     }
 
     /// Draws which surfaces the camera sees how far off.
@@ -332,31 +326,10 @@ impl Reflections {
             Some(depth_stencil(&self.depth_stencil, true, false)),
         );
         for (role, pipelines) in [
-            (Role::Real, &self.depth_of_real),
-            (Role::Virtual, &self.depth_of_virtual),
+            (Role::Real, &self.pipelines.depth_of_real),
+            (Role::Virtual, &self.pipelines.depth_of_virtual),
         ] {
             gpu_scene.draw_surfaces(&mut pass, pipelines, role, DrawnLight::Whole(0), whole);
-        }
-    }
-
-    /// Draws the finest level of a picture, and makes the coarser ones.
-    fn keep(
-        &self,
-        passes: &mut Passes<'_>,
-        gpu: &Gpu,
-        to: &LinearPicture,
-        (finest, group): (&wgpu::RenderPipeline, &wgpu::BindGroup),
-    ) {
-        let mut from = (finest, group.clone());
-        for level in &to.levels {
-            let (pipeline, group) = from;
-            let mut pass = passes.begin("linear picture", None, &[cleared(level)], None);
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, &group, &[]);
-            pass.draw(0..3, 0..1);
-            drop(pass);
-            let finer = wgpu::BindingResource::TextureView(level);
-            from = (&self.halve, gpu.bind_group(&PICTURE_GROUP, [finer]));
         }
     }
 }
@@ -366,36 +339,4 @@ fn lamp(light: &Light, camera_from_world: &DAffine3) -> CameraLight {
     let mut lamp = CameraLight::new(light, camera_from_world);
     lamp.axis_in_camera.w = f32::from(LightKind::of(light).number());
     lamp
-}
-
-impl LinearPicture {
-    /// As large as the picture at least, so that each level has half as many texels as the finer one.
-    fn new(device: &wgpu::Device, label: &str, [width, height]: [u32; 2]) -> Self {
-        let coarsest = 1 << (LEVELS - 1);
-        let texture = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some(label),
-            size: wgpu::Extent3d {
-                width: width.next_multiple_of(coarsest),
-                height: height.next_multiple_of(coarsest),
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: LEVELS,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: REFLECTIONS_FORMAT,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
-        let level = |level| {
-            texture.create_view(&wgpu::TextureViewDescriptor {
-                base_mip_level: level,
-                mip_level_count: Some(1),
-                ..Default::default()
-            })
-        };
-        Self {
-            view: texture.create_view(&Default::default()),
-            levels: (0..texture.mip_level_count()).map(level).collect(),
-        }
-    }
 }
