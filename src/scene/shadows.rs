@@ -461,6 +461,7 @@ mod tests {
             ("samples", None),
             ("light_samples", None),
             ("ambient_samples", None),
+            ("reflection_samples", None),
             ("max_silhouette_error_px", None),
             ("sources", None),
         ];

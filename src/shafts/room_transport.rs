@@ -74,6 +74,22 @@ impl Room<'_> {
     }
 }
 
+/// What each vertex gets of each source, and of all light, as luminances.
+fn arriving<'a>(
+    rows: impl Iterator<Item = &'a [f32]>,
+    source_radiance: &[Vec3],
+    irradiance: &[Vec3],
+) -> Arriving {
+    let radiosities = source_radiance
+        .iter()
+        .map(|&radiance| luminance(radiance) * PI);
+    let radiosities: Vec<f32> = radiosities.collect();
+    Arriving::new(
+        rows.map(|row| row.iter().zip(&radiosities).map(|(f, l)| f * l).collect()),
+        irradiance.iter().map(|&light| luminance(light)).collect(),
+    )
+}
+
 impl RoomTransport {
     /// Works a room out.
     pub fn new(room: &Room<'_>) -> Self {
@@ -130,14 +146,7 @@ impl RoomTransport {
             .collect();
 
         let source_count = sources.patches.len();
-        let luminances: Vec<f32> = sender_radiance[..source_count]
-            .iter()
-            .map(|&radiance| luminance(radiance) * PI)
-            .collect();
-        let arriving = Arriving::new(
-            rows().map(|row| row.iter().zip(&luminances).map(|(f, l)| f * l).collect()),
-            irradiance.iter().map(|&light| luminance(light)).collect(),
-        );
+        let arriving = arriving(rows(), &sender_radiance[..source_count], &irradiance);
         let receivers = ReceiverTree::new(&patches, options.receivers_per_leaf);
         let hierarchy =
             ShaftHierarchy::new(&sources, &receivers, &arriving, options.least_part as f32);

@@ -45,13 +45,9 @@ pub fn with_edit(text: &str, scene: &Scene, edit: &Edit) -> Result<String, Unfit
     let mut spliced = Spliced::new(text);
     match edit {
         Edit::Light { index, light } => {
-            let written = (
-                tables(&document, &LIGHT_SECTION).get(*index).copied(),
-                scene.lights.get(*index),
-            );
-            let (Some(body), Some(old)) = written else {
-                return Err(no_light(*index));
-            };
+            let bodies = tables(&document, &LIGHT_SECTION);
+            let written = bodies.get(*index).zip(scene.lights.get(*index));
+            let (&body, old) = written.ok_or_else(|| no_light(*index))?;
             set_light(&mut spliced, body, &old.light, light);
         }
         Edit::AddLight(light) => {
@@ -64,24 +60,12 @@ pub fn with_edit(text: &str, scene: &Scene, edit: &Edit) -> Result<String, Unfit
             }
             spliced.remove_table(&lights, *index);
         }
-        Edit::Ambient(radiance) => match tables(&document, &AMBIENT_SECTION).first() {
-            Some(&body) => set_vector(&mut spliced, body, &AMBIENT.radiance, *radiance),
-            None => {
-                let keys = [new_key(&AMBIENT.radiance, radiance)];
-                add_table(&mut spliced, &document, &AMBIENT_SECTION, &keys);
-            }
-        },
+        Edit::Ambient(radiance) => set_ambient(&mut spliced, &document, *radiance),
         Edit::Place { thing, placement } => {
             set_placement(&mut spliced, thing_of(&document, thing)?, placement)?;
         }
         Edit::Show { thing, visible } => {
-            let (WrittenThing::Object(body) | WrittenThing::TableTop(body)) =
-                thing_of(&document, thing)?;
-            let key = &THING.visible;
-            let written = body.value(key.name).and_then(Value::as_bool);
-            if written.unwrap_or(*key.default()) != *visible {
-                spliced.set(body, key.name, visible.to_string());
-            }
+            set_visible(&mut spliced, thing_of(&document, thing)?, *visible);
         }
         Edit::Shadows(change) => set_shadows(&mut spliced, &document, scene, change),
         Edit::AnchorSize { anchor, size_m } => {
@@ -293,6 +277,25 @@ fn set_animation(spliced: &mut Spliced, thing: Body, animation: Option<&Animatio
                 spliced.remove_key(thing, key.name());
             }
         }
+    }
+}
+
+fn set_ambient(spliced: &mut Spliced, document: &Document<&str>, radiance: DVec3) {
+    match tables(document, &AMBIENT_SECTION).first() {
+        Some(&body) => set_vector(spliced, body, &AMBIENT.radiance, radiance),
+        None => {
+            let keys = [new_key(&AMBIENT.radiance, &radiance)];
+            add_table(spliced, document, &AMBIENT_SECTION, &keys);
+        }
+    }
+}
+
+fn set_visible(spliced: &mut Spliced, thing: WrittenThing, visible: bool) {
+    let (WrittenThing::Object(body) | WrittenThing::TableTop(body)) = thing;
+    let key = &THING.visible;
+    let written = body.value(key.name).and_then(Value::as_bool);
+    if written.unwrap_or(*key.default()) != visible {
+        spliced.set(body, key.name, visible.to_string());
     }
 }
 

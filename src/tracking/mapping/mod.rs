@@ -240,31 +240,7 @@ pub fn learn_board(
         sizes_are_free: settings.learns_sizes,
     };
     let mut dropped = vec![0; ids.len()];
-    let in_space = adjust_without_outliers(&mut bundle, &mut dropped, &ids)?;
-    let plane = common_plane(&bundle, &in_space, settings.plane_tolerance_m);
-    let is_flat = plane.as_ref().is_some_and(|plane| plane.off.is_empty());
-    let (certainty, off_plane_m, shape) = match (settings.shape, plane) {
-        (ShapeWanted::Flat, None) => return Err(MapError::NotDetermined),
-        (ShapeWanted::Flat, Some(plane)) if !is_flat => {
-            let off = plane.off_by_id(&ids);
-            return Err(MapError::NotPlanar { off });
-        }
-        (ShapeWanted::Flat | ShapeWanted::AsSeen, Some(plane)) if is_flat => {
-            lay_into(&mut bundle, &plane.plane_from_world);
-            bundle.freedom = MarkerFreedom::Plane;
-            let certainty = adjust_without_outliers(&mut bundle, &mut dropped, &ids)?;
-            (certainty, plane.distances_m, BoardShape::Flat)
-        }
-        (_, plane) => {
-            let mut shape = in_space_by(&mut bundle, plane.as_ref(), &ids);
-            if let (ShapeWanted::Space, BoardShape::Space { off, .. }) =
-                (settings.shape, &mut shape)
-            {
-                off.clear();
-            }
-            (in_space, vec![0.0; ids.len()], shape)
-        }
-    };
+    let (certainty, off_plane_m, shape) = adjusted(&mut bundle, &mut dropped, &ids, settings)?;
     let markers = (0..ids.len()).map(|marker| LearntMarker {
         dropped: dropped[marker],
         off_plane_m: off_plane_m[marker],
@@ -277,6 +253,41 @@ pub fn learn_board(
         pictures: bundle.views.len(),
         noise_px: certainty.noise_px,
         left_out,
+    })
+}
+
+/// Adjusts a bundle in space, and then in the plane that its markers have in common, if that is what it is to have: how sure it
+/// is, how far each marker lies off the plane, and which shape it has. `dropped` counts what is left out of each marker.
+fn adjusted(
+    bundle: &mut Bundle,
+    dropped: &mut [usize],
+    ids: &[u32],
+    settings: &MapSettings,
+) -> Result<(Certainty, Vec<f64>, BoardShape), MapError> {
+    let in_space = adjust_without_outliers(bundle, dropped, ids)?;
+    let plane = common_plane(bundle, &in_space, settings.plane_tolerance_m);
+    let is_flat = plane.as_ref().is_some_and(|plane| plane.off.is_empty());
+    Ok(match (settings.shape, plane) {
+        (ShapeWanted::Flat, None) => return Err(MapError::NotDetermined),
+        (ShapeWanted::Flat, Some(plane)) if !is_flat => {
+            let off = plane.off_by_id(ids);
+            return Err(MapError::NotPlanar { off });
+        }
+        (ShapeWanted::Flat | ShapeWanted::AsSeen, Some(plane)) if is_flat => {
+            lay_into(bundle, &plane.plane_from_world);
+            bundle.freedom = MarkerFreedom::Plane;
+            let certainty = adjust_without_outliers(bundle, dropped, ids)?;
+            (certainty, plane.distances_m, BoardShape::Flat)
+        }
+        (_, plane) => {
+            let mut shape = in_space_by(bundle, plane.as_ref(), ids);
+            if let (ShapeWanted::Space, BoardShape::Space { off, .. }) =
+                (settings.shape, &mut shape)
+            {
+                off.clear();
+            }
+            (in_space, vec![0.0; ids.len()], shape)
+        }
     })
 }
 
