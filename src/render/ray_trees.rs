@@ -1,8 +1,7 @@
 //! Rays against the scene's things on the GPU: a tree of boxes for each thing, in its own space, and where things and lights are
 //! in a frame, as tables that ray_trees.wgsl reads.
 
-use bytemuck::{Pod, Zeroable};
-use glam::{DAffine3, Vec3, Vec4};
+use glam::{DAffine3, Vec3};
 
 use crate::geometry::bounds::Bounds;
 use crate::geometry::camera::Intrinsics;
@@ -17,6 +16,7 @@ use super::deforming::DeformingThing;
 use super::gpu::Gpu;
 use super::mirroring::mirrors;
 use super::tables::{most_texels, table, with_word, words};
+use super::uniforms::TracedThing;
 
 /// Texels of a node, and of a triangle.
 const NODE_TEXELS: usize = 2;
@@ -30,17 +30,6 @@ const MOST_TRIANGLES: usize = 65_536;
 const IS_REAL: u32 = 1;
 const IS_SOLID: u32 = 2;
 const CASTS: u32 = 4;
-
-/// A thing in a frame: the twin of `TracedThing` in ray_trees.wgsl.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(super) struct TracedThing {
-    pub own_from_camera: [Vec4; 3],
-    pub low: Vec3,
-    pub what: u32,
-    pub high: Vec3,
-    pub root: u32,
-}
 
 /// A thing that rays may meet.
 struct TreedThing {

@@ -5,7 +5,6 @@
 //! colours, the shadows of virtual things in it, and needs no model but of shapes.
 //! Reads the picture without and with virtual things, and the scene's triangles. Writes what layer_albedo.wgsl reads.
 
-use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DMat3, Mat4, Vec3};
 
 use crate::geometry::reach::PixelRect;
@@ -29,7 +28,7 @@ use super::pipelines::{
 use super::ray_trees::RayTrees;
 use super::surfaces::{Sided, SurfaceKinds, surface_description};
 use super::technique::FrameContext;
-use super::uniforms::{CameraLight, GEOMETRY_GROUPS, NEAR_M};
+use super::uniforms::{CameraLight, GEOMETRY_GROUPS, NEAR_M, ReflectionFrame};
 use super::volumes::set_scissor;
 
 const DEPTHS_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Float;
@@ -49,20 +48,6 @@ const REFLECTION_GROUP: GroupLayout = GroupLayout {
         storage(10, wgpu::ShaderStages::FRAGMENT),
     ],
 };
-
-/// The twin of `ReflectionFrame` in reflections.wgsl.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(super) struct ReflectionFrame {
-    pub clip_from_camera: Mat4,
-    pub light_from_camera: Mat4,
-    pub ambient: Vec3,
-    pub thing_count: u32,
-    pub light_count: u32,
-    pub has_probe: u32,
-    pub focal_px: f32,
-    pub padding: u32,
-}
 
 /// Pipelines and pictures of the passes.
 pub(super) struct Reflections {

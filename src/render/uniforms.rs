@@ -1,7 +1,7 @@
 //! Uniform structs, each the twin of a WGSL struct; a test holds them against it offset by offset.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DAffine3, DMat3, DVec3, Mat4, Vec4};
+use glam::{DAffine3, DMat3, DVec3, Mat4, Vec3, Vec4};
 
 use crate::geometry::bounds::HalfSpace;
 use crate::geometry::camera::{Distortion, Intrinsics};
@@ -194,6 +194,31 @@ impl Lens {
     }
 }
 
+/// What rays of reflections are followed with in a frame: the twin of `ReflectionFrame` in reflections.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(super) struct ReflectionFrame {
+    pub clip_from_camera: Mat4,
+    pub light_from_camera: Mat4,
+    pub ambient: Vec3,
+    pub thing_count: u32,
+    pub light_count: u32,
+    pub has_probe: u32,
+    pub focal_px: f32,
+    pub padding: u32,
+}
+
+/// A thing that such rays may meet, in a frame: the twin of `TracedThing` in ray_trees.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(super) struct TracedThing {
+    pub own_from_camera: [Vec4; 3],
+    pub low: Vec3,
+    pub what: u32,
+    pub high: Vec3,
+    pub root: u32,
+}
+
 /// Group 0 where geometry is drawn: an [`AnchorView`], what a glossy layer mirrors of light from everywhere, and what rays have met
 /// for it.
 pub(super) const VIEW_GROUP: GroupLayout = GroupLayout {
@@ -267,8 +292,6 @@ impl UniformRow {
 mod tests {
     use super::*;
     use crate::render::materials::{MapOnGpu, MaterialOnGpu};
-    use crate::render::ray_trees::TracedThing;
-    use crate::render::reflections::ReflectionFrame;
     use crate::render::shader;
     use crate::render::shafts::data::ShaftFrame;
     use crate::shafts::shadow_atlas::MappedSource;

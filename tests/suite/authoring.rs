@@ -334,7 +334,7 @@ mod edits {
         changed_to(
             &painted("cup", Some(0.3)),
             "albedo = [0.1, 0.1, 0.8]\n",
-            "albedo = [0.5, 0.25, 0.125]\nroughness = 0.3\nmetallic = 1\n",
+            "albedo = [0.5, 0.25, 0.125]\nroughness = 0.3\nmetallic = 1.0\n",
         );
         changed_to(
             &painted("torus", None),
