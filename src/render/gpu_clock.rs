@@ -4,7 +4,8 @@ use super::error::RenderError;
 use super::gpu::Gpu;
 use super::readback::map_for_reading;
 
-/// The last frame's time on the GPU, milliseconds; `None` where nothing was drawn or the adapter has no timestamps.
+/// The last frame's time on the GPU, milliseconds, without what reflections take; `None` where nothing was drawn or the adapter
+/// has no timestamps.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct GpuTimes {
     /// Surfaces, shadow volumes and light.

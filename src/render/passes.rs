@@ -31,7 +31,7 @@ impl<'a> Passes<'a> {
         }
     }
 
-    /// What is recorded from here on is not timed.
+    /// What is recorded from here on is not timed: a span of the clock is one of passes that come once.
     pub fn stop_clock(&mut self) {
         self.clock = None;
     }

@@ -440,7 +440,6 @@ fn draw_mirroring(
 ) {
     reflections.begin(passes, frame);
     technique.draw(passes, frame);
-    // (A span of the clock is one of passes that come once.)
     passes.stop_clock();
     let mirroring = reflections.draw(passes, frame, technique.mirrored());
     if !mirroring.is_empty() {
