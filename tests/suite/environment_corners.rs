@@ -40,6 +40,8 @@ fn ball_under(probe: Probe, above: Option<Object>, method: EnvironmentMethod) ->
     scene.probe = Some(probe_scene(probe));
     scene.probe.as_mut().expect("a probe").exposure = 1.0;
     scene.shadows.environment.method = method;
+    // (The light from afar alone is judged here, not what stands on the table.)
+    scene.shadows.reflection_samples = 0;
     let (_, _, picture) = gains(&scene, camera());
     picture
 }
