@@ -1,5 +1,5 @@
-//! Rays against the scene's things on the GPU: a tree of boxes for each thing, in its own space, and where things and lights are
-//! in a frame, as tables that ray_trees.wgsl reads.
+//! Rays against the scene's things on the GPU: a tree of boxes for each thing, in its own space, as a table that ray_trees.wgsl
+//! reads, and where things are in a frame.
 
 use glam::{DAffine3, Vec3};
 
@@ -53,13 +53,14 @@ pub(super) struct RayTrees {
     roots: Vec<u32>,
     /// `None`: a thing has changed its shape.
     table: Option<wgpu::TextureView>,
-    most_triangles: usize,
+    /// So many triangles of a thing have a place in the table.
+    fitting: usize,
 }
 
 impl TreedThing {
-    fn new(object: &Object, role: Role, most_triangles: usize) -> Self {
+    fn new(object: &Object, role: Role, fitting: usize) -> Self {
         let occluder = object.occluder();
-        let triangles = triangles(&occluder, most_triangles);
+        let triangles = triangles(&occluder, fitting);
         let is_solid =
             object.animation.is_none() && holes(&object.mesh).is_some_and(|holes| holes.is_empty());
         let flag = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
@@ -127,12 +128,16 @@ fn content(content: BoxContent, (first_node, first_triangle): (usize, usize)) ->
     }
 }
 
-/// What rays meet of a thing, in its own space.
-fn triangles(occluder: &Occluder<'_>, most: usize) -> Vec<([Vec3; 3], Vec3)> {
-    match occluder.mesh.triangles.len() > most {
+/// What rays meet of a thing, in its own space; nothing of what has no place even simplified.
+fn triangles(occluder: &Occluder<'_>, fitting: usize) -> Vec<([Vec3; 3], Vec3)> {
+    let mut triangles = match occluder.mesh.triangles.len() > MOST_TRIANGLES.min(fitting) {
         true => occluder.simplified(),
         false => occluder.whole(),
+    };
+    if triangles.len() > fitting {
+        triangles.clear();
     }
+    triangles
 }
 
 impl RayTrees {
@@ -143,15 +148,14 @@ impl RayTrees {
         let texels = 2 * NODE_TEXELS + TRIANGLE_TEXELS;
         let most_texels = most_texels(gpu).min(1 << PLACE_BITS);
         let fitting = most_texels / texels / things.len().max(1);
-        let most_triangles = MOST_TRIANGLES.min(fitting);
         let things = things.into_iter();
         Self {
             things: things
-                .map(|(object, role)| TreedThing::new(object, role, most_triangles))
+                .map(|(object, role)| TreedThing::new(object, role, fitting))
                 .collect(),
             roots: Vec::new(),
             table: None,
-            most_triangles,
+            fitting,
         }
     }
 
@@ -166,7 +170,7 @@ impl RayTrees {
     /// Takes note of a thing that has another shape now.
     pub fn deform(&mut self, deforming: &DeformingThing) {
         if let Some(thing) = self.things.get_mut(deforming.number) {
-            *thing = TreedThing::new(&deforming.object, deforming.role, self.most_triangles);
+            *thing = TreedThing::new(&deforming.object, deforming.role, self.fitting);
             self.table = None;
         }
     }
