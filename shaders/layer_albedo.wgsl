@@ -49,8 +49,8 @@ fn radiance_all_around(look: Look, cos_camera: f32, arriving: vec3f, around: vec
     if look.is_principled {
         // The mean of `burley` over light from everywhere, with 0.6 as the half angle's squared cosine: within .03 but for the
         // last degrees.
-        let grazing = 1.2 * sqrt(look.roughness) - 0.5;
-        below = (1.0 + grazing / 21.0) * (1.0 + grazing * pow(1.0 - min(cos_camera, 1.0), 5.0));
+        let at_grazing = 1.2 * sqrt(look.roughness) - 0.5;
+        below = (1.0 + at_grazing / 21.0) * (1.0 + at_grazing * grazing(cos_camera));
     }
 //!end
     let dielectric = diffuse * below + around * (1.0 - let_through(layer));

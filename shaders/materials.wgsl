@@ -25,8 +25,7 @@ struct MaterialOnGpu {
     cutoff: f32,
     normal_scale: f32,
     occlusion_strength: f32,
-    // 1 if the colour is the radiance itself.
-    // UNLIT, PRINCIPLED, or 0.
+    // UNLIT if the colour is the radiance itself, PRINCIPLED, or 0.
     shading: u32,
     // 1 if it lets light through.
     translucent: u32,
@@ -192,10 +191,10 @@ fn albedo_at(number: u32, uv: vec4f, color: vec3f) -> vec3f {
     return materials[number].albedo * srgb_of(materials[number].maps[0], at).rgb * color;
 }
 
-// What the pictures make of a material; `normal` has unit length and looks out of the surface.
 const UNLIT: u32 = 1u;
 const PRINCIPLED: u32 = 2u;
 
+// What the pictures make of a material; `normal` has unit length and looks out of the surface.
 fn material_at(number: u32, uv: vec4f, color: vec4f, tangent: vec4f, normal: vec3f, side: f32) -> Look {
     let at = TextureCoordinates(uv, dpdx(uv), dpdy(uv));
     let material = materials[number];

@@ -34,8 +34,8 @@ struct ReflectionFrame {
 override RAYS: u32 = 16u;
 // Below this roughness one ray is enough: the picture's own levels blur it.
 const SHARP: f32 = 0.03;
-// A dielectric rougher than this shows nothing of what it mirrors beside what lies below its layer.
-const ROUGHEST_DIELECTRIC: f32 = 0.5;
+// Set when the shader is built: a dielectric rougher than this shows nothing of what it mirrors beside what lies below its layer.
+override ROUGHEST_DIELECTRIC: f32 = 0.5;
 // What is seen may lie so far behind or before what a ray meets, as a part of its depth.
 const SAME_DEPTH: f32 = 0.004;
 // Rays start so far off a surface, as a part of its depth.

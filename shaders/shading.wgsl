@@ -146,9 +146,7 @@ fn reflectance(look: Look, to_light: vec3f, to_camera: vec3f) -> vec3f {
 //!if LOOKS
     let below = select(passed, burley(roughness, cos_light, cos_camera, dot(to_light, halfway)), look.is_principled);
     let dielectric = diffuse * below + specular;
-    let way = 1.0 - clamp(dot(to_light, halfway), 0.0, 1.0);
-    let way_squared = way * way;
-    let metal = look.albedo + (1.0 - look.albedo) * way_squared * way_squared * way;
+    let metal = look.albedo + (1.0 - look.albedo) * grazing(dot(to_light, halfway));
     return mix(dielectric, distribution * visibility * metal, look.metallic);
 //!else
     return diffuse * passed + specular;
@@ -157,13 +155,18 @@ fn reflectance(look: Look, to_light: vec3f, to_camera: vec3f) -> vec3f {
 
 // Times Lambert: what a rough surface throws back of grazing light (Burley 2012, section 5.3).
 fn burley(alpha: f32, cos_light: f32, cos_camera: f32, cos_between: f32) -> f32 {
-    let grazing = 2.0 * sqrt(alpha) * cos_between * cos_between - 0.5;
-    return (1.0 + grazing * pow(1.0 - min(cos_light, 1.0), 5.0)) * (1.0 + grazing * pow(1.0 - min(cos_camera, 1.0), 5.0));
+    let at_grazing = 2.0 * sqrt(alpha) * cos_between * cos_between - 0.5;
+    return (1.0 + at_grazing * grazing(cos_light)) * (1.0 + at_grazing * grazing(cos_camera));
 }
 
 // Schlick's approximation for a dielectric of index 1.5.
 fn fresnel(cosine: f32) -> f32 {
-    let grazing = 1.0 - clamp(cosine, 0.0, 1.0);
-    let grazing_squared = grazing * grazing;
-    return 0.04 + 0.96 * grazing_squared * grazing_squared * grazing;
+    return 0.04 + 0.96 * grazing(cosine);
+}
+
+// Schlick's weight of grazing light.
+fn grazing(cosine: f32) -> f32 {
+    let left = 1.0 - clamp(cosine, 0.0, 1.0);
+    let left_squared = left * left;
+    return left_squared * left_squared * left;
 }

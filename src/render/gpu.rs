@@ -157,6 +157,17 @@ impl Gpu {
     }
 
     /// A buffer of a content that may be empty, which no binding can be.
+    /// A sampler that reads between texels and between levels, and ends at the edges.
+    pub(super) fn linear_sampler(&self, label: &str) -> wgpu::Sampler {
+        self.device.create_sampler(&wgpu::SamplerDescriptor {
+            label: Some(label),
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            mipmap_filter: wgpu::MipmapFilterMode::Linear,
+            ..Default::default()
+        })
+    }
+
     pub(super) fn buffer(
         &self,
         label: &str,

@@ -5,7 +5,7 @@ use crate::scene::{EnvironmentMethod, Object, Scene, ShadowTechnique};
 /// Format of what is mirrored.
 pub(super) const REFLECTIONS_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 /// A dielectric rougher than this shows nothing of what it mirrors: `ROUGHEST_DIELECTRIC` of reflections.wgsl.
-const ROUGHEST_DIELECTRIC: f64 = 0.5;
+pub(super) const ROUGHEST_DIELECTRIC: f64 = 0.5;
 
 /// Whether rays are followed for a scene's glossy things.
 pub(super) fn are_followed(scene: &Scene) -> bool {

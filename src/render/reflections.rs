@@ -19,7 +19,7 @@ use super::gpu_scene::{DrawnLight, GpuScene};
 use super::light_kind::LightKind;
 use super::linear_picture::{LinearPicture, LinearPictures};
 use super::mirrored_probe::MirroredProbe;
-use super::mirroring::{REFLECTIONS_FORMAT, are_followed};
+use super::mirroring::{REFLECTIONS_FORMAT, ROUGHEST_DIELECTRIC, are_followed};
 use super::passes::Passes;
 use super::pipelines::{
     GroupLayout, PipelineDescription, filtered, overwritten, sampler, storage, texels, uniform,
@@ -82,7 +82,11 @@ impl Pipelines {
             shader: "reflections.wgsl",
             vertex: "place",
             fragment,
-            constants: vec![("GLOSSY", 1.0), ("RAYS", f64::from(rays))],
+            constants: vec![
+                ("GLOSSY", 1.0),
+                ("RAYS", f64::from(rays)),
+                ("ROUGHEST_DIELECTRIC", ROUGHEST_DIELECTRIC),
+            ],
             groups,
             targets: vec![target],
             ..surface_description(gpu, None)
@@ -160,13 +164,7 @@ impl Reflections {
                 1,
                 wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
             ),
-            sampler: device.create_sampler(&wgpu::SamplerDescriptor {
-                label: Some("mirrored picture"),
-                mag_filter: wgpu::FilterMode::Linear,
-                min_filter: wgpu::FilterMode::Linear,
-                mipmap_filter: wgpu::MipmapFilterMode::Linear,
-                ..Default::default()
-            }),
+            sampler: gpu.linear_sampler("mirrored picture"),
             no_probe: MirroredProbe::new(device, &gpu.queue, None),
         })
     }
@@ -183,42 +181,42 @@ impl Reflections {
         }
     }
 
-    /// Keeps the video, which is all that the picture shows so far; no ray has met anything yet.
-    pub fn begin(&self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) {
-        let reflections = frame.gpu_scene.reflections();
-        let reflections = reflections.create_view(&Default::default());
+    /// Forgets what rays have met, and keeps the video, which is all that the picture shows so far, if anything that mirrors can be
+    /// in it. Returns where.
+    pub fn begin(&self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) -> PixelRect {
+        let gpu_scene = frame.gpu_scene;
+        let reflections = gpu_scene.reflections().create_view(&Default::default());
         drop(passes.begin("no reflections", None, &[cleared(&reflections)], None));
-        self.pictures
-            .take(frame.gpu, passes, frame.picture, &self.recorded);
+        let mirroring = self.trees.mirroring_pixels(
+            gpu_scene.camera_from_anchor(),
+            gpu_scene.unseen(),
+            gpu_scene.intrinsics(),
+        );
+        let mirroring = mirroring.intersection(frame.bounds.virtuals);
+        if !mirroring.is_empty() {
+            self.pictures
+                .take(frame.gpu, passes, frame.picture, &self.recorded);
+        }
+        mirroring
     }
 
-    /// Follows rays from all glossy virtual surfaces of the picture, which shows them without reflections. Returns where these can
-    /// be. `probe` is what is mirrored where a ray meets nothing.
+    /// Follows rays from the glossy virtual surfaces `within` the picture, which shows them without reflections. `probe` is what is
+    /// mirrored where a ray meets nothing.
     pub fn draw(
         &mut self,
         passes: &mut Passes<'_>,
         frame: &FrameContext<'_>,
+        within: PixelRect,
         probe: Option<&MirroredProbe>,
-    ) -> PixelRect {
+    ) {
         let (gpu, gpu_scene) = (frame.gpu, frame.gpu_scene);
-        let camera_from_anchor = gpu_scene.camera_from_anchor();
-        let (intrinsics, unseen) = (gpu_scene.intrinsics(), gpu_scene.unseen());
-        let within = self
-            .trees
-            .mirroring_pixels(camera_from_anchor, unseen, intrinsics);
-        let within = within.intersection(frame.bounds.virtuals);
-        let camera_from_world = camera_from_anchor.first().copied().flatten();
-        let Some(camera_from_world) = camera_from_world.filter(|_| !within.is_empty()) else {
-            return PixelRect::NONE;
-        };
-        let whole = PixelRect::whole(intrinsics.size_px);
-        self.draw_depths(passes, gpu_scene, whole);
+        self.draw_depths(passes, gpu_scene);
         self.pictures.take(gpu, passes, frame.picture, &self.shown);
         let picture = [frame.picture, &self.depths];
         self.pictures
             .take_real(gpu, passes, picture, &self.shown_real);
         let trees = self.trees.table(gpu).clone();
-        let group = self.group(frame, &camera_from_world, &trees, probe);
+        let group = self.group(frame, &trees, probe);
         let mirrored = self.mirrored.create_view(&Default::default());
         let mut pass = passes.begin(
             "reflections",
@@ -241,14 +239,12 @@ impl Reflections {
         passes
             .note("reflections to surfaces")
             .copy_texture_to_texture(self.mirrored.as_image_copy(), to.as_image_copy(), to.size());
-        within
     }
 
     /// All that the rays read.
     fn group(
         &self,
         frame: &FrameContext<'_>,
-        camera_from_world: &DAffine3,
         trees: &wgpu::TextureView,
         probe: Option<&MirroredProbe>,
     ) -> wgpu::BindGroup {
@@ -257,11 +253,8 @@ impl Reflections {
         let things = self
             .trees
             .placed(gpu_scene.camera_from_anchor(), gpu_scene.unseen());
-        let lamps: Vec<CameraLight> = gpu_scene
-            .shining()
-            .iter()
-            .map(|light| lamp(light, camera_from_world))
-            .collect();
+        let lamps = gpu_scene.shining_in_camera();
+        let lamps: Vec<CameraLight> = lamps.iter().map(lamp).collect();
         let light_from_camera = gpu_scene
             .camera_from_light()
             .map_or(DMat3::IDENTITY, |pose| pose.matrix3.transpose());
@@ -303,7 +296,8 @@ impl Reflections {
     }
 
     /// Draws which surfaces the camera sees how far off.
-    fn draw_depths(&self, passes: &mut Passes<'_>, gpu_scene: &GpuScene, whole: PixelRect) {
+    fn draw_depths(&self, passes: &mut Passes<'_>, gpu_scene: &GpuScene) {
+        let whole = PixelRect::whole(gpu_scene.intrinsics().size_px);
         let mut pass = passes.begin(
             "depths",
             None,
@@ -319,9 +313,9 @@ impl Reflections {
     }
 }
 
-/// A light of the world, with what it is in the last number of its axis.
-fn lamp(light: &Light, camera_from_world: &DAffine3) -> CameraLight {
-    let mut lamp = CameraLight::new(light, camera_from_world);
+/// A light of the camera's space, with what it is in the last number of its axis.
+fn lamp(light: &Light) -> CameraLight {
+    let mut lamp = CameraLight::new(light, &DAffine3::IDENTITY);
     lamp.axis_in_camera.w = f32::from(LightKind::of(light).number());
     lamp
 }

@@ -438,16 +438,17 @@ fn draw_mirroring(
     passes: &mut Passes<'_>,
     frame: &FrameContext<'_>,
 ) {
-    reflections.begin(passes, frame);
+    let mirroring = reflections.begin(passes, frame);
     technique.draw(passes, frame);
-    passes.stop_clock();
-    let mirroring = reflections.draw(passes, frame, technique.mirrored());
-    if !mirroring.is_empty() {
-        let bounds = frame.bounds.only(mirroring);
-        let again = FrameContext {
-            bounds: &bounds,
-            ..*frame
-        };
-        technique.draw(passes, &again);
+    if mirroring.is_empty() {
+        return;
     }
+    passes.stop_clock();
+    reflections.draw(passes, frame, mirroring, technique.mirrored());
+    let bounds = frame.bounds.only(mirroring);
+    let again = FrameContext {
+        bounds: &bounds,
+        ..*frame
+    };
+    technique.draw(passes, &again);
 }

@@ -112,6 +112,17 @@ pub fn object(name: &str, mesh: Mesh, albedo: DVec3, world_from_object: DAffine3
     }
 }
 
+/// A square table top of a half side in the plane z = 0 that casts no shadow.
+pub fn table_top(half_m: f32, albedo: DVec3) -> Object {
+    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    let positions = corners.map(|[x, y]| Vec3::new(x, y, 0.0) * half_m).to_vec();
+    let mesh = flat_mesh(positions, vec![[0, 1, 2], [0, 2, 3]]);
+    Object {
+        casts: false,
+        ..object("table", mesh, albedo, DAffine3::IDENTITY)
+    }
+}
+
 /// A scene of four samples whose world is the only anchor; real surfaces get no light but of the lights, and all of the ambient.
 pub fn scene(
     phantoms: Vec<Object>,

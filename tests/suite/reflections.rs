@@ -1,12 +1,12 @@
 //! What glossy virtual things mirror, held against rays that are followed here once more: the video's own colours, the picture's
 //! shadows, the light from everywhere, and a furnace.
 
-use crate::common::{flat_mesh, frame_of, gpu, lamp, look_at, object, scene};
+use crate::common::{flat_mesh, frame_of, gpu, lamp, look_at, object, scene, table_top};
 use glam::{DAffine3, DVec2, DVec3, Vec3};
 use gnomon::capture::Frame;
 use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::geometry::cuboid::cuboid;
-use gnomon::light::layer_albedo::{LAYER_ALBEDO, SIDE};
+use gnomon::light::layer_albedo;
 use gnomon::light::texture::srgb_from_linear;
 use gnomon::light::{Light, Material};
 use gnomon::render::{REAL, Renderer, Shown, VIRTUAL};
@@ -59,17 +59,7 @@ fn mirror(roughness: f64) -> Object {
 }
 
 fn table() -> Object {
-    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
-    let positions = corners.map(|[x, y]| Vec3::new(x, y, 0.0)).to_vec();
-    Object {
-        casts: false,
-        ..object(
-            "table",
-            flat_mesh(positions, vec![[0, 1, 2], [0, 2, 3]]),
-            DVec3::splat(0.5),
-            DAffine3::IDENTITY,
-        )
-    }
+    table_top(1.0, DVec3::splat(0.5))
 }
 
 fn block(name: &str, low: [f32; 3], high: [f32; 3]) -> Object {
@@ -109,6 +99,17 @@ fn role_at(role: &[u8], [x, y]: [usize; 2]) -> u8 {
     role[y * CAMERA.size_px[0] as usize + x]
 }
 
+/// Where the way through a pixel comes to the mirror's plane, and where it goes from there.
+fn mirrored_way([x, y]: [usize; 2]) -> (DVec3, DVec3) {
+    let world_from_camera = camera_from_world().inverse();
+    let eye = world_from_camera.translation;
+    let pixel = DVec2::new(x as f64, y as f64);
+    let ahead = ((pixel - CAMERA.center_px) / CAMERA.focal_px).extend(1.0);
+    let direction = world_from_camera.transform_vector3(ahead);
+    let place = eye + direction * ((MIRROR_Y - eye.y) / direction.y);
+    (place, DVec3::new(direction.x, -direction.y, direction.z))
+}
+
 /// Where a mirrored ray of a pixel comes to the table, as the camera sees it; `None` where it does not, or not in the picture.
 enum Mirrored {
     Table([usize; 2]),
@@ -125,18 +126,11 @@ fn mirrored(drawn: &Drawn, [x, y]: [usize; 2]) -> Option<Mirrored> {
             return None;
         }
     }
-    let camera_from_world = camera_from_world();
-    let world_from_camera = camera_from_world.inverse();
-    let eye = world_from_camera.translation;
-    let pixel = DVec2::new(x as f64, y as f64);
-    let ahead = ((pixel - CAMERA.center_px) / CAMERA.focal_px).extend(1.0);
-    let direction = world_from_camera.transform_vector3(ahead);
-    let place = eye + direction * ((MIRROR_Y - eye.y) / direction.y);
+    let (place, back) = mirrored_way([x, y]);
     let on_mirror = place.x.abs() < 0.1 && (0.01..0.16).contains(&place.z);
     if !on_mirror {
         return None;
     }
-    let back = DVec3::new(direction.x, -direction.y, direction.z);
     if back.z >= -1e-6 {
         return Some(Mirrored::Nothing);
     }
@@ -144,7 +138,7 @@ fn mirrored(drawn: &Drawn, [x, y]: [usize; 2]) -> Option<Mirrored> {
     if met.x.abs() > 1.0 || met.y.abs() > 1.0 {
         return Some(Mirrored::Nothing);
     }
-    let seen = camera_from_world.transform_point3(met);
+    let seen = camera_from_world().transform_point3(met);
     if seen.z <= 0.0 {
         return Some(Mirrored::OutsideOfThePicture);
     }
@@ -213,16 +207,16 @@ fn a_mirror_has_the_ambient_light_where_it_shows_nothing() {
     assert!(count > 5000, "{count} pixels");
 }
 
-/// The shadow of a virtual thing lies on the table in the mirror too, and a real thing that stands there hides it.
+/// The shadow of a virtual thing lies on the table in the mirror too.
 #[test]
 fn a_mirror_shows_the_picture_with_its_shadows() {
     let frame = frame_of(CAMERA.size_px, |_| 150);
-    let lit = || vec![lamp([-0.3, -0.1, 0.4], [0.3; 3])];
-    let caster = block("caster", [-0.08, 0.0, 0.05], [0.02, 0.04, 0.06]);
+    let bounds = [DVec3::new(-0.08, 0.0, 0.05), DVec3::new(0.02, 0.04, 0.06)];
+    let [low, high] = bounds.map(|corner| corner.as_vec3().to_array());
     let scene = scene(
         vec![table()],
-        vec![mirror(1e-4), caster.clone()],
-        lit(),
+        vec![mirror(1e-4), block("caster", low, high)],
+        vec![lamp([-0.3, -0.1, 0.4], [0.3; 3])],
         AMBIENT,
     );
     let drawn = Drawn::new(&scene, &frame);
@@ -233,7 +227,7 @@ fn a_mirror_shows_the_picture_with_its_shadows() {
         };
         let there = at(&drawn.picture, seen);
         // (The sharpest metal that shaders know blurs by some pixels.)
-        if !is_even(&drawn, seen) || meets_block(pixel, &caster_box()) {
+        if !is_even(&drawn, seen) || meets_block(pixel, &bounds) {
             continue;
         }
         all += 1;
@@ -262,19 +256,9 @@ fn is_even(drawn: &Drawn, [x, y]: [usize; 2]) -> bool {
     })
 }
 
-fn caster_box() -> [DVec3; 2] {
-    [DVec3::new(-0.08, 0.0, 0.05), DVec3::new(0.02, 0.04, 0.06)]
-}
-
 /// Whether the mirrored ray of a pixel meets a box, or nearly (slabs).
-fn meets_block([x, y]: [usize; 2], [low, high]: &[DVec3; 2]) -> bool {
-    let world_from_camera = camera_from_world().inverse();
-    let eye = world_from_camera.translation;
-    let pixel = DVec2::new(x as f64, y as f64);
-    let ahead = ((pixel - CAMERA.center_px) / CAMERA.focal_px).extend(1.0);
-    let direction = world_from_camera.transform_vector3(ahead);
-    let place = eye + direction * ((MIRROR_Y - eye.y) / direction.y);
-    let back = DVec3::new(direction.x, -direction.y, direction.z);
+fn meets_block(pixel: [usize; 2], [low, high]: &[DVec3; 2]) -> bool {
+    let (place, back) = mirrored_way(pixel);
     let (a, b) = (
         (*low - DVec3::splat(8e-3) - place) / back,
         (*high + DVec3::splat(8e-3) - place) / back,
@@ -341,7 +325,10 @@ fn a_rough_metal_in_a_furnace_reflects_what_its_layer_does() {
             if mirrored(&drawn, pixel).is_none() {
                 continue;
             }
-            let expected = AMBIENT * reflected_of_all(roughness, cos_camera(pixel));
+            // What a white metal reflects of light from everywhere, of the table that the shaders have.
+            let (_, back) = mirrored_way(pixel);
+            let [factor, summand, _] = layer_albedo::between(-back.normalize().y, roughness);
+            let expected = AMBIENT * (factor + summand);
             let expected = 255.0 * srgb_from_linear(expected);
             let found = f64::from(at(&drawn.picture, pixel)[0]);
             count += 1;
@@ -350,31 +337,6 @@ fn a_rough_metal_in_a_furnace_reflects_what_its_layer_does() {
         assert!(count > 5000, "{count} pixels");
         assert!(worst < 4.0, "roughness {roughness}: off by {worst} levels");
     }
-}
-
-/// Cosine between the mirror's normal and the way to the camera.
-fn cos_camera([x, y]: [usize; 2]) -> f64 {
-    let pixel = DVec2::new(x as f64, y as f64);
-    let ahead = ((pixel - CAMERA.center_px) / CAMERA.focal_px).extend(1.0);
-    let direction = camera_from_world().inverse().transform_vector3(ahead);
-    direction.normalize().y
-}
-
-/// What a white metal reflects of light from everywhere, from the table that the shaders have.
-fn reflected_of_all(roughness: f64, cosine: f64) -> f64 {
-    let last = (SIDE - 1) as f64;
-    let entry = |column: usize, row: usize| {
-        let [factor, summand, _] = LAYER_ALBEDO[row * SIDE + column];
-        f64::from(factor + summand)
-    };
-    let (u, v) = (cosine.sqrt() * last, roughness.sqrt() * last);
-    let (column, row) = (u.floor().min(last - 1.0), v.floor().min(last - 1.0));
-    let (s, t) = (u - column, v - row);
-    let (column, row) = (column as usize, row as usize);
-    (1.0 - s) * (1.0 - t) * entry(column, row)
-        + s * (1.0 - t) * entry(column + 1, row)
-        + (1.0 - s) * t * entry(column, row + 1)
-        + s * t * entry(column + 1, row + 1)
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Shading and gains held against closed forms and the CPU twins in `light`: what a light gives a virtual surface, what
 //! its loss takes from a real one, that nothing is darkened twice, and how the recorded picture passes.
 
-use crate::common::{flat_mesh, gpu, grey_frame, lamp, look_at, object, scene, sun};
+use crate::common::{flat_mesh, gpu, grey_frame, lamp, look_at, object, scene, sun, table_top};
 use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
 use gnomon::app::truth::ray_cast::pixels;
 use gnomon::capture::Frame;
@@ -131,21 +131,6 @@ impl Crate {
         let (a, b) = ((self.low - point) / way, (self.high - point) / way);
         let (enters, leaves) = (a.min(b).max_element(), a.max(b).min_element());
         enters < leaves && leaves > 1e-9 && enters < reach
-    }
-}
-
-/// A table top in the plane z = 0 that casts no shadow.
-fn table() -> Object {
-    let corners = [[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]];
-    let positions = corners.map(|[x, y]| Vec3::new(x, y, 0.0)).to_vec();
-    Object {
-        casts: false,
-        ..object(
-            "table",
-            flat_mesh(positions, vec![[0, 1, 2], [0, 2, 3]]),
-            ALBEDO,
-            DAffine3::IDENTITY,
-        )
     }
 }
 
@@ -444,7 +429,7 @@ fn point_light_falls_off_with_the_square_of_distance() {
     for height_m in [0.25, 0.5, 1.0] {
         let plate = Object {
             name: "plate".to_owned(),
-            ..table()
+            ..table_top(2.0, ALBEDO)
         };
         let light = lamp([0.0, 0.0, height_m], [intensity; 3]);
         let (picture, _) = render(
@@ -523,7 +508,7 @@ fn all_real(layers: &Layers, size_px: [u32; 2]) -> Vec<bool> {
 /// many lie in both a real and a virtual shadow.
 fn hold_gains(name: &str, real: &[Crate], seeming: &[Crate], light: Light) -> [usize; 2] {
     let camera = table_camera();
-    let phantoms = std::iter::once(table())
+    let phantoms = std::iter::once(table_top(2.0, ALBEDO))
         .chain(real.iter().map(|it| it.object("real")))
         .collect();
     let virtuals = seeming.iter().map(|it| it.object("virtual")).collect();
@@ -615,7 +600,7 @@ fn perfect_lens_passes_the_video_bit_for_bit() {
     let light = sun([0.6, 0.3, -1.0], [1.2, 0.9, 0.6]);
     let video = noise(SIZE_PX);
     let scene = scene(
-        vec![table()],
+        vec![table_top(2.0, ALBEDO)],
         vec![CASTER.object("box")],
         vec![light],
         AMBIENT,
@@ -661,7 +646,7 @@ fn perfect_lens_passes_the_video_bit_for_bit() {
 fn what_goes_fades_and_the_rest_stays_bit_for_bit() {
     let light = sun([0.6, 0.3, -1.0], [1.2, 0.9, 0.6]);
     let scene = scene(
-        vec![table()],
+        vec![table_top(2.0, ALBEDO)],
         vec![CASTER.object("box")],
         vec![light],
         AMBIENT,
@@ -717,7 +702,7 @@ fn undistorted_as_by_rays(distortion: Distortion) {
     let light = sun([0.6, 0.3, -1.0], [1.2, 0.9, 0.6]);
     let (picture, layers) = render(
         &scene(
-            vec![table()],
+            vec![table_top(2.0, ALBEDO)],
             vec![CASTER.object("box")],
             vec![light],
             AMBIENT,

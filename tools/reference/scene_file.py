@@ -122,7 +122,8 @@ def read_scene(path):
             if on not in scene.anchors:
                 raise SceneError(f"{path}: {thing['name']} stands on \"{on}\"; there are {', '.join(scene.anchors)}")
             scene.things.append(Thing(thing["name"], kind == "phantom", on, place, albedo, material.get("roughness"),
-                                      material.get("metallic", 0.0), thing.get("casts", True), find(thing["mesh"]) if "mesh" in thing else None,
+                                      material.get("metallic", 0.0), thing.get("casts", True),
+                                      find(thing["mesh"]) if "mesh" in thing else None,
                                       thing.get("rect_m"), thing.get("fit_m")))
     scene.lights = tree.get("light", [])
     scene.ambient = rgb(tree.get("ambient", {}).get("radiance", 0))

@@ -48,14 +48,18 @@ impl GpuScene {
         }
     }
 
-    /// The lights that cast shadow volumes and shine, in the world.
-    pub fn shining(&self) -> Vec<Light> {
-        self.lights.shining()
+    /// The lights that cast shadow volumes and shine, in the camera's space; none where the world has no pose.
+    pub fn shining_in_camera(&self) -> Vec<Light> {
+        let camera_from_world = self.camera_from_anchor.first().copied().flatten();
+        let shining = self.lights.shining().into_iter();
+        camera_from_world.map_or(Vec::new(), |pose| {
+            shining.map(|light| light.moved(&pose)).collect()
+        })
     }
 
     /// They in the space that light from afar is known in.
     pub fn shining_in_light(&self) -> Vec<Light> {
-        let shining = self.shining();
+        let shining = self.lights.shining();
         match self.light_from_world() {
             Some(light_from_world) if self.light_anchor != 0 => {
                 let lights = shining.iter();

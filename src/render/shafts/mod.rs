@@ -149,13 +149,7 @@ impl Shafts {
                 usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             }),
-            sampler: device.create_sampler(&wgpu::SamplerDescriptor {
-                label: Some("shaft maps"),
-                mag_filter: wgpu::FilterMode::Linear,
-                min_filter: wgpu::FilterMode::Linear,
-                mipmap_filter: wgpu::MipmapFilterMode::Linear,
-                ..Default::default()
-            }),
+            sampler: gpu.linear_sampler("shaft maps"),
             environment: MirroredProbe::new(device, &gpu.queue, environment),
             world_from_anchor: Vec::new(),
             hidden: None,
