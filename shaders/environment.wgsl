@@ -256,21 +256,30 @@ fn is_open(index: u32, open_low: u32, direction: vec3f) -> bool {
     return (bits >> (bit & 31u) & 1u) == 1u;
 }
 
+// The first harmonic of the visibility of a place from which nothing is hidden, √(4π).
+const NOTHING_HIDDEN: f32 = 3.5449077;
+
 @fragment
 fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: bool) -> LightSums {
     let surface = surface(sampled);
     let point_in_world = (frame.world_from_camera * vec4f(surface.point_in_camera, 1.0)).xyz;
-    let look = look(surface, outside);
 //!if LOOKS
+    var look = look(surface, outside);
     if look.opacity == 0.0 {
         discard;
     }
+    // What its shape hides of the light is told by rays already: a picture of occlusion counts for what is finer than its triangles.
+    let open = recovered(vec3f(sampled.visibility_0.x), vec3f(NOTHING_HIDDEN), sampled.one).x / NOTHING_HIDDEN;
+    look.occlusion = min(look.occlusion / max(open, 1e-3), 1.0);
+//!else
+    let look = look(surface, outside);
 //!end
     let normal = (frame.world_from_camera * vec4f(look.normal, 0.0)).xyz;
     let to_camera = normalize(frame.world_from_camera[3].xyz - point_in_world);
     // Of what arrives and of what the glossy layer sends to the camera: all that the thing itself leaves, and what others take.
     var whole = vec3f(0.0);
     var taken = vec3f(0.0);
+    var thrown_back = vec3f(0.0);
     var whole_gloss = vec3f(1e-6);
     var taken_gloss = vec3f(0.0);
 //!if HARMONIC_GLOSS
@@ -290,6 +299,12 @@ fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: boo
         let hidden = 1.0 - left_by(0u, frame.caster_count, index, region, point, sampled.thing);
         whole += arriving;
         taken += arriving * hidden;
+//!if LOOKS
+        if look.is_principled {
+            let between = dot(toward, normalize(toward + to_camera));
+            thrown_back += arriving * burley(look.roughness, cosine, dot(normal, to_camera), between);
+        }
+//!end
 //!if HARMONIC_GLOSS
         // Equation 15, which knows no cosine.
         taken_gloss += region.irradiance * (seen * hidden * phong_lobe(exponent, direction, toward));
@@ -300,10 +315,19 @@ fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: boo
 //!end
     }
     // The paper takes off what is hidden (equation 3). A part of what arrives is never more than all of it, whatever the few
-    // regions miss.
-    let subtracted = max(surface.indirect - taken, vec3f(0.0));
-    let scaled = surface.indirect * (1.0 - taken / max(whole, vec3f(1e-6)));
-    let arriving = select(scaled, subtracted, BY_PLANES);
+    // regions miss. What hides light reflects light, which nothing is taken of.
+    let reflected = recovered(sampled.reflected, sampled.first_reflected, sampled.one);
+    var from_afar = max(surface.indirect - reflected, vec3f(0.0));
+//!if LOOKS
+    if look.is_principled {
+        // More than of light from everywhere, where most of it grazes the surface.
+        let mean = mean_burley(look.roughness, max(dot(normal, to_camera), 1e-3));
+        from_afar *= thrown_back / max(whole, vec3f(1e-6)) / mean;
+    }
+//!end
+    let subtracted = max(from_afar - taken, vec3f(0.0));
+    let scaled = from_afar * (1.0 - taken / max(whole, vec3f(1e-6)));
+    let arriving = reflected + select(scaled, subtracted, BY_PLANES);
 //!if HARMONIC_GLOSS
     if GLOSSY && look.roughness > 0.0 {
         let mean = max(mean_over_lobe(sampled, exponent) - taken_gloss, vec3f(0.0));

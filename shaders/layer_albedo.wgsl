@@ -47,10 +47,7 @@ fn radiance_all_around(look: Look, cos_camera: f32, arriving: vec3f, around: vec
     var below = let_through(layer);
 //!if LOOKS
     if look.is_principled {
-        // The mean of `burley` over light from everywhere, with 0.6 as the half angle's squared cosine: within .03 but for the
-        // last degrees.
-        let at_grazing = 1.2 * sqrt(look.roughness) - 0.5;
-        below = (1.0 + at_grazing / 21.0) * (1.0 + at_grazing * grazing(cos_camera));
+        below = mean_burley(look.roughness, cos_camera);
     }
 //!end
     let dielectric = diffuse * below + around * (1.0 - let_through(layer));
@@ -60,6 +57,12 @@ fn radiance_all_around(look: Look, cos_camera: f32, arriving: vec3f, around: vec
 //!else
     return dielectric;
 //!end
+}
+
+// The mean of `burley` over light from everywhere, with 0.6 as the half angle's squared cosine: within .03 but for the last degrees.
+fn mean_burley(roughness: f32, cos_camera: f32) -> f32 {
+    let at_grazing = 1.2 * sqrt(roughness) - 0.5;
+    return (1.0 + at_grazing / 21.0) * (1.0 + at_grazing * grazing(cos_camera));
 }
 
 // Part of the light that a dielectric's layer lets in or out (light::layer_albedo).

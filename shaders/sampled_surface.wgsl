@@ -30,6 +30,9 @@ struct SampledSurface {
     @location(18) @interpolate(perspective, centroid) visibility_3: vec4f,
     // Number of the thing.
     @location(19) @interpolate(flat) thing: u32,
+    // The part of the irradiance that is of what things reflect.
+    @location(24) @interpolate(perspective, centroid) reflected: vec3f,
+    @location(25) @interpolate(flat) first_reflected: vec3f,
 //!end
 //!if HARMONIC_GLOSS
     // What is mirrored, degree by degree (harmonic_gloss.wgsl).
@@ -47,6 +50,7 @@ struct OcclusionCorner {
     @location(10) visibility_2: vec4f,
     @location(11) visibility_3: vec4f,
     @location(12) thing: u32,
+    @location(13) reflected: vec3f,
 }
 //!end
 
@@ -85,6 +89,8 @@ fn place_sampled(corner: SurfaceCorner, @builtin(vertex_index) index: u32) -> Sa
         occlusion.visibility_2,
         occlusion.visibility_3,
         occlusion.thing,
+        occlusion.reflected,
+        occlusion.reflected,
 //!end
 //!if HARMONIC_GLOSS
         degrees.degree_0,

@@ -58,7 +58,7 @@ fn cuts_of_meshes(folder: Option<PathBuf>) -> DiskCache {
     DiskCache {
         folder,
         extension: "cuts",
-        version: 1,
+        version: 3,
         most_bytes: 1 << 24,
         most_files: 64,
     }

@@ -251,22 +251,49 @@ impl PlacedScene<'_> {
             }
             let start = seen.place + seen.normal * OFFSET_M;
             let direct = self.direct(start, seen.normal, how, number);
-            direct.map(|direct| seen.albedo * (direct + how.sky.irradiance(seen.normal)))
+            let of_sky = self.left_of_sky(start, seen.normal, how, number);
+            [0, 1].map(|with| seen.albedo * (direct[with] + of_sky[with]))
         };
         let axes = normal.any_orthonormal_pair();
         // Neighbouring rays look elsewhere.
         let first = number * DIRECTIONS_APART;
-        let mut sums = [Vec3::ZERO; 2];
+        // What rays meet is there in place of the sky behind it: few rays tell that better than the sky where they meet nothing.
+        let mut changes = [Vec3::ZERO; 2];
         for ray in 0..RAYS_OF_AN_END {
             let turn = first + ray * DIRECTIONS_OF_AN_END / RAYS_OF_AN_END;
             let which = [turn % DIRECTIONS_OF_AN_END, DIRECTIONS_OF_AN_END];
             let direction = over_hemisphere(normal, axes, which);
+            let behind = PI * how.sky.radiance_from(direction);
+            let change = |seen: &SeenSurface| of_surface(seen).map(|given| given - behind);
             let [real, before] = self.met(start, direction);
-            let [without, behind] = real.as_ref().map_or([of_sky; 2], of_surface);
-            sums[0] += without;
-            sums[1] += before.as_ref().map_or(behind, |seen| of_surface(seen)[1]);
+            let [without, of_real] = real.as_ref().map_or([Vec3::ZERO; 2], change);
+            changes[0] += without;
+            changes[1] += before.as_ref().map_or(of_real, |seen| change(seen)[1]);
         }
-        sums.map(|sum| sum / RAYS_OF_AN_END as f32)
+        changes.map(|change| (of_sky + change / RAYS_OF_AN_END as f32).max(Vec3::ZERO))
+    }
+
+    /// Irradiance of a place of the sky and, where something hides it, of the sky's light that this reflects, as a single ray tells
+    /// it: without virtual things, and with them.
+    fn left_of_sky(
+        &self,
+        start: Vec3,
+        normal: Vec3,
+        how: &Gathering<'_>,
+        turn: usize,
+    ) -> [Vec3; 2] {
+        let which = [
+            turn * DIRECTIONS_APART % DIRECTIONS_OF_AN_END,
+            DIRECTIONS_OF_AN_END,
+        ];
+        let direction = over_hemisphere(normal, normal.any_orthonormal_pair(), which);
+        let behind = PI * how.sky.radiance_from(direction);
+        let [real, before] = self.met(start, direction);
+        let of_sky = how.sky.irradiance(normal);
+        [real, before.or(real)].map(|met| match met {
+            Some(seen) => of_sky + seen.albedo * how.sky.irradiance(seen.normal) - behind,
+            None => of_sky,
+        })
     }
 
     /// Irradiance of a place of the lights themselves, without virtual things and with them, as that of their places whose turn

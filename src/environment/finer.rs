@@ -12,10 +12,11 @@ use crate::geometry::mesh::Mesh;
 
 use super::self_occlusion::{OwnRays, OwnSpace, TRANSFERS, directions};
 
-/// Edges shorter than this part of a thing's size are left whole: a thing that is as fine as that is fine enough, ...
+/// Edges shorter than this part of a thing's size are left whole: a thing that is as fine as that is fine enough.
 const SHORTEST_PART: f64 = 1.0 / 24.0;
-/// ... and longer ones than this part are looked at in more places than their middle.
-const LONG_PART: f64 = 0.25;
+/// Edges longer than this part are halved whatever a thing hides from itself: what stands around it reflects light, which varies
+/// from end to end.
+const LONGEST_PART: f64 = 1.0 / 6.0;
 /// Transfer may be off by this part of that of a place from which nothing is hidden, root mean square over all lights.
 const OFF: f64 = 0.04;
 /// Rays from each place that is looked at.
@@ -23,9 +24,9 @@ const RAYS: usize = 1024;
 /// Part of the way to its triangle's middle at which a place is looked at: what stands on an edge would see into the other face.
 const INSET: f32 = 0.05;
 /// Edges are halved so many times at most, ...
-const MOST_HALVINGS: usize = 5;
-/// ... and no more are where a mesh has so many triangles.
-const MOST_TRIANGLES: usize = 8192;
+const MOST_HALVINGS: usize = 6;
+/// ... and no more are where so many triangles have come in.
+const MOST_ADDED: usize = 8192;
 
 /// The edges that are halved, one set after the other, each of the mesh that the one before left.
 pub type Cuts = Vec<Vec<Edge>>;
@@ -57,6 +58,7 @@ pub fn cuts(mesh: &Mesh, space: &OwnSpace, goes_on: &(dyn Fn() -> bool + Sync)) 
         directions: directions(RAYS),
         normal_matrix: space.own_from_object.inverse().transpose(),
     };
+    let most = mesh.triangles.len() + MOST_ADDED;
     let mut finer = mesh.clone();
     // (A triangle that is whole and even once is so later.)
     let mut even: HashSet<[u32; 3]> = HashSet::new();
@@ -74,7 +76,7 @@ pub fn cuts(mesh: &Mesh, space: &OwnSpace, goes_on: &(dyn Fn() -> bool + Sync)) 
             }
         }
         let edges: HashSet<Edge> = looked_at.into_iter().flatten().collect();
-        if edges.is_empty() || finer.triangles.len() >= MOST_TRIANGLES {
+        if edges.is_empty() || finer.triangles.len() >= most {
             break;
         }
         finer = finer.with_edges_cut(&edges);
@@ -126,6 +128,15 @@ impl Looking<'_> {
         if long_enough.is_empty() {
             return Vec::new();
         }
+        let is_too_long = |side: &&(usize, usize)| length(**side) > LONGEST_PART * self.size;
+        let too_long: Vec<Edge> = long_enough
+            .iter()
+            .filter(is_too_long)
+            .map(|&(a, b)| edge(triangle[a], triangle[b]))
+            .collect();
+        if !too_long.is_empty() {
+            return too_long;
+        }
         let mut known: HashMap<[u8; 3], Transfer> = HashMap::new();
         // Places by how many eighths of each corner they have.
         let mut transfer = |parts: [u8; 3]| {
@@ -141,16 +152,9 @@ impl Looking<'_> {
         // What lies amid a face is seen from no edge.
         let is_even_amid = is_even([3, 3, 2]) && is_even([2, 3, 3]) && is_even([3, 2, 3]);
         let mut uneven = |&(a, b): &(usize, usize)| {
-            let places: &[u8] = match length((a, b)) > LONG_PART * self.size {
-                true => &[4, 1, 2, 6, 7],
-                false => &[4],
-            };
-            let mut parts = places.iter().map(|&part| {
-                let mut parts = [0; 3];
-                (parts[a], parts[b]) = (part, 8 - part);
-                parts
-            });
-            !is_even_amid || !parts.all(&mut is_even)
+            let mut middle = [0; 3];
+            (middle[a], middle[b]) = (4, 4);
+            !is_even_amid || !is_even(middle)
         };
         let uneven = long_enough.iter().filter(|side| uneven(side));
         uneven
@@ -266,11 +270,13 @@ mod tests {
     }
 
     #[test]
-    fn what_hides_nothing_from_itself_is_left_whole() {
+    fn what_hides_nothing_from_itself_is_cut_for_what_is_around_alone() {
         let (positions, triangles) = crate::geometry::cuboid::cuboid(Vec3::ZERO, Vec3::ONE);
         let cube = welded(&positions, &triangles);
         let space = OwnSpace::new(&DAffine3::from_rotation_x(0.4));
-        assert!(is_coarse(&cube, &space));
-        assert_eq!(cuts(&cube, &space, &|| true), Some(Cuts::new()));
+        let cuts = cuts(&cube, &space, &|| true).expect("nobody stops it");
+        let finer = finer(&cube, &cuts);
+        // Quarters of its sides, of which no edge is longer than a sixth of its diagonal, √3.
+        assert_eq!(finer.triangles.len(), 6 * 2 * 4 * 4 * 2);
     }
 }

@@ -42,6 +42,8 @@ pub enum Among {
 pub struct SeenSurface {
     /// Number of the thing.
     pub thing: usize,
+    /// Number of its triangle.
+    pub triangle: usize,
     /// In the world.
     pub place: Vec3,
     /// Unit length, on the side that is seen.
@@ -97,6 +99,13 @@ impl PlacedThing<'_> {
         let direction = self.anchor_from_world.transform_vector3(direction);
         let hit = self.thing.caster.first_hit(origin, direction, reach)?;
         Some((hit.triangle, hit.distance))
+    }
+
+    /// Number of the disc of its surface where a ray has met it; `None` where that has none.
+    pub fn disc_at(&self, seen: &SeenSurface) -> Option<usize> {
+        let place = self.anchor_from_world.transform_point3(seen.place);
+        let normal = self.anchor_from_world.transform_vector3(seen.normal);
+        self.thing.disc_at(seen.triangle, place, normal)
     }
 
     /// Whether it hides what lies `reach` along a direction.
@@ -208,6 +217,7 @@ impl PlacedScene<'_> {
         let is_averted = outward.dot(direction) > 0.0;
         Some(SeenSurface {
             thing: index,
+            triangle,
             place: origin + direction * distance,
             normal: match is_averted {
                 true => -normal,
@@ -219,10 +229,15 @@ impl PlacedScene<'_> {
         })
     }
 
-    /// Whether a thing that casts shadows hides what lies `reach` along a direction.
+    /// Whether something hides what lies `reach` along a direction: what casts shadows, or what is real and casts none, as a
+    /// table, which no light comes through from below.
     fn is_hidden(&self, among: Among, origin: Vec3, direction: Vec3, reach: f32) -> bool {
-        let counts = |placed: &PlacedThing<'_>| among == Among::All || placed.thing.is_real;
-        self.is_hidden_by(counts, origin, direction, reach)
+        let counts = |placed: &&PlacedThing<'_>| match placed.thing.is_real {
+            true => true,
+            false => among == Among::All && placed.thing.casts,
+        };
+        let mut things = self.things.iter().filter(counts);
+        things.any(|placed| placed.hides(origin, direction, reach))
     }
 
     /// Whether one of the things that cast shadows and that `counts` says yes of hides what lies `reach` along a direction.
@@ -256,7 +271,7 @@ impl PlacedScene<'_> {
         let broad: Vec3 = (0..asked)
             .map(|index| {
                 // Each asks for regions that lie far apart in their order, and rays beside each other for others.
-                let region = (turn * asked + index * regions.len() / asked) % regions.len();
+                let region = (turn + index * regions.len() / asked) % regions.len();
                 self.of_region(among, start, seen.normal, &regions[region])
             })
             .sum();

@@ -7,16 +7,21 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::shafts::light_of_room::hemisphere;
-use crate::shafts::surfels::{Surfel, as_one, from_disc, mean_by_area, open_directions};
+use crate::shafts::surfels::{Surfel, as_one, from_open_disc, mean_by_area, open_directions};
 
-use super::placed::{Among, OFFSET_M, PlacedScene, PlacedThing};
+use super::placed::{Among, OFFSET_M, PlacedScene, PlacedThing, SeenSurface};
 
 /// Parts that a group is cut into.
 const PARTS: usize = 4;
-/// Rays that gather what others reflect on to a disc.
+/// Rays that gather what others reflect on to a disc, ...
 const RAYS: usize = 32;
-/// A group is seen as one disc from so many of its radii; environment.wgsl has the same number.
-const SEEN_AS_ONE: f32 = 4.0;
+/// ... and the irradiance of one for each unit of the radiance that it meets.
+const WEIGHT: f32 = PI / RAYS as f32;
+/// How often light goes from surface to surface.
+const BOUNCES: usize = 3;
+/// A group is seen as one disc from so many of its radii: from nearer than by the pixel (environment.wgsl), for what is passed on
+/// is little.
+const SEEN_AS_ONE: f32 = 2.0;
 
 /// A disc that reflects light on to real surfaces.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,55 +54,167 @@ pub struct DiscNode {
 pub struct DiscTree {
     /// The nodes.
     pub nodes: Vec<DiscNode>,
+    /// For each thing and each of its discs the part of the radiance that comes of what things reflect.
+    passed_on: Vec<Vec<Radiances>>,
+}
+
+/// Radiance without virtual things, and with them.
+type Radiances = [Vec3; 2];
+
+/// A disc, and what is around it.
+struct GatheringDisc {
+    surfel: Surfel,
+    open: u64,
+    /// Radiance of what the lights alone give it.
+    of_lights: Radiances,
+    /// Irradiance of what the surfaces around it reflect of the lights.
+    thrown_back: Radiances,
+    /// Those surfaces, as rays have met them.
+    around: [Vec<SeenSurface>; 2],
+}
+
+impl Among {
+    /// Of `[without virtual things, with them]`.
+    fn index(self) -> usize {
+        match self {
+            Self::Real => 0,
+            Self::All => 1,
+        }
+    }
 }
 
 impl PlacedScene<'_> {
-    /// What casting things reflect of all light that reaches them, one bounce of it from others among it.
+    /// What casting things reflect of all light that reaches them, also of what they and what throws no shadow reflect on to each
+    /// other.
     pub fn reflecting(&self) -> DiscTree {
-        let mut tree = DiscTree::default();
-        for (thing, placed) in self.things.iter().enumerate() {
+        let of_thing = |placed: &PlacedThing<'_>| -> Vec<GatheringDisc> {
             let surfels = placed.thing.surfels.par_iter();
-            let lit = surfels.map(|surfel| self.lit(placed, surfel));
-            tree.add(&lit.collect::<Vec<_>>(), thing);
+            surfels
+                .map(|surfel| self.gathering(placed, surfel))
+                .collect()
+        };
+        let discs: Vec<Vec<GatheringDisc>> = self.things.iter().map(of_thing).collect();
+        let nothing = discs.iter().map(|discs| vec![[Vec3::ZERO; 2]; discs.len()]);
+        let mut tree = DiscTree::new(&discs, nothing.collect());
+        for _ in 0..BOUNCES {
+            let passed_on = discs.iter().map(|discs| {
+                let discs = discs.par_iter();
+                discs.map(|disc| disc.passed_on(self, &tree)).collect()
+            });
+            tree = DiscTree::new(&discs, passed_on.collect());
         }
         tree
     }
 
-    fn lit(&self, placed: &PlacedThing<'_>, surfel: &Surfel) -> ReflectingDisc {
+    fn gathering(&self, placed: &PlacedThing<'_>, surfel: &Surfel) -> GatheringDisc {
         let surfel = Surfel {
             position: placed.world_from_anchor.transform_point3(surfel.position),
             normal: placed.world_from_anchor.transform_vector3(surfel.normal),
             ..*surfel
         };
-        let start = surfel.position + surfel.normal * OFFSET_M;
-        let radiance = |among: Among| {
-            let thrown_back = |(number, direction): (usize, Vec3)| {
-                let counts = |placed: &PlacedThing<'_>| among == Among::All || placed.thing.is_real;
-                let seen = self.seen(start, direction, counts)?;
-                Some(self.radiance(among, &seen, number))
-            };
-            let directions = hemisphere(surfel.normal, RAYS).enumerate();
-            let thrown_back: Vec3 = directions.filter_map(thrown_back).sum();
-            let arriving = self.irradiance(among, surfel.position, surfel.normal)
-                + thrown_back * (PI / RAYS as f32);
-            surfel.albedo * arriving * FRAC_1_PI
-        };
-        let with = radiance(Among::All);
-        ReflectingDisc {
+        let open = open_directions(&surfel, |start, direction| {
+            placed.hides(start, direction, f32::INFINITY)
+        });
+        let mut disc = GatheringDisc {
             surfel,
-            open: open_directions(&surfel, |start, direction| {
-                placed.hides(start, direction, f32::INFINITY)
-            }),
-            without: match placed.thing.is_real {
-                true => radiance(Among::Real),
-                false => Vec3::ZERO,
-            },
-            with,
+            open,
+            of_lights: [Vec3::ZERO; 2],
+            thrown_back: [Vec3::ZERO; 2],
+            around: [Vec::new(), Vec::new()],
+        };
+        disc.gather(self, Among::All);
+        if placed.thing.is_real {
+            disc.gather(self, Among::Real);
         }
+        disc
+    }
+}
+
+impl GatheringDisc {
+    fn gather(&mut self, scene: &PlacedScene<'_>, among: Among) {
+        let Surfel {
+            position, normal, ..
+        } = self.surfel;
+        let start = position + normal * OFFSET_M;
+        let counts = |placed: &PlacedThing<'_>| among == Among::All || placed.thing.is_real;
+        let which = among.index();
+        for (number, direction) in hemisphere(normal, RAYS).enumerate() {
+            if let Some(seen) = scene.seen(start, direction, counts) {
+                self.thrown_back[which] += scene.radiance(among, &seen, number) * WEIGHT;
+                self.around[which].push(seen);
+            }
+        }
+        let arriving = scene.irradiance(among, position, normal);
+        self.of_lights[which] = self.surfel.albedo * arriving * FRAC_1_PI;
+    }
+
+    /// Radiance of what the surfaces around it reflect, of the lights and of what is in `tree`.
+    fn passed_on(&self, scene: &PlacedScene<'_>, tree: &DiscTree) -> Radiances {
+        [Among::Real, Among::All].map(|among| {
+            let around = self.around[among.index()].iter();
+            let further: Vec3 = around.map(|seen| tree.passed_on(scene, among, seen)).sum();
+            let arriving = self.thrown_back[among.index()] + further * WEIGHT;
+            self.surfel.albedo * arriving * FRAC_1_PI
+        })
     }
 }
 
 impl DiscTree {
+    fn new(discs: &[Vec<GatheringDisc>], passed_on: Vec<Vec<Radiances>>) -> Self {
+        let mut tree = Self::default();
+        for (thing, (discs, passed_on)) in discs.iter().zip(&passed_on).enumerate() {
+            let lit = discs.iter().zip(passed_on).map(|(disc, further)| {
+                let [without, with] = [0, 1].map(|which| disc.of_lights[which] + further[which]);
+                ReflectingDisc {
+                    surfel: disc.surfel,
+                    open: disc.open,
+                    without,
+                    with,
+                }
+            });
+            tree.add(&lit.collect::<Vec<_>>(), thing);
+        }
+        Self { passed_on, ..tree }
+    }
+
+    /// Radiance that a surface which a ray has met reflects of what things reflect on to it.
+    pub fn passed_on(&self, scene: &PlacedScene<'_>, among: Among, seen: &SeenSurface) -> Vec3 {
+        let placed = &scene.things[seen.thing];
+        if placed.thing.casts {
+            let disc = placed.disc_at(seen);
+            return disc.map_or(Vec3::ZERO, |disc| {
+                self.passed_on[seen.thing][disc][among.index()]
+            });
+        }
+        seen.albedo * FRAC_1_PI * self.irradiance(among, seen.place, seen.normal)
+    }
+
+    /// Irradiance of a place from all discs.
+    fn irradiance(&self, among: Among, place: Vec3, normal: Vec3) -> Vec3 {
+        let mut sum = Vec3::ZERO;
+        let mut index = 0;
+        while let Some(node) = self.nodes.get(index) {
+            let ReflectingDisc {
+                surfel,
+                open,
+                without,
+                with,
+            } = &node.whole;
+            let way = surfel.position - place;
+            let facing = normal.dot(way);
+            let is_near = way.length_squared() < (SEEN_AS_ONE * node.radius).powi(2);
+            match is_near && facing >= -node.radius {
+                true => index += 1,
+                false => {
+                    let radiance = [without, with][among.index()];
+                    sum += *radiance * from_open_disc(place, normal, surfel, *open);
+                    index = node.next as usize;
+                }
+            }
+        }
+        sum
+    }
+
     /// Adds discs of a thing, of which neighbours lie beside each other in their order.
     fn add(&mut self, discs: &[ReflectingDisc], thing: usize) {
         match discs {
@@ -120,28 +237,6 @@ impl DiscTree {
                 self.nodes[first].next = self.nodes.len() as u32;
             }
         }
-    }
-
-    /// Irradiance, with virtual things there, of a place on a thing from its own discs that it faces and that face it, as those
-    /// of a hollow do.
-    pub fn irradiance_from_itself(&self, thing: usize, place: Vec3, normal: Vec3) -> Vec3 {
-        let mut sum = Vec3::ZERO;
-        let mut index = 0;
-        while let Some(node) = self.nodes.get(index) {
-            let disc = &node.whole;
-            let way = disc.surfel.position - place;
-            let is_near = way.length_squared() < (SEEN_AS_ONE * node.radius).powi(2);
-            match node.thing == thing && is_near {
-                true => index += 1,
-                false => {
-                    if node.thing == thing {
-                        sum += disc.with * from_disc(place, normal, &disc.surfel);
-                    }
-                    index = node.next as usize;
-                }
-            }
-        }
-        sum
     }
 }
 

@@ -6,6 +6,8 @@ use crate::light::probe::Probe;
 use crate::light::radiance9::Radiance9;
 use crate::light::regions::{Region, regions};
 
+use super::distant_light::coarse_radiance;
+
 /// Of so many rays that a scene asks for one looks for what things reflect, where the sky's light has directions of its own.
 const RAYS_FOR_ONE: usize = 4;
 
@@ -17,6 +19,8 @@ pub struct Sky {
     /// Of regions of like power, each from one direction: a bright part of the sky gets many of them.
     pub sources: Vec<Region>,
     harmonics: Radiance9,
+    /// Its radiance by direction.
+    coarse: Probe,
 }
 
 impl Sky {
@@ -35,6 +39,7 @@ impl Sky {
             radiance: Vec3::ZERO,
             sources,
             harmonics,
+            coarse: coarse_radiance(probe, exposure),
         }
     }
 
@@ -47,6 +52,7 @@ impl Sky {
             radiance: radiance.as_vec3(),
             sources: Vec::new(),
             harmonics,
+            coarse: Probe::of_one_radiance(radiance.as_vec3()),
         }
     }
 
@@ -56,6 +62,11 @@ impl Sky {
             true => asked_for,
             false => asked_for.div_ceil(RAYS_FOR_ONE),
         }
+    }
+
+    /// Mean radiance around a direction.
+    pub fn radiance_from(&self, direction: Vec3) -> Vec3 {
+        self.coarse.radiance(direction.as_dvec3())
     }
 
     /// Irradiance of a surface with a unit normal that sees all of it.

@@ -1,113 +1,120 @@
-//! The light around a thing: what comes from afar, with what stands around it in its place, as harmonics at the corners of a
-//! box. The paper has distant light alone; on a table half of all that arrives is thrown back by it.
+//! The light that a thing's surface gets from what stands around it, in place of the light from afar behind that, as rays find it
+//! at some places of the surface. The paper has distant light alone; on a table half of all that arrives is thrown back by it.
 
-use std::f64::consts::PI;
+use std::f32::consts::PI;
 
-use glam::{DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
-use crate::geometry::bounds::Bounds;
-use crate::light::harmonics::{Turn, basis, sphere};
+use crate::light::irradiance_records::IrradianceRecords;
+use crate::shafts::casters::COARSE_PART;
+use crate::shafts::light_of_room::hemisphere;
 
 use super::placed::{Among, PlacedScene, PlacedThing};
-use super::self_occlusion::{TRANSFER_DEGREE, TRANSFERS};
+use super::reflected::DiscTree;
 
-/// Rays from each corner of the box.
-const RAYS: usize = 256;
-/// How far the corners lie within the thing's own box, in parts of its size: those of what stands on a table are above it.
-const INSET: f64 = 0.1;
+/// Places start this part of the way to their thing's middle, along the surface: a foot on the table would see below it.
+const INSET: f32 = 0.02;
 
-/// Coefficients of radiance.
-pub type Radiance = [DVec3; TRANSFERS];
-
-/// Radiance around a thing.
-#[derive(Debug, Clone)]
-pub struct LocalLight {
-    low: DVec3,
-    size: DVec3,
-    /// x first, then y, then z.
-    corners: [Radiance; 8],
+/// How many rays there are for a thing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Budget {
+    /// Places on its surface, hardly more than these.
+    pub places: usize,
+    /// From all of them together, about.
+    pub rays: usize,
 }
 
-impl LocalLight {
-    /// In world space, around a box in which thing `own` is (its place among `scene.things`): that hides nothing here, for
-    /// what it hides from itself is known corner by corner.
-    ///
-    /// What casts no shadow, as the table, stands in place of the light behind it. What casts some adds what it reflects;
-    /// what it hides is drawn in maps, by the pixel. Around a phantom there is only what others reflect, for all the rest of
-    /// its light is summed up by the pixel.
-    pub fn new(scene: &PlacedScene<'_>, bounds: Bounds, own: usize) -> Self {
-        let size = bounds.high - bounds.low;
-        let (low, size) = (bounds.low + size * INSET, size * (1.0 - 2.0 * INSET));
-        let mut corners = [[DVec3::ZERO; TRANSFERS]; 8];
-        corners
-            .par_iter_mut()
-            .enumerate()
-            .for_each(|(index, corner)| {
-                let part = |bit: usize| (index >> bit & 1) as f64;
-                let place = low + size * DVec3::new(part(0), part(1), part(2));
-                *corner = radiance_at(scene, place.as_vec3(), own);
-            });
-        Self { low, size, corners }
-    }
+/// From each place at least, and at most.
+const RAYS_OF_A_PLACE: [usize; 2] = [32, 256];
 
-    /// The same in directions of an anchor, which `turn` makes of the world's; places stay those of the world.
-    pub fn turned(&self, turn: &Turn) -> Self {
-        Self {
-            corners: self.corners.map(|corner| turn.turned(&corner)),
-            ..*self
-        }
-    }
-
-    /// At a place in the world, between the corners of the box.
-    pub fn at(&self, place: DVec3) -> Radiance {
-        let part = (place - self.low) / self.size.max(DVec3::splat(1e-9));
-        let part = part.clamp(DVec3::ZERO, DVec3::ONE);
-        let mut sums = [DVec3::ZERO; TRANSFERS];
-        for (index, corner) in self.corners.iter().enumerate() {
-            let along = |bit: usize, part: f64| match index >> bit & 1 {
-                0 => 1.0 - part,
-                _ => part,
-            };
-            let weight = along(0, part.x) * along(1, part.y) * along(2, part.z);
-            for (sum, radiance) in sums.iter_mut().zip(corner) {
-                *sum += *radiance * weight;
-            }
-        }
-        sums
-    }
+impl Budget {
+    /// Where nothing moves by itself.
+    pub const STANDING: Self = Self {
+        places: 1024,
+        rays: 49_152,
+    };
+    /// Where it is worked out in each frame.
+    pub const MOVING: Self = Self {
+        places: 256,
+        rays: 8192,
+    };
 }
 
-fn radiance_at(scene: &PlacedScene<'_>, place: Vec3, own: usize) -> Radiance {
-    let number_of_own = scene.things[own].number;
-    let own = scene.things[own].thing;
-    let mut sums = [DVec3::ZERO; TRANSFERS];
-    if !own.is_real {
-        sums.copy_from_slice(&scene.distant.harmonics);
-    }
-    let among = match own.is_real {
+/// Irradiance of a place.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Around {
+    /// Of what things reflect.
+    pub reflected: Vec3,
+    /// Of the light from afar that what casts no shadow keeps from it.
+    pub kept_off: Vec3,
+}
+
+/// What reaches points of thing `own` (its place among `scene.things`) that `records` are of, in a space of pose
+/// `world_from_points`.
+///
+/// What casts no shadow, as the table, stands in place of the light behind it. What casts some adds what it reflects; what it
+/// hides is drawn in maps, by the pixel, and what the thing itself hides is known corner by corner. A phantom gets what casts no
+/// shadow reflects alone, for all the rest of its light is summed up by the pixel.
+pub fn around(
+    scene: &PlacedScene<'_>,
+    discs: &DiscTree,
+    own: usize,
+    (records, world_from_points): (&IrradianceRecords, &DAffine3),
+    budget: Budget,
+) -> Vec<Around> {
+    let [fewest, most] = RAYS_OF_A_PLACE;
+    let rays = (budget.rays / records.places.len().max(1)).clamp(fewest, most);
+    let bounds = scene.things[own].bounds();
+    let middle = (0.5 * (bounds.low + bounds.high)).as_vec3();
+    let offset_m = (COARSE_PART * (bounds.high - bounds.low).length()) as f32;
+    let at_place = |&(place, normal): &(DVec3, DVec3)| {
+        let place = world_from_points.transform_point3(place).as_vec3();
+        let normal = world_from_points.transform_vector3(normal).as_vec3();
+        let normal = normal.normalize_or_zero();
+        let inwards = INSET * (middle - place).reject_from_normalized(normal);
+        let start = place + inwards + normal * offset_m;
+        around_place(scene, discs, own, (start, normal), rays)
+    };
+    let at_records: Vec<Around> = records.places.par_iter().map(at_place).collect();
+    let at_points = |of: fn(&Around) -> Vec3| {
+        let values: Vec<Vec3> = at_records.iter().map(of).collect();
+        records.at_points(&values)
+    };
+    let reflected = at_points(|around| around.reflected).into_iter();
+    let both = reflected.zip(at_points(|around| around.kept_off));
+    both.map(|(reflected, kept_off)| Around {
+        reflected,
+        kept_off,
+    })
+    .collect()
+}
+
+fn around_place(
+    scene: &PlacedScene<'_>,
+    discs: &DiscTree,
+    own: usize,
+    (start, normal): (Vec3, Vec3),
+    rays: usize,
+) -> Around {
+    let is_real = scene.things[own].thing.is_real;
+    let own = scene.things[own].number;
+    let among = match is_real {
         true => Among::Real,
         false => Among::All,
     };
-    let weight = 4.0 * PI / RAYS as f64;
-    for (number, direction) in sphere(RAYS).enumerate() {
-        // What casters reflect on to real things is added by the pixel.
-        let counts = |placed: &PlacedThing<'_>| {
-            placed.number != number_of_own && !(placed.thing.casts && own.is_real)
-        };
-        let Some(seen) = scene.seen(place, direction.as_vec3(), counts) else {
+    let counts = |placed: &PlacedThing<'_>| !is_real || !placed.thing.casts && placed.number != own;
+    let weight = PI / rays.max(1) as f32;
+    let mut around = Around::default();
+    for (number, direction) in hemisphere(normal, rays).enumerate() {
+        let Some(seen) = scene.seen(start, direction, counts) else {
             continue;
         };
-        let values = basis(direction, TRANSFER_DEGREE);
-        let mut added = scene.radiance(among, &seen, number).as_dvec3();
-        if !own.is_real && !scene.things[seen.thing].thing.casts {
-            let parts = scene.distant.harmonics.iter().zip(&values);
-            let behind: DVec3 = parts.map(|(&part, &value)| part * value).sum();
-            added -= behind.max(DVec3::ZERO);
-        }
-        for (sum, value) in sums.iter_mut().zip(values) {
-            *sum += added * (weight * value);
+        let reflected = scene.radiance(among, &seen, number) + discs.passed_on(scene, among, &seen);
+        around.reflected += reflected * weight;
+        if !scene.things[seen.thing].thing.casts {
+            around.kept_off += scene.distant.coarse.radiance(direction.as_dvec3()) * weight;
         }
     }
-    sums
+    around
 }

@@ -1,5 +1,7 @@
 //! A thing as light from afar meets it: simplified, in its anchor's space.
 
+use std::ops::Range;
+
 use glam::Vec3;
 
 use crate::geometry::bounds::Bounds;
@@ -7,7 +9,7 @@ use crate::geometry::ray_caster::RayCaster;
 use crate::geometry::solid::holes;
 use crate::shafts::bounding::Ball;
 use crate::shafts::casters::Occluder;
-use crate::shafts::surfels::{Surfel, surfels};
+use crate::shafts::surfels::{Surfel, surfels_of_triangles};
 
 /// Discs that a thing's surface reflects light from.
 const SURFELS: usize = 256;
@@ -34,6 +36,8 @@ pub struct Thing {
     pub bounds: Bounds,
     /// Its surface as discs of one area; none where it casts no shadow: what a table reflects is known otherwise.
     pub surfels: Vec<Surfel>,
+    /// For each triangle the numbers of those on it, or nearest to it.
+    surfels_on: Vec<Range<usize>>,
 }
 
 impl Thing {
@@ -44,13 +48,27 @@ impl Thing {
         }
         let with_albedo = thing.simplified_in_anchor();
         let own = Self::of_triangles(thing, is_real, &with_albedo)?;
+        let (surfels, surfels_on) = match thing.casts {
+            true => surfels_of_triangles(&with_albedo, SURFELS),
+            false => Default::default(),
+        };
         Some(Self {
-            surfels: match thing.casts {
-                true => surfels(&with_albedo, SURFELS),
-                false => Vec::new(),
-            },
+            surfels,
+            surfels_on,
             ..own
         })
+    }
+
+    /// Number of the disc of its surface that is nearest to a place on a triangle, and on the side of a normal; in the anchor's
+    /// space.
+    pub fn disc_at(&self, triangle: usize, place: Vec3, normal: Vec3) -> Option<usize> {
+        let on = self.surfels_on.get(triangle)?.clone();
+        let on = on.filter(|&number| {
+            let surfel = self.surfels.get(number);
+            surfel.is_some_and(|surfel| surfel.normal.dot(normal) > 0.0)
+        });
+        let distance = |&number: &usize| self.surfels[number].position.distance_squared(place);
+        on.min_by(|one, other| distance(one).total_cmp(&distance(other)))
     }
 
     /// With all its triangles and without discs; `None` where nothing of it is there.
@@ -82,6 +100,7 @@ impl Thing {
             ball: Ball { center, radius },
             bounds,
             surfels: Vec::new(),
+            surfels_on: Vec::new(),
             triangles,
             albedos,
         })

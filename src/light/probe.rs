@@ -19,6 +19,14 @@ impl Probe {
             .then_some(Self { size_px, radiance })
     }
 
+    /// The same radiance from everywhere.
+    pub fn of_one_radiance(radiance: Vec3) -> Self {
+        Self {
+            size_px: [1, 1],
+            radiance: vec![radiance],
+        }
+    }
+
     /// Columns and rows.
     pub fn size_px(&self) -> [usize; 2] {
         self.size_px
@@ -40,18 +48,47 @@ impl Probe {
         })
     }
 
+    /// The same light in no more than so many columns and rows, each pixel the mean of what lies in it.
+    pub fn coarser(&self, most_px: [usize; 2]) -> Self {
+        let size_px = [0, 1].map(|axis| self.size_px[axis].min(most_px[axis].max(1)));
+        let mut sums = vec![(Vec3::ZERO, 0.0_f32); size_px[0] * size_px[1]];
+        for (index, (_, radiance, solid_angle)) in self.rays().enumerate() {
+            let place = [index % self.size_px[0], index / self.size_px[0]];
+            let [column, row] = [0, 1].map(|axis| place[axis] * size_px[axis] / self.size_px[axis]);
+            let (sum, whole) = &mut sums[row * size_px[0] + column];
+            *sum += radiance * solid_angle as f32;
+            *whole += solid_angle as f32;
+        }
+        let means = sums.into_iter().map(|(sum, whole)| sum / whole);
+        Self {
+            size_px,
+            radiance: means.collect(),
+        }
+    }
+
+    /// Makes all of it so many times as bright.
+    pub fn scale(&mut self, factor: f32) {
+        self.radiance
+            .iter_mut()
+            .for_each(|radiance| *radiance *= factor);
+    }
+
     /// Puts another radiance into a pixel.
     pub(super) fn set_pixel(&mut self, index: usize, radiance: Vec3) {
         self.radiance[index] = radiance;
     }
 
-    /// Radiance from the pixel that a direction of any length falls into.
+    /// Radiance from the pixel that a direction of any length falls into; of no pixels, none.
     pub fn radiance(&self, direction: DVec3) -> Vec3 {
         let [width, height] = self.size_px;
         let u = (direction.y.atan2(direction.x) + PI) / TAU;
         let v = (direction.z / direction.length()).clamp(-1.0, 1.0).acos() / PI;
-        let pixel = |part: f64, count: usize| ((part * count as f64) as usize).min(count - 1);
-        self.radiance[pixel(v, height) * width + pixel(u, width)]
+        let pixel =
+            |part: f64, count: usize| ((part * count as f64) as usize).min(count.saturating_sub(1));
+        let found = self
+            .radiance
+            .get(pixel(v, height) * width + pixel(u, width));
+        found.copied().unwrap_or_default()
     }
 
     /// Unit direction of a place in the picture, in pixels from its upper left corner.
@@ -91,5 +128,23 @@ mod tests {
         let sphere: f64 = (0..8).map(|row| 16.0 * probe.pixel_solid_angle(row)).sum();
         assert!((sphere - 4.0 * PI).abs() < 1e-12);
         assert!(Probe::new([3, 2], vec![Vec3::ZERO; 5]).is_none());
+    }
+
+    #[test]
+    fn a_coarser_probe_has_the_same_light() {
+        let pixel = |index: usize| Vec3::new((index % 7) as f32, (index / 30) as f32, 1.0);
+        let probe = Probe::new([30, 18], (0..540).map(pixel).collect()).expect("pixels");
+        let sum = |probe: &Probe| -> DVec3 {
+            let parts = probe.rays();
+            let parts = parts.map(|(_, radiance, angle)| radiance.as_dvec3() * angle);
+            parts.sum()
+        };
+        for (most_px, size_px) in [([10, 6], [10, 6]), ([64, 32], [30, 18])] {
+            let coarser = probe.coarser(most_px);
+            assert_eq!(coarser.size_px(), size_px);
+            assert!((sum(&coarser) / sum(&probe) - 1.0).abs().max_element() < 1e-5);
+        }
+        // What is above stays above.
+        assert_eq!(probe.coarser([1, 2]).pixels()[1].y, 13.0 + 1.0 / 3.0);
     }
 }

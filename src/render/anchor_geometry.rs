@@ -82,8 +82,8 @@ pub(super) struct SurfaceBatch {
     pub indices: wgpu::Buffer,
     /// For each corner a [`CornerOfMaterial`], where the scene needs them.
     pub looks: Option<wgpu::Buffer>,
-    /// For each corner its self-occlusion, where a technique gives it ([`OCCLUSION_LAYOUT`]).
-    pub occlusion: Option<wgpu::Buffer>,
+    /// Where a technique gives it.
+    pub occlusion: Option<OcclusionCorners>,
     /// The same corners as values.
     pub places: BatchCorners,
 }
@@ -96,7 +96,22 @@ pub(super) struct BatchCorners {
     pub thing_of: Vec<u32>,
 }
 
-/// Vertex layout of [`SurfaceBatch::occlusion`]: visibility in 16 harmonics, and the number of the thing.
+/// What is known of light from afar at each corner of a batch.
+pub(super) struct OcclusionCorners {
+    /// Its self-occlusion ([`OCCLUSION_LAYOUT`]).
+    pub own: wgpu::Buffer,
+    /// The part of its irradiance that is of what things reflect ([`REFLECTED_LAYOUT`]).
+    pub reflected: wgpu::Buffer,
+}
+
+/// Vertex layout of [`OcclusionCorners::reflected`].
+pub(super) const REFLECTED_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
+    array_stride: 12,
+    step_mode: wgpu::VertexStepMode::Vertex,
+    attributes: &wgpu::vertex_attr_array![13 => Float32x3],
+};
+
+/// Vertex layout of [`OcclusionCorners::own`]: visibility in 16 harmonics, and the number of the thing.
 pub(super) const OCCLUSION_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
     array_stride: 68,
     step_mode: wgpu::VertexStepMode::Vertex,
@@ -434,7 +449,8 @@ impl SharedCorners {
 }
 
 /// Vertices that may be written again.
-const CHANGING: wgpu::BufferUsages = wgpu::BufferUsages::VERTEX.union(wgpu::BufferUsages::COPY_DST);
+pub(super) const CHANGING: wgpu::BufferUsages =
+    wgpu::BufferUsages::VERTEX.union(wgpu::BufferUsages::COPY_DST);
 
 /// What a corner of a mesh that changes its shape follows, so written that corners which may part have different ones.
 fn moved_by(mesh: &Mesh, number: usize) -> [u32; 7] {

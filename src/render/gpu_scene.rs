@@ -18,8 +18,8 @@ use crate::light::Light;
 use crate::scene::{Scene, SceneLight, ShadowSettings, Shortcut};
 
 use super::anchor_geometry::{
-    AnchorGeometry, AnchoredModel, BatchCorners, Corners, KnownLevels, ModelLevel, Role,
-    SurfaceBatch,
+    AnchorGeometry, AnchoredModel, BatchCorners, Corners, KnownLevels, ModelLevel,
+    OcclusionCorners, Role, SurfaceBatch,
 };
 use super::attachments::texture;
 use super::casters::Casters;
@@ -370,19 +370,25 @@ impl GpuScene {
         batches.map(|batch| (batch.role, batch.anchor, &batch.places))
     }
 
-    /// Gives each batch, in their order, what its corners hide from themselves (as [`OCCLUSION_LAYOUT`] has it).
-    ///
-    /// [`OCCLUSION_LAYOUT`]: super::anchor_geometry::OCCLUSION_LAYOUT
-    pub fn set_occlusion(&mut self, occlusions: impl Iterator<Item = Option<wgpu::Buffer>>) {
+    /// Gives each batch, in their order, what its corners hide from themselves.
+    pub fn set_occlusion(&mut self, occlusions: impl Iterator<Item = Option<OcclusionCorners>>) {
         for (batch, occlusion) in self.batches.iter_mut().zip(occlusions) {
             batch.occlusion = occlusion;
         }
     }
 
-    /// Gives a batch's corners their irradiance; `number` counts the batches.
-    pub fn write_indirect(&self, queue: &wgpu::Queue, number: usize, irradiances: &[Vec3]) {
-        let contents = bytemuck::cast_slice(irradiances);
-        queue.write_buffer(&self.batches[number].indirect, 0, contents);
+    /// Gives a batch's corners their irradiance, and the part of it that is of what things reflect; `number` counts the batches.
+    pub fn write_indirect(
+        &self,
+        queue: &wgpu::Queue,
+        number: usize,
+        [irradiances, reflected]: [&[Vec3]; 2],
+    ) {
+        let batch = &self.batches[number];
+        queue.write_buffer(&batch.indirect, 0, bytemuck::cast_slice(irradiances));
+        if let Some(occlusion) = &batch.occlusion {
+            queue.write_buffer(&occlusion.reflected, 0, bytemuck::cast_slice(reflected));
+        }
     }
 
     /// The real things as the frame has them.

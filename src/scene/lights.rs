@@ -143,7 +143,7 @@ choices! {
         Estimated = "estimated",
         /// Once, and no more.
         Once = "once",
-        /// Twice, the second time by few rays.
+        /// Twice, the second time by few rays; what goes on from there is estimated.
         Twice = "twice",
     }
 }

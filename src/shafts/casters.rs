@@ -15,7 +15,7 @@ use super::selection::Representative;
 use super::surfels::{GroupedSurfels, LitSurfel, Surfel, open_directions, surfels};
 
 /// The limit to how far outlines may move for fewer triangles, in parts of a thing's size.
-const COARSE_PART: f64 = 0.004;
+pub const COARSE_PART: f64 = 0.004;
 /// Surfels of all things together.
 const SURFELS: usize = 512;
 /// Surfels of each thing at least.

@@ -2,6 +2,7 @@
 //! thing itself does not hide it.
 
 use std::f32::consts::PI;
+use std::ops::Range;
 
 use glam::Vec3;
 
@@ -74,11 +75,7 @@ pub fn interreflected_irradiance<'a>(
 impl LitSurfel {
     /// Irradiance of a place for each unit of its radiance.
     pub fn irradiance_part(&self, place: Vec3, normal: Vec3) -> f32 {
-        let part = from_disc(place, normal, &self.surfel);
-        match part > 0.0 && is_open(self.open, place - self.surfel.position) {
-            true => part,
-            false => 0.0,
-        }
+        from_open_disc(place, normal, &self.surfel, self.open)
     }
 }
 
@@ -165,8 +162,25 @@ impl Group {
     }
 }
 
+/// [`from_disc`], where the bit of the direction to the place is set.
+pub fn from_open_disc(place: Vec3, normal: Vec3, surfel: &Surfel, open: u64) -> f32 {
+    let part = from_disc(place, normal, surfel);
+    match part > 0.0 && is_open(open, place - surfel.position) {
+        true => part,
+        false => 0.0,
+    }
+}
+
 /// About `count` surfels of equal area on triangles (with their albedo), spread over them.
 pub fn surfels(triangles: &[([Vec3; 3], Vec3)], count: usize) -> Vec<Surfel> {
+    surfels_of_triangles(triangles, count).0
+}
+
+/// The same, and for each triangle those that are on it or, where none is, the nearest in their order.
+pub fn surfels_of_triangles(
+    triangles: &[([Vec3; 3], Vec3)],
+    count: usize,
+) -> (Vec<Surfel>, Vec<Range<usize>>) {
     let area = |[a, b, c]: [Vec3; 3]| 0.5 * (b - a).cross(c - a).length();
     let mut order: Vec<usize> = (0..triangles.len()).collect();
     let center = |index: usize| triangles[index].0.iter().sum::<Vec3>() / 3.0;
@@ -174,6 +188,7 @@ pub fn surfels(triangles: &[([Vec3; 3], Vec3)], count: usize) -> Vec<Surfel> {
     let total: f32 = triangles.iter().map(|(corners, _)| area(*corners)).sum();
     let share = total / count.max(1) as f32;
     let mut result = Vec::with_capacity(count);
+    let mut on_triangle = vec![0..0; triangles.len()];
     let mut covered = 0.0;
     for index in order {
         let (corners, albedo) = triangles[index];
@@ -181,6 +196,11 @@ pub fn surfels(triangles: &[([Vec3; 3], Vec3)], count: usize) -> Vec<Surfel> {
         let before = (covered / share + 0.5).floor();
         covered += area(corners);
         let here = ((covered / share + 0.5).floor() - before) as usize;
+        let first = match here {
+            0 => result.len().saturating_sub(1),
+            _ => result.len(),
+        };
+        on_triangle[index] = first..first + here.max(1);
         result.extend(points_on(corners, here).map(|position| Surfel {
             position,
             normal: (b - a).cross(c - a).normalize_or_zero(),
@@ -188,7 +208,7 @@ pub fn surfels(triangles: &[([Vec3; 3], Vec3)], count: usize) -> Vec<Surfel> {
             albedo,
         }));
     }
-    result
+    (result, on_triangle)
 }
 
 /// Halves again and again along the longest axis: neighbours in the order are neighbours in space.

@@ -257,6 +257,204 @@ fn a_coarse_shelf_is_as_dark_in_its_corner_as_rays_say() {
     );
 }
 
+/// A patch of the white shelf's floor or wall in the world.
+struct Patch {
+    place: DVec3,
+    normal: DVec3,
+    area: f64,
+    /// Irradiance.
+    arriving: f64,
+}
+
+/// The shelf's floor or its wall in patches, each with the light from afar that nothing hides.
+fn patches(probe: &Probe, caster: &RayCaster, is_floor: bool) -> Vec<Patch> {
+    const SIDE: usize = 24;
+    let along =
+        |low: f64, high: f64, index: usize| low + (high - low) * (index as f64 + 0.5) / SIDE as f64;
+    let places = (0..SIDE * SIDE).map(|index| (index % SIDE, index / SIDE));
+    let of_place = |(column, row)| {
+        let y = along(-0.08, 0.08, column);
+        let (place, normal, size) = match is_floor {
+            true => (DVec3::new(along(-0.08, 0.07, row), y, 0.06), DVec3::Z, 0.15),
+            false => (
+                DVec3::new(0.07, y, along(0.06, 0.15, row)),
+                DVec3::NEG_X,
+                0.09,
+            ),
+        };
+        Patch {
+            place,
+            normal,
+            area: 0.16 * size / (SIDE * SIDE) as f64,
+            arriving: exact(probe, place, normal, &[caster]),
+        }
+    };
+    places.map(of_place).collect()
+}
+
+/// Irradiance of a place from white patches of an albedo.
+fn from_patches(place: DVec3, normal: DVec3, patches: &[Patch], albedo: f64) -> f64 {
+    let parts = patches.iter().map(|patch| {
+        let way = patch.place - place;
+        let squared = way.length_squared();
+        let cosines = way.dot(normal).max(0.0) * (-way.dot(patch.normal)).max(0.0);
+        albedo / std::f64::consts::PI * patch.arriving * patch.area * cosines / (squared * squared)
+    });
+    parts.sum()
+}
+
+const ALBEDO: f64 = 0.8;
+
+/// Gives patches what others reflect, beside what is theirs alone.
+fn pass_on(patches: &mut [Patch], alone: &[f64], others: &[Patch]) {
+    for (patch, alone) in patches.iter_mut().zip(alone) {
+        patch.arriving = alone + from_patches(patch.place, patch.normal, others, ALBEDO);
+    }
+}
+
+/// What its wall and its floor reflect on to each other.
+#[test]
+fn a_white_shelf_is_as_bright_in_its_corner_as_radiosity_says() {
+    let mut scene = shelf_scene();
+    scene.virtuals[0].materials[0].albedo = DVec3::splat(ALBEDO);
+    scene.probe.as_mut().expect("a probe").exposure = 0.5;
+    let (_, _, picture) = gains(&scene, camera());
+    let probe = scene.probe.as_ref().expect("a probe");
+    let caster = RayCaster::new(&triangles(&scene.virtuals[0]));
+    let mut floor = patches(&probe.probe, &caster, true);
+    let mut wall = patches(&probe.probe, &caster, false);
+    let [of_floor, of_wall] = [&floor, &wall].map(|patches| {
+        let direct = patches.iter().map(|patch| patch.arriving);
+        direct.collect::<Vec<f64>>()
+    });
+    // What is left of light after so many bounces is nothing.
+    for _ in 0..8 {
+        pass_on(&mut wall, &of_wall, &floor);
+        pass_on(&mut floor, &of_floor, &wall);
+    }
+    let [mut squares, mut off, mut reflected, mut whole] = [0.0; 4];
+    for (patch, direct) in floor.iter().zip(of_floor) {
+        // (Nearer to the wall than its patches are wide they tell little.)
+        if patch.place.x > 0.06 || patch.place.y.abs() > 0.075 {
+            continue;
+        }
+        let radiance = ALBEDO / std::f64::consts::PI * probe.exposure;
+        let difference = picture.linear(pixel_of(patch.place)).y / radiance - patch.arriving;
+        squares += difference * difference / floor.len() as f64;
+        off += difference;
+        reflected += patch.arriving - direct;
+        whole += patch.arriving / floor.len() as f64;
+    }
+    let rms = squares.sqrt() / whole;
+    assert!(rms < 0.045, "{rms}");
+    // (Between corners it is more than it should be: light from a wall falls off as a hollow curve.)
+    assert!(off.abs() < 0.2 * reflected, "{off} of {reflected}");
+}
+
+/// The pixel that shows a place.
+fn pixel_of(place: DVec3) -> usize {
+    let seen = camera().transform_point3(place);
+    let pixel = CAMERA.focal_px * seen.truncate() / seen.z + CAMERA.center_px;
+    pixel.y.round() as usize * 120 + pixel.x.round() as usize
+}
+
+/// A box of one albedo.
+fn white_box(name: &str, low: [f32; 3], high: [f32; 3]) -> Object {
+    let mut made = black_box(name, low, high, DAffine3::IDENTITY);
+    made.materials[0].albedo = DVec3::splat(ALBEDO);
+    made
+}
+
+/// A sky with a glow low above the horizon, towards the camera.
+fn evening() -> Probe {
+    let grid = even(1.0);
+    let toward = DVec3::new(0.2, -1.0, 0.2).normalize();
+    let pixels = (0..96 * 48).map(|index| {
+        let way = grid.direction((index % 96) as f64 + 0.5, (index / 96) as f64 + 0.5);
+        let glow = 30.0 * way.dot(toward).max(0.0).powi(60);
+        Vec3::splat(if way.z > 0.0 { 0.3 + glow } else { 0.05 } as f32)
+    });
+    Probe::new([96, 48], pixels.collect()).expect("pixels")
+}
+
+/// Harmonics smear a low glow over what the table hides.
+#[test]
+fn a_low_glow_is_all_on_what_faces_it() {
+    let cube = white_box("cube", [-0.03, 0.0, 0.0], [0.03, 0.05, 0.06]);
+    let mut scene = under_sky(0, Vec::new(), vec![cube]);
+    scene.probe = Some(probe_scene(evening()));
+    let (_, _, picture) = gains(&scene, camera());
+    let place = DVec3::new(0.0, 0.0, 0.04);
+    let probe = scene.probe.as_ref().expect("a probe");
+    let irradiance = exact(&probe.probe, place, DVec3::NEG_Y, &[]) * probe.exposure;
+    let expected = ALBEDO / std::f64::consts::PI * irradiance;
+    let found = picture.linear(pixel_of(place)).y;
+    assert!(
+        (found / expected - 1.0).abs() < 0.03,
+        "{found}, not {expected}"
+    );
+}
+
+/// Nothing is taken of what a real wall reflects on to a virtual face for the light that the same wall hides.
+#[test]
+fn a_wall_gives_what_it_reflects_for_what_it_hides() {
+    let cube = white_box("cube", [-0.03, 0.0, 0.0], [0.03, 0.05, 0.06]);
+    // Beside the camera's way to the cube, lit from there.
+    let wall = white_box("wall", [0.05, -0.12, 0.0], [0.06, 0.1, 0.15]);
+    let caster = RayCaster::new(&triangles(&wall));
+    let toward = DVec3::new(-0.6, -0.5, 0.6).normalize();
+    let grid = even(1.0);
+    let pixels = (0..96 * 48).map(|index| {
+        let way = grid.direction((index % 96) as f64 + 0.5, (index / 96) as f64 + 0.5);
+        Vec3::splat((0.2 + 8.0 * way.dot(toward).max(0.0).powi(8)) as f32)
+    });
+    let probe = probe_scene(Probe::new([96, 48], pixels.collect()).expect("pixels"));
+    let (place, normal) = (DVec3::new(0.015, 0.0, 0.04), DVec3::NEG_Y);
+    let irradiance_beside = |wall: &Object| {
+        let mut scene = under_sky(0, vec![wall.clone()], vec![cube.clone()]);
+        scene.probe = Some(probe.clone());
+        let (_, _, picture) = gains(&scene, camera());
+        picture.linear(pixel_of(place)).y * std::f64::consts::PI / (ALBEDO * probe.exposure)
+    };
+    let mut black = wall.clone();
+    black.materials[0].albedo = DVec3::ZERO;
+    let [found, beside_black] = [&wall, &black].map(irradiance_beside);
+    let direct = exact(&probe.probe, place, normal, &[&caster]);
+    // The wall's side in front of the cube, and the cube's front, which light each other.
+    let patch = |place: DVec3, normal: DVec3, casters: &[&RayCaster]| Patch {
+        place,
+        normal,
+        area: 0.005 * 0.005,
+        arriving: exact(&probe.probe, place, normal, casters),
+    };
+    let along = |step: usize| 0.005 * (step as f64 + 0.5);
+    let grid_of = |columns: usize, rows: usize| {
+        (0..columns * rows).map(move |index| (along(index % columns), along(index / columns)))
+    };
+    let mut side: Vec<Patch> = grid_of(24, 30)
+        .map(|(y, z)| patch(DVec3::new(0.05, y - 0.12, z), DVec3::NEG_X, &[]))
+        .collect();
+    let mut front: Vec<Patch> = grid_of(12, 12)
+        .map(|(x, z)| patch(DVec3::new(x - 0.03, 0.0, z), normal, &[&caster]))
+        .collect();
+    let alone = |patches: &[Patch]| patches.iter().map(|it| it.arriving).collect::<Vec<f64>>();
+    let (of_side, of_front) = (alone(&side), alone(&front));
+    for _ in 0..6 {
+        pass_on(&mut side, &of_side, &front);
+        pass_on(&mut front, &of_front, &side);
+    }
+    let reflected = from_patches(place, normal, &side, ALBEDO);
+    assert!(
+        (beside_black / direct - 1.0).abs() < 0.06,
+        "{beside_black}, not {direct}"
+    );
+    let gained = found - beside_black;
+    assert!(
+        (gained / reflected - 1.0).abs() < 0.15,
+        "{gained}, not {reflected}"
+    );
+}
+
 #[test]
 fn what_is_cut_has_the_outline_that_it_had() {
     let scene = shelf_scene();

@@ -33,8 +33,8 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context as _, Result, bail};
 
+use crate::app::files::LockedFolder;
 use crate::app::files::job_files::{JobFiles, Replacing};
-use crate::app::files::lock;
 use crate::app::files::picture_files::{write_rgb_png, write_text};
 use crate::app::files::result_kind::ResultKind;
 use crate::app::stages::progress::Progress;
@@ -152,7 +152,7 @@ pub fn chart(request: &ChartRequest, stop: &AtomicBool) -> Result<String> {
     let count = counts?.into_iter().sum();
     let measured = request.out.join(MEASURED);
     let _this_run_s = std::fs::create_dir_all(&measured)
-        .and_then(|()| lock(&measured))
+        .and_then(|()| LockedFolder::open(&measured))
         .with_context(|| measured.display().to_string())?;
     let progress = Progress::of_measurements(count);
     for chart in &charts {

@@ -7,7 +7,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::file_identity::is_at;
-use super::locked_folder::lock;
+use super::locked_folder::LockedFolder;
 use super::new_file::{NewFile, vanished};
 use super::output_error::OutputError;
 
@@ -16,7 +16,7 @@ use super::output_error::OutputError;
 pub struct FrameFolder {
     path: PathBuf,
     /// Open, so that it is known again, and locked.
-    folder: File,
+    folder: LockedFolder,
     written: BTreeSet<String>,
     /// Whether nothing was there before.
     is_new: bool,
@@ -31,7 +31,7 @@ impl FrameFolder {
         let is_new = !path.exists();
         let open = || {
             fs::create_dir_all(path)?;
-            lock(path)
+            LockedFolder::open(path)
         };
         Ok(Self {
             path: path.to_owned(),

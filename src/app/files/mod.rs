@@ -20,4 +20,4 @@ pub mod unfinished;
 pub mod video_writer;
 
 pub(crate) use file_identity::is_at;
-pub(crate) use locked_folder::lock;
+pub(crate) use locked_folder::LockedFolder;

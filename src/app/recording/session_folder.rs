@@ -9,9 +9,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tempfile::TempDir;
 
 use super::scene_copy::{SCENE_NAME, copy_folders};
+use crate::app::files::LockedFolder;
 use crate::app::files::is_at;
 use crate::app::files::job_files::Replacing;
-use crate::app::files::lock;
 use crate::app::files::output_error::OutputError;
 use crate::app::files::unfinished::Unfinished;
 
@@ -40,7 +40,7 @@ pub struct SessionFolder {
 struct Begun {
     path: PathBuf,
     /// Open, so that it is known again, and locked.
-    folder: File,
+    folder: LockedFolder,
     /// Holds the older session.
     older: Option<TempDir>,
     kept: bool,
@@ -98,7 +98,7 @@ impl Begun {
         io_error: impl Fn(io::Error) -> OutputError,
     ) -> Result<Self, OutputError> {
         fs::create_dir_all(path).map_err(&io_error)?;
-        let mut folder = lock(path).map_err(&io_error)?;
+        let mut folder = LockedFolder::open(path).map_err(&io_error)?;
         let names = names_in(path).map_err(&io_error)?;
         let mut older = None;
         if let Some(first) = names.first() {
@@ -114,7 +114,7 @@ impl Begun {
                 ),
                 (Replacing::Anything, None) => {
                     older = Some(set_aside(path).map_err(&io_error)?);
-                    folder = lock(path).map_err(&io_error)?;
+                    folder = LockedFolder::open(path).map_err(&io_error)?;
                     String::new()
                 }
             };

@@ -19,6 +19,7 @@ use crate::environment::glossy::EnvironmentMatrix;
 use crate::environment::placed::PlacedScene;
 use crate::environment::self_occlusion::OwnSpace;
 use crate::environment::sky::Sky;
+use crate::environment::surroundings::Budget;
 use crate::environment::thing::Thing;
 use crate::geometry::bounds::Bounds;
 use crate::geometry::mesh::Mesh;
@@ -109,6 +110,10 @@ impl Environment {
             }
             EnvironmentMethod::Penumbrae | EnvironmentMethod::Maps => None,
         };
+        let budget = match scene.node_count() > 1 {
+            true => Budget::MOVING,
+            false => Budget::STANDING,
+        };
         let kinds = gpu_scene.kinds;
         let is_by_harmonics = kinds.glossy && settings.method == EnvironmentMethod::Maps;
         Self {
@@ -118,7 +123,7 @@ impl Environment {
             anchor: probe.anchor,
             things: things(scene),
             own_light: OwnLight::new(
-                &lit_by_corners(scene, final_gather.is_some()),
+                (&lit_by_corners(scene, final_gather.is_some()), budget),
                 gpu_scene,
                 precomputation,
             ),
@@ -154,8 +159,7 @@ impl Environment {
         let scene = PlacedScene::new(things, world_from_anchor, &self.distant, compact);
         let bounds: Vec<Bounds> = scene.things.iter().map(|placed| placed.bounds()).collect();
         let discs = scene.reflecting();
-        self.own_light
-            .write(gpu, gpu_scene, &scene, &bounds, &discs);
+        self.own_light.write(gpu, gpu_scene, &scene, &discs);
         let maps = casting.maps(&scene, &self.distant, self.things.len());
         let (seen_by, draws) = casting.draws(&maps);
         let regions = &self.distant.regions;

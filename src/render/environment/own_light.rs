@@ -3,20 +3,20 @@
 
 use std::sync::Arc;
 
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, Vec3};
 
 use crate::environment::placed::PlacedScene;
 use crate::environment::reflected::DiscTree;
 use crate::environment::self_occlusion::{
     OwnSpace, OwnSurface, SelfOcclusion, TRANSFER_DEGREE, VISIBILITIES,
 };
-use crate::environment::surroundings::LocalLight;
-use crate::geometry::bounds::Bounds;
+use crate::environment::surroundings::{self, Budget};
 use crate::geometry::corner_points::corner_points;
 use crate::light::harmonics::Turn;
+use crate::light::irradiance_records::IrradianceRecords;
 use crate::scene::Object;
 
-use super::super::anchor_geometry::{BatchCorners, Role};
+use super::super::anchor_geometry::{BatchCorners, CHANGING, OcclusionCorners, Role};
 use super::super::gpu::Gpu;
 use super::super::gpu_scene::GpuScene;
 use super::super::precomputation::Precomputation;
@@ -51,12 +51,12 @@ struct PlacedCorners {
     /// Number of the batch.
     batch: usize,
     anchor: usize,
-    /// Place and unit normal in the anchor's space.
-    points: Vec<(DVec3, DVec3)>,
     /// For each point the number of its self-occlusion.
     occlusion_of_point: Vec<usize>,
     /// The batch's corners, each with its point.
     corners: Vec<(usize, usize)>,
+    /// Where it is told what the points get from what stands around, in the anchor's space.
+    records: IrradianceRecords,
 }
 
 /// The things whose light is worked out at their corners.
@@ -65,13 +65,14 @@ pub(super) struct OwnLight {
     things: Vec<Option<OwnLitThing>>,
     /// What is known of each, also of those that are not there now.
     known: Vec<Option<Arc<OwnOcclusion>>>,
+    budget: Budget,
     is_placed: bool,
 }
 
 impl OwnLight {
     /// Of objects by their numbers; `None` where one is not there, or its light is gathered otherwise.
     pub fn new(
-        objects: &[Option<&Object>],
+        (objects, budget): (&[Option<&Object>], Budget),
         gpu_scene: &GpuScene,
         precomputation: &dyn Precomputation,
     ) -> Self {
@@ -95,6 +96,7 @@ impl OwnLight {
         Self {
             known: things.iter().map(own).collect(),
             things,
+            budget,
             is_placed: false,
         }
     }
@@ -139,7 +141,7 @@ impl OwnLight {
             return;
         }
         let batches = gpu_scene.corners().enumerate();
-        let buffers: Vec<Option<wgpu::Buffer>> = batches
+        let buffers: Vec<Option<OcclusionCorners>> = batches
             .map(|(batch, (_, anchor, corners))| self.place_in(gpu, (batch, anchor), corners))
             .collect();
         gpu_scene.set_occlusion(buffers.into_iter());
@@ -151,14 +153,15 @@ impl OwnLight {
         gpu: &Gpu,
         (batch, anchor): (usize, usize),
         corners: &BatchCorners,
-    ) -> Option<wgpu::Buffer> {
+    ) -> Option<OcclusionCorners> {
         let mut visibilities = vec![[0.0; VISIBILITIES]; corners.thing_of.len()];
         let mut is_any = false;
         for (number, thing) in self.things.iter_mut().enumerate() {
             let Some(thing) = thing else {
                 continue;
             };
-            let Some(placed) = PlacedCorners::new((batch, anchor), corners, number, &thing.own)
+            let Some(placed) =
+                PlacedCorners::new((batch, anchor), corners, (number, &thing.own), self.budget)
             else {
                 continue;
             };
@@ -171,7 +174,11 @@ impl OwnLight {
         }
         is_any.then(|| {
             let contents = occlusion_corners(&corners.thing_of, &visibilities);
-            gpu.buffer("self-occlusion", &contents, wgpu::BufferUsages::VERTEX)
+            let nothing = vec![Vec3::ZERO; visibilities.len()];
+            OcclusionCorners {
+                own: gpu.buffer("self-occlusion", &contents, wgpu::BufferUsages::VERTEX),
+                reflected: gpu.buffer("reflected", bytemuck::cast_slice(&nothing), CHANGING),
+            }
         })
     }
 
@@ -214,16 +221,14 @@ impl OwnLight {
         gpu: &Gpu,
         gpu_scene: &GpuScene,
         scene: &PlacedScene<'_>,
-        bounds: &[Bounds],
         discs: &DiscTree,
     ) {
         let world_from_anchor = gpu_scene.light_from_anchor().unwrap_or_default();
-        let batches = gpu_scene.corners();
-        let mut irradiances: Vec<Option<Vec<Vec3>>> = batches.map(|_| None).collect();
         let sizes: Vec<usize> = gpu_scene
             .corners()
             .map(|(_, _, corners)| corners.thing_of.len())
             .collect();
+        let mut batches: Vec<Option<[Vec<Vec3>; 2]>> = sizes.iter().map(|_| None).collect();
         for (number, thing) in self.things.iter().enumerate() {
             let Some((thing, placed)) = thing
                 .as_ref()
@@ -231,50 +236,53 @@ impl OwnLight {
             else {
                 continue;
             };
-            let of_batch = &mut irradiances[placed.batch];
-            let of_batch = of_batch.get_or_insert_with(|| vec![Vec3::ZERO; sizes[placed.batch]]);
+            let of_batch = batches[placed.batch].get_or_insert_with(|| {
+                let dark = vec![Vec3::ZERO; sizes[placed.batch]];
+                [dark.clone(), dark]
+            });
             let there = scene.position(number).zip(world_from_anchor[placed.anchor]);
             let Some((index, pose)) = there else {
                 continue;
             };
-            let light = LocalLight::new(scene, bounds[index], index);
-            let at_points = thing.irradiances(placed, &pose, &light, |place, normal| {
-                match scene.things[index].thing.is_real {
-                    true => Vec3::ZERO,
-                    false => discs.irradiance_from_itself(index, place, normal),
-                }
-            });
+            let at_points = thing.irradiances(placed, &pose, (scene, index), discs, self.budget);
             for &(corner, point) in &placed.corners {
-                of_batch[corner] = at_points[point];
+                for (values, value) in of_batch.iter_mut().zip(at_points[point]) {
+                    values[corner] = value;
+                }
             }
         }
-        for (batch, irradiances) in irradiances.iter().enumerate() {
-            if let Some(irradiances) = irradiances {
-                gpu_scene.write_indirect(&gpu.queue, batch, irradiances);
+        for (batch, values) in batches.iter().enumerate() {
+            if let Some([irradiances, reflected]) = values {
+                gpu_scene.write_indirect(&gpu.queue, batch, [irradiances, reflected]);
             }
         }
     }
 }
 
 impl OwnLitThing {
-    /// Irradiance of each point; `from_itself` says what the thing itself reflects on to a place with a normal, in the world.
+    /// Irradiance of each point, and the part of it that is of what things reflect; `own` is its place among the scene's things.
     fn irradiances(
         &self,
         placed: &PlacedCorners,
         world_from_anchor: &DAffine3,
-        light: &LocalLight,
-        from_itself: impl Fn(Vec3, Vec3) -> Vec3,
-    ) -> Vec<Vec3> {
+        (scene, own): (&PlacedScene<'_>, usize),
+        discs: &DiscTree,
+        budget: Budget,
+    ) -> Vec<[Vec3; 2]> {
+        let records = (&placed.records, world_from_anchor);
+        let around = surroundings::around(scene, discs, own, records, budget);
+        if scene.things[own].thing.is_real {
+            return around.iter().map(|it| [it.reflected; 2]).collect();
+        }
         let world_from_own = world_from_anchor.matrix3 * self.anchor_from_own;
         let turn = Turn::new(world_from_own.transpose(), TRANSFER_DEGREE);
-        let light = light.turned(&turn);
-        let points = placed.points.iter().zip(&placed.occlusion_of_point);
+        let from_afar = turn.turned(&scene.distant.harmonics);
+        let points = placed.occlusion_of_point.iter().zip(&around);
         points
-            .map(|(&(place, normal), &occlusion)| {
-                let place = world_from_anchor.transform_point3(place);
-                let normal = world_from_anchor.transform_vector3(normal);
-                let around = self.own.occlusions[occlusion].irradiance(&light.at(place));
-                around + from_itself(place.as_vec3(), normal.as_vec3())
+            .map(|(&occlusion, around)| {
+                let from_afar = self.own.occlusions[occlusion].irradiance(&from_afar);
+                let left = (from_afar - around.kept_off).max(Vec3::ZERO);
+                [left + around.reflected, around.reflected]
             })
             .collect()
     }
@@ -285,8 +293,8 @@ impl PlacedCorners {
     fn new(
         (batch, anchor): (usize, usize),
         BatchCorners { corners, thing_of }: &BatchCorners,
-        number: usize,
-        own: &OwnOcclusion,
+        (number, own): (usize, &OwnOcclusion),
+        budget: Budget,
     ) -> Option<Self> {
         let (values, triangles) = corners;
         let is_of_thing = |triangle: &&[u32; 3]| thing_of[triangle[0] as usize] as usize == number;
@@ -308,7 +316,7 @@ impl PlacedCorners {
         Some(Self {
             batch,
             anchor,
-            points,
+            records: IrradianceRecords::new(&points, budget.places),
             occlusion_of_point,
             corners,
         })

@@ -1,6 +1,6 @@
 //! How the environment's passes are built.
 
-use super::super::anchor_geometry::OCCLUSION_LAYOUT;
+use super::super::anchor_geometry::{OCCLUSION_LAYOUT, REFLECTED_LAYOUT};
 use super::super::gpu::Gpu;
 use super::super::pipelines::{
     GroupLayout, PipelineDescription, filtered, overwritten, sampler, uniform, untouched, words,
@@ -65,6 +65,7 @@ impl Pipelines {
         };
         let with_occlusion = |mut description: PipelineDescription| {
             description.vertex_buffers.push(OCCLUSION_LAYOUT);
+            description.vertex_buffers.push(REFLECTED_LAYOUT);
             Sided::new(gpu, &description)
         };
         let depth_alone = PipelineDescription {

@@ -1,6 +1,6 @@
 //! Things that change their shape, on the GPU: each has a node, and with it a batch, to itself.
 
-use super::super::anchor_geometry::{Role, corners};
+use super::super::anchor_geometry::{OcclusionCorners, Role, corners};
 use super::super::deforming::DeformingThing;
 use super::super::gpu::Gpu;
 use super::GpuScene;
@@ -33,7 +33,7 @@ impl GpuScene {
     }
 
     /// Gives the batch of a role and anchor another self-occlusion (see [`GpuScene::set_occlusion`]).
-    pub fn set_occlusion_of(&mut self, (role, anchor): (Role, usize), occlusion: wgpu::Buffer) {
+    pub fn set_occlusion_of(&mut self, (role, anchor): (Role, usize), occlusion: OcclusionCorners) {
         let mut batches = self.batches.iter_mut();
         if let Some(batch) = batches.find(|batch| (batch.role, batch.anchor) == (role, anchor)) {
             batch.occlusion = Some(occlusion);

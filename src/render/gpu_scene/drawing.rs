@@ -194,7 +194,8 @@ impl GpuScene {
         }
         if let Some(occlusion) = &batch.occlusion {
             let slot = 2 + u32::from(batch.looks.is_some());
-            pass.set_vertex_buffer(slot, occlusion.slice(..));
+            pass.set_vertex_buffer(slot, occlusion.own.slice(..));
+            pass.set_vertex_buffer(slot + 1, occlusion.reflected.slice(..));
         }
         if let Some(materials) = self
             .materials

@@ -220,12 +220,14 @@ fn set_map(material: &mut Material, written: &MtlMap, mtl: &MtlMaterial, map: Ma
         }
         MapRole::Roughness => {
             maps.roughness = Some(map);
+            material.shading = Shading::Principled;
             if mtl.roughness.is_none_or(|roughness| roughness == 0.0) {
                 material.roughness = Some(1.0);
             }
         }
         MapRole::Metallic => {
             maps.metallic = Some(map);
+            material.shading = Shading::Principled;
             if mtl.metallic.is_none_or(|metallic| metallic == 0.0) {
                 material.metallic = 1.0;
             }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3, Vec4Swizzles as _};
 use gnomon::app::scene_warnings::warnings;
-use gnomon::light::material::Coverage;
+use gnomon::light::material::{Coverage, Shading};
 use gnomon::scene::{Object, Scene};
 
 use super::{HEAD, load_in, project};
@@ -241,6 +241,47 @@ fn the_colours_picture_as_opacity_means_its_alpha() {
     let (leaves, warnings) = with("leaves.png");
     assert!((area(&leaves) - 0.005).abs() < 2e-4, "{}", area(&leaves));
     assert!(!warnings.iter().any(|warning| warning.contains("map_d")));
+}
+
+/// Roughness and metal come as pictures, as numbers or not at all, and with either the rest is a PBR renderer's.
+#[test]
+fn a_picture_of_roughness_or_metal_says_as_much_as_its_number() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let grey = image::GrayImage::from_pixel(2, 2, image::Luma([128]));
+    grey.save(here.join("grey.png")).unwrap();
+    let square = "mtllib a.mtl\nusemtl a\nv 0 0 0\nv .1 0 0\nv .1 .1 0\nv 0 .1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
+    let path = here.join("square.obj");
+    fs::write(&path, square).unwrap();
+    let with = |record: &str| {
+        fs::write(
+            here.join("a.mtl"),
+            format!("newmtl a\nKd 1 1 1\n{record}\n"),
+        )
+        .unwrap();
+        let (object, _) = thing(&path, "").unwrap();
+        object.materials[0]
+    };
+    for (record, shading, roughness, metallic) in [
+        ("", Shading::Lit, None, 0.0),
+        ("Pr .5", Shading::Principled, Some(0.25), 0.0),
+        ("map_Pr grey.png", Shading::Principled, Some(1.0), 0.0),
+        ("Pr 0\nmap_Pr grey.png", Shading::Principled, Some(1.0), 0.0),
+        ("map_Pm grey.png", Shading::Principled, None, 1.0),
+        ("map_Pr gone.png", Shading::Lit, None, 0.0),
+    ] {
+        let material = with(record);
+        assert_eq!(material.shading, shading, "{record}");
+        assert_eq!(material.roughness, roughness, "{record}");
+        assert_eq!(material.metallic, metallic, "{record}");
+        let has_map = record.contains("grey");
+        let maps = material.maps;
+        assert_eq!(
+            maps.roughness.or(maps.metallic).is_some(),
+            has_map,
+            "{record}"
+        );
+    }
 }
 
 /// Scanners' programs write a library and no `usemtl`.
