@@ -195,17 +195,8 @@ fn is_between(found: &Transfer, corners: &[Transfer; 3], weights: [f32; 3]) -> b
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::mesh::RawTriangle;
+    use crate::geometry::mesh::tests::welded;
     use glam::{DAffine3, DMat3};
-
-    fn welded(positions: &[Vec3], triangles: &[[u32; 3]]) -> Mesh {
-        let raw = triangles.iter().map(|&vertices| RawTriangle {
-            vertices,
-            normals: [None; 3],
-            material: 0,
-        });
-        Mesh::weld(positions, &raw.collect::<Vec<_>>(), 0.0).0
-    }
 
     /// A floor and a wall, open at their backs.
     fn corner() -> Mesh {

@@ -106,18 +106,12 @@ fn between(a: &CornerLook, b: &CornerLook) -> CornerLook {
 mod tests {
     use super::*;
     use crate::geometry::cuboid::cuboid;
-    use crate::geometry::mesh::RawTriangle;
+    use crate::geometry::mesh::tests::welded;
     use glam::{Vec2, Vec4};
 
     fn cube() -> Mesh {
         let (positions, triangles) = cuboid(Vec3::ZERO, Vec3::ONE);
-        let raw = triangles.iter().map(|&vertices| RawTriangle {
-            vertices,
-            normals: [None; 3],
-            material: 0,
-        });
-        let raw: Vec<RawTriangle> = raw.collect();
-        Mesh::weld(&positions, &raw, 0.0).0
+        welded(&positions, &triangles)
     }
 
     #[test]

@@ -427,4 +427,4 @@ fn component_count(uses: &[EdgeUse], triangles: usize) -> usize {
 mod looks_tests;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -181,17 +181,8 @@ fn crosses(from: DVec3, to: DVec3, [a, b, c]: &[DVec3; 3]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::mesh::RawTriangle;
+    use crate::geometry::mesh::tests::welded as mesh;
     use glam::Vec3;
-
-    fn mesh(positions: &[Vec3], triangles: &[[u32; 3]]) -> Mesh {
-        let raw = triangles.iter().map(|&vertices| RawTriangle {
-            vertices,
-            normals: [None; 3],
-            material: 0,
-        });
-        Mesh::weld(positions, &raw.collect::<Vec<_>>(), 0.0).0
-    }
 
     fn is_solid(mesh: &Mesh) -> bool {
         holes(mesh).is_some_and(|holes| holes.is_empty())

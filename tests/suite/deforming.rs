@@ -249,7 +249,10 @@ fn frozen(scene: &Scene, time_s: f64) -> Scene {
     let mut frozen = scene.shaped_at(time_s).into_owned();
     for thing in frozen.phantoms.iter_mut().chain(&mut frozen.virtuals) {
         thing.animation = None;
-        Arc::make_mut(&mut thing.mesh).held.clear();
+        // (What is held is not cut finer, as nothing is that changes its shape.)
+        if scene.shadows.technique != gnomon::scene::Technique::Environment {
+            Arc::make_mut(&mut thing.mesh).held.clear();
+        }
     }
     frozen
 }

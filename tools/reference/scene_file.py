@@ -13,7 +13,7 @@ class SceneError(Exception):
 
 @dataclass
 class Thing:
-    """A phantom or a virtual thing: a mesh file, or a rectangle x0, y0, x1, y1."""
+    """A phantom or a virtual thing: a mesh file, or a shape by its key in the scene, with its numbers."""
 
     name: str
     real: bool
@@ -24,8 +24,11 @@ class Thing:
     metallic: float
     casts: bool
     mesh: Path | None = None
-    rect_m: list | None = None
+    shape: tuple | None = None
     fit_m: float | None = None
+
+
+SHAPES = ("rect_m", "box_m", "sphere_m", "cylinder_m")
 
 
 @dataclass
@@ -111,7 +114,7 @@ def read_scene(path):
     if table := tree.get("table"):
         height = affine(np.eye(3), [0, 0, table.get("height_m", 0)])
         scene.things.append(Thing("table", True, world, height, rgb(table.get("albedo", 0.5)), None, 0.0, False,
-                                  rect_m=table["rect_m"]))
+                                  shape=("rect_m", table["rect_m"])))
     for kind in ("phantom", "virtual"):
         for thing in tree.get(kind, []):
             scale = np.diag(rgb(thing.get("scale", 1)))
@@ -121,10 +124,13 @@ def read_scene(path):
             on = thing.get("on", world)
             if on not in scene.anchors:
                 raise SceneError(f"{path}: {thing['name']} stands on \"{on}\"; there are {', '.join(scene.anchors)}")
+            shape = next(((key, thing[key]) for key in SHAPES if key in thing), None)
+            if shape is None and "mesh" not in thing:
+                raise SceneError(f"{path}: {thing['name']}: of shapes mesh, {', '.join(SHAPES)} are known here")
             scene.things.append(Thing(thing["name"], kind == "phantom", on, place, albedo, material.get("roughness"),
                                       material.get("metallic", 0.0), thing.get("casts", True),
                                       find(thing["mesh"]) if "mesh" in thing else None,
-                                      thing.get("rect_m"), thing.get("fit_m")))
+                                      shape, thing.get("fit_m")))
     scene.lights = tree.get("light", [])
     scene.ambient = rgb(tree.get("ambient", {}).get("radiance", 0))
     if probe := tree.get("probe"):

@@ -58,6 +58,41 @@ def rectangle(rect_m, world_from_object, lift_m=0.0):
     return {"type": "rectangle", "to_world": matrix(world_from_object @ place)}
 
 
+def box(numbers, world_from_object):
+    """Of three sides, standing on its origin; or between two corners."""
+    numbers = np.array(numbers, float)
+    low, high = (numbers[:3], numbers[3:]) if len(numbers) == 6 else (numbers * [-0.5, -0.5, 0], numbers * [0.5, 0.5, 1])
+    place = np.diag([*(high - low) / 2, 1])
+    place[:3, 3] = (low + high) / 2
+    return [{"type": "cube", "to_world": matrix(world_from_object @ place)}]
+
+
+def ball(radius, world_from_object):
+    """Lying on its origin."""
+    place = np.diag([radius, radius, radius, 1.0])
+    place[2, 3] = radius
+    return [{"type": "sphere", "to_world": matrix(world_from_object @ place)}]
+
+
+def cylinder(numbers, world_from_object):
+    """Of a radius and a height, standing on its origin, with both ends."""
+    radius, height = numbers
+    side = np.diag([radius, radius, height, 1.0])
+    top, bottom = np.diag([radius, radius, 1.0, 1.0]), np.diag([radius, -radius, -1.0, 1.0])
+    top[2, 3] = height
+    disks = [{"type": "disk", "to_world": matrix(world_from_object @ place)} for place in (top, bottom)]
+    return [{"type": "cylinder", "to_world": matrix(world_from_object @ side)}, *disks]
+
+
+def sheet(numbers, world_from_object):
+    """Between two corners, or of two sides about its origin."""
+    corners = numbers if len(numbers) == 4 else [-numbers[0] / 2, -numbers[1] / 2, numbers[0] / 2, numbers[1] / 2]
+    return [rectangle(corners, world_from_object)]
+
+
+SHAPES = {"rect_m": sheet, "box_m": box, "sphere_m": ball, "cylinder_m": cylinder}
+
+
 def has_normals(path):
     with open(path, errors="replace") as file:
         return any(line.startswith("vn ") for line in file)
@@ -74,12 +109,14 @@ def shapes(thing, world_from_anchor):
                 for number, part in enumerate(parts)}
     if thing.fit_m is not None:
         raise SceneError(f"{thing.name}: fit_m is known here of glTF alone")
-    if thing.rect_m is not None:
-        made = rectangle(thing.rect_m, place)
+    if thing.shape is not None:
+        key, numbers = thing.shape
+        parts = SHAPES[key](numbers, place)
     else:
         flat = thing.real or not has_normals(thing.mesh)
-        made = {"type": "obj", "filename": str(thing.mesh), "to_world": matrix(place), "face_normals": flat}
-    return {thing.name: {**made, "bsdf": surface(thing)}}
+        parts = [{"type": "obj", "filename": str(thing.mesh), "to_world": matrix(place), "face_normals": flat}]
+    names = [thing.name] if len(parts) == 1 else [f"{thing.name} {number}" for number in range(len(parts))]
+    return {name: {**part, "bsdf": surface(thing)} for name, part in zip(names, parts)}
 
 
 def picture(values):

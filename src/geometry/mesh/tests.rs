@@ -8,6 +8,12 @@ fn raw(vertices: [u32; 3]) -> RawTriangle {
     }
 }
 
+/// Flat triangles of one material, welded.
+pub(crate) fn welded(positions: &[Vec3], triangles: &[[u32; 3]]) -> Mesh {
+    let raw: Vec<RawTriangle> = triangles.iter().copied().map(raw).collect();
+    Mesh::weld(positions, &raw, 0.0).0
+}
+
 /// A tetrahedron whose triangles share no vertex.
 fn loose_tetrahedron() -> (Vec<Vec3>, Vec<RawTriangle>) {
     let corners = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
