@@ -197,7 +197,8 @@ fn light_on_real(sampled: SampledSurface, @builtin(front_facing) outside: bool) 
     }
     let reflected = reflected(point_in_world, normal);
     reaching += reflected.reaching;
-    let lost = taken + reflected.taken;
+    let of_reflected = recovered(sampled.reflected, sampled.first_reflected, sampled.one);
+    let lost = taken + reflected.taken + of_reflected;
     let is_seen = any(abs(lost) > LEAST_TAKEN * reaching);
     return LightSums(vec4f(reaching, 1.0), vec4f(select(vec3f(0.0), lost, is_seen), 0.0));
 }

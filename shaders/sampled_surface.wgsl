@@ -30,7 +30,7 @@ struct SampledSurface {
     @location(18) @interpolate(perspective, centroid) visibility_3: vec4f,
     // Number of the thing.
     @location(19) @interpolate(flat) thing: u32,
-    // The part of the irradiance that is of what things reflect.
+    // The part of the irradiance that is of what things reflect; on what is real, what virtual things take of that.
     @location(24) @interpolate(perspective, centroid) reflected: vec3f,
     @location(25) @interpolate(flat) first_reflected: vec3f,
 //!end

@@ -46,8 +46,10 @@ impl Budget {
 pub struct Around {
     /// Of what things reflect.
     pub reflected: Vec3,
-    /// Of the light from afar that what casts no shadow keeps from it.
+    /// Of a virtual thing: of the light from afar that what casts no shadow keeps from it.
     pub kept_off: Vec3,
+    /// Of a phantom: of what is reflected that virtual things take.
+    pub taken: Vec3,
 }
 
 /// What reaches points of thing `own` (its place among `scene.things`) that `records` are of, in a space of pose
@@ -82,10 +84,13 @@ pub fn around(
         records.at_points(&values)
     };
     let reflected = at_points(|around| around.reflected).into_iter();
-    let both = reflected.zip(at_points(|around| around.kept_off));
-    both.map(|(reflected, kept_off)| Around {
+    let kept_off = at_points(|around| around.kept_off);
+    let taken = at_points(|around| around.taken);
+    let all = reflected.zip(kept_off).zip(taken);
+    all.map(|((reflected, kept_off), taken)| Around {
         reflected,
         kept_off,
+        taken,
     })
     .collect()
 }
@@ -99,10 +104,6 @@ fn around_place(
 ) -> Around {
     let is_real = scene.things[own].thing.is_real;
     let own = scene.things[own].number;
-    let among = match is_real {
-        true => Among::Real,
-        false => Among::All,
-    };
     let counts = |placed: &PlacedThing<'_>| !is_real || !placed.thing.casts && placed.number != own;
     let weight = PI / rays.max(1) as f32;
     let mut around = Around::default();
@@ -110,8 +111,22 @@ fn around_place(
         let Some(seen) = scene.seen(start, direction, counts) else {
             continue;
         };
-        let reflected = scene.radiance(among, &seen, number) + discs.passed_on(scene, among, &seen);
-        around.reflected += reflected * weight;
+        let reflected = |among: Among| {
+            let of_lights = scene.radiance(among, &seen, number);
+            (of_lights + discs.passed_on(scene, among, &seen)) * weight
+        };
+        if is_real {
+            let without = reflected(Among::Real);
+            let hides = |placed: &PlacedThing<'_>| !placed.thing.is_real;
+            let with = match scene.is_hidden_by(hides, start, direction, seen.distance) {
+                true => Vec3::ZERO,
+                false => reflected(Among::All),
+            };
+            around.reflected += without;
+            around.taken += without - with;
+            continue;
+        }
+        around.reflected += reflected(Among::All);
         if !scene.things[seen.thing].thing.casts {
             around.kept_off += scene.distant.coarse.radiance(direction.as_dvec3()) * weight;
         }

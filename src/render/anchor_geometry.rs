@@ -100,7 +100,7 @@ pub(super) struct BatchCorners {
 pub(super) struct OcclusionCorners {
     /// Its self-occlusion ([`OCCLUSION_LAYOUT`]).
     pub own: wgpu::Buffer,
-    /// The part of its irradiance that is of what things reflect ([`REFLECTED_LAYOUT`]).
+    /// The part of its irradiance that is of what things reflect; on phantoms what virtual things take of that ([`REFLECTED_LAYOUT`]).
     pub reflected: wgpu::Buffer,
 }
 

@@ -377,7 +377,8 @@ impl GpuScene {
         }
     }
 
-    /// Gives a batch's corners their irradiance, and the part of it that is of what things reflect; `number` counts the batches.
+    /// Gives a batch's corners their irradiance, and the part of it that is of what things reflect, or on phantoms what virtual things
+    /// take of it; `number` counts the batches.
     pub fn write_indirect(
         &self,
         queue: &wgpu::Queue,

@@ -260,7 +260,8 @@ impl OwnLight {
 }
 
 impl OwnLitThing {
-    /// Irradiance of each point, and the part of it that is of what things reflect; `own` is its place among the scene's things.
+    /// Irradiance of each point, and the part of it that is of what things reflect, or on phantoms what virtual things take of it;
+    /// `own` is its place among the scene's things.
     fn irradiances(
         &self,
         placed: &PlacedCorners,
@@ -272,7 +273,7 @@ impl OwnLitThing {
         let records = (&placed.records, world_from_anchor);
         let around = surroundings::around(scene, discs, own, records, budget);
         if scene.things[own].thing.is_real {
-            return around.iter().map(|it| [it.reflected; 2]).collect();
+            return around.iter().map(|it| [it.reflected, it.taken]).collect();
         }
         let world_from_own = world_from_anchor.matrix3 * self.anchor_from_own;
         let turn = Turn::new(world_from_own.transpose(), TRANSFER_DEGREE);
