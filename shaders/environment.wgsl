@@ -264,16 +264,14 @@ const NOTHING_HIDDEN: f32 = 3.5449077;
 fn light_on_virtual(sampled: SampledSurface, @builtin(front_facing) outside: bool) -> LightSums {
     let surface = surface(sampled);
     let point_in_world = (frame.world_from_camera * vec4f(surface.point_in_camera, 1.0)).xyz;
-//!if LOOKS
     var look = look(surface, outside);
+//!if LOOKS
     if look.opacity == 0.0 {
         discard;
     }
     // What its shape hides of the light is told by rays already: a picture of occlusion counts for what is finer than its triangles.
     let open = recovered(vec3f(sampled.visibility_0.x), vec3f(NOTHING_HIDDEN), sampled.one).x / NOTHING_HIDDEN;
     look.occlusion = min(look.occlusion / max(open, 1e-3), 1.0);
-//!else
-    let look = look(surface, outside);
 //!end
     let normal = (frame.world_from_camera * vec4f(look.normal, 0.0)).xyz;
     let to_camera = normalize(frame.world_from_camera[3].xyz - point_in_world);

@@ -215,8 +215,7 @@ impl PlacedScene<'_> {
             let toward = source.toward.as_vec3();
             let cosine = toward.dot(normal);
             let is_hidden = |counts: fn(&PlacedThing<'_>) -> bool| {
-                let mut things = self.things.iter().filter(|placed| counts(placed));
-                things.any(|placed| placed.hides(start, toward, f32::INFINITY))
+                self.is_behind(counts, start, toward, f32::INFINITY)
             };
             if cosine <= 0.0 || is_hidden(is_real) {
                 continue;

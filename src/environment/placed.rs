@@ -232,11 +232,22 @@ impl PlacedScene<'_> {
     /// Whether something hides what lies `reach` along a direction: what casts shadows, or what is real and casts none, as a
     /// table, which no light comes through from below.
     fn is_hidden(&self, among: Among, origin: Vec3, direction: Vec3, reach: f32) -> bool {
-        let counts = |placed: &&PlacedThing<'_>| match placed.thing.is_real {
+        let counts = |placed: &PlacedThing<'_>| match placed.thing.is_real {
             true => true,
             false => among == Among::All && placed.thing.casts,
         };
-        let mut things = self.things.iter().filter(counts);
+        self.is_behind(counts, origin, direction, reach)
+    }
+
+    /// Whether one of the things that `counts` says yes of hides what lies `reach` along a direction.
+    pub fn is_behind(
+        &self,
+        counts: impl Fn(&PlacedThing<'_>) -> bool,
+        origin: Vec3,
+        direction: Vec3,
+        reach: f32,
+    ) -> bool {
+        let mut things = self.things.iter().filter(|placed| counts(placed));
         things.any(|placed| placed.hides(origin, direction, reach))
     }
 
@@ -248,9 +259,8 @@ impl PlacedScene<'_> {
         direction: Vec3,
         reach: f32,
     ) -> bool {
-        let things = self.things.iter();
-        let mut casting = things.filter(|placed| placed.thing.casts && counts(placed));
-        casting.any(|placed| placed.hides(origin, direction, reach))
+        let casts_and_counts = |placed: &PlacedThing<'_>| placed.thing.casts && counts(placed);
+        self.is_behind(casts_and_counts, origin, direction, reach)
     }
 
     /// Irradiance of a place past things: of compact lights and of all regions.

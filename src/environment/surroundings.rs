@@ -15,6 +15,8 @@ use super::reflected::DiscTree;
 
 /// Places start this part of the way to their thing's middle, along the surface: a foot on the table would see below it.
 const INSET: f32 = 0.02;
+/// Rays from each place at least, and at most.
+const RAYS_OF_A_PLACE: [usize; 2] = [32, 256];
 
 /// How many rays there are for a thing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,9 +26,6 @@ pub struct Budget {
     /// From all of them together, about.
     pub rays: usize,
 }
-
-/// From each place at least, and at most.
-const RAYS_OF_A_PLACE: [usize; 2] = [32, 256];
 
 impl Budget {
     /// Where nothing moves by itself.
