@@ -5,10 +5,10 @@
 
 use glam::DVec2;
 
-use super::Detection;
 use super::light::Grey;
 use super::marker_template::MarkerTemplate;
-use super::reading::agreement_at_corners;
+use super::reading::{agreement_at_corners, agreement_of};
+use super::{Detection, TrackingError};
 use crate::scene::Family;
 
 /// A marker that looks so much like itself is believed at once, whatever its family.
@@ -87,6 +87,20 @@ impl Belief {
         });
         confirmed
     }
+}
+
+/// Whether a single picture proves a marker: its code alone, or how much it looks like itself.
+pub(super) fn is_proven(
+    picture: Grey<'_>,
+    detection: &Detection,
+    corrected_bits: u32,
+) -> Result<bool, TrackingError> {
+    let family = detection.family;
+    let corrected_bits = corrected_bits.min(family.correctable_bits());
+    if least_agreement(family.false_rate(corrected_bits)).is_none() {
+        return Ok(true);
+    }
+    Ok(agreement_of(picture, detection)?.is_some_and(|agreement| agreement >= AT_ONCE))
 }
 
 /// The least agreement of a marker that is believed once it is seen again; `None` where the code alone is proof. Measured on

@@ -8,6 +8,7 @@ use glam::DVec2;
 use super::TrackingError;
 use super::apriltag::AprilTagDetector;
 use super::aruco::ArucoDetector;
+use super::belief::is_proven;
 use super::light::Grey;
 use super::refine::refined;
 use crate::scene::format::{AnyKey, TRACKING};
@@ -70,6 +71,7 @@ pub struct Detector {
     encoded_anew: Vec<u8>,
     /// Whether corners are fitted again in linear light.
     refines: Refines,
+    corrected_bits: u32,
 }
 
 /// Whose corners are fitted again.
@@ -125,6 +127,7 @@ impl Detector {
             april_tag: april_tag.transpose()?,
             aruco: aruco.transpose()?,
             encoded_anew: Vec::new(),
+            corrected_bits: settings.corrected_bits,
             refines: Refines {
                 april_tag: settings.refine_edges,
                 aruco: settings.refine_edges && refines_aruco,
@@ -146,6 +149,26 @@ impl Detector {
             None => Vec::new(),
         };
         self.finished(tags, grey, size_px)
+    }
+
+    /// As [`detect`](Self::detect), but only what this picture alone proves: of families with few bits the markers whose
+    /// whole print is there, for codes of them are read in what is no marker too.
+    pub fn detect_proven(
+        &mut self,
+        grey: &[u8],
+        size_px: [u32; 2],
+    ) -> Result<Vec<Detection>, TrackingError> {
+        let picture = Grey {
+            levels: grey,
+            size_px,
+        };
+        let mut proven = Vec::new();
+        for detection in self.detect(grey, size_px)? {
+            if is_proven(picture, &detection, self.corrected_bits)? {
+                proven.push(detection);
+            }
+        }
+        Ok(proven)
     }
 
     /// As [`detect`](Self::detect), but at full resolution. OpenCV's ArUco finds no more than it does anyway.

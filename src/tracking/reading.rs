@@ -12,8 +12,10 @@ use glam::{DVec2, DVec3};
 use super::expected_picture::{ExpectedPicture, PER_CELL};
 use super::light::Grey;
 use super::marker_template::MarkerTemplate;
+use super::printed_marker::PrintedMarker;
+use super::{Detection, TrackingError};
 use crate::geometry::homography::linear_homography;
-use crate::scene::Family;
+use crate::scene::{Family, Marker};
 
 /// A cell of more pixels is looked at in more than one place for each sample.
 const SAMPLE_PX: f64 = 2.0;
@@ -41,6 +43,24 @@ pub(super) fn agreement_at_corners(
         template,
         place_by_corners(f64::from(template.side), corners_px)?,
     )
+}
+
+/// The same of a marker of any family.
+///
+/// # Errors
+/// A marker that its family does not have.
+pub(super) fn agreement_of(
+    picture: Grey<'_>,
+    detection: &Detection,
+) -> Result<Option<f64>, TrackingError> {
+    let Detection { family, id, .. } = *detection;
+    let printed = PrintedMarker::of(family, id)?;
+    let template = MarkerTemplate::new(&Marker::alone(family, id, 1.0), printed);
+    Ok(agreement_at_corners(
+        picture,
+        &template,
+        detection.corners_px,
+    ))
 }
 
 /// Where a point in cells from the top left corner of a square of `side` cells is, pixels.

@@ -1,12 +1,10 @@
 //! Markers of all families that people print, for those who ask why theirs are not found.
 
 use super::light::Grey;
-use super::marker_template::MarkerTemplate;
-use super::printed_marker::PrintedMarker;
-use super::reading::agreement_at_corners;
+use super::reading::agreement_of;
 use super::{Detection, Detector, TrackingError, grey_from_rgba};
 use crate::capture::Frame;
-use crate::scene::{Family, Ink, Marker, TrackingSettings};
+use crate::scene::{Family, Ink, TrackingSettings};
 
 /// Of each kind of codes the family with the most markers.
 const FAMILIES: [&str; 15] = [
@@ -72,10 +70,7 @@ impl Survey {
         };
         let mut found = Vec::new();
         for detection in self.detector.detect(&grey, frame.size_px)? {
-            let Detection { family, id, .. } = detection;
-            let printed = PrintedMarker::of(family, id)?;
-            let template = MarkerTemplate::new(&Marker::alone(family, id, 1.0), printed);
-            let agreement = agreement_at_corners(picture, &template, detection.corners_px);
+            let agreement = agreement_of(picture, &detection)?;
             if agreement.is_some_and(|agreement| agreement >= LEAST_AGREEMENT) {
                 found.push(detection);
             }

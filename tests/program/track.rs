@@ -9,7 +9,8 @@ use assert_cmd::Command;
 use glam::{DAffine3, DQuat, DVec3};
 use gnomon::app::files::picture_files::write_rgb_png;
 use gnomon::capture::FrameSource;
-use gnomon::scene::Scene;
+use gnomon::scene::{Family, Scene};
+use gnomon::tracking::printed_cells;
 
 fn project_file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
@@ -440,6 +441,63 @@ mod cases {
             }
         }
     }
+}
+
+/// A mosaic that has a code of a weak family, read from both sides, and is no marker: tiles of many greys, light ones where
+/// white cells would be. Pictures of it from several places, in a folder.
+fn pictures_of_a_mosaic(folder: &Path) -> PathBuf {
+    const SIZE_PX: [u32; 2] = [320, 240];
+    let family = Family::from_name("DICT_4X4_50").expect("a family");
+    let cells = printed_cells(family, 17).expect("a marker");
+    let side = cells.len().isqrt() as f64;
+    let pictures = folder.join("mosaic");
+    std::fs::create_dir_all(&pictures).expect("a folder");
+    for number in 0..8 {
+        // It shrinks to one side, as from aslant.
+        let slant = 0.05 + 0.03 * f64::from(number % 4);
+        let shift_px = 9.0 * f64::from(number);
+        let level = |x: f64, y: f64| {
+            let depth = 1.0 + slant * (x - 100.0) / 100.0;
+            let place = [x - 60.0 - shift_px, (y - 120.0) * depth + 50.0];
+            let place = place.map(|px| px / 100.0 * side);
+            if place.iter().any(|at| !(0.0..side).contains(at)) {
+                return 235;
+            }
+            let [column, row] = place.map(|at| at as usize);
+            let tile = row * side as usize + column;
+            let grey = (tile * 37 + column * 11) % 120;
+            if cells[tile] {
+                255 - grey as u8
+            } else {
+                grey as u8
+            }
+        };
+        let mut rgba = Vec::new();
+        for (y, x) in (0..SIZE_PX[1]).flat_map(|y| (0..SIZE_PX[0]).map(move |x| (y, x))) {
+            let level = level(f64::from(x), f64::from(y));
+            rgba.extend([level, level, level, 255]);
+        }
+        let file = pictures.join(format!("{number}.png"));
+        write_rgb_png(&file, SIZE_PX, &rgba).expect("a written picture");
+    }
+    pictures
+}
+
+#[test]
+fn what_only_has_a_weak_code_tells_nothing_of_the_camera() {
+    let folder = tempfile::tempdir().unwrap();
+    let pictures = pictures_of_a_mosaic(folder.path());
+    let mut arguments = vec!["track", plain(&pictures)];
+    arguments.extend(["--size-mm", "40", "--family", "DICT_4X4_50"]);
+    arguments.extend(["--poses", "poses.csv", "--markers", "markers.csv"]);
+    let said = done(folder.path(), &arguments);
+    assert!(said.contains("0 markers found"), "{said}");
+    assert!(rows(&folder.path().join("poses.csv")).is_empty(), "{said}");
+    // The detector does read the code.
+    let read = rows(&folder.path().join("markers.csv"));
+    assert!(read.len() >= 6, "{read:?}");
+    assert!(said.contains("guessed"), "{said}");
+    assert!(!said.contains("turned left for right"), "{said}");
 }
 
 /// Frames of the lamp as pictures, as they are and as a camera that mirrors gives them.

@@ -18,6 +18,7 @@ mod marker_view;
 mod measured;
 mod moved;
 pub mod peers_table;
+mod photographs;
 mod pictures;
 mod scaling;
 mod shadows;

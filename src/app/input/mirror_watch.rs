@@ -53,7 +53,7 @@ impl MirrorWatch {
         mirrored.mirror();
         let mut grey = Vec::new();
         grey_from_rgba(&mirrored, &mut grey)?;
-        Ok(!detector.detect(&grey, frame.size_px)?.is_empty())
+        Ok(!detector.detect_proven(&grey, frame.size_px)?.is_empty())
     }
 
     /// What to say at the end: nothing unless markers were seen in mirrored frames alone. `mirror`: whether frames were

@@ -154,7 +154,7 @@ fn learn_with_camera(
     Ok((learnt, camera))
 }
 
-/// What the detector sees in each frame that is looked at.
+/// The markers that each frame that is looked at proves.
 fn detections(
     mut source: FrameSource,
     settings: &TrackingSettings,
@@ -175,7 +175,7 @@ fn detections(
         }
         if frame.index.is_multiple_of(step) {
             grey_from_rgba(&frame, &mut grey)?;
-            pictures.push(detector.detect(&grey, frame.size_px)?);
+            pictures.push(detector.detect_proven(&grey, frame.size_px)?);
         }
     }
     progress.finish();

@@ -218,7 +218,7 @@ impl CameraLearner {
         }
         let mut grey = std::mem::take(&mut self.grey);
         let detected = grey_from_rgba(frame, &mut grey)
-            .and_then(|()| self.detector.detect(&grey, frame.size_px));
+            .and_then(|()| self.detector.detect_proven(&grey, frame.size_px));
         self.grey = grey;
         self.look_at(&detected?);
         Ok(())
