@@ -12,6 +12,10 @@ if [ ! -f "$shared/peers/track_peer.cpp" ]; then
     echo "bench: no ../shared/peers: nothing to compare with" >&2
     exit 1
 fi
+if ! python3 -c 'import numpy' 2>/dev/null; then
+    echo "bench: the peers' judge, pose_error.py, needs numpy (python3-numpy)" >&2
+    exit 1
+fi
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 echo "bench: building the peers" >&2
@@ -58,7 +62,9 @@ for round in $(seq "$rounds"); do
             add "${session}_$peer.csv"
         done
         for name in "${mine[@]}"; do
-            target/release/gnomon track "$work/${session}_$name.toml" --poses "$work/new.csv" 2>/dev/null
+            # A peer's rows are no poses of ours, which nothing replaces unasked.
+            target/release/gnomon track "$work/${session}_$name.toml" --poses "$work/new.csv" --force 2>"$work/said" ||
+                { cat "$work/said" >&2; exit 1; }
             add "${session}_$name.csv"
         done
     done

@@ -1,7 +1,7 @@
 //! Photographs and films of others beside the project, and which markers people see in them. None of them is shipped: where
 //! they are not, a chart goes without them.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, ensure};
@@ -331,15 +331,19 @@ fn grid(folder: &Path) -> Result<Vec<Still>> {
             .map_or(name.as_str(), |(stem, _)| stem);
         let list = folder.join(format!("grid0/cam0/data/{stem}.csv"));
         let text = std::fs::read_to_string(&list).with_context(|| list.display().to_string())?;
-        let ids = text.lines().skip(1).map(|row| {
+        let mut corners: BTreeMap<u32, u32> = BTreeMap::new();
+        for row in text.lines().skip(1) {
             let id = row.split(',').nth(10).unwrap_or_default();
-            id.trim()
+            let id = id
+                .trim()
                 .parse()
-                .with_context(|| format!("{}: a row without an id", list.display()))
-        });
+                .with_context(|| format!("{}: a row without an id", list.display()))?;
+            *corners.entry(id).or_default() += 1;
+        }
+        let whole = corners.into_iter().filter(|&(_, count)| count == 4);
         Ok(Still {
             besides: (0..36).collect(),
-            ..still(&pictures, &name, ids.collect::<Result<Vec<u32>>>()?)?
+            ..still(&pictures, &name, whole.map(|(id, _)| id))?
         })
     });
     stills.collect()
