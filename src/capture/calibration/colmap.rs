@@ -20,8 +20,8 @@ pub(super) fn cameras(text: &str) -> Result<Vec<(String, UncheckedCalibration)>,
 
 /// What to say of a text file that is not COLMAP's.
 fn other_text() -> String {
-    "of text files COLMAP's cameras.txt, whose lines are CAMERA_ID MODEL WIDTH HEIGHT PARAMS[], and ROS's ost.txt are read; \
-     write other programs' numbers as size_px, focal_px, center_px and distortion into a .toml"
+    "of text files COLMAP's cameras.txt, whose lines are CAMERA_ID MODEL WIDTH HEIGHT PARAMS[], ROS's ost.txt, a matrix of 3 x 3 numbers \
+     and KITTI's projections are read; write other programs' numbers as size_px, focal_px, center_px and distortion into a .toml"
         .to_owned()
 }
 

@@ -1,11 +1,12 @@
 //! Calibration files: gnomon's own TOML or JSON, a session's JSON, OpenCV's FileStorage (YAML, XML, JSON), ROS's
 //! `CameraInfo` and `ost.txt`, Kalibr's camchain and EuRoC's sensors, PhotonVision's and calib.io's JSON, whatever names
-//! `fx`, `fy`, `cx`, `cy` (RealSense, ORB-SLAM, VINS, NeRF), COLMAP's `cameras.txt`. All but the last become the same tree of
-//! values first (`tree.rs`), so there is one place that knows the keys (`kinds.rs`; `by_letters.rs` for the letters).
+//! `fx`, `fy`, `cx`, `cy` (RealSense, ORB-SLAM, VINS, NeRF), NumPy's arrays (`numpy.rs`), COLMAP's `cameras.txt`. All but the
+//! last become the same tree of values first (`tree.rs`), so there is one place that knows the keys (`kinds.rs`; `by_letters.rs` for the letters).
 
 mod by_letters;
 mod colmap;
 mod kinds;
+mod numpy;
 mod ost;
 mod tree;
 mod values;
@@ -250,6 +251,8 @@ enum Language {
     Xml,
     /// ROS's `ost.txt`.
     Ost,
+    /// A matrix or several.
+    Matrices,
     /// COLMAP's `cameras.txt`.
     Colmap,
 }
@@ -271,6 +274,8 @@ impl Language {
             Some(Self::Xml)
         } else if ost::is_ost(text) {
             Some(Self::Ost)
+        } else if numpy::tree_of_text(text).is_some() {
+            Some(Self::Matrices)
         } else if extension == "txt" && !begins("%YAML") {
             Some(Self::Colmap)
         } else {
@@ -292,16 +297,25 @@ fn read(path: &Path, frame_px: Option<[u32; 2]>) -> Result<UncheckedCalibration,
         path: path.to_owned(),
         message,
     };
-    if let Some(what) = in_place_of(&bytes) {
-        return Err(syntax(format!("{what}; a calibration is expected")));
-    }
-    // Windows' editors begin a file with a byte order mark, and some still write no UTF-8.
-    let text = decoded(&bytes);
     let extension = path
         .extension()
         .and_then(|extension| extension.to_str())
         .unwrap_or_default()
         .to_ascii_lowercase();
+    if numpy::is_numpy(&extension, &bytes) {
+        let tree = numpy::tree(&bytes).map_err(syntax)?;
+        let cameras = kinds::cameras(&tree).map_err(value)?;
+        return only_camera(cameras, frame_px).map_err(value);
+    }
+    if let Some(what) = in_place_of(&bytes) {
+        return Err(syntax(format!("{what}; a calibration is expected")));
+    }
+    if bytes.starts_with(b"\x80") {
+        let message = "a pickle of Python's, which is a program and is not run: write its matrices by numpy.savez";
+        return Err(syntax(message.to_owned()));
+    }
+    // Windows' editors begin a file with a byte order mark, and some still write no UTF-8.
+    let text = decoded(&bytes);
     let language = match text.contains('\0') {
         true => None,
         false => Language::of(&extension, &text),
@@ -312,12 +326,13 @@ fn read(path: &Path, frame_px: Option<[u32; 2]>) -> Result<UncheckedCalibration,
         Some(Language::Yaml) => tree::of_yaml(&text),
         Some(Language::Xml) => tree::of_xml(&text),
         Some(Language::Ost) => ost::tree(&text),
+        Some(Language::Matrices) => numpy::tree_of_text(&text).ok_or_else(String::new),
         Some(Language::Colmap) => {
             let cameras = colmap::cameras(&text).map_err(value)?;
             return only_camera(cameras, frame_px).map_err(value);
         }
         None => Err(
-            "a calibration is a .toml, .json, .yaml, .yml or .xml file, ROS's ost.txt or COLMAP's cameras.txt"
+            "a calibration is a .toml, .json, .yaml, .yml, .xml or .npz file, ROS's ost.txt or COLMAP's cameras.txt"
                 .to_owned(),
         ),
     };

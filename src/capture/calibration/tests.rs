@@ -525,7 +525,14 @@ fn what_only_looks_like_a_camera_is_refused_by_name() {
             "3 x 3 finite numbers",
         ),
         ("a.yaml", "other: 1\n", "this file has other"),
-        ("a.npz", "PK\u{3}\u{4}", "an archive"),
+        ("a.npz", "PK\u{3}\u{4}", "a.npz: "),
+        ("a.zip", "PK\u{3}\u{4}", "an archive"),
+        (
+            "a.txt",
+            "700 0 320\n0 700 240\n0 0 2\n",
+            "of text files COLMAP's cameras.txt",
+        ),
+        ("a.txt", "R: 1 0 0 0 1 0 0 0 1\n", "of text files"),
         ("a.npy", "NUMPY\0", "a calibration is a .toml"),
         ("a.yaml", "<!DOCTYPE html><html>", "a page of the web"),
     ] {
@@ -537,6 +544,70 @@ fn what_only_looks_like_a_camera_is_refused_by_name() {
         load("a.json", &without).unwrap().distortion,
         Distortion::NONE
     );
+}
+
+/// What `numpy.savez`, `save` and `savetxt` wrote (NumPy 2.4): the matrix in rows and in columns, of 64 and 32 bits and whole
+/// numbers, packed and not, beside a list of views.
+#[test]
+fn numpy_s_arrays_are_read() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/calibrations/numpy");
+    let camera = |name: &str| {
+        load_calibration_among(&folder.join(name), [640, 480])
+            .unwrap()
+            .0
+    };
+    for name in ["savez.npz", "packed.npz", "columns.npz", "whole.npz"] {
+        let Intrinsics {
+            focal_px,
+            center_px,
+            distortion,
+            ..
+        } = camera(name);
+        assert_eq!(focal_px, DVec2::new(615.0, 613.0), "{name}");
+        assert_eq!(center_px, DVec2::new(321.0, 238.0), "{name}");
+        assert_eq!(distortion.coefficients()[0], 0.125, "{name}");
+        assert_eq!(distortion.coefficients()[3], -0.25, "{name}");
+    }
+    for name in ["matrix.npy", "savetxt.txt"] {
+        let read = camera(name);
+        assert_eq!(read.focal_px, DVec2::new(615.0, 613.0), "{name}");
+        assert_eq!(read.distortion, Distortion::NONE, "{name}");
+    }
+    // Cut off anywhere, or with any byte changed, it is refused or read, and no more.
+    let whole = std::fs::read(folder.join("savez.npz")).unwrap();
+    let path = tempfile::tempdir().unwrap();
+    let path = path.path().join("broken.npz");
+    for at in (0..whole.len()).step_by(7) {
+        for bytes in [whole[..at].to_vec(), {
+            let mut changed = whole.clone();
+            changed[at] ^= 0xff;
+            changed
+        }] {
+            std::fs::write(&path, bytes).unwrap();
+            let _ = load_calibration_among(&path, [640, 480]);
+        }
+    }
+    let pickle = load_calibration(&folder.join("camera.pkl"))
+        .unwrap_err()
+        .to_string();
+    assert!(pickle.contains("numpy.savez"), "{pickle}");
+}
+
+/// KITTI's odometry: rectified cameras of the same lens, side by side, among turns and places.
+#[test]
+fn kitti_s_projections_are_read() {
+    let line = |name: &str, shift: &str| {
+        format!(
+            "{name}: 7.18856e+02 0.0 6.071928e+02 {shift} 0.0 7.18856e+02 1.852157e+02 0.0 0.0 0.0 1.0 0.0\n"
+        )
+    };
+    let text = line("P0", "0.0") + &line("P1", "-3.861448e+02") + "Tr: 1 0 0 0 0 1 0 0 0 0 1 0\n";
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("calib.txt");
+    std::fs::write(&path, text).unwrap();
+    let read = load_calibration_among(&path, [1241, 376]).unwrap().0;
+    assert_eq!(read.focal_px, DVec2::splat(718.856));
+    assert_eq!(read.center_px, DVec2::new(607.1928, 185.2157));
 }
 
 /// Of two cameras of different sizes frames of a known size tell which is meant.
