@@ -42,4 +42,5 @@ pub mod solid;
 mod soup;
 pub mod subdivide;
 pub mod surface_distance;
+mod triangle_tree;
 pub mod winding;

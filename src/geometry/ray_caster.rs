@@ -1,13 +1,12 @@
 //! Rays against triangles, by a bounding-volume hierarchy (obvhs).
 
-use std::time::Duration;
-
 use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::builder::build_bvh2_from_tris;
 use obvhs::ray::{Ray, RayHit};
 use obvhs::triangle::Triangle;
+
+use super::triangle_tree::triangle_tree;
 
 /// Triangles ready to be hit.
 pub struct RayCaster {
@@ -61,10 +60,8 @@ impl RayCaster {
                 v2: v2.into(),
             })
             .collect();
-        let hierarchy = (!triangles.is_empty()).then(|| {
-            let params = BvhBuildParams::medium_build();
-            build_bvh2_from_tris(&triangles, params, &mut Duration::default())
-        });
+        let hierarchy = (!triangles.is_empty())
+            .then(|| triangle_tree(&triangles, BvhBuildParams::medium_build()));
         Self {
             triangles,
             hierarchy,

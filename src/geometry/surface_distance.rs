@@ -5,17 +5,16 @@
 //! from it than at a corner; and between two points the distance changes by no more than the points are apart.
 
 use std::ops::Range;
-use std::time::Duration;
 
 use glam::{DVec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::builder::build_bvh2_from_tris;
 use obvhs::triangle::Triangle;
 use rayon::prelude::*;
 
 use super::mesh::Mesh;
 use super::normals::face_normal;
+use super::triangle_tree::triangle_tree;
 
 /// The largest distance is searched to this part of itself, which is then added.
 const TOLERANCE: f64 = 0.02;
@@ -385,14 +384,11 @@ impl NearestTriangle {
                 Triangle { v0, v1, v2 }
             })
             .collect();
-        let hierarchy = build_bvh2_from_tris(
-            &triangles,
-            BvhBuildParams {
-                max_prims_per_leaf: LEAF_TRIANGLES,
-                ..BvhBuildParams::fast_build()
-            },
-            &mut Duration::default(),
-        );
+        let params = BvhBuildParams {
+            max_prims_per_leaf: LEAF_TRIANGLES,
+            ..BvhBuildParams::fast_build()
+        };
+        let hierarchy = triangle_tree(&triangles, params);
         let in_order =
             |&index: &u32| corners(&mesh.triangles[index as usize]).map(|corner| corner.as_dvec3());
         Self {

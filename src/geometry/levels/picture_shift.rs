@@ -1,7 +1,7 @@
 //! How far pictures and colours slide on a coarser version of a mesh: the texture deviation of Cohen, Olano & Manocha 1998
 //! (*Appearance-Preserving Simplification*), at the vertices that went.
 
-use glam::{DVec2, DVec3, Vec4};
+use glam::{DVec2, DVec3, Vec2, Vec4};
 use rayon::prelude::*;
 
 use super::{Simplifier, metres_of_picture};
@@ -92,7 +92,7 @@ impl<'a> Charts<'a> {
             match (gone().next(), coarse.is_empty()) {
                 (None, _) => PictureShift::NONE,
                 (Some(_), true) => self.of_lost_chart(vertices),
-                (Some(_), false) => self.in_chart(gone(), coarse),
+                (Some(_), false) => self.in_chart(vertices, &stays, coarse),
             }
         });
         shifts.reduce(|| PictureShift::NONE, PictureShift::max)
@@ -112,12 +112,8 @@ impl<'a> Charts<'a> {
         }
     }
 
-    /// At vertices that went, on the triangles that are left of their chart.
-    fn in_chart<'b>(
-        &self,
-        gone: impl Iterator<Item = &'b u32>,
-        coarse: &[[u32; 3]],
-    ) -> PictureShift {
+    /// At those of a chart's vertices that went, on the triangles that are left of it.
+    fn in_chart(&self, vertices: &[u32], stays: &[bool], coarse: &[[u32; 3]]) -> PictureShift {
         let nearest = |place: &dyn Fn(u32) -> DVec3| {
             let corners = coarse.iter().flatten().map(|&vertex| place(vertex));
             NearestTriangle::new(&Mesh {
@@ -129,15 +125,26 @@ impl<'a> Charts<'a> {
             })
         };
         let in_space = nearest(&|vertex| self.place(vertex));
-        let in_pictures = [0, 1].map(|set| nearest(&|vertex| self.in_picture(vertex, set)));
+        // What shows one texel is nowhere off, a set that a file does not have among it; and of triangles that all lie in one
+        // place none can be found faster than by asking each.
+        let in_pictures = [0, 1].map(|set| {
+            let shows_more = self.shows_more_than_a_texel(vertices, set);
+            shows_more.then(|| nearest(&|vertex| self.in_picture(vertex, set)))
+        });
         let mut search = in_space.search();
-        let mut searches = [0, 1].map(|set: usize| in_pictures[set].search());
+        let mut searches = in_pictures
+            .each_ref()
+            .map(|set| Some((set.as_ref()?, set.as_ref()?.search())));
+        let gone = vertices.iter().filter(|vertex| !stays[**vertex as usize]);
         let shifts = gone.map(|&vertex| {
             let at = in_space.in_mesh(search.nearest(self.place(vertex)));
             let (near, color) = self.beside(vertex, coarse[at]);
             let mut of_set = |set: usize| {
-                let found = searches[set].nearest(self.in_picture(vertex, set));
-                let triangle = coarse[in_pictures[set].in_mesh(found)];
+                let Some((in_picture, search)) = &mut searches[set] else {
+                    return 0.0;
+                };
+                let found = search.nearest(self.in_picture(vertex, set));
+                let triangle = coarse[in_picture.in_mesh(found)];
                 near[set].min(found.distance_m + self.shown_m(vertex, triangle, set))
             };
             PictureShift {
@@ -146,6 +153,13 @@ impl<'a> Charts<'a> {
             }
         });
         shifts.fold(PictureShift::NONE, PictureShift::max)
+    }
+
+    fn shows_more_than_a_texel(&self, vertices: &[u32], set: usize) -> bool {
+        let uv = |vertex: &u32| self.simplifier.looks[*vertex as usize].uv[set];
+        let least = vertices.iter().map(uv).fold(Vec2::INFINITY, Vec2::min);
+        let most = vertices.iter().map(uv).fold(Vec2::NEG_INFINITY, Vec2::max);
+        f64::from((most - least).max_element()) > UNSEEN
     }
 
     /// A vertex's texture coordinates as a place on the picture, as large as it lies on the mesh.
