@@ -9,6 +9,7 @@ use bytemuck::Zeroable as _;
 use crate::environment::finer::{self, Cuts};
 use crate::environment::self_occlusion::{OwnSpace, OwnSurface, SelfOcclusion};
 use crate::geometry::camera::Intrinsics;
+use crate::geometry::levels::{Level, levels_while};
 use crate::geometry::mesh::Mesh;
 use crate::light::Light;
 use crate::render::{Gpu, Precomputation, RenderError, Renderer};
@@ -68,6 +69,9 @@ fn cuts_of_meshes(folder: Option<PathBuf>) -> DiskCache {
 pub trait Onlooker: Sync {
     /// So many points of so many are done. Returns whether it is to go on.
     fn sees(&self, done: usize, of: usize) -> bool;
+
+    /// Whether it is to go on, where nobody can tell how far it is.
+    fn goes_on(&self) -> bool;
 }
 
 /// Nobody.
@@ -75,6 +79,10 @@ pub struct NoOnlooker;
 
 impl Onlooker for NoOnlooker {
     fn sees(&self, _done: usize, _of: usize) -> bool {
+        true
+    }
+
+    fn goes_on(&self) -> bool {
         true
     }
 }
@@ -86,6 +94,10 @@ struct KeptOnDisk<'a>(&'a dyn Onlooker);
 impl Precomputation for KeptOnDisk<'_> {
     fn transport(&self, room: &Room<'_>) -> RoomTransport {
         ready_room(room).transport
+    }
+
+    fn levels(&self, mesh: &Mesh) -> Vec<Level> {
+        levels_while(mesh, &|| self.0.goes_on())
     }
 
     fn self_occlusions(&self, surface: &OwnSurface) -> Vec<SelfOcclusion> {
@@ -254,6 +266,10 @@ mod tests {
             let mut seen = self.seen.lock().unwrap();
             seen.push(done);
             seen.len() <= self.most
+        }
+
+        fn goes_on(&self) -> bool {
+            true
         }
     }
 

@@ -19,7 +19,7 @@ use super::bounds::Bounds;
 use super::mesh::{CornerLook, Mesh};
 use super::normals::face_normal;
 use super::soup::{by_edge, edge_uses};
-use super::surface_distance::SampledSurface;
+use super::surface_distance::{GoesOn, SampledSurface};
 use picture_shift::{Charts, PictureShift};
 
 /// A coarser version of a mesh. Its vertices are some of the mesh's.
@@ -60,10 +60,15 @@ const MEAN_TO_MAX: f64 = 1.0 / 12.0;
 /// Ever coarser versions of a mesh, each with about half the triangles of the one before; the mesh itself is not among
 /// them. Any soup of triangles will do: a version that is no good is left out.
 pub fn levels(mesh: &Mesh) -> Vec<Level> {
+    levels_while(mesh, &|| true)
+}
+
+/// The same, as far as it is when `goes_on` says no.
+pub fn levels_while(mesh: &Mesh, goes_on: GoesOn<'_>) -> Vec<Level> {
     if mesh.triangles.len() < WORTH_IT {
         return Vec::new();
     }
-    chain(mesh, FEWEST)
+    chain(mesh, FEWEST, goes_on)
 }
 
 /// Whether a level may stand for its mesh where outlines, in the picture or of its shadow, are off by `max_px` at most
@@ -72,7 +77,7 @@ pub fn is_close_enough(max_px: f64, mean_px: f64, max_silhouette_error_px: f64) 
     max_px < max_silhouette_error_px && mean_px < max_silhouette_error_px * MEAN_TO_MAX
 }
 
-fn chain(mesh: &Mesh, fewest: usize) -> Vec<Level> {
+fn chain(mesh: &Mesh, fewest: usize, goes_on: GoesOn<'_>) -> Vec<Level> {
     let mut levels = Vec::new();
     let bounds = Bounds::around(mesh.positions.iter().map(|position| position.as_dvec3()));
     let (Some(surface), Some(bounds)) = (SampledSurface::new(mesh), bounds) else {
@@ -85,7 +90,7 @@ fn chain(mesh: &Mesh, fewest: usize) -> Vec<Level> {
     let mut indices = simplifier.indices.clone();
     loop {
         let count = indices.len() / 3;
-        if count / 2 < fewest {
+        if count / 2 < fewest || !goes_on() {
             return levels;
         }
         indices = simplifier.simplified(&indices, count / 2);
@@ -99,12 +104,17 @@ fn chain(mesh: &Mesh, fewest: usize) -> Vec<Level> {
             continue;
         }
         let Some(distance) =
-            SampledSurface::new(&coarse).map(|coarse| surface.distance_to(&coarse))
+            SampledSurface::new(&coarse).and_then(|coarse| surface.distance_to(&coarse, goes_on))
         else {
             return levels;
         };
-        let shift = charts.as_ref().map(|charts| charts.shift(&indices));
+        let shift = charts
+            .as_ref()
+            .map(|charts| charts.shift(&indices, goes_on));
         let shift = shift.unwrap_or(PictureShift::NONE);
+        if !goes_on() {
+            return levels;
+        }
         let max_error_m = distance.max_m.max(shift.max_m);
         if max_error_m > largest_error_m || shift.color > LARGEST_COLOR_ERROR {
             return levels;

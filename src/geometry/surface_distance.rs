@@ -32,6 +32,9 @@ const LEAF_TRIANGLES: u32 = 2;
 /// Items of work that are done in one go. It is fixed, so that the result is the same on every machine.
 const CHUNK: usize = 128;
 
+/// Whether somebody still waits for what takes long: never again, once it has said no.
+pub type GoesOn<'a> = &'a (dyn Fn() -> bool + Sync);
+
 /// How far the points of each of two surfaces lie from the other surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceDistance {
@@ -94,34 +97,38 @@ impl SampledSurface {
         })
     }
 
-    /// How far the two lie apart.
-    pub fn distance_to(&self, other: &Self) -> SurfaceDistance {
-        let (forth, back) = (self.one_sided(other), other.one_sided(self));
-        SurfaceDistance {
+    /// How far the two lie apart; `None` where `goes_on` says that nobody waits for it any more.
+    pub fn distance_to(&self, other: &Self, goes_on: GoesOn<'_>) -> Option<SurfaceDistance> {
+        let forth = self.one_sided(other, goes_on)?;
+        let back = other.one_sided(self, goes_on)?;
+        Some(SurfaceDistance {
             max_m: forth.max_m.max(back.max_m),
             outline_mean_m: forth.outline_mean_m.max(back.outline_mean_m),
-        }
+        })
     }
 
-    fn one_sided(&self, other: &Self) -> SurfaceDistance {
-        let at_vertices = in_parallel(self.positions.len(), |vertices| {
+    fn one_sided(&self, other: &Self, goes_on: GoesOn<'_>) -> Option<SurfaceDistance> {
+        let at_vertices = in_parallel(self.positions.len(), goes_on, |vertices| {
             let mut search = other.nearest.search();
             self.positions[vertices]
                 .iter()
                 .map(|point| search.nearest(*point))
                 .collect()
         });
-        let along_edges = in_parallel(self.edges.len(), |edges| {
+        // What is cut short is not to be looked into.
+        goes_on().then_some(())?;
+        let along_edges = in_parallel(self.edges.len(), goes_on, |edges| {
             let mut search = other.nearest.search();
             self.edges[edges]
                 .iter()
                 .map(|edge| self.along(edge, &at_vertices, other, &mut search))
                 .collect()
         });
+        goes_on().then_some(())?;
         let on_edges_m = along_edges
             .iter()
             .fold(0.0, |most: f64, along| most.max(along.peak_m));
-        let pieces = in_parallel(self.triangles.len(), |triangles| {
+        let pieces = in_parallel(self.triangles.len(), goes_on, |triangles| {
             let mut search = other.nearest.search();
             triangles
                 .map(|triangle| {
@@ -138,10 +145,10 @@ impl SampledSurface {
             weighted += outline_m * along.mean_m;
             weight += outline_m;
         }
-        SurfaceDistance {
+        goes_on().then_some(SurfaceDistance {
             max_m: max_m * (1.0 + TOLERANCE),
             outline_mean_m: if weight > 0.0 { weighted / weight } else { 0.0 },
-        }
+        })
     }
 
     fn along(
@@ -288,7 +295,7 @@ fn largest(known_m: f64, mut open: Vec<Piece>, to: &NearestTriangle) -> f64 {
         }
         open.sort_unstable_by(by_promise);
         let uncut = open.split_off(CUTS.min(open.len()));
-        open = in_parallel(open.len(), |range| {
+        open = in_parallel(open.len(), &|| true, |range| {
             let mut search = to.search();
             open[range]
                 .iter()
@@ -512,11 +519,19 @@ fn distance_squared(point: DVec3, [a, b, c]: &[DVec3; 3]) -> f64 {
     height * height / area_squared
 }
 
-/// Does `work` on the ranges that make up `0..count`, on all cores, and joins the results in their order.
-fn in_parallel<T: Send>(count: usize, work: impl Fn(Range<usize>) -> Vec<T> + Sync) -> Vec<T> {
+/// Does `work` on the ranges that make up `0..count`, on all cores, and joins the results in their order; from where `goes_on` says
+/// no, there are none.
+fn in_parallel<T: Send>(
+    count: usize,
+    goes_on: GoesOn<'_>,
+    work: impl Fn(Range<usize>) -> Vec<T> + Sync,
+) -> Vec<T> {
     let chunks = (0..count.div_ceil(CHUNK)).into_par_iter();
     chunks
-        .flat_map_iter(|chunk| work(chunk * CHUNK..count.min((chunk + 1) * CHUNK)))
+        .flat_map_iter(|chunk| match goes_on() {
+            true => work(chunk * CHUNK..count.min((chunk + 1) * CHUNK)),
+            false => Vec::new(),
+        })
         .collect()
 }
 

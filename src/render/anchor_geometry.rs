@@ -20,6 +20,7 @@ use crate::scene::{Object, Scene, Shortcut};
 
 use super::gpu::Gpu;
 use super::materials::needs_looks;
+use super::precomputation::Precomputation;
 
 /// The kind of model that a surface belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -189,6 +190,21 @@ impl KnownLevels {
         }
     }
 
+    /// Coarser versions of all that a scene shows in them are known too.
+    pub fn prepared(mut self, scene: &Scene, precomputation: &dyn Precomputation) -> Self {
+        for object in scene.phantoms.iter().chain(&scene.virtuals) {
+            let mesh = &object.mesh;
+            let is_known = position(&self.finer, mesh)
+                .or_else(|| position(&self.coarser, mesh))
+                .is_some();
+            if object.visible && has_levels(scene, object) && !is_known {
+                self.coarser
+                    .push((Arc::clone(mesh), precomputation.levels(mesh)));
+            }
+        }
+        self
+    }
+
     /// What a mesh is drawn as, and coarser versions of that, made where they are not known.
     fn of<'a>(&'a mut self, mesh: &'a Arc<Mesh>, with_levels: bool) -> (&'a Mesh, &'a [Level]) {
         if let Some(index) = position(&self.finer, mesh) {
@@ -211,6 +227,13 @@ impl KnownLevels {
         let levels = coarser.map_or(&[][..], |index| &self.coarser[index].1);
         std::iter::once(finer.unwrap_or(mesh)).chain(levels.iter().map(|level| &level.mesh))
     }
+}
+
+/// Whether coarser versions of a thing may be drawn. (How far one is off is measured in one shape.)
+fn has_levels(scene: &Scene, object: &Object) -> bool {
+    scene.shadows.max_silhouette_error_px > 0.0
+        && object.animation.is_none()
+        && !scene.shadows.without.has(Shortcut::Levels)
 }
 
 /// Where a mesh is in a list. (To compare large meshes takes longer than a frame.)
@@ -249,12 +272,7 @@ impl AnchorGeometry {
                 for (index, object) in there {
                     let ties = role == Role::Virtual && ties(scene, &surfaces, index);
                     let tie = ties.then_some(index);
-                    let coarsest_px = scene.shadows.max_silhouette_error_px;
-                    // (How far a level is off is measured in one shape.)
-                    let with_levels = coarsest_px > 0.0
-                        && object.animation.is_none()
-                        && !scene.shadows.without.has(Shortcut::Levels);
-                    let drawn = known.of(&object.mesh, with_levels);
+                    let drawn = known.of(&object.mesh, has_levels(scene, object));
                     let before = objects.iter().take(index);
                     shared.first_material =
                         before.map(|object| object.materials.len() as u32).sum();

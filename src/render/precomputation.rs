@@ -2,6 +2,7 @@
 
 use crate::environment::finer::{Cuts, cuts};
 use crate::environment::self_occlusion::{OwnSpace, OwnSurface, SelfOcclusion};
+use crate::geometry::levels::{Level, levels};
 use crate::geometry::mesh::Mesh;
 use crate::shafts::room::Room;
 use crate::shafts::room_transport::RoomTransport;
@@ -11,6 +12,11 @@ pub trait Precomputation {
     /// A room's transport of light.
     fn transport(&self, room: &Room<'_>) -> RoomTransport {
         room.transport()
+    }
+
+    /// Coarser versions of a mesh.
+    fn levels(&self, mesh: &Mesh) -> Vec<Level> {
+        levels(mesh)
     }
 
     /// Where a mesh is made finer for what it hides from itself.

@@ -4,7 +4,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::false_colour;
 use super::frame_tracker::TrackedPicture;
@@ -40,6 +40,10 @@ impl Onlooker for Preparing {
         };
         drop(known);
         (self.wake)();
+        self.goes_on()
+    }
+
+    fn goes_on(&self) -> bool {
         !self.is_over.load(Ordering::Relaxed)
     }
 }
@@ -60,8 +64,8 @@ pub struct SceneCanvas {
     preparing: Arc<Preparing>,
     /// Shortcuts that are switched off.
     without: Shortcuts,
-    /// Whether a renderer for the scene as it is has yet to come.
-    awaits: bool,
+    /// Since when a renderer for the scene as it is has yet to come.
+    awaited_since: Option<Instant>,
     maker: Option<JoinHandle<()>>,
 }
 
@@ -109,7 +113,7 @@ impl SceneCanvas {
             made,
             preparing,
             without: Shortcuts::NONE,
-            awaits: false,
+            awaited_since: None,
             maker: Some(maker),
         }
     }
@@ -127,7 +131,7 @@ impl SceneCanvas {
                     scene: Arc::clone(&scene),
                     intrinsics: order.intrinsics,
                 });
-                self.awaits = true;
+                self.awaited_since.get_or_insert_with(Instant::now);
             }
         }
         self.scene = scene;
@@ -155,7 +159,12 @@ impl SceneCanvas {
 
     /// Whether the scene is shown as well as can be, or a better renderer has yet to come.
     pub fn is_settled(&self) -> bool {
-        !self.awaits
+        self.awaited_since.is_none()
+    }
+
+    /// How long a better renderer has been awaited.
+    pub fn awaited(&self) -> Option<Duration> {
+        self.awaited_since.map(|since| since.elapsed())
     }
 
     /// The part that is done, 0 to 1, of what takes the renderer to come longest; `None` where it takes no time.
@@ -184,7 +193,9 @@ impl SceneCanvas {
         if !self.current.as_ref().is_some_and(fits) {
             return Ok(false);
         }
-        self.awaits = !is_of_now;
+        if is_of_now {
+            self.awaited_since = None;
+        }
         let order = RendererOrder {
             scene: Arc::clone(&self.scene),
             ..made.order
@@ -275,7 +286,7 @@ impl SceneCanvas {
             scene: Arc::clone(&self.scene),
             intrinsics,
         });
-        self.awaits = true;
+        self.awaited_since.get_or_insert_with(Instant::now);
         Ok(())
     }
 }

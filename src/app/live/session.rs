@@ -281,6 +281,11 @@ impl LiveSession {
         self.canvas.preparing()
     }
 
+    /// How long the scene has been shown worse than it can be, or not at all.
+    pub fn awaited(&self) -> Option<Duration> {
+        self.canvas.awaited()
+    }
+
     /// The frame that was drawn last.
     pub fn picture(&self) -> Option<&TrackedPicture> {
         self.picture.drawn().map(|picture| &picture.tracked)

@@ -36,6 +36,8 @@ use crate::scene::SceneLight;
 
 /// The window looks at the world at least this often, even when no frame comes.
 const PULSE: Duration = Duration::from_millis(200);
+/// What takes no longer is not told.
+const LONG_AWAITED: Duration = Duration::from_secs(1);
 const PANEL_WIDTH: f32 = 330.0;
 const PROGRESS_WIDTH: f32 = 330.0;
 const TROUBLE: Color32 = Color32::from_rgb(255, 190, 90);
@@ -286,7 +288,9 @@ impl LiveWindow {
         let shown = self.session.notices.shown(self.session.now_secs());
         let [session, video] = self.session.records();
         let preparing = self.session.preparing();
-        if shown.is_empty() && !session && !video && !self.state.holds && preparing.is_none() {
+        let awaits_long = (self.session.awaited()).is_some_and(|awaited| awaited >= LONG_AWAITED);
+        let is_calm = !session && !video && !self.state.holds;
+        if shown.is_empty() && is_calm && preparing.is_none() && !awaits_long {
             return;
         }
         let place = area.left_top() + Vec2::splat(10.0);
@@ -307,6 +311,13 @@ impl LiveWindow {
                         ProgressBar::new(part)
                             .desired_width(PROGRESS_WIDTH)
                             .text(text),
+                    );
+                }
+                if awaits_long && preparing.is_none() {
+                    boxed(
+                        ui,
+                        RichText::new("preparing the scene: large models take a while")
+                            .color(Color32::WHITE),
                     );
                 }
                 for (recording, what) in [(session, "the camera"), (video, "the composite")] {

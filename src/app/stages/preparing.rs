@@ -36,7 +36,7 @@ struct ShownProgress<'a> {
 
 impl Onlooker for ShownProgress<'_> {
     fn sees(&self, done: usize, of: usize) -> bool {
-        let goes_on = !self.stop.load(Ordering::Relaxed);
+        let goes_on = self.goes_on();
         let mut bar = self.bar.lock().unwrap_or_else(PoisonError::into_inner);
         match done < of && goes_on {
             true => bar
@@ -45,5 +45,9 @@ impl Onlooker for ShownProgress<'_> {
             false => bar.take().iter().for_each(Progress::finish),
         }
         goes_on
+    }
+
+    fn goes_on(&self) -> bool {
+        !self.stop.load(Ordering::Relaxed)
     }
 }

@@ -8,7 +8,10 @@ use super::{Simplifier, metres_of_picture};
 use crate::geometry::bounds::Bounds;
 use crate::geometry::looks::weights;
 use crate::geometry::mesh::Mesh;
-use crate::geometry::surface_distance::NearestTriangle;
+use crate::geometry::surface_distance::{GoesOn, NearestTriangle};
+
+/// Vertices that are looked at in one go.
+const CHUNK: usize = 1024;
 
 /// How far what lies on a surface is off.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,7 +80,8 @@ impl<'a> Charts<'a> {
     }
 
     /// How far what lies on the mesh is off on a coarser one, whose vertices these are, three for each triangle.
-    pub fn shift(&self, coarse: &[u32]) -> PictureShift {
+    /// Anything, where `goes_on` says no.
+    pub fn shift(&self, coarse: &[u32], goes_on: GoesOn<'_>) -> PictureShift {
         let mut triangles: Vec<Vec<[u32; 3]>> = vec![Vec::new(); self.vertices.len()];
         let mut stays = vec![false; self.of_vertex.len()];
         for triangle in coarse.as_chunks::<3>().0 {
@@ -92,7 +96,7 @@ impl<'a> Charts<'a> {
             match (gone().next(), coarse.is_empty()) {
                 (None, _) => PictureShift::NONE,
                 (Some(_), true) => self.of_lost_chart(vertices),
-                (Some(_), false) => self.in_chart(vertices, &stays, coarse),
+                (Some(_), false) => self.in_chart((vertices, &stays), coarse, goes_on),
             }
         });
         shifts.reduce(|| PictureShift::NONE, PictureShift::max)
@@ -113,7 +117,12 @@ impl<'a> Charts<'a> {
     }
 
     /// At those of a chart's vertices that went, on the triangles that are left of it.
-    fn in_chart(&self, vertices: &[u32], stays: &[bool], coarse: &[[u32; 3]]) -> PictureShift {
+    fn in_chart(
+        &self,
+        (vertices, stays): (&[u32], &[bool]),
+        coarse: &[[u32; 3]],
+        goes_on: GoesOn<'_>,
+    ) -> PictureShift {
         let nearest = |place: &dyn Fn(u32) -> DVec3| {
             let corners = coarse.iter().flatten().map(|&vertex| place(vertex));
             NearestTriangle::new(&Mesh {
@@ -131,28 +140,33 @@ impl<'a> Charts<'a> {
             let shows_more = self.shows_more_than_a_texel(vertices, set);
             shows_more.then(|| nearest(&|vertex| self.in_picture(vertex, set)))
         });
-        let mut search = in_space.search();
-        let mut searches = in_pictures
-            .each_ref()
-            .map(|set| Some((set.as_ref()?, set.as_ref()?.search())));
-        let gone = vertices.iter().filter(|vertex| !stays[**vertex as usize]);
-        let shifts = gone.map(|&vertex| {
-            let at = in_space.in_mesh(search.nearest(self.place(vertex)));
-            let (near, color) = self.beside(vertex, coarse[at]);
-            let mut of_set = |set: usize| {
-                let Some((in_picture, search)) = &mut searches[set] else {
-                    return 0.0;
-                };
-                let found = search.nearest(self.in_picture(vertex, set));
-                let triangle = coarse[in_picture.in_mesh(found)];
-                near[set].min(found.distance_m + self.shown_m(vertex, triangle, set))
-            };
-            PictureShift {
-                max_m: of_set(0).max(of_set(1)),
-                color,
+        let shifts = vertices.par_chunks(CHUNK).map(|vertices| {
+            if !goes_on() {
+                return PictureShift::NONE;
             }
+            let mut search = in_space.search();
+            let mut searches =
+                (in_pictures.each_ref()).map(|set| set.as_ref().map(|set| (set, set.search())));
+            let gone = vertices.iter().filter(|vertex| !stays[**vertex as usize]);
+            let shifts = gone.map(|&vertex| {
+                let at = in_space.in_mesh(search.nearest(self.place(vertex)));
+                let (near, color) = self.beside(vertex, coarse[at]);
+                let mut of_set = |set: usize| {
+                    let Some((in_picture, search)) = &mut searches[set] else {
+                        return 0.0;
+                    };
+                    let found = search.nearest(self.in_picture(vertex, set));
+                    let triangle = coarse[in_picture.in_mesh(found)];
+                    near[set].min(found.distance_m + self.shown_m(vertex, triangle, set))
+                };
+                PictureShift {
+                    max_m: of_set(0).max(of_set(1)),
+                    color,
+                }
+            });
+            shifts.fold(PictureShift::NONE, PictureShift::max)
         });
-        shifts.fold(PictureShift::NONE, PictureShift::max)
+        shifts.reduce(|| PictureShift::NONE, PictureShift::max)
     }
 
     fn shows_more_than_a_texel(&self, vertices: &[u32], set: usize) -> bool {

@@ -262,7 +262,7 @@ fn errors_hold_at_every_point_of_a_denser_sampling() {
 #[test]
 fn a_cut_box_becomes_twelve_triangles_with_its_materials_and_flat_normals() {
     let mesh = cut_box(8);
-    let levels = chain(&mesh, 12);
+    let levels = chain(&mesh, 12, &|| true);
     let smallest = &levels[levels.len() - 1].mesh;
     assert_eq!(
         (smallest.triangles.len(), smallest.positions.len()),
@@ -279,12 +279,35 @@ fn a_cut_box_becomes_twelve_triangles_with_its_materials_and_flat_normals() {
     }
     // In a mirrored placement the winding is turned, the normals are not.
     let mirrored = cut_box(8).with_winding_reversed();
-    for level in chain(&mirrored, 12) {
+    for level in chain(&mirrored, 12, &|| true) {
         for (triangle, normals) in level.mesh.triangles.iter().zip(&level.mesh.corner_normals) {
             let normal = face_normal(&level.mesh.positions, *triangle).as_vec3();
             assert_eq!(*normals, [-normal; 3]);
         }
     }
+}
+
+/// Whenever it is, it ends, and gives the first of all levels.
+#[test]
+fn levels_that_nobody_waits_for_any_more_are_not_made() {
+    let (mesh, _) = pictured_torus(96, 48);
+    let all = levels(&mesh);
+    assert!(all.len() > 3);
+    let mut ends = std::collections::BTreeSet::new();
+    for asked in [0, 1, 2, 5, 20, 60, 150, 400, 1000] {
+        let left = std::sync::atomic::AtomicI64::new(asked);
+        let goes_on = || left.fetch_sub(1, std::sync::atomic::Ordering::Relaxed) > 0;
+        let some = levels_while(&mesh, &goes_on);
+        let counts = |levels: &[Level]| -> Vec<usize> {
+            levels
+                .iter()
+                .map(|level| level.mesh.triangles.len())
+                .collect()
+        };
+        assert_eq!(counts(&some), counts(&all)[..some.len()], "{asked}");
+        ends.insert(some.len());
+    }
+    assert!(ends.contains(&0) && ends.len() > 2, "{ends:?}");
 }
 
 #[test]
@@ -561,7 +584,7 @@ fn facets_are_measured_where_a_surface_bends_and_nowhere_else() {
         let facet_m = level.largest_facet_m;
         assert!(facet_m > 0.0 && facet_m < 4.0, "{facet_m}");
     }
-    let flat = chain(&cut_box(8), 12);
+    let flat = chain(&cut_box(8), 12, &|| true);
     assert!(flat.iter().all(|level| level.largest_facet_m == 0.0));
 }
 

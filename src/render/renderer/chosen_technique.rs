@@ -39,10 +39,10 @@ impl ChosenTechnique {
         background: &Background,
         precomputation: &dyn Precomputation,
     ) -> (Self, GpuScene) {
+        let known = || KnownLevels::default().prepared(scene, precomputation);
         match (scene.chosen_technique().0, &scene.probe) {
             (ShadowTechnique::Shafts | ShadowTechnique::Both, Some(probe)) => {
-                let gpu_scene =
-                    GpuScene::new(gpu, scene, intrinsics, LitBy::Room, KnownLevels::default());
+                let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Room, known());
                 let kinds = gpu_scene.kinds;
                 let shafts = Shafts::new(gpu, scene, probe, kinds, precomputation);
                 let technique = match gpu_scene.light_count() {
@@ -60,6 +60,7 @@ impl ChosenTechnique {
             }
             (ShadowTechnique::Environment, Some(probe)) => {
                 let finer = KnownLevels::with_finer(finer_meshes(scene, precomputation));
+                let finer = finer.prepared(scene, precomputation);
                 let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Room, finer);
                 let (samples, kinds) = (scene.shadows.samples, gpu_scene.kinds);
                 let broad = Environment::new(gpu, scene, probe, &gpu_scene, precomputation);
@@ -69,13 +70,7 @@ impl ChosenTechnique {
             }
             // (No scene that was read has shafts or an environment without a probe.)
             (_, _) => {
-                let gpu_scene = GpuScene::new(
-                    gpu,
-                    scene,
-                    intrinsics,
-                    LitBy::Lights,
-                    KnownLevels::default(),
-                );
+                let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Lights, known());
                 let (samples, kinds) = (scene.shadows.samples, gpu_scene.kinds);
                 // (A lamp that moves along may be lost, and one of some size has soft shadows.)
                 let is_plain = |light: &SceneLight| light.anchor == 0 && !light.light.has_size();
