@@ -124,7 +124,7 @@ fn work(soup: &Soup) {
     for level in levels(&mesh) {
         assert!(level.max_error_m >= 0.0 && level.mean_error_m >= 0.0);
     }
-    let _ = SampledSurface::new(&mesh).map(|surface| surface.distance_to(&surface));
+    let _ = SampledSurface::new(&mesh).map(|surface| surface.distance_to(&surface, &|| true));
     let corners_of = |triangle: &[u32; 3]| triangle.map(|index| mesh.positions[index as usize]);
     let corners: Vec<[Vec3; 3]> = mesh.triangles.iter().map(corners_of).collect();
     let exact: Vec<[DVec3; 3]> = corners

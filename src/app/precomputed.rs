@@ -96,6 +96,10 @@ impl Precomputation for KeptOnDisk<'_> {
         ready_room(room).transport
     }
 
+    fn goes_on(&self) -> bool {
+        self.0.goes_on()
+    }
+
     fn levels(&self, mesh: &Mesh) -> Vec<Level> {
         levels_while(mesh, &|| self.0.goes_on())
     }

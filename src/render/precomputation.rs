@@ -14,6 +14,11 @@ pub trait Precomputation {
         room.transport()
     }
 
+    /// Whether somebody still waits for the renderer.
+    fn goes_on(&self) -> bool {
+        true
+    }
+
     /// Coarser versions of a mesh.
     fn levels(&self, mesh: &Mesh) -> Vec<Level> {
         levels(mesh)

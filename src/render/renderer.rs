@@ -161,8 +161,12 @@ impl Renderer {
         let shaped = scene.shaped_at(0.0);
         let LayeredScene { scene, layers } = LayeredScene::new(&shaped);
         let scene = scene.as_ref();
+        let known = ChosenTechnique::known_levels(scene, precomputation);
+        // What nobody waits for any more shows nothing.
+        let nothing = (!precomputation.goes_on()).then(|| scene.without_things());
+        let scene = nothing.as_ref().unwrap_or(scene);
         let (technique, gpu_scene) =
-            ChosenTechnique::new(&gpu, scene, intrinsics, &background, precomputation);
+            ChosenTechnique::new(&gpu, scene, intrinsics, &background, known, precomputation);
         let made_for = Shape::of(scene, &scene.outlined_lights());
         Ok(Self {
             technique,

@@ -117,6 +117,16 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// The same camera, anchors and lights with nothing there, and no probe.
+    pub fn without_things(&self) -> Self {
+        Self {
+            phantoms: Vec::new(),
+            virtuals: Vec::new(),
+            probe: None,
+            ..self.clone()
+        }
+    }
+
     /// The families of all markers, as often as they have some.
     pub fn families(&self) -> Vec<Family> {
         let markers = self.anchors.iter().flat_map(|anchor| &anchor.markers);

@@ -269,12 +269,7 @@ impl SceneCanvas {
 
     /// Another camera: the video is shown at once, its things follow.
     fn begin(&mut self, intrinsics: Intrinsics) -> Result<(), RenderError> {
-        let empty = Arc::new(Scene {
-            phantoms: Vec::new(),
-            virtuals: Vec::new(),
-            probe: None,
-            ..(*self.scene).clone()
-        });
+        let empty = Arc::new(self.scene.without_things());
         let renderer =
             crate::app::precomputed::renderer(Arc::clone(&self.gpu), &empty, intrinsics)?;
         let order = RendererOrder {

@@ -31,18 +31,27 @@ pub(super) enum ChosenTechnique {
 }
 
 impl ChosenTechnique {
+    /// Coarser versions of a scene's meshes, and finer ones where its technique asks for them.
+    pub fn known_levels(scene: &Scene, precomputation: &dyn Precomputation) -> KnownLevels {
+        let finer = match (scene.chosen_technique().0, &scene.probe) {
+            (ShadowTechnique::Environment, Some(_)) => finer_meshes(scene, precomputation),
+            _ => Vec::new(),
+        };
+        KnownLevels::with_finer(finer).prepared(scene, precomputation)
+    }
+
     /// The technique of a scene, and the scene as it draws it.
     pub fn new(
         gpu: &Gpu,
         scene: &Scene,
         intrinsics: Intrinsics,
         background: &Background,
+        known: KnownLevels,
         precomputation: &dyn Precomputation,
     ) -> (Self, GpuScene) {
-        let known = || KnownLevels::default().prepared(scene, precomputation);
         match (scene.chosen_technique().0, &scene.probe) {
             (ShadowTechnique::Shafts | ShadowTechnique::Both, Some(probe)) => {
-                let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Room, known());
+                let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Room, known);
                 let kinds = gpu_scene.kinds;
                 let shafts = Shafts::new(gpu, scene, probe, kinds, precomputation);
                 let technique = match gpu_scene.light_count() {
@@ -59,9 +68,7 @@ impl ChosenTechnique {
                 (technique, gpu_scene)
             }
             (ShadowTechnique::Environment, Some(probe)) => {
-                let finer = KnownLevels::with_finer(finer_meshes(scene, precomputation));
-                let finer = finer.prepared(scene, precomputation);
-                let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Room, finer);
+                let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Room, known);
                 let (samples, kinds) = (scene.shadows.samples, gpu_scene.kinds);
                 let broad = Environment::new(gpu, scene, probe, &gpu_scene, precomputation);
                 let compact = Accumulated::new(gpu, background, samples, kinds, First::DepthAlone);
@@ -70,7 +77,7 @@ impl ChosenTechnique {
             }
             // (No scene that was read has shafts or an environment without a probe.)
             (_, _) => {
-                let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Lights, known());
+                let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Lights, known);
                 let (samples, kinds) = (scene.shadows.samples, gpu_scene.kinds);
                 // (A lamp that moves along may be lost, and one of some size has soft shadows.)
                 let is_plain = |light: &SceneLight| light.anchor == 0 && !light.light.has_size();
