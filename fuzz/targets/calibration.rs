@@ -2,7 +2,15 @@
 
 use gnomon::capture::load_calibration;
 
-const NAMES: [&str; 5] = ["a.toml", "a.yaml", "a.json", "a.xml", "cameras.txt"];
+const NAMES: [&str; 7] = [
+    "a.toml",
+    "a.yaml",
+    "a.json",
+    "a.xml",
+    "cameras.txt",
+    "a.npz",
+    "a.npy",
+];
 
 // The choice says which name the bytes get.
 pub fn run(input: &[u8]) {

@@ -121,6 +121,39 @@ impl RayCaster {
 mod tests {
     use super::*;
 
+    /// Each of these took minutes to hours.
+    #[test]
+    fn what_is_all_alike_becomes_a_tree_too() {
+        const SIDE: u32 = 500;
+        let square = |number: u32| {
+            let place = |at: u32| at as f32 / SIDE as f32;
+            let [x, y] = [number % SIDE, number / SIDE].map(place);
+            let step = 1.0 / SIDE as f32;
+            let corner = |right: f32, up: f32| Vec3::new(x + right * step, y + up * step, 0.0);
+            [
+                [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0)],
+                [corner(0.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)],
+            ]
+        };
+        let grid: Vec<[Vec3; 3]> = (0..SIDE * SIDE).flat_map(square).collect();
+        let caster = RayCaster::new(&grid);
+        let down = |x: f32, y: f32| caster.first_hit(Vec3::new(x, y, 1.0), Vec3::NEG_Z, 2.0);
+        for number in [0, 777, SIDE * SIDE / 2 + 13, SIDE * SIDE - 1] {
+            let middle = (square(number)[0][0] + square(number)[0][1] + square(number)[0][2]) / 3.0;
+            let hit = down(middle.x, middle.y).expect("a hit");
+            assert_eq!(hit.triangle, 2 * number as usize);
+        }
+        assert_eq!(down(1.5, 0.5), None);
+        for alike in [
+            [Vec3::ZERO, Vec3::X, Vec3::Y],
+            [Vec3::ONE; 3],
+            [Vec3::ZERO; 3],
+        ] {
+            let boxes = RayCaster::new(&vec![alike; 200_000]);
+            assert!(boxes.boxes().len() > 10_000);
+        }
+    }
+
     #[test]
     fn a_ray_hits_the_nearer_of_two_squares_and_no_farther_than_it_reaches() {
         let square = |z: f32| {

@@ -4,13 +4,14 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::false_colour;
 use super::frame_tracker::TrackedPicture;
 use super::views::ViewMode;
 use crate::app::input::mailbox::{Mailbox, Taken};
 use crate::app::precomputed::{Onlooker, watched_renderer};
+use crate::app::stopwatch::Stopwatch;
 use crate::app::window::Wake;
 use crate::geometry::camera::Intrinsics;
 use crate::render::{Gpu, RenderError, Renderer, Shown};
@@ -65,7 +66,7 @@ pub struct SceneCanvas {
     /// Shortcuts that are switched off.
     without: Shortcuts,
     /// Since when a renderer for the scene as it is has yet to come.
-    awaited_since: Option<Instant>,
+    awaited_since: Option<Stopwatch>,
     maker: Option<JoinHandle<()>>,
 }
 
@@ -131,7 +132,7 @@ impl SceneCanvas {
                     scene: Arc::clone(&scene),
                     intrinsics: order.intrinsics,
                 });
-                self.awaited_since.get_or_insert_with(Instant::now);
+                self.awaited_since.get_or_insert_with(Stopwatch::start);
             }
         }
         self.scene = scene;
@@ -162,9 +163,9 @@ impl SceneCanvas {
         self.awaited_since.is_none()
     }
 
-    /// How long a better renderer has been awaited.
-    pub fn awaited(&self) -> Option<Duration> {
-        self.awaited_since.map(|since| since.elapsed())
+    /// How long a better renderer has been awaited, milliseconds.
+    pub fn awaited_ms(&self) -> Option<f64> {
+        self.awaited_since.map(|since| since.elapsed_ms())
     }
 
     /// The part that is done, 0 to 1, of what takes the renderer to come longest; `None` where it takes no time.
@@ -281,7 +282,7 @@ impl SceneCanvas {
             scene: Arc::clone(&self.scene),
             intrinsics,
         });
-        self.awaited_since.get_or_insert_with(Instant::now);
+        self.awaited_since.get_or_insert_with(Stopwatch::start);
         Ok(())
     }
 }

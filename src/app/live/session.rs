@@ -281,9 +281,9 @@ impl LiveSession {
         self.canvas.preparing()
     }
 
-    /// How long the scene has been shown worse than it can be, or not at all.
-    pub fn awaited(&self) -> Option<Duration> {
-        self.canvas.awaited()
+    /// How long the scene has been shown worse than it can be, or not at all, milliseconds.
+    pub fn awaited_ms(&self) -> Option<f64> {
+        self.canvas.awaited_ms()
     }
 
     /// The frame that was drawn last.

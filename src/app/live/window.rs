@@ -37,7 +37,7 @@ use crate::scene::SceneLight;
 /// The window looks at the world at least this often, even when no frame comes.
 const PULSE: Duration = Duration::from_millis(200);
 /// What takes no longer is not told.
-const LONG_AWAITED: Duration = Duration::from_secs(1);
+const LONG_AWAITED_MS: f64 = 1000.0;
 const PANEL_WIDTH: f32 = 330.0;
 const PROGRESS_WIDTH: f32 = 330.0;
 const TROUBLE: Color32 = Color32::from_rgb(255, 190, 90);
@@ -288,7 +288,7 @@ impl LiveWindow {
         let shown = self.session.notices.shown(self.session.now_secs());
         let [session, video] = self.session.records();
         let preparing = self.session.preparing();
-        let awaits_long = (self.session.awaited()).is_some_and(|awaited| awaited >= LONG_AWAITED);
+        let awaits_long = (self.session.awaited_ms()).is_some_and(|ms| ms >= LONG_AWAITED_MS);
         let is_calm = !session && !video && !self.state.holds;
         if shown.is_empty() && is_calm && preparing.is_none() && !awaits_long {
             return;
@@ -316,8 +316,7 @@ impl LiveWindow {
                 if awaits_long && preparing.is_none() {
                     boxed(
                         ui,
-                        RichText::new("preparing the scene: large models take a while")
-                            .color(Color32::WHITE),
+                        RichText::new("preparing the scene …").color(Color32::WHITE),
                     );
                 }
                 for (recording, what) in [(session, "the camera"), (video, "the composite")] {

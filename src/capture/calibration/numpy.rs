@@ -12,6 +12,9 @@ const MOST_BYTES: u64 = 1 << 20;
 /// Numbers of the largest array that is looked at.
 const MOST_NUMBERS: u64 = 64;
 const MOST_ARRAYS: usize = 1000;
+/// Bytes of the longest header that is looked into; NumPy's have 128 where an array has numbers.
+const MOST_HEADER: usize = 512;
+const MOST_BRACKETS: usize = 4;
 
 /// Whether these are the bytes of an array or an archive of arrays.
 pub(super) fn is_numpy(extension: &str, bytes: &[u8]) -> bool {
@@ -59,6 +62,14 @@ fn numbers(bytes: &[u8]) -> Result<Option<Value>, String> {
     };
     if length > bytes.len() {
         return Err("the array is cut off".to_owned());
+    }
+    // (Of numbers alone it is short and has two brackets; its parser takes twice as long for each one more within another.)
+    let brackets = bytes[..length]
+        .iter()
+        .filter(|byte| b"([{".contains(byte))
+        .count();
+    if length > MOST_HEADER || brackets > MOST_BRACKETS {
+        return Ok(None);
     }
     let file = NpyFile::new(bytes).map_err(|error| error.to_string())?;
     let count = file

@@ -587,6 +587,17 @@ fn numpy_s_arrays_are_read() {
             let _ = load_calibration_among(&path, [640, 480]);
         }
     }
+    for deep in ["(", "[", "{0:", "-", "'", "((((((((0,"] {
+        for times in [60, 160, 400, 5000] {
+            let header = deep.repeat(times);
+            let mut bytes = b"\x93NUMPY\x02\0".to_vec();
+            bytes.extend((header.len() as u32).to_le_bytes());
+            bytes.extend(header.as_bytes());
+            std::fs::write(path.with_extension("npy"), bytes).unwrap();
+            let refused = load_calibration_among(&path.with_extension("npy"), [640, 480]);
+            assert!(refused.is_err(), "{deep} {times}");
+        }
+    }
     let pickle = load_calibration(&folder.join("camera.pkl"))
         .unwrap_err()
         .to_string();
