@@ -215,6 +215,20 @@ pub fn welded(model: RawModel, normals: Normals) -> Option<LoadedMesh> {
     welded_as(model, (normals, Kept::Needed), None)
 }
 
+/// What to say of so many triangles that memory may not do for them.
+fn too_many(triangles: usize) -> Option<String> {
+    const MANY: usize = 500_000;
+    /// Measured: some 5 kB of memory for each that is drawn and casts shadows.
+    const BYTES_EACH: f64 = 5e3;
+    let gigabytes = triangles as f64 * BYTES_EACH / 1e9;
+    (triangles > MANY).then(|| {
+        format!(
+            "its {:.1} million triangles take some {gigabytes:.0} GB of memory to draw; on a table a coarser version looks the same",
+            triangles as f64 / 1e6
+        )
+    })
+}
+
 /// What corners keep of texture coordinates and colours.
 #[derive(Clone, Copy, PartialEq)]
 enum Kept {
@@ -264,7 +278,8 @@ fn welded_as(
             Mesh::weld_with_looks(positions, triangles, &model.looks, crease_rad)
         }
     };
-    let notes = model.notes.told();
+    let mut notes = model.notes.told();
+    notes.extend(too_many(mesh.triangles.len()));
     let materials = || model.materials.iter();
     (!mesh.triangles.is_empty()).then(|| LoadedMesh {
         mesh: Arc::new(mesh),
