@@ -4,23 +4,22 @@
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::ops::Range;
-use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3, Vec4};
 
 use crate::geometry::bounds::Bounds;
 use crate::geometry::coincidence::{IN_ONE_PLACE_M, may_coincide};
-use crate::geometry::levels::{Level, levels};
+use crate::geometry::levels::Level;
 use crate::geometry::mesh::{CornerLook, HeldCorner, HeldNormal, Mesh};
 use crate::geometry::outline_scale::largest_scale;
 use crate::geometry::shadow_volume::Caster;
 use crate::geometry::solid::holes;
-use crate::scene::{Object, Scene, Shortcut};
+use crate::scene::{Object, Scene};
 
 use super::gpu::Gpu;
+use super::known_levels::KnownLevels;
 use super::materials::needs_looks;
-use super::precomputation::Precomputation;
 
 /// The kind of model that a surface belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -173,79 +172,6 @@ pub(super) struct AnchorGeometry {
     pub things: Vec<AnchoredModel>,
 }
 
-/// Other versions of meshes, which take long to make: each with the mesh that it is of.
-#[derive(Default)]
-pub(super) struct KnownLevels {
-    coarser: Vec<(Arc<Mesh>, Vec<Level>)>,
-    /// In place of their meshes, without coarser ones.
-    finer: Vec<(Arc<Mesh>, Mesh)>,
-}
-
-impl KnownLevels {
-    /// Some are drawn as finer ones.
-    pub fn with_finer(finer: Vec<(Arc<Mesh>, Mesh)>) -> Self {
-        Self {
-            finer,
-            ..Self::default()
-        }
-    }
-
-    /// Coarser versions of all that a scene shows in them are known too.
-    pub fn prepared(mut self, scene: &Scene, precomputation: &dyn Precomputation) -> Self {
-        for object in scene.phantoms.iter().chain(&scene.virtuals) {
-            let mesh = &object.mesh;
-            let is_known = position(&self.finer, mesh)
-                .or_else(|| position(&self.coarser, mesh))
-                .is_some();
-            if object.visible && has_levels(scene, object) && !is_known {
-                self.coarser
-                    .push((Arc::clone(mesh), precomputation.levels(mesh)));
-            }
-        }
-        self
-    }
-
-    /// What a mesh is drawn as, and coarser versions of that, made where they are not known.
-    fn of<'a>(&'a mut self, mesh: &'a Arc<Mesh>, with_levels: bool) -> (&'a Mesh, &'a [Level]) {
-        if let Some(index) = position(&self.finer, mesh) {
-            return (&self.finer[index].1, &[]);
-        }
-        if !with_levels {
-            return (mesh, &[]);
-        }
-        let index = position(&self.coarser, mesh).unwrap_or_else(|| {
-            self.coarser.push((Arc::clone(mesh), levels(mesh)));
-            self.coarser.len() - 1
-        });
-        (mesh, &self.coarser[index].1)
-    }
-
-    /// What a mesh is drawn as, the finest first.
-    pub fn drawn<'a>(&'a self, mesh: &'a Arc<Mesh>) -> impl Iterator<Item = &'a Mesh> {
-        let finer = position(&self.finer, mesh).map(|index| &self.finer[index].1);
-        let coarser = position(&self.coarser, mesh).filter(|_| finer.is_none());
-        let levels = coarser.map_or(&[][..], |index| &self.coarser[index].1);
-        std::iter::once(finer.unwrap_or(mesh)).chain(levels.iter().map(|level| &level.mesh))
-    }
-}
-
-/// Whether coarser versions of a thing may be drawn. (How far one is off is measured in one shape.)
-fn has_levels(scene: &Scene, object: &Object) -> bool {
-    scene.shadows.max_silhouette_error_px > 0.0
-        && object.animation.is_none()
-        && !scene.shadows.without.has(Shortcut::Levels)
-}
-
-/// Where a mesh is in a list. (To compare large meshes takes longer than a frame.)
-fn position<T>(known: &[(Arc<Mesh>, T)], mesh: &Arc<Mesh>) -> Option<usize> {
-    let same = |(known, _): &(Arc<Mesh>, T)| Arc::ptr_eq(known, mesh);
-    let like = |(known, _): &(Arc<Mesh>, T)| known == mesh;
-    known
-        .iter()
-        .position(same)
-        .or_else(|| known.iter().position(like))
-}
-
 impl AnchorGeometry {
     pub fn new(gpu: &Gpu, scene: &Scene, known: &mut KnownLevels) -> Self {
         let ambient = (PI * scene.ambient_radiance).as_vec3();
@@ -272,7 +198,7 @@ impl AnchorGeometry {
                 for (index, object) in there {
                     let ties = role == Role::Virtual && ties(scene, &surfaces, index);
                     let tie = ties.then_some(index);
-                    let drawn = known.of(&object.mesh, has_levels(scene, object));
+                    let drawn = known.of(scene, object);
                     let before = objects.iter().take(index);
                     shared.first_material =
                         before.map(|object| object.materials.len() as u32).sum();

@@ -18,8 +18,8 @@ use crate::light::Light;
 use crate::scene::{Scene, SceneLight, ShadowSettings, Shortcut};
 
 use super::anchor_geometry::{
-    AnchorGeometry, AnchoredModel, BatchCorners, Corners, KnownLevels, ModelLevel,
-    OcclusionCorners, Role, SurfaceBatch,
+    AnchorGeometry, AnchoredModel, BatchCorners, Corners, ModelLevel, OcclusionCorners, Role,
+    SurfaceBatch,
 };
 use super::attachments::texture;
 use super::casters::Casters;
@@ -27,6 +27,7 @@ use super::detail::{chosen_levels, widest_penumbra_px};
 use super::gpu::Gpu;
 use super::indirect::Indirect;
 use super::insides::{Insides, insides};
+use super::known_levels::KnownLevels;
 use super::light_kind::LightKind;
 use super::light_piece::LitBy;
 use super::lights::Lights;

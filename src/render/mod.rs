@@ -23,6 +23,7 @@ mod gpu_clock;
 mod gpu_scene;
 mod indirect;
 mod insides;
+mod known_levels;
 mod layered_scene;
 mod layers;
 mod light_kind;

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use gnomon::app::truth::photographs::{self, Photographs, Still};
 use gnomon::capture::Frame;
 
 /// A folder of photographs beside the project; tests that ask for it are ignored without `cfg(has_shared)`.
@@ -11,28 +12,21 @@ pub fn photographs(name: &str) -> PathBuf {
         .join(name)
 }
 
+/// Photographs of a name that the charts have too, with the markers that people see in them.
+#[allow(dead_code)] // Each test uses its own part.
+pub fn known(name: &str) -> (&'static Photographs, Vec<Still>) {
+    let known = photographs::ALL.iter().find(|known| known.name == name);
+    let known = known.expect("known photographs");
+    let stills = known.read().unwrap_or_else(|error| panic!("{error:#}"));
+    (known, stills)
+}
+
 pub fn read_photograph(path: &Path) -> Frame {
-    let picture = image::open(path)
-        .unwrap_or_else(|error| panic!("{}: {error}", path.display()))
-        .to_rgba8();
-    Frame {
-        index: 0,
-        time_secs: 0.0,
-        size_px: [picture.width(), picture.height()],
-        rgba: picture.into_raw(),
-    }
+    photographs::read_picture(path).unwrap_or_else(|error| panic!("{error:#}"))
 }
 
 /// The PNG and JPEG files of a folder, sorted by name.
 pub fn pictures_in(folder: &Path) -> Vec<PathBuf> {
-    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
-        .unwrap_or_else(|error| panic!("{}: {error}", folder.display()))
-        .map(|entry| entry.expect("a file").path())
-        .filter(|path| {
-            let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
-            ending == "png" || ending == "jpg"
-        })
-        .collect();
-    files.sort();
-    files
+    let names = photographs::pictures_in(folder).unwrap_or_else(|error| panic!("{error:#}"));
+    names.into_iter().map(|name| folder.join(name)).collect()
 }

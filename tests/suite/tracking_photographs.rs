@@ -6,13 +6,14 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 use glam::{DAffine3, DQuat, DVec2, DVec3};
+use gnomon::app::truth::photographs::Still;
 use gnomon::capture::Frame;
 use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::scene::{Anchor, ArucoRefinement, DetectorKind, Family, Marker, TrackingSettings};
 use gnomon::tracking::focal::CameraLearner;
 use gnomon::tracking::{Detector, Status, Tracker, TrackingError};
 
-use crate::common::photographs::{photographs, pictures_in, read_photograph};
+use crate::common::photographs::{known, photographs, pictures_in, read_photograph};
 use crate::common::sheets::{
     anchor, angle_between_deg, grey_of, marker, settings, track_once, true_corners_px, turned,
 };
@@ -20,23 +21,16 @@ use crate::common::sheets::{
 #[test]
 #[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
 fn photographs_of_a_room_show_the_markers_that_people_counted() {
-    let folder = photographs("swatbotics/mapping_feb_2014");
-    let truth = std::fs::read_to_string(folder.join("groundtruth.txt")).unwrap();
     let full = TrackingSettings {
         decimation: 1.0,
         ..TrackingSettings::default()
     };
     let mut detector = Detector::new(&full, &[Family::TAG36H11]).unwrap();
     let (mut visible, mut found, mut invented) = (0, 0, Vec::new());
-    for line in truth.lines().filter(|line| !line.trim().is_empty()) {
-        let mut words = line.split_whitespace();
-        let name = words.next().unwrap();
-        let expected = words
-            .map(|word| word.parse::<u32>().unwrap())
-            .collect::<BTreeSet<_>>();
-        let frame = read_photograph(&folder.join(name));
+    for (number, still) in known("a room").1.iter().enumerate() {
+        let expected = &still.ids;
         let seen = detector
-            .detect_thoroughly(&grey_of(&frame), frame.size_px)
+            .detect_thoroughly(&grey_of(&still.frame), still.frame.size_px)
             .unwrap();
         let seen = seen
             .iter()
@@ -45,8 +39,8 @@ fn photographs_of_a_room_show_the_markers_that_people_counted() {
         visible += expected.len();
         found += expected.intersection(&seen).count();
         invented.extend(
-            seen.difference(&expected)
-                .map(|id| format!("{id} in {name}")),
+            seen.difference(expected)
+                .map(|id| format!("{id} in picture {number}")),
         );
     }
     let recall = found as f64 / visible as f64;
@@ -265,7 +259,7 @@ fn pose_at(poses: &[(i64, DAffine3)], time_ns: i64) -> DAffine3 {
 }
 
 /// A still: what the camera says, and where the motion capture has its body.
-struct Still {
+struct CapturedStill {
     camera_from_grid: DAffine3,
     target_from_body: DAffine3,
 }
@@ -291,12 +285,12 @@ impl HandEye {
     }
 
     /// What the camera should have said.
-    fn camera_from_grid(&self, still: &Still) -> DAffine3 {
+    fn camera_from_grid(&self, still: &CapturedStill) -> DAffine3 {
         (still.target_from_body * self.body_from_camera).inverse() * self.target_from_grid
     }
 
     /// Turn and shift that are left, in units of what is to be expected, and robust (Geman and McClure's).
-    fn left(&self, stills: &[Still]) -> Vec<f64> {
+    fn left(&self, stills: &[CapturedStill]) -> Vec<f64> {
         const TURN: f64 = 0.004;
         const SHIFT_M: f64 = 0.004;
         let left = stills.iter().flat_map(|still| {
@@ -320,7 +314,7 @@ impl HandEye {
 }
 
 /// Levenberg-Marquardt with a numeric Jacobian.
-fn fit_hand_eye(stills: &[Still], start: HandEye) -> (f64, HandEye) {
+fn fit_hand_eye(stills: &[CapturedStill], start: HandEye) -> (f64, HandEye) {
     const NUDGE: f64 = 1e-6;
     let squares = |left: &[f64]| left.iter().map(|value| value * value).sum::<f64>();
     let mut place = start;
@@ -449,14 +443,14 @@ fn photographs_of_an_april_grid_agree_with_motion_capture() {
     let target_from_world = world_from_target.inverse();
     let anchors = [anchor("grid", &april_grid())];
     let settings = settings(DetectorKind::AprilTag);
-    let stills: Vec<Still> = pictures_in(&folder.join("cam0/data"))
+    let stills: Vec<CapturedStill> = pictures_in(&folder.join("cam0/data"))
         .iter()
         .map(|file| {
             let name = file.file_stem().expect("a name").to_string_lossy();
             let pose = &track_once(&settings, &anchors, GRID_CAMERA, &read_photograph(file))[0];
             assert_eq!(pose.status, Status::Tracked, "{name}");
             let time_ns = name.parse().expect("nanoseconds");
-            Still {
+            CapturedStill {
                 camera_from_grid: pose.camera_from_anchor.expect("a pose"),
                 target_from_body: target_from_world * pose_at(&bodies, time_ns),
             }
@@ -558,29 +552,22 @@ fn camera_of(frame: &Frame) -> Intrinsics {
 #[test]
 #[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
 fn photographs_of_a_clipboard_show_its_tags() {
-    let folder = photographs("swatbotics/clipboard");
     // Ten more than it has.
     let anchors = lone_markers(Family::TAG36H11, 0..40, 0.02);
     // Of those pictures that show the clipboard whole.
     let (mut visible, mut found) = (0, 0);
-    for (number, file) in pictures_in(&folder).iter().enumerate() {
-        let frame = read_photograph(file);
+    for (number, still) in known("a clipboard").1.iter().enumerate() {
+        let frame = &still.frame;
         let seen = seen_ids(
             &settings(DetectorKind::AprilTag),
             &anchors,
-            camera_of(&frame),
-            &frame,
+            camera_of(frame),
+            frame,
         );
         eprintln!("clipboard {number}: {} of 30", seen.len());
-        assert!(
-            seen.iter().all(|&id| id < 30),
-            "{}: {seen:?}",
-            file.display()
-        );
-        if ![0, 3, 7].contains(&number) {
-            visible += 30;
-            found += seen.len();
-        }
+        assert!(seen.iter().all(|&id| id < 30), "{number}: {seen:?}");
+        visible += still.ids.len();
+        found += still.ids.intersection(&seen.into_iter().collect()).count();
     }
     assert_eq!(visible, 210);
     assert!(
@@ -592,24 +579,25 @@ fn photographs_of_a_clipboard_show_its_tags() {
 #[test]
 #[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
 fn photographs_of_a_hallway_show_one_tag_each() {
-    let folder = photographs("swatbotics/hallway");
     let anchors = lone_markers(Family::TAG36H11, 0..30, 0.16);
-    for (file, id) in pictures_in(&folder).iter().zip([3, 3, 2, 2, 10]) {
-        let frame = read_photograph(file);
+    let stills = known("a hallway").1;
+    assert_eq!(stills.len(), 5);
+    for (number, still) in stills.iter().enumerate() {
+        let frame = &still.frame;
         let seen = seen_ids(
             &settings(DetectorKind::AprilTag),
             &anchors,
-            camera_of(&frame),
-            &frame,
+            camera_of(frame),
+            frame,
         );
-        assert_eq!(seen, [id], "{}", file.display());
+        assert_eq!(seen.len(), 1, "{number}: {seen:?}");
+        assert!(still.ids.iter().eq(&seen), "{number}: {seen:?}");
     }
 }
 
 #[test]
 #[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
 fn photographs_of_road_signs_show_their_tags() {
-    let folder = photographs("duckietown");
     let camera = |focal_px, center_px| Intrinsics {
         size_px: [640, 480],
         focal_px,
@@ -618,71 +606,53 @@ fn photographs_of_road_signs_show_their_tags() {
     };
     let table = camera(DVec2::new(338.563, 338.939), DVec2::new(336.455, 230.487));
     let road = camera(DVec2::new(336.776, 336.027), DVec2::new(333.358, 212.774));
-    // Some stand or lie behind others, or are seen from the edge.
-    let pictures: [(&str, Intrinsics, &[u32]); 11] = [
-        ("multiple_01", table, &[22, 24, 58, 85, 144, 198]),
-        ("multiple_02", table, &[22, 24, 85, 144, 198]),
-        ("multiple_03", table, &[22, 24, 58, 85, 144, 198]),
-        ("multiple_04", table, &[22, 24, 58, 85, 144, 198]),
-        ("multiple_05", table, &[22, 24, 85, 198]),
-        ("multiple_06", table, &[22, 24, 58, 85, 144, 198]),
-        ("multiple_07", table, &[22, 24, 58, 85, 144, 198]),
-        ("multiple_08", table, &[85, 144, 198]),
-        ("multiple_09", table, &[22, 24, 58, 85, 144]),
-        ("multiple_10", table, &[22, 24, 58, 85, 198]),
-        ("", road, &[60, 82, 318, 328, 387]),
-    ];
-    for (name, camera, ids) in pictures {
-        let name = format!("test_image_{name}")
-            .trim_end_matches('_')
-            .to_owned();
-        let frame = read_photograph(&folder.join(format!("{name}.png")));
+    let stills = known("road signs").1;
+    assert_eq!(
+        stills.iter().map(|still| still.ids.len()).sum::<usize>(),
+        57
+    );
+    for (number, still) in stills.iter().enumerate() {
+        let camera = if still.ids.contains(&318) {
+            road
+        } else {
+            table
+        };
         // A hundred others beside them.
-        let asked: BTreeSet<u32> = ids.iter().copied().chain(400..500).collect();
+        let asked: BTreeSet<u32> = still.ids.iter().copied().chain(400..500).collect();
         let anchors = lone_markers(Family::TAG36H11, asked.into_iter(), 0.065);
-        let seen = seen_ids(&settings(DetectorKind::AprilTag), &anchors, camera, &frame);
-        assert_eq!(seen, ids, "{name}");
+        let settings = settings(DetectorKind::AprilTag);
+        let seen = seen_ids(&settings, &anchors, camera, &still.frame);
+        assert!(still.ids.iter().eq(&seen), "{number}: {seen:?}");
     }
 }
 
 #[test]
 #[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
 fn photographs_of_the_aruco_tutorials_show_their_markers() {
-    let folder = photographs("opencv_tutorial");
-    let predefined = Family::from_name("DICT_6X6_250").expect("a dictionary");
-    let own = Family::from_file(&folder.join("tutorial_dict.yml")).expect("a dictionary");
+    let (predefined, singles_and_boards) = known("tutorial, 6X6_250");
+    let (own, boards) = known("tutorial, its own");
+    let [predefined, own] = [predefined, own].map(|known| known.family().expect("a dictionary"));
     assert_eq!(own.id_count(), 35);
-    // A mouse hides four markers of one, two of another, on which lines are drawn that cross ten more; the boards gb* have
-    // a dictionary of their own.
-    let pictures: [(&str, Family, Vec<u32>); 7] = [
-        (
-            "singlemarkersoriginal",
-            predefined,
-            vec![23, 40, 62, 98, 124, 203],
-        ),
-        ("choriginal", predefined, (0..17).collect()),
-        (
-            "chocclusion_original",
-            predefined,
-            (0..11).chain([12, 15]).collect(),
-        ),
-        ("gboriginal", predefined, vec![]),
-        ("gbocclusion", predefined, vec![]),
-        ("gboriginal", own, (0..35).collect()),
-        (
-            "gbocclusion",
-            own,
-            [7..11, 12..15, 16..20, 21..29, 30..34]
-                .into_iter()
-                .flatten()
-                .collect(),
-        ),
-    ];
-    for (name, family, expected) in pictures {
+    let seen = |family: Family, still: &Still| {
         let anchors = lone_markers(family, 0..family.id_count(), 0.03);
-        let frame = read_photograph(&folder.join(format!("{name}.jpg")));
-        let camera = camera_of(&frame);
-        let seen = seen_ids(&settings(DetectorKind::Aruco), &anchors, camera, &frame);
-        assert_eq!(seen, expected, "{name}");
+        let camera = camera_of(&still.frame);
+        seen_ids(
+            &settings(DetectorKind::Aruco),
+            &anchors,
+            camera,
+            &still.frame,
+        )
+    };
+    let count = |stills: &[Still]| stills.iter().map(|still| still.ids.len()).sum::<usize>();
+    assert_eq!([count(&singles_and_boards), count(&boards)], [36, 58]);
+    for (family, stills) in [(predefined, &singles_and_boards), (own, &boards)] {
+        for (number, still) in stills.iter().enumerate() {
+            let seen = seen(family, still);
+            assert!(still.ids.iter().eq(&seen), "{family}, {number}: {seen:?}");
+        }
+    }
+    // The boards of a dictionary of their own have none of the other.
+    for still in &boards {
+        assert_eq!(seen(predefined, still), [0; 0]);
     }
 }

@@ -13,9 +13,11 @@ use super::family::Chart;
 use super::figure::{Axis, Figure, FigurePanel, Point, Scale, Series};
 use super::lab::Lab;
 use super::measured::rounded;
-use super::photographs::{self, Photographs, Still, TURNED_CAMERA, read_picture, turned_tag};
 use super::tracking::bare_library;
 use crate::app::stages::stats::quantile;
+use crate::app::truth::photographs::{
+    self, Photographs, Still, TURNED_CAMERA, read_picture, turned_tag,
+};
 use crate::app::truth::sheets::{Light, camera_above, cube, with_noise};
 use crate::app::truth::{PoseErrors, shifts_px};
 use crate::geometry::camera::{Distortion, Intrinsics};
@@ -40,7 +42,7 @@ const FLIPPED_DEG: f64 = 15.0;
 pub struct Footage;
 
 /// One library on one footage.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct FootageRow {
     footage: String,
     library: String,
@@ -99,9 +101,8 @@ fn read_ids(library: &str, footage: &Photographs, stills: &[Still]) -> Result<Ve
         |size_px| Tracker::of_every_marker(&settings, (family, 0.1), guessed_intrinsics(size_px));
     let mut played: Option<Tracker> = None;
     for still in stills {
-        let follows = footage.plays_on();
         let tracker = match played.take() {
-            Some(tracker) if follows => tracker,
+            Some(tracker) if footage.plays_on() => tracker,
             _ => every(still.frame.size_px)?,
         };
         let tracker = played.insert(tracker);
@@ -139,9 +140,7 @@ fn rows_of_photographs(lab: &Lab<'_>, footage: &Photographs) -> Result<Option<Ve
             wanted: wanted as u32,
             found_pct: (wanted > 0).then(|| rounded(100.0 * found as f64 / wanted as f64)),
             invented: invented as u32,
-            flipped_pct: None,
-            shift_median_px: None,
-            jitter_px: None,
+            ..FootageRow::default()
         });
     }
     Ok(Some(rows))
@@ -181,10 +180,8 @@ fn rows_of_the_turned(lab: &Lab<'_>) -> Result<Option<Vec<FootageRow>>> {
             pictures: wanted as u32,
             wanted: wanted as u32,
             found_pct: Some(pct(excess_deg.len(), wanted)),
-            invented: 0,
             flipped_pct: Some(pct(flipped, excess_deg.len())),
-            shift_median_px: None,
-            jitter_px: None,
+            ..FootageRow::default()
         });
     }
     Ok(Some(rows))

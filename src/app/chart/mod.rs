@@ -18,7 +18,6 @@ mod marker_view;
 mod measured;
 mod moved;
 pub mod peers_table;
-mod photographs;
 mod pictures;
 mod scaling;
 mod shadows;

@@ -2,6 +2,7 @@
 //! really there. Charts and tests hold gnomon against them.
 
 mod comparison;
+pub mod photographs;
 mod picture;
 mod pose_error;
 mod poses;

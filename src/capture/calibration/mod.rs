@@ -1,7 +1,8 @@
 //! Calibration files: gnomon's own TOML or JSON, a session's JSON, OpenCV's FileStorage (YAML, XML, JSON), ROS's
 //! `CameraInfo` and `ost.txt`, Kalibr's camchain and EuRoC's sensors, PhotonVision's and calib.io's JSON, whatever names
 //! `fx`, `fy`, `cx`, `cy` (RealSense, ORB-SLAM, VINS, NeRF), NumPy's arrays (`numpy.rs`), COLMAP's `cameras.txt`. All but the
-//! last become the same tree of values first (`tree.rs`), so there is one place that knows the keys (`kinds.rs`; `by_letters.rs` for the letters).
+//! last become the same tree of values first (`tree.rs`), so there is one place that knows the keys (`kinds.rs`; `by_letters.rs`
+//! for the letters).
 
 mod by_letters;
 mod colmap;
@@ -251,8 +252,10 @@ enum Language {
     Xml,
     /// ROS's `ost.txt`.
     Ost,
-    /// A matrix or several.
+    /// A matrix or several, as text.
     Matrices,
+    /// NumPy's arrays.
+    Arrays,
     /// COLMAP's `cameras.txt`.
     Colmap,
 }
@@ -302,12 +305,9 @@ fn read(path: &Path, frame_px: Option<[u32; 2]>) -> Result<UncheckedCalibration,
         .and_then(|extension| extension.to_str())
         .unwrap_or_default()
         .to_ascii_lowercase();
-    if numpy::is_numpy(&extension, &bytes) {
-        let tree = numpy::tree(&bytes).map_err(syntax)?;
-        let cameras = kinds::cameras(&tree).map_err(value)?;
-        return only_camera(cameras, frame_px).map_err(value);
-    }
-    if let Some(what) = in_place_of(&bytes) {
+    let is_numpy = numpy::is_numpy(&extension, &bytes);
+    // (An archive is what an array's file is.)
+    if let Some(what) = in_place_of(&bytes).filter(|_| !is_numpy) {
         return Err(syntax(format!("{what}; a calibration is expected")));
     }
     if bytes.starts_with(b"\x80") {
@@ -317,6 +317,7 @@ fn read(path: &Path, frame_px: Option<[u32; 2]>) -> Result<UncheckedCalibration,
     // Windows' editors begin a file with a byte order mark, and some still write no UTF-8.
     let text = decoded(&bytes);
     let language = match text.contains('\0') {
+        _ if is_numpy => Some(Language::Arrays),
         true => None,
         false => Language::of(&extension, &text),
     };
@@ -326,7 +327,10 @@ fn read(path: &Path, frame_px: Option<[u32; 2]>) -> Result<UncheckedCalibration,
         Some(Language::Yaml) => tree::of_yaml(&text),
         Some(Language::Xml) => tree::of_xml(&text),
         Some(Language::Ost) => ost::tree(&text),
-        Some(Language::Matrices) => numpy::tree_of_text(&text).ok_or_else(String::new),
+        Some(Language::Matrices) => {
+            numpy::tree_of_text(&text).ok_or_else(|| "no matrix of 3 x 3 numbers".to_owned())
+        }
+        Some(Language::Arrays) => numpy::tree(&bytes),
         Some(Language::Colmap) => {
             let cameras = colmap::cameras(&text).map_err(value)?;
             return only_camera(cameras, frame_px).map_err(value);
@@ -364,5 +368,7 @@ fn only_camera(
     }
 }
 
+#[cfg(test)]
+mod numpy_tests;
 #[cfg(test)]
 mod tests;

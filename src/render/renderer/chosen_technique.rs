@@ -1,7 +1,6 @@
 //! The technique that draws a renderer's shadows, with all that it alone needs.
 
 use super::super::accumulated::Accumulated;
-use super::super::anchor_geometry::KnownLevels;
 use super::super::background::Background;
 use super::super::combined::Combined;
 use super::super::direct::Direct;
@@ -9,6 +8,7 @@ use super::super::environment::{Environment, finer_meshes};
 use super::super::final_gather::FinalGather;
 use super::super::gpu::Gpu;
 use super::super::gpu_scene::GpuScene;
+use super::super::known_levels::KnownLevels;
 use super::super::light_kind::LightKind;
 use super::super::light_piece::LitBy;
 use super::super::precomputation::Precomputation;
@@ -37,7 +37,7 @@ impl ChosenTechnique {
             (ShadowTechnique::Environment, Some(_)) => finer_meshes(scene, precomputation),
             _ => Vec::new(),
         };
-        KnownLevels::with_finer(finer).prepared(scene, precomputation)
+        KnownLevels::new(scene, finer, precomputation)
     }
 
     /// The technique of a scene, and the scene as it draws it.

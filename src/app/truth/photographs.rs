@@ -13,9 +13,12 @@ use crate::scene::Family;
 
 /// Where they lie.
 const FOLDER: &str = "../shared/real";
+const ROOM: &str = "swatbotics/mapping_feb_2014";
+const WALL: &str = "../cases/tracking/false_chase.mkv";
 
 /// A picture, and the markers that are in it.
 pub struct Still {
+    /// The picture, at time 0 where it is no film.
     pub frame: Frame,
     /// Those that people see.
     pub ids: BTreeSet<u32>,
@@ -48,7 +51,7 @@ enum FamilyOf {
 
 /// All that are known.
 pub const ALL: [Photographs; 13] = [
-    Photographs::stills("a room", "tag36h11", "swatbotics/mapping_feb_2014", room),
+    Photographs::stills("a room", "tag36h11", ROOM, room),
     Photographs::stills("a clipboard", "tag36h11", "swatbotics/clipboard", clipboard),
     Photographs::stills("a hallway", "tag36h11", "swatbotics/hallway", hallway),
     Photographs::stills("road signs", "tag36h11", "duckietown", road_signs),
@@ -66,27 +69,12 @@ pub const ALL: [Photographs; 13] = [
         family: FamilyOf::File("tutorial_dict.yml"),
         ..Photographs::stills("tutorial, its own", "", "opencv_tutorial", tutorial_own)
     },
-    Photographs::none(
-        "room, for tag16h5",
-        "tag16h5",
-        "swatbotics/mapping_feb_2014",
-        room_of_none,
-    ),
-    Photographs::none(
-        "room, for 4X4_50",
-        "DICT_4X4_50",
-        "swatbotics/mapping_feb_2014",
-        room_of_none,
-    ),
-    Photographs::none(
-        "room, for 5X5_1000",
-        "DICT_5X5_1000",
-        "swatbotics/mapping_feb_2014",
-        room_of_none,
-    ),
-    Photographs::film("a wall, for tag16h5", "tag16h5"),
-    Photographs::film("a wall, for 4X4_50", "DICT_4X4_50"),
-    Photographs::film("a wall, for 5X5_1000", "DICT_5X5_1000"),
+    Photographs::stills("room, for tag16h5", "tag16h5", ROOM, room).asked_in_vain(),
+    Photographs::stills("room, for 4X4_50", "DICT_4X4_50", ROOM, room).asked_in_vain(),
+    Photographs::stills("room, for 5X5_1000", "DICT_5X5_1000", ROOM, room).asked_in_vain(),
+    Photographs::stills("a wall, for tag16h5", "tag16h5", WALL, film).asked_in_vain(),
+    Photographs::stills("a wall, for 4X4_50", "DICT_4X4_50", WALL, film).asked_in_vain(),
+    Photographs::stills("a wall, for 5X5_1000", "DICT_5X5_1000", WALL, film).asked_in_vain(),
 ];
 
 impl Photographs {
@@ -105,26 +93,12 @@ impl Photographs {
         }
     }
 
-    const fn none(
-        name: &'static str,
-        family: &'static str,
-        place: &'static str,
-        read: fn(&Path) -> Result<Vec<Still>>,
-    ) -> Self {
+    /// The same asked for markers of which none is there.
+    const fn asked_in_vain(self) -> Self {
         Self {
             of_none: true,
-            ..Self::stills(name, family, place, read)
+            ..self
         }
-    }
-
-    /// A part of a film of a room in which no marker is.
-    const fn film(name: &'static str, family: &'static str) -> Self {
-        Self::none(
-            name,
-            family,
-            "../cases/tracking/false_chase.mkv",
-            film_of_none,
-        )
     }
 
     /// The file or folder.
@@ -163,7 +137,11 @@ impl Photographs {
     /// # Errors
     /// What cannot be read.
     pub fn read(&self) -> Result<Vec<Still>> {
-        (self.read)(&self.place())
+        let mut stills = (self.read)(&self.place())?;
+        if self.of_none {
+            stills.iter_mut().for_each(|still| still.ids.clear());
+        }
+        Ok(stills)
     }
 }
 
@@ -212,8 +190,11 @@ fn still(folder: &Path, name: &str, ids: impl IntoIterator<Item = u32>) -> Resul
     })
 }
 
-/// The names of a folder's pictures, in order.
-fn pictures_in(folder: &Path) -> Result<Vec<String>> {
+/// The names of a folder's PNG and JPEG pictures, in order.
+///
+/// # Errors
+/// A folder that cannot be read.
+pub fn pictures_in(folder: &Path) -> Result<Vec<String>> {
     let entries = std::fs::read_dir(folder).with_context(|| folder.display().to_string())?;
     let mut names = Vec::new();
     for entry in entries {
@@ -240,15 +221,8 @@ fn room(folder: &Path) -> Result<Vec<Still>> {
     stills.collect()
 }
 
-fn room_of_none(folder: &Path) -> Result<Vec<Still>> {
-    let stills = room(folder)?.into_iter().map(|still| Still {
-        ids: BTreeSet::new(),
-        ..still
-    });
-    Ok(stills.collect())
-}
-
-fn film_of_none(file: &Path) -> Result<Vec<Still>> {
+/// A part of a film of a room in which no marker is.
+fn film(file: &Path) -> Result<Vec<Still>> {
     let mut source = FrameSource::open(&file.to_string_lossy())?;
     let mut stills = Vec::new();
     while let Some(frame) = source.next_frame()? {
