@@ -6,8 +6,6 @@
 //! *signed multiplicity* keep a side. The sum is closed whichever triangles cast, and counts at each point how many of
 //! them lie between it and the light.
 
-use std::f64::consts::PI;
-
 use glam::{DVec3, Vec3, Vec4};
 
 use super::bounds::Bounds;
@@ -80,11 +78,19 @@ struct OddEdge {
     triangles: Vec<(u32, bool)>,
 }
 
+/// A triangle that casts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct CastingTriangle {
+    triangle: u32,
+    /// 1: as it is wound; -1: turned over.
+    sign: i8,
+}
+
 /// Triangles that cast for one light, and the edges that bound them as the light sees them.
 #[derive(Debug, Clone)]
 pub struct Silhouette {
-    /// For each triangle: 1, it casts as it is wound; -1, turned over; 0, not.
-    casts: Vec<i8>,
+    /// What casts.
+    casting: Vec<CastingTriangle>,
     /// Edges in the direction in which the casting triangles pass them, each as often as its multiplicity.
     edges: Vec<[u32; 2]>,
 }
@@ -240,22 +246,26 @@ impl Caster {
 
     /// How the triangles that face the light cast, and how those do that are turned away, with their outline.
     fn silhouette(&self, light: LightPlace, [facing, turned_away]: [i8; 2]) -> Silhouette {
-        let casts = self
-            .light_heights(light)
-            .map(|height| {
-                if height > 0.0 {
-                    facing
-                } else if height < 0.0 {
-                    turned_away
-                } else {
-                    0
-                }
-            })
-            .collect();
-        self.outline(casts)
+        let signs = self.light_heights(light).map(|height| {
+            if height > 0.0 {
+                facing
+            } else if height < 0.0 {
+                turned_away
+            } else {
+                0
+            }
+        });
+        let casting = (0..).zip(signs).filter(|(_, sign)| *sign != 0);
+        let casting = casting.map(|(triangle, sign)| CastingTriangle { triangle, sign });
+        self.outline(casting.collect())
     }
 
-    fn outline(&self, casts: Vec<i8>) -> Silhouette {
+    /// What bounds triangles that cast.
+    fn outline(&self, casting: Vec<CastingTriangle>) -> Silhouette {
+        let mut signs = vec![0_i8; self.triangles.len()];
+        for CastingTriangle { triangle, sign } in &casting {
+            signs[*triangle as usize] = *sign;
+        }
         let mut edges = Vec::new();
         let mut push = |[a, b]: [u32; 2], multiplicity: i32| {
             let edge = if multiplicity > 0 { [a, b] } else { [b, a] };
@@ -263,19 +273,19 @@ impl Caster {
         };
         for edge in &self.paired_edges {
             let multiplicity =
-                i32::from(casts[edge.forward as usize]) - i32::from(casts[edge.backward as usize]);
+                i32::from(signs[edge.forward as usize]) - i32::from(signs[edge.backward as usize]);
             if multiplicity != 0 {
                 push(edge.ends, multiplicity);
             }
         }
         for edge in &self.odd_edges {
             let net = |&(triangle, forward): &(u32, bool)| {
-                let cast = i32::from(casts[triangle as usize]);
-                if forward { cast } else { -cast }
+                let sign = i32::from(signs[triangle as usize]);
+                if forward { sign } else { -sign }
             };
             push(edge.ends, edge.triangles.iter().map(net).sum());
         }
-        Silhouette { casts, edges }
+        Silhouette { casting, edges }
     }
 
     /// Triangles of the volume's sides, counter-clockwise seen from outside it.
@@ -296,16 +306,15 @@ impl Caster {
     /// pixels at the same depths as the mesh does.
     pub fn cap_indices(&self, silhouette: &Silhouette) -> [Vec<u32>; 2] {
         let far = self.positions.len() as u32;
-        let mut outward = Vec::with_capacity(6 * self.triangles.len());
+        let mut outward = Vec::with_capacity(6 * silhouette.casting.len());
         let mut turned = Vec::new();
-        for (&[a, b, c], &cast) in self.triangles.iter().zip(&silhouette.casts) {
-            match cast {
-                0 => {}
-                1 => outward.extend([a, b, c, far + a, far + c, far + b]),
-                _ => {
-                    turned.extend([a, b, c]);
-                    outward.extend([far + a, far + b, far + c]);
-                }
+        for CastingTriangle { triangle, sign } in &silhouette.casting {
+            let [a, b, c] = self.triangles[*triangle as usize];
+            if *sign > 0 {
+                outward.extend([a, b, c, far + a, far + c, far + b]);
+            } else {
+                turned.extend([a, b, c]);
+                outward.extend([far + a, far + b, far + c]);
             }
         }
         [outward, turned]
@@ -377,17 +386,8 @@ pub struct LitTriangles {
     pub back_facing: SeenTriangles,
 }
 
-impl Silhouette {
-    fn casting_triangles(&self) -> impl Iterator<Item = usize> {
-        let casts = self.casts.iter().enumerate();
-        casts
-            .filter(|(_, cast)| **cast != 0)
-            .map(|(triangle, _)| triangle)
-    }
-}
-
-/// How many volumes can lie one in another, so that a narrow counter never wraps.
 impl Caster {
+    /// Cuts what casts into parts of no more than `most` layers, each half of what was more.
     fn shallow(
         &self,
         light: LightPlace,
@@ -403,130 +403,13 @@ impl Caster {
                 counted_apart,
             }];
         }
-        let casting = silhouette.casting_triangles().count();
-        let mut first = silhouette.casts.clone();
-        let mut second = silhouette.casts;
-        let mut seen = 0;
-        for (first, second) in first.iter_mut().zip(&mut second) {
-            if *first != 0 {
-                let dropped = if 2 * seen < casting { second } else { first };
-                *dropped = 0;
-                seen += 1;
-            }
-        }
+        let mut first = silhouette.casting;
+        let second = first.split_off(first.len().div_ceil(2));
         [first, second]
             .into_iter()
-            .flat_map(|casts| self.shallow(light, self.outline(casts), most, counted_apart))
+            .flat_map(|half| self.shallow(light, self.outline(half), most, counted_apart))
             .collect()
     }
-
-    /// An upper bound of the number of casting triangles between the light and any point; the first found that is at
-    /// most `enough`, which is all that the caller asks.
-    ///
-    /// On the sphere of directions about the light that number changes at silhouette edges alone, and a great circle
-    /// crosses them as often inwards as outwards: no direction can have more than half the edges that a great circle
-    /// through it and a pole meets, besides what the pole has.
-    fn most_layers(&self, light: LightPlace, silhouette: &Silhouette, enough: u32) -> u32 {
-        let casting = silhouette.casting_triangles().count() as u32;
-        let at_pole;
-        let mut spans: Vec<[f64; 2]> = Vec::new();
-        let place = |index: u32| self.positions[index as usize].as_dvec3();
-        match (light, &self.bounds) {
-            (LightPlace::Point(light), Some(bounds)) => {
-                let away = light - light.clamp(bounds.low, bounds.high);
-                let pole = away.try_normalize().unwrap_or(SOME_DIRECTION);
-                at_pole = match away == DVec3::ZERO {
-                    true => self.casting_towards(silhouette, light, pole),
-                    false => 0,
-                };
-                let quick = casting.min(at_pole + silhouette.edges.len() as u32 / 2);
-                if quick <= enough {
-                    return quick;
-                }
-                let (first, second) = pole.any_orthonormal_pair();
-                let angle = |index: u32| {
-                    let way = place(index) - light;
-                    way.dot(second).atan2(way.dot(first)) / PI
-                };
-                spans.extend(silhouette.edges.iter().map(|&[from, to]| {
-                    // In half turns: a great circle is two opposite meridians. The arc takes the shorter way.
-                    let from = angle(from);
-                    let turn = (angle(to) - from + 1.0).rem_euclid(2.0) - 1.0;
-                    [from + turn.min(0.0), from + turn.max(0.0)]
-                }));
-            }
-            (LightPlace::Along(direction), Some(bounds)) => {
-                at_pole = 0;
-                let quick = casting.min(silhouette.edges.len() as u32 / 2);
-                if quick <= enough {
-                    return quick;
-                }
-                // Seen from afar the great circles are parallel lines.
-                let across =
-                    direction.any_orthonormal_vector() / (bounds.high - bounds.low).length();
-                spans.extend(silhouette.edges.iter().map(|&[from, to]| {
-                    let ends =
-                        [from, to].map(|index| (place(index) - bounds.low).dot(across) / 2.0);
-                    [ends[0].min(ends[1]), ends[0].max(ends[1])]
-                }));
-            }
-            (_, None) => return 0,
-        }
-        casting.min(at_pole + most_overlapping(&spans) / 2)
-    }
-
-    /// Casting triangles that the ray from the light meets (Möller & Trumbore 1997).
-    fn casting_towards(&self, silhouette: &Silhouette, light: DVec3, direction: DVec3) -> u32 {
-        let meets = |triangle: &[u32; 3]| {
-            let [a, b, c] = triangle.map(|index| self.positions[index as usize].as_dvec3());
-            let (first, second) = (b - a, c - a);
-            let across = direction.cross(second);
-            let determinant = first.dot(across);
-            let u = (light - a).dot(across) / determinant;
-            let aside = (light - a).cross(first);
-            let v = direction.dot(aside) / determinant;
-            u >= 0.0 && v >= 0.0 && u + v <= 1.0 && second.dot(aside) / determinant > 0.0
-        };
-        let casting = self.triangles.iter().zip(&silhouette.casts);
-        casting
-            .filter(|(triangle, cast)| **cast != 0 && meets(triangle))
-            .count() as u32
-    }
-}
-
-/// A direction along which no mesh has a reason to put a vertex.
-const SOME_DIRECTION: DVec3 = DVec3::new(
-    0.267_261_241_912_424,
-    0.534_522_483_824_849,
-    0.801_783_725_737_273,
-);
-
-/// An upper bound of how many of the spans share a point, where whole numbers are one and the same.
-fn most_overlapping(spans: &[[f64; 2]]) -> u32 {
-    let bins = (4 * spans.len()).max(64);
-    let mut change = vec![0_i64; bins + 1];
-    let mut wrapped = 0;
-    for &[low, high] in spans {
-        // A bin more on both sides leaves rounding no say.
-        let first = (low * bins as f64).floor() as i64 - 1;
-        let last = (high * bins as f64).floor() as i64 + 1;
-        if last - first >= bins as i64 {
-            wrapped += 1;
-            continue;
-        }
-        let first = first.rem_euclid(bins as i64) as usize;
-        let last = last.rem_euclid(bins as i64) as usize;
-        change[first] += 1;
-        change[last + 1] -= 1;
-        wrapped += i64::from(first > last);
-    }
-    let mut overlapping = wrapped;
-    let mut most = 0;
-    for change in change {
-        overlapping += change;
-        most = most.max(overlapping);
-    }
-    most as u32
 }
 
 /// A triangle whose height is a smaller part than this of its longest edge has no orientation that rounding left whole.
@@ -567,5 +450,6 @@ fn planes(positions: &[Vec3], triangles: &[[u32; 3]], edges: &[PairedEdge]) -> V
     planes
 }
 
+mod layers;
 #[cfg(test)]
 mod tests;

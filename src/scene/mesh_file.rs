@@ -217,9 +217,9 @@ pub fn welded(model: RawModel, normals: Normals) -> Option<LoadedMesh> {
 
 /// What to say of so many triangles that memory may not do for them.
 fn too_many(triangles: usize) -> Option<String> {
-    const MANY: usize = 500_000;
-    /// Measured: some 5 kB of memory for each that is drawn and casts shadows.
-    const BYTES_EACH: f64 = 5e3;
+    const MANY: usize = 1_000_000;
+    /// Measured: some 2 kB of memory for each that is drawn and casts shadows.
+    const BYTES_EACH: f64 = 2e3;
     let gigabytes = triangles as f64 * BYTES_EACH / 1e9;
     (triangles > MANY).then(|| {
         format!(

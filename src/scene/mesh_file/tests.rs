@@ -144,10 +144,10 @@ fn models_are_turned_upright_and_fitted() {
 
 #[test]
 fn models_that_memory_may_not_do_for_are_told() {
-    assert_eq!(too_many(500_000), None);
+    assert_eq!(too_many(1_000_000), None);
     let said = too_many(3_374_802).expect("a note");
     assert!(
-        said.contains("3.4 million") && said.contains("17 GB"),
+        said.contains("3.4 million") && said.contains("7 GB"),
         "{said}"
     );
 }
