@@ -48,7 +48,7 @@ fn self_occlusions(folder: Option<PathBuf>) -> DiskCache {
     DiskCache {
         folder,
         extension: "occlusion",
-        version: 1,
+        version: 3,
         most_bytes: 1 << 28,
         most_files: 64,
     }
@@ -59,7 +59,7 @@ fn cuts_of_meshes(folder: Option<PathBuf>) -> DiskCache {
     DiskCache {
         folder,
         extension: "cuts",
-        version: 3,
+        version: 4,
         most_bytes: 1 << 24,
         most_files: 64,
     }

@@ -20,8 +20,6 @@ use super::sky::Sky;
 const NEAR_PART: f32 = 1.0 / 20.0;
 /// ... and elsewhere this part of the way to it: what it hides varies over such lengths.
 const AWAY_PART: f32 = 0.25;
-/// A point of which more of its rays than this part start in a solid is inside of it.
-const INSIDE_PART: f32 = 0.5;
 /// Places that a light of some size shines from on what rays meet.
 const PLACES_OF_A_LIGHT: usize = 8;
 /// Directions over the place that a ray ends at, ...
@@ -173,7 +171,6 @@ impl PlacedScene<'_> {
     fn sample(&self, start: Vec3, normal: Vec3, how: &Gathering<'_>) -> Sample {
         let rays = how.sky.rays(how.rays);
         let [mut without, mut with] = [Vec3::ZERO; 2];
-        let (mut inside_real, mut inside) = (0, 0);
         for (number, direction) in hemisphere(normal, rays).enumerate() {
             let [real, before] = self.met(start, direction);
             let [of_real, behind] = match &real {
@@ -185,18 +182,20 @@ impl PlacedScene<'_> {
                 Some(seen) => self.reflected_by(seen, how, number)[1],
                 None => behind,
             };
-            inside_real += usize::from(real.is_some_and(|seen| seen.is_inside));
-            inside += usize::from(before.or(real).is_some_and(|seen| seen.is_inside));
         }
         let weight = PI / rays.max(1) as f32;
         let [of_sky, left_of_sky] = self.of_sources(start, normal, how.sky);
-        let most_inside = (INSIDE_PART * rays as f32) as usize;
+        let is_inside = |counts: fn(&PlacedThing<'_>) -> bool| {
+            let mut things = self.things.iter().filter(|placed| counts(placed));
+            things.any(|placed| placed.surrounds(start, normal))
+        };
+        let is_inside_real = is_inside(is_real);
         Sample {
             without: without * weight + of_sky,
             with: with * weight + left_of_sky,
             direct: self.direct(start, normal, how, 0)[0],
-            is_inside_real: inside_real > most_inside,
-            is_inside: inside > most_inside,
+            is_inside_real,
+            is_inside: is_inside_real || is_inside(is_virtual_caster),
         }
     }
 

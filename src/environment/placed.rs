@@ -52,8 +52,6 @@ pub struct SeenSurface {
     pub albedo: Vec3,
     /// Along the ray, in units of its direction.
     pub distance: f32,
-    /// Whether the ray came from inside of a solid.
-    pub is_inside: bool,
 }
 
 /// All things where they are, and what shines on them.
@@ -106,6 +104,13 @@ impl PlacedThing<'_> {
         let place = self.anchor_from_world.transform_point3(seen.place);
         let normal = self.anchor_from_world.transform_vector3(seen.normal);
         self.thing.disc_at(seen.triangle, place, normal)
+    }
+
+    /// Whether a place with a unit normal, in the world, lies inside of it.
+    pub fn surrounds(&self, place: Vec3, normal: Vec3) -> bool {
+        let place = self.anchor_from_world.transform_point3(place);
+        let normal = self.anchor_from_world.transform_vector3(normal);
+        self.thing.surrounds(place, normal)
     }
 
     /// Whether it hides what lies `reach` along a direction.
@@ -225,7 +230,6 @@ impl PlacedScene<'_> {
             },
             albedo: placed.thing.albedos[triangle],
             distance,
-            is_inside: is_averted && placed.thing.is_solid,
         })
     }
 

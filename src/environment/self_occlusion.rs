@@ -10,7 +10,7 @@ use glam::{DAffine3, DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::geometry::bounds::Bounds;
-use crate::geometry::corner_points::corner_points;
+use crate::geometry::corner_points::{corner_points, is_buried};
 use crate::geometry::mesh::Mesh;
 use crate::geometry::ray_caster::RayCaster;
 use crate::light::harmonics::{basis, cosine_lobe, count, sphere};
@@ -139,12 +139,13 @@ impl OwnSurface {
         let triangles: Vec<[u32; 3]> = (0..corners.len() as u32 / 3)
             .map(|triangle| [0, 1, 2].map(|corner| 3 * triangle + corner))
             .collect();
-        let (points, point_of_corner) = corner_points(&corners, &triangles);
+        let rays = OwnRays::new(mesh, space);
+        let (points, point_of_corner) = corner_points(&corners, &triangles, &rays.caster);
         Self {
             key: space.key(mesh),
             point_of_corner,
             points,
-            rays: OwnRays::new(mesh, space),
+            rays,
         }
     }
 
@@ -216,6 +217,16 @@ impl OwnRays {
             caster: RayCaster::new(&own),
             offset: space.size(mesh) * START_OFFSET,
         }
+    }
+
+    /// Whether a place with a unit normal lies in a solid; `is_turned`: its triangle is wound the other way around the normal.
+    pub fn is_buried(&self, place: DVec3, normal: DVec3, is_turned: bool) -> bool {
+        is_buried(
+            &self.caster,
+            place + normal * self.offset,
+            normal,
+            is_turned,
+        )
     }
 
     /// The self-occlusion of a place with a unit normal, by rays in directions with their harmonics.

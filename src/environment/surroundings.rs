@@ -73,8 +73,12 @@ pub fn around(
         let place = world_from_points.transform_point3(place).as_vec3();
         let normal = world_from_points.transform_vector3(normal).as_vec3();
         let normal = normal.normalize_or_zero();
-        let inwards = INSET * (middle - place).reject_from_normalized(normal);
-        let start = place + inwards + normal * offset_m;
+        let inwards = (middle - place).reject_from_normalized(normal);
+        // What was sunk into a table gets the light of where it comes out of it: nobody sees it below.
+        let is_table = |placed: &PlacedThing<'_>| placed.thing.is_real && !placed.thing.casts;
+        let table = scene.seen_within(place, inwards, 1.0 - INSET, is_table);
+        let out = table.map_or(0.0, |seen| seen.distance);
+        let start = place + (out + INSET) * inwards + normal * offset_m;
         around_place(scene, discs, own, (start, normal), rays)
     };
     let at_records: Vec<Around> = records.places.par_iter().map(at_place).collect();

@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::geometry::bounds::Bounds;
+use crate::geometry::corner_points::is_buried;
 use crate::geometry::ray_caster::RayCaster;
 use crate::geometry::solid::holes;
 use crate::shafts::bounding::Ball;
@@ -20,8 +21,6 @@ pub struct Thing {
     pub is_real: bool,
     /// Whether it takes light away from others.
     pub casts: bool,
-    /// Whether it has an inside.
-    pub is_solid: bool,
     /// Number of its anchor.
     pub anchor: usize,
     /// Its triangles, in the anchor's space, metres.
@@ -30,6 +29,10 @@ pub struct Thing {
     pub albedos: Vec<Vec3>,
     /// Rays against them.
     pub caster: RayCaster,
+    /// What has an inside but for holes: the same with these closed.
+    solid: Option<RayCaster>,
+    /// Whether its triangles are wound clockwise seen from outside.
+    is_mirrored: bool,
     /// Around them.
     pub ball: Ball,
     /// Around them too.
@@ -79,6 +82,13 @@ impl Thing {
         }
     }
 
+    /// Whether a place with a unit normal lies inside of it, also where it is open, as many a model is below; in the anchor's space.
+    pub fn surrounds(&self, place: Vec3, normal: Vec3) -> bool {
+        let [place, normal] = [place, normal].map(|it| it.as_dvec3());
+        let solid = self.solid.as_ref();
+        solid.is_some_and(|solid| is_buried(solid, place, normal, self.is_mirrored))
+    }
+
     fn of_triangles(
         thing: &Occluder<'_>,
         is_real: bool,
@@ -87,6 +97,12 @@ impl Thing {
         let (triangles, albedos): (Vec<[Vec3; 3]>, Vec<Vec3>) = with_albedo.iter().copied().unzip();
         let corners = || triangles.iter().flatten();
         let bounds = Bounds::around(corners().map(|corner| corner.as_dvec3()))?;
+        let solid = holes(thing.mesh).map(|holes| {
+            let in_anchor =
+                |corner: DVec3| thing.anchor_from_object.transform_point3(corner).as_vec3();
+            let closing = holes.iter().map(|hole| hole.map(in_anchor));
+            RayCaster::new(&triangles.iter().copied().chain(closing).collect::<Vec<_>>())
+        });
         let center = ((bounds.low + bounds.high) / 2.0).as_vec3();
         let radius = corners()
             .map(|corner| corner.distance(center))
@@ -94,9 +110,10 @@ impl Thing {
         Some(Self {
             is_real,
             casts: thing.casts,
-            is_solid: holes(thing.mesh).is_some_and(|holes| holes.is_empty()),
             anchor: thing.anchor,
             caster: RayCaster::new(&triangles),
+            solid,
+            is_mirrored: thing.anchor_from_object.matrix3.determinant() < 0.0,
             ball: Ball { center, radius },
             bounds,
             surfels: Vec::new(),

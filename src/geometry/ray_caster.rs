@@ -105,6 +105,15 @@ impl RayCaster {
         })
     }
 
+    /// Whether the first triangle along a ray is met on its outer side, from which it is wound counter-clockwise; `None` where none
+    /// is met.
+    pub fn side_met(&self, origin: Vec3, direction: Vec3) -> Option<bool> {
+        let hit = self.first_hit(origin, direction, f32::INFINITY)?;
+        let Triangle { v0, v1, v2 } = self.triangles[hit.triangle];
+        let outward = (v1 - v0).cross(v2 - v0);
+        Some(outward.dot(direction.into()) < 0.0)
+    }
+
     /// Whether anything lies within `reach` along a ray.
     pub fn is_hidden(&self, origin: Vec3, direction: Vec3, reach: f32) -> bool {
         let Some(hierarchy) = &self.hierarchy else {

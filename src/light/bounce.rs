@@ -115,6 +115,11 @@ impl Surroundings {
         }
     }
 
+    /// Rays against all of it.
+    pub fn caster(&self) -> &RayCaster {
+        &self.caster
+    }
+
     /// Sends rays from points with unit normals, some `budget` in all.
     pub fn gather(&self, places: &[(DVec3, DVec3)], budget: usize) -> Gathering {
         let rays_per_point = (budget / places.len().max(1)).clamp(LEAST_RAYS, MOST_RAYS);

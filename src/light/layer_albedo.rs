@@ -6,7 +6,8 @@ use std::sync::LazyLock;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{HEAD_ON, grazing, layer_visibility};
+use super::material::{Material, Shading};
+use super::{HEAD_ON, grazing, layer_visibility, mean_burley};
 
 /// Entries along a side of the table.
 const SIDE: usize = 32;
@@ -22,7 +23,9 @@ pub static LAYER_ALBEDO: LazyLock<Vec<[f32; 3]>> = LazyLock::new(|| {
         let alpha = along(row);
         let entries = (0..SIDE).map(|column| entry(along(column), alpha));
         let entries: Vec<[f32; 2]> = entries.collect();
-        let mean = mean_over_cosines(&entries) as f32;
+        let dielectric =
+            |[factor, summand]: &[f32; 2]| HEAD_ON * f64::from(*factor) + f64::from(*summand);
+        let mean = mean_over_cosines(&entries, dielectric) as f32;
         let entries = entries.into_iter();
         entries.map(move |[factor, summand]| [factor, summand, mean])
     });
@@ -38,13 +41,45 @@ pub(super) fn let_through(alpha: f64, cosine: Option<f64>) -> f64 {
     }
 }
 
-/// The cosine-weighted mean of what a dielectric's layer mirrors, over a row: ∫ E 2μ dμ, where μ = t² has 2μ dμ = 4t³ dt.
-fn mean_over_cosines(row: &[[f32; 2]]) -> f64 {
-    let last = (SIDE - 1) as f64;
-    let at = |index: usize| {
-        let [factor, summand] = row[index].map(f64::from);
-        HEAD_ON * factor + summand
+/// For each row of [`LAYER_ALBEDO`] factor and summand that make the part that is mirrored of light from everywhere towards
+/// everywhere.
+static MEANS: LazyLock<Vec<[f64; 2]>> = LazyLock::new(|| {
+    let rows = LAYER_ALBEDO.chunks(SIDE);
+    let mean = |row: &[[f32; 3]]| {
+        [0, 1].map(|part| mean_over_cosines(row, |entry| f64::from(entry[part])))
     };
+    rows.map(mean).collect()
+});
+
+/// The part of light from everywhere that a material reflects, all around: the albedo that stands for it where others get light
+/// from it. Its pictures are left out.
+pub fn mean_reflectance(material: &Material) -> DVec3 {
+    let Some(alpha) = material
+        .layer_roughness()
+        .filter(|_| material.shading != Shading::Unlit)
+    else {
+        return material.albedo;
+    };
+    let place = alpha.clamp(0.0, 1.0).sqrt() * (SIDE - 1) as f64;
+    let low = (place as usize).min(SIDE - 2);
+    let [factor, summand] = [0, 1].map(|part| {
+        let [before, after] = [MEANS[low][part], MEANS[low + 1][part]];
+        before + (after - before) * (place - low as f64)
+    });
+    let mirrored = HEAD_ON * factor + summand;
+    let below = match material.shading {
+        Shading::Principled => mean_burley(alpha),
+        Shading::Lit | Shading::Unlit => 1.0 - mirrored,
+    };
+    let dielectric = material.albedo * below + mirrored;
+    let metal = material.albedo * factor + summand;
+    dielectric.lerp(metal, material.metallic)
+}
+
+/// The cosine-weighted mean over a row: ∫ E 2μ dμ, where μ = t² has 2μ dμ = 4t³ dt.
+fn mean_over_cosines<Entry>(row: &[Entry], value: impl Fn(&Entry) -> f64) -> f64 {
+    let last = (SIDE - 1) as f64;
+    let at = |index: usize| value(&row[index]);
     // (Exact for what is straight between entries: ∫ t³ and ∫ t⁴ over each piece.)
     let pieces = (0..SIDE - 1).map(|index| {
         let (from, to) = (index as f64 / last, (index + 1) as f64 / last);
@@ -101,7 +136,6 @@ fn entry(cos_camera: f64, alpha: f64) -> [f32; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::light::material::Material;
     use crate::light::reflectance;
 
     #[test]
@@ -140,6 +174,35 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn the_mean_reflectance_is_that_of_all_ways_of_light() {
+        let color = DVec3::new(0.1, 0.5, 0.9);
+        for (alpha, metallic, shading) in [
+            (0.09, 0.0, Shading::Lit),
+            (0.36, 0.0, Shading::Principled),
+            (1.0, 0.0, Shading::Principled),
+            (0.3, 1.0, Shading::Lit),
+            (0.5, 0.4, Shading::Principled),
+        ] {
+            let material = Material {
+                roughness: Some(alpha),
+                metallic,
+                shading,
+                ..Material::matt(color)
+            };
+            // Middles of rings that get like parts of light from everywhere.
+            let rings = 12;
+            let cosines =
+                (0..rings).map(|ring| ((f64::from(ring) + 0.5) / f64::from(rings)).sqrt());
+            let of_rings = cosines.map(|cosine| of_light_from_everywhere(&material, cosine));
+            let expected = of_rings.sum::<DVec3>() / f64::from(rings);
+            let found = mean_reflectance(&material);
+            let off = (found - expected).abs().max_element();
+            assert!(off < 0.012, "{material:?}: {found}, {expected}");
+        }
+        assert_eq!(mean_reflectance(&Material::matt(color)), color);
     }
 
     /// The part of light from everywhere that a material reflects towards a cosine.

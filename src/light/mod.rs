@@ -296,6 +296,14 @@ fn burley(alpha: f64, cosines: [f64; 2], cos_between: f64) -> f64 {
     light * camera
 }
 
+/// The mean of `burley` over light from everywhere towards everywhere, with 0.6 as the half angle's squared cosine (the twin of
+/// `mean_burley` in layer_albedo.wgsl has it towards one direction).
+fn mean_burley(alpha: f64) -> f64 {
+    let at_grazing = 1.2 * alpha.sqrt() - 0.5;
+    // (Schlick's weight of grazing light is 1/21 on the average over all cosines.)
+    (1.0 + at_grazing / 21.0).powi(2)
+}
+
 /// Height-correlated Smith term of GGX over four times both cosines.
 fn layer_visibility(alpha: f64, cos_light: f64, cos_camera: f64) -> f64 {
     let alpha_squared = alpha * alpha;

@@ -18,15 +18,16 @@ use crate::environment::sky::Sky;
 use crate::environment::thing::Thing;
 use crate::geometry::bounds::Bounds;
 use crate::geometry::corner_points::corner_points;
+use crate::geometry::ray_caster::RayCaster;
 use crate::geometry::reach::{self, PixelRect};
 use crate::geometry::subdivide::{Corner, subdivided};
-use crate::light::Light;
 use crate::scene::{Bounces, Scene};
 
 use super::anchor_geometry::Role;
 use super::deforming::DeformingThing;
 use super::gpu::Gpu;
 use super::gpu_scene::{DrawnModel, GpuScene};
+use super::known_states::{KnownStates, Standing, differ_in_presence};
 use super::pipelines::{PipelineDescription, overwritten};
 use super::stencil::{IN_A_SURFACE, depth_stencil_state};
 use super::uniforms::VIEW_GROUP;
@@ -85,19 +86,18 @@ pub(super) struct FinalGather {
     pipeline: wgpu::RenderPipeline,
     /// Whether things can move to each other without an edit.
     moves: bool,
-    gathered: Option<GatheredFor>,
-    /// Surfaces that are in small parts as they are, by the numbers of a thing and of its level of detail, and whether
-    /// light was gathered finely.
-    known: BTreeMap<(usize, usize, bool), Parts>,
+    /// The present state's first.
+    gathered: KnownStates<Standing, GatheredState>,
+    /// Whether nothing was changed since what is known was gathered finely, or the first time.
+    is_settled: bool,
+    /// Surfaces that are in small parts as they are.
+    known: BTreeMap<PartsFor, Parts>,
     /// Those of the present frame.
     drawn: Vec<(usize, usize)>,
 }
 
-/// What was gathered where things are.
-struct GatheredFor {
-    /// Where anchors are in the world.
-    world_from_anchor: Vec<Option<DAffine3>>,
-    lights: Vec<Light>,
+/// What was gathered in one state.
+struct GatheredState {
     is_fine: bool,
     /// By the numbers of a thing and of its level of detail.
     on_models: BTreeMap<(usize, usize), OnModel>,
@@ -111,6 +111,10 @@ struct OnModel {
     /// Around what virtual things change, in the anchor's space; `None`: nothing.
     changed: Option<Bounds>,
 }
+
+/// The numbers of a thing and of its level of detail, whether light is gathered finely, and which things are there: parts are fine
+/// near virtual ones.
+type PartsFor = (usize, usize, bool, Vec<usize>);
 
 /// A surface in small parts, in its anchor's space.
 struct Parts {
@@ -150,7 +154,7 @@ impl FinalGather {
             wgpu::StencilState::default(),
         );
         let samples = scene.shadows.samples;
-        let moves = scene.node_count() > 1;
+        let moves = scene.moves();
         Some(Self {
             things: things(scene),
             distant: DistantLight::default(),
@@ -177,7 +181,8 @@ impl FinalGather {
                 ..Default::default()
             }),
             moves,
-            gathered: None,
+            gathered: KnownStates::new(moves),
+            is_settled: !moves,
             known: BTreeMap::new(),
             drawn: Vec::new(),
         })
@@ -198,10 +203,8 @@ impl FinalGather {
 
     /// What was gathered is of no use any more.
     fn forget_light(&mut self) {
-        if let Some(gathered) = &mut self.gathered {
-            // As for another scene, which moves.
-            gathered.world_from_anchor.clear();
-        }
+        self.gathered.clear();
+        self.is_settled = false;
     }
 
     /// Takes the shapes that things have now.
@@ -218,10 +221,7 @@ impl FinalGather {
                 self.known.clear();
             }
         }
-        if let Some(gathered) = &mut self.gathered {
-            // As for things that are elsewhere.
-            gathered.world_from_anchor.clear();
-        }
+        self.forget_light();
     }
 
     /// Gathers what the frame needs and is not known. Returns the pixels that virtual things can change.
@@ -230,11 +230,12 @@ impl FinalGather {
         let Some(world_from_anchor) = gpu_scene.light_from_anchor() else {
             return PixelRect::NONE;
         };
-        let mut gathered = self.gathered_for(world_from_anchor, gpu_scene.shining_in_light());
+        let standing = (world_from_anchor, gpu_scene.shining_in_light());
+        let mut gathered = self.gathered_for(&standing);
         let models: Vec<DrawnModel<'_>> = gpu_scene.drawn_real().collect();
         let is_known = |model: &&DrawnModel<'_>| gathered.on_models.contains_key(&key(model));
         if !models.iter().all(|model| is_known(&model)) {
-            self.gather(gpu, &models, &mut gathered);
+            self.gather(gpu, &models, &standing, &mut gathered);
         }
         let mut pixels = PixelRect::NONE;
         for model in &models {
@@ -250,22 +251,23 @@ impl FinalGather {
             });
             pixels = pixels.union(changed.unwrap_or(PixelRect::NONE));
         }
-        self.gathered = Some(gathered);
+        self.gathered.keep(standing, gathered);
         pixels
     }
 
     /// Gathers on the models that are not known yet.
-    fn gather(&mut self, gpu: &Gpu, models: &[DrawnModel<'_>], gathered: &mut GatheredFor) {
-        let GatheredFor {
-            world_from_anchor,
-            lights,
-            is_fine,
-            on_models,
-        } = gathered;
+    fn gather(
+        &mut self,
+        gpu: &Gpu,
+        models: &[DrawnModel<'_>],
+        (world_from_anchor, lights): &Standing,
+        GatheredState { is_fine, on_models }: &mut GatheredState,
+    ) {
         let things = self.things.iter().enumerate();
         let scene = PlacedScene::new(things, world_from_anchor, &self.distant, lights);
         let virtuals = scene.things.iter().filter(|placed| !placed.thing.is_real);
         let virtuals: Vec<Bounds> = virtuals.map(PlacedThing::bounds).collect();
+        let there: Vec<usize> = scene.things.iter().map(|placed| placed.number).collect();
         let fineness = match is_fine {
             true => FINE,
             false => COARSE,
@@ -281,7 +283,7 @@ impl FinalGather {
                 continue;
             };
             on_models.entry(key(model)).or_insert_with(|| {
-                let known = (model.number, model.level, *is_fine);
+                let known = (model.number, model.level, *is_fine, there.clone());
                 let parts = self.known.remove(&known);
                 let parts = parts.unwrap_or_else(|| Parts::new(model, &virtuals, &pose, &fineness));
                 let on_model = OnModel::new(gpu, &scene, &parts, model, &pose, &how);
@@ -293,27 +295,22 @@ impl FinalGather {
         }
     }
 
-    /// What is known of things at these places under these lights.
-    fn gathered_for(
-        &mut self,
-        world_from_anchor: Vec<Option<DAffine3>>,
-        lights: Vec<Light>,
-    ) -> GatheredFor {
-        let last = self.gathered.take();
-        let is_first = last.is_none();
-        let is_same = |last: &GatheredFor| {
-            last.world_from_anchor == world_from_anchor && last.lights == lights
-        };
-        let is_fine = match last.filter(is_same) {
-            Some(last) if last.is_fine => return last,
+    /// What is known of a state. What stands is gathered finely at once, if nobody changes it: else coarsely, and finely when it is
+    /// asked for once more.
+    fn gathered_for(&mut self, standing: &Standing) -> GatheredState {
+        let is_fine = match self.gathered.take(standing) {
             // (Where things move a frame is the same whichever frame was before it.)
-            Some(last) if self.moves => return last,
+            Some(known) if known.is_fine || self.moves => return known,
             Some(_) => true,
-            None => is_first && !self.moves,
+            None => {
+                let is_of_same = |(other, known): &(Standing, GatheredState)| {
+                    known.is_fine && differ_in_presence(other, standing)
+                };
+                self.is_settled || self.gathered.iter().any(is_of_same)
+            }
         };
-        GatheredFor {
-            world_from_anchor,
-            lights,
+        self.is_settled = false;
+        GatheredState {
             is_fine,
             on_models: BTreeMap::new(),
         }
@@ -321,7 +318,7 @@ impl FinalGather {
 
     /// Draws what was gathered where the surfaces are.
     pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, gpu_scene: &GpuScene) {
-        let Some(gathered) = &self.gathered else {
+        let Some((_, gathered)) = self.gathered.last() else {
             return;
         };
         pass.set_pipeline(&self.pipeline);
@@ -370,13 +367,16 @@ impl Parts {
         let longest_m = |from: Vec3, to: Vec3| {
             longest_edge_m(virtuals, fineness.coarser, in_world(from), in_world(to))
         };
-        let parts = subdivided(model.triangles(), longest_m, MOST_PARTS);
+        let triangles = model.triangles();
+        let places = triangles.iter().map(|it| it.map(|(place, _)| place));
+        let surface = RayCaster::new(&places.collect::<Vec<_>>());
+        let parts = subdivided(triangles, longest_m, MOST_PARTS);
         let corners: Vec<Corner> = parts.into_flattened();
         let triangles: Vec<[u32; 3]> = (0..corners.len() as u32 / 3)
             .map(|triangle| [0, 1, 2].map(|corner| 3 * triangle + corner))
             .collect();
         let (points, point_of_corner): (Vec<(DVec3, DVec3)>, Vec<usize>) =
-            corner_points(&corners, &triangles);
+            corner_points(&corners, &triangles, &surface);
         let of_points =
             |triangle: &[u32; 3]| triangle.map(|it| point_of_corner[it as usize] as u32);
         let joined: Vec<[u32; 3]> = triangles.iter().map(of_points).collect();

@@ -378,18 +378,17 @@ impl GpuScene {
         }
     }
 
-    /// Gives a batch's corners their irradiance, and the part of it that is of what things reflect, or on phantoms what virtual things
-    /// take of it; `number` counts the batches.
-    pub fn write_indirect(
-        &self,
-        queue: &wgpu::Queue,
-        number: usize,
-        [irradiances, reflected]: [&[Vec3]; 2],
-    ) {
-        let batch = &self.batches[number];
-        queue.write_buffer(&batch.indirect, 0, bytemuck::cast_slice(irradiances));
-        if let Some(occlusion) = &batch.occlusion {
-            queue.write_buffer(&occlusion.reflected, 0, bytemuck::cast_slice(reflected));
+    /// Gives the corners of batches, in their order, their irradiance, and the part of it that is of what things reflect, or on phantoms
+    /// what virtual things take of it.
+    pub fn write_indirect(&self, queue: &wgpu::Queue, values: &[Option<[Vec<Vec3>; 2]>]) {
+        for (batch, values) in self.batches.iter().zip(values) {
+            let Some([irradiances, reflected]) = values else {
+                continue;
+            };
+            queue.write_buffer(&batch.indirect, 0, bytemuck::cast_slice(irradiances));
+            if let Some(occlusion) = &batch.occlusion {
+                queue.write_buffer(&occlusion.reflected, 0, bytemuck::cast_slice(reflected));
+            }
         }
     }
 

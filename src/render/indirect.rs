@@ -11,6 +11,7 @@ use crate::light::irradiance_records::IrradianceRecords;
 use crate::scene::{Object, Scene};
 
 use super::anchor_geometry::Corners;
+use super::known_states::KnownStates;
 
 /// Rays for a scene in which nothing moves: gathered once, in a second or so.
 const STANDING: Budget = Budget {
@@ -38,8 +39,10 @@ pub(super) struct Indirect {
     movers: Vec<(usize, Mover)>,
     /// For each corner of the batch its point.
     point_of_corner: Vec<usize>,
-    /// Whether the batch has light that fits; without movers once is enough.
-    settled: bool,
+    /// The light of the batch's corners, by where the movers are; that of the present state first.
+    known: KnownStates<Vec<Option<DAffine3>>, Vec<Vec3>>,
+    /// Whether the batch has that.
+    is_written: bool,
 }
 
 impl Indirect {
@@ -59,25 +62,26 @@ impl Indirect {
             .collect();
         let surroundings =
             Surroundings::new(on_anchor(0), scene.world_lights(), scene.ambient_radiance);
-        let (points, point_of_corner) = corner_points(corners, triangles);
+        let (points, point_of_corner) = corner_points(corners, triangles, surroundings.caster());
         let Budget {
             rays,
             rays_per_record,
-        } = if movers.is_empty() { STANDING } else { MOVING };
+        } = if scene.moves() { MOVING } else { STANDING };
         let records = IrradianceRecords::new(&points, rays / rays_per_record);
         Some(Self {
             gathering: surroundings.gather(&records.places, rays),
             records,
             movers,
             point_of_corner,
-            settled: false,
+            known: KnownStates::new(scene.moves()),
+            is_written: false,
         })
     }
 
     /// The same light for things that stand elsewhere; `None` where those are not the same things.
     pub fn for_corners(self, (corners, _): &Corners) -> Option<Self> {
         (self.point_of_corner.len() == corners.len()).then_some(Self {
-            settled: false,
+            is_written: false,
             ..self
         })
     }
@@ -90,6 +94,7 @@ impl Indirect {
             let triangles = object.mesh.triangles.iter();
             let corners = triangles.map(|triangle| triangle.map(|it| positions[it as usize]));
             mover.deform(&corners.collect::<Vec<_>>());
+            self.known.clear();
         }
     }
 
@@ -101,24 +106,34 @@ impl Indirect {
         camera_from_anchor: &[Option<DAffine3>],
         camera_from_world: &DAffine3,
     ) {
-        if self.settled {
+        let world_from_camera = camera_from_world.inverse();
+        let pose = |anchor: usize| {
+            let camera_from_anchor = camera_from_anchor[anchor]?;
+            Some(match camera_from_anchor == *camera_from_world {
+                // (As a layer does that stands in the world.)
+                true => DAffine3::IDENTITY,
+                false => world_from_camera * camera_from_anchor,
+            })
+        };
+        let poses = self.movers.iter().map(|(anchor, _)| pose(*anchor));
+        let poses: Vec<Option<DAffine3>> = poses.collect();
+        let is_as_before = self
+            .known
+            .last()
+            .is_some_and(|(before, _)| *before == poses);
+        if is_as_before && self.is_written {
             return;
         }
-        let world_from_camera = camera_from_world.inverse();
-        let placed: Vec<(&Mover, DAffine3)> = self
-            .movers
-            .iter()
-            .filter_map(|(anchor, mover)| {
-                Some((mover, world_from_camera * camera_from_anchor[*anchor]?))
-            })
-            .collect();
-        let irradiances = self.records.at_points(&self.gathering.irradiances(&placed));
-        let corners: Vec<Vec3> = self
-            .point_of_corner
-            .iter()
-            .map(|&point| irradiances[point])
-            .collect();
+        let corners = self.known.take(&poses).unwrap_or_else(|| {
+            let movers = self.movers.iter().zip(&poses);
+            let placed = movers.filter_map(|((_, mover), pose)| Some((mover, (*pose)?)));
+            let irradiances = self.gathering.irradiances(&placed.collect::<Vec<_>>());
+            let irradiances = self.records.at_points(&irradiances);
+            let points = self.point_of_corner.iter();
+            points.map(|&point| irradiances[point]).collect()
+        });
         queue.write_buffer(batch, 0, bytemuck::cast_slice(&corners));
-        self.settled = self.movers.is_empty();
+        self.known.keep(poses, corners);
+        self.is_written = true;
     }
 }

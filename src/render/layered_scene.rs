@@ -6,9 +6,12 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use crate::geometry::bounds::Bounds;
-use crate::light::Material;
+use crate::geometry::mesh::CornerLook;
+use crate::geometry::shadow_volume::LightPlace;
 use crate::light::material::{Coverage, Encoding};
 use crate::scene::{Motion, Object, Scene};
+
+use super::opacity_map::OpacityMap;
 
 /// Parts of a thing that hang together in no place are layers of their own, up to this number; with more, such as leaves,
 /// they are one.
@@ -26,7 +29,6 @@ pub(super) struct LayeredScene<'a> {
 }
 
 /// A thing, or a part of one, that lets light through.
-#[derive(Debug, Clone, PartialEq)]
 pub(super) struct TranslucentLayer {
     /// The node that it stands on, and that by which it is there or not.
     pub stands_on: usize,
@@ -36,6 +38,32 @@ pub(super) struct TranslucentLayer {
     /// Its middle in its node's space, metres.
     pub middle: DVec3,
     pub visible: bool,
+    /// All of it, on its node.
+    thing: Arc<Object>,
+    /// How opaque it is as the brightest light sees it; `None` where nobody has asked yet.
+    seen_by_light: Option<Arc<OpacityMap>>,
+}
+
+impl TranslucentLayer {
+    /// How opaque it is as a light sees it that stands so in its node's space; `None` where that stands in it.
+    pub fn opacity_map(&mut self, light: LightPlace) -> Option<Arc<OpacityMap>> {
+        let known = self.seen_by_light.take().filter(|map| map.is_for(light));
+        self.seen_by_light = known.or_else(|| {
+            let thing = &*self.thing;
+            let positions = thing.positions_in_anchor(&thing.mesh);
+            let opacity = |triangle, weights| opacity_between(thing, triangle, weights);
+            let map = OpacityMap::new(&positions, &thing.mesh.triangles, opacity, light);
+            map.map(Arc::new)
+        });
+        self.seen_by_light.clone()
+    }
+
+    /// Takes another shape.
+    pub fn deform(&mut self, thing: &Object) {
+        self.middle = middle(thing);
+        self.thing = Arc::new(thing.clone());
+        self.seen_by_light = None;
+    }
 }
 
 impl<'a> LayeredScene<'a> {
@@ -98,13 +126,15 @@ impl<'a> LayeredScene<'a> {
             opacity,
             middle: middle(&layer),
             visible: thing.visible,
+            thing: Arc::new(layer.clone()),
+            seen_by_light: None,
         });
         self.scene.to_mut().virtuals.push(layer);
     }
 }
 
 /// The middle of a thing in its node's space, metres.
-pub(super) fn middle(thing: &Object) -> DVec3 {
+fn middle(thing: &Object) -> DVec3 {
     let positions = thing.positions_in_anchor(&thing.mesh);
     let bounds = Bounds::around(positions.iter().map(|position| position.as_dvec3()));
     bounds.map_or(DVec3::ZERO, |bounds| 0.5 * (bounds.low + bounds.high))
@@ -129,48 +159,33 @@ fn mean_opacity(thing: &Object, triangles: &[usize]) -> Option<f64> {
 
 /// The opacity of a triangle in the middles of small ones, of which `rows` lie along each of its sides.
 fn opacities(thing: &Object, triangle: usize, rows: u32) -> Vec<f64> {
-    let material = &thing.materials[thing.mesh.triangle_materials[triangle] as usize];
-    if material.coverage != Coverage::Blend {
-        return vec![1.0];
-    }
-    let Some(looks) = thing.mesh.corner_looks.get(triangle) else {
-        return vec![material.opacity];
-    };
-    let looks = looks.map(|look| thing.mesh.looks[look as usize]);
     let step = 1.0 / rows as f32;
     let cells = (0..rows).flat_map(|row| (0..rows - row).map(move |column| (row, column)));
     let places = cells.map(|(row, column)| {
         let (first, second) = (row as f32 + 1.0 / 3.0, column as f32 + 1.0 / 3.0);
         [first * step, second * step]
     });
-    places
-        .map(|[first, second]| {
-            let weights = [1.0 - first - second, first, second];
-            let mixed = |of: &dyn Fn(usize) -> glam::Vec4| {
-                (0..3)
-                    .map(|corner| of(corner) * weights[corner])
-                    .sum::<glam::Vec4>()
-            };
-            let uv = mixed(&|corner| {
-                let [first, second] = looks[corner].uv;
-                glam::Vec4::new(first.x, first.y, second.x, second.y)
-            });
-            let color = mixed(&|corner| looks[corner].color);
-            opacity_at(thing, material, [uv.x, uv.y, uv.z, uv.w]) * f64::from(color.w)
-        })
-        .map(|opacity| opacity.clamp(0.0, 1.0))
-        .collect()
+    let opacity = |[first, second]: [f32; 2]| {
+        opacity_between(thing, triangle, [1.0 - first - second, first, second])
+    };
+    places.map(opacity).collect()
 }
 
-fn opacity_at(thing: &Object, material: &Material, [u_0, v_0, u_1, v_1]: [f32; 4]) -> f64 {
+/// The opacity of a place between a triangle's corners, 0 to 1.
+fn opacity_between(thing: &Object, triangle: usize, weights: [f32; 3]) -> f64 {
+    let material = &thing.materials[thing.mesh.triangle_materials[triangle] as usize];
+    if material.coverage != Coverage::Blend {
+        return 1.0;
+    }
+    let Some(looks) = thing.mesh.corner_looks.get(triangle) else {
+        return material.opacity.clamp(0.0, 1.0);
+    };
+    let look = CornerLook::blended(looks.map(|look| &thing.mesh.looks[look as usize]), weights);
     let map = material.maps.color;
     let picture = map.and_then(|map| Some((map, thing.textures.get(map.texture as usize)?)));
     let of_picture = picture.map_or(1.0, |(map, texture)| {
-        let uv = match map.uv_set {
-            0 => glam::Vec2::new(u_0, v_0),
-            _ => glam::Vec2::new(u_1, v_1),
-        };
+        let uv = look.uv[map.uv_set as usize & 1];
         texture.sample(&map, uv, Encoding::Linear).w
     });
-    material.opacity * of_picture
+    (material.opacity * of_picture * f64::from(look.color.w)).clamp(0.0, 1.0)
 }

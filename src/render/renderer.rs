@@ -25,7 +25,7 @@ use super::fade::{self, Fade};
 use super::gpu::Gpu;
 use super::gpu_clock::{GpuClock, GpuTimes};
 use super::gpu_scene::GpuScene;
-use super::layered_scene::{LayeredScene, TranslucentLayer, middle};
+use super::layered_scene::{LayeredScene, TranslucentLayer};
 use super::layers::LayerPasses;
 use super::light_kind::LightKind;
 use super::passes::{Passes, RecordedPasses};
@@ -247,7 +247,7 @@ impl Renderer {
             self.gpu_scene.deform(&self.gpu, thing);
             let mut layers = self.layers.iter_mut();
             if let Some(layer) = layers.find(|layer| layer.node == thing.object.anchor) {
-                layer.middle = middle(&thing.object);
+                layer.deform(&thing.object);
             }
         }
     }

@@ -194,6 +194,16 @@ impl Lens {
     }
 }
 
+/// What a layer that lets light through takes of it: the twin of `LayerOpacity` in translucent.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(super) struct LayerOpacity {
+    pub map_from_camera: Mat4,
+    pub mean: f32,
+    pub has_map: u32,
+    pub padding: [u32; 2],
+}
+
 /// What rays of reflections are followed with in a frame: the twin of `ReflectionFrame` in reflections.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -399,6 +409,15 @@ mod tests {
             light_count,
             has_probe,
             focal_px,
+            padding
+        );
+        let translucent = shader::source("translucent.wgsl", &[]).unwrap();
+        assert_twins!(
+            &translucent,
+            LayerOpacity,
+            map_from_camera,
+            mean,
+            has_map,
             padding
         );
         assert_twins!(

@@ -158,6 +158,16 @@ impl Scene {
         self.anchors.len() + self.moving().count()
     }
 
+    /// Whether things can move to each other, or change their shape, without an edit.
+    pub fn moves(&self) -> bool {
+        let mut things = self.phantoms.iter().chain(&self.virtuals);
+        self.anchors.len() > 1
+            || things.any(|thing| {
+                let motion = thing.motion.as_ref();
+                thing.animation.is_some() || motion.is_some_and(|motion| !motion.is_none())
+            })
+    }
+
     /// Where the nodes are at a frame's time, from where the anchors are.
     pub fn camera_from_nodes(
         &self,

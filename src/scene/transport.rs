@@ -1,12 +1,16 @@
 //! A scene as the floors below take it: what reflects light, what hides it, and the room around.
 
-use glam::{DVec3, UVec2, Vec3};
+use std::sync::Arc;
+
+use glam::{DVec3, DVec4, UVec2, Vec3};
 
 use super::{Object, ProbeScene, Scene, SplitLight};
 use crate::geometry::bounds::Bounds;
 use crate::geometry::mesh::{CornerLook, Mesh};
 use crate::light::bounce::Reflector;
-use crate::light::material::Encoding;
+use crate::light::layer_albedo::mean_reflectance;
+use crate::light::material::{Encoding, Map, Material};
+use crate::light::texture::Texture;
 use crate::shafts::casters::Occluder;
 use crate::shafts::patches::RoomTriangle;
 use crate::shafts::placed_probe::PlacedProbe;
@@ -76,30 +80,40 @@ impl Object {
                 || looks.any(|look| look.color.truncate() != Vec3::ONE))
     }
 
-    /// Mean diffuse reflectance of a triangle: its material's, its picture's in its middle and halfway to its corners (at more
-    /// places where it covers many texels), and its corners' colours.
+    /// The part of light from everywhere that a triangle reflects on the average: of its material, with what its pictures have in
+    /// its middle and halfway to its corners (at more places where it covers many texels), and its corners' colours.
     ///
     /// # Panics
     /// If there is no such triangle.
     pub fn albedo(&self, triangle: usize) -> DVec3 {
         let material = &self.materials[self.mesh.triangle_materials[triangle] as usize];
         let Some(looks) = self.mesh.corner_looks.get(triangle) else {
-            return material.albedo;
+            return mean_reflectance(material);
         };
         let looks = looks.map(|look| &self.mesh.looks[look as usize]);
-        let texture = material.maps.color.and_then(|map| {
-            let texture = self.textures.get(map.texture as usize)?;
-            Some((map, texture))
+        let maps = &material.maps;
+        let [color, roughness, metallic] = [maps.color, maps.roughness, maps.metallic].map(|map| {
+            let map = map?;
+            Some((map, self.textures.get(map.texture as usize)?))
         });
         let at = |weights: [f32; 3]| {
             let look = CornerLook::blended(looks, weights);
-            let picture = texture.map_or(DVec3::ONE, |(map, texture)| {
-                let uv = look.uv[map.uv_set as usize & 1];
-                texture.sample(&map, uv, Encoding::Srgb).truncate()
-            });
-            picture * look.color.truncate().as_dvec3()
+            let texel = |picture: Option<(Map, &Arc<Texture>)>, encoding: Encoding| {
+                picture.map_or(DVec4::ONE, |(map, texture)| {
+                    let uv = look.uv[map.uv_set as usize & 1];
+                    texture.sample(&map, uv, encoding)
+                })
+            };
+            let tint = texel(color, Encoding::Srgb) * look.color.as_dvec4();
+            let rough = texel(roughness, Encoding::Linear).y;
+            mean_reflectance(&Material {
+                albedo: material.albedo * tint.truncate(),
+                roughness: material.roughness.map(|alpha| alpha * rough * rough),
+                metallic: material.metallic * texel(metallic, Encoding::Linear).z,
+                ..*material
+            })
         };
-        let texels = texture.map_or(0.0, |(map, texture)| {
+        let texels = color.map_or(0.0, |(map, texture)| {
             let [a, b, c] = looks.map(|look| {
                 let uv = look.uv[map.uv_set as usize & 1];
                 let place = map.picture_from_corner.transform_point2(uv);
@@ -110,18 +124,14 @@ impl Object {
         let rows = ((texels / TEXELS_A_PLACE).sqrt() as usize).clamp(2, MOST_ROWS);
         let places = middles(rows);
         let count = (rows * rows) as f64;
-        material.albedo * places.map(at).sum::<DVec3>() / count
+        places.map(at).sum::<DVec3>() / count
     }
 
     /// The mean of [`Object::albedo`] over each material's surface.
     pub fn mean_albedos(&self) -> Vec<DVec3> {
         let mesh = &self.mesh;
         if mesh.looks.is_empty() {
-            return self
-                .materials
-                .iter()
-                .map(|material| material.albedo)
-                .collect();
+            return self.materials.iter().map(mean_reflectance).collect();
         }
         let mut sums = vec![(DVec3::ZERO, 0.0); self.materials.len()];
         for (number, triangle) in mesh.triangles.iter().enumerate() {
@@ -137,7 +147,7 @@ impl Object {
                 if area > 0.0 {
                     sum / area
                 } else {
-                    material.albedo
+                    mean_reflectance(material)
                 }
             })
             .collect()

@@ -11,7 +11,7 @@ use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::light::probe::Probe;
 use gnomon::light::{Light, Material};
 use gnomon::render::{Layers, REAL, Renderer, Shown, VIRTUAL, VIRTUAL_HIDES};
-use gnomon::scene::{EnvironmentMethod, Scene, Shortcut, Shortcuts};
+use gnomon::scene::{EnvironmentMethod, Scene, Shortcut, Shortcuts, Station};
 use serde_json::Value;
 
 use crate::common::composite::Expected;
@@ -248,7 +248,16 @@ fn a_fox_that_is_real_hides_and_shades_what_is_virtual() {
 fn frozen(scene: &Scene, time_s: f64) -> Scene {
     let mut frozen = scene.shaped_at(time_s).into_owned();
     for thing in frozen.phantoms.iter_mut().chain(&mut frozen.virtuals) {
-        thing.animation = None;
+        // (What moves is lit more coarsely than what stands: it stays where it is, but by moving.)
+        if thing.animation.take().is_some()
+            && let Some(motion) = &mut thing.motion
+        {
+            motion.path = vec![Station {
+                time_s: 0.0,
+                offset_m: DVec3::ZERO,
+                rotation_deg: DVec3::ZERO,
+            }];
+        }
         // (What is held is not cut finer, as nothing is that changes its shape.)
         if scene.shadows.technique != gnomon::scene::Technique::Environment {
             Arc::make_mut(&mut thing.mesh).held.clear();

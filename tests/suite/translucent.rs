@@ -1,13 +1,17 @@
 //! What lets light through, and what a mask leaves, held against closed forms: sheets under suns above a table that nothing else
 //! lights.
 
-use glam::{DVec2, DVec3};
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec2, DVec3, Vec3};
 use gnomon::geometry::camera::{Distortion, Intrinsics};
+use gnomon::geometry::mesh::CornerLook;
 use gnomon::light::material::Coverage;
 use gnomon::render::{Shown, VIRTUAL};
-use gnomon::scene::Scene;
+use gnomon::scene::{Object, Scene};
 
 use crate::common::{Picture, Stage, linear_of_level, look_at, project_file};
+use crate::environment::{black_box, under_sky};
 
 const CAMERA: Intrinsics = Intrinsics {
     size_px: [320, 240],
@@ -26,6 +30,16 @@ struct Sheet {
     opacity: f64,
     /// A disc, of its half side as the radius.
     is_round: bool,
+    /// Clear at its left side and as opaque as it is said to be at its right one.
+    fades: bool,
+}
+
+impl Sheet {
+    /// At a place on it.
+    fn opacity_at(&self, place: DVec3) -> f64 {
+        let part = 0.5 + 0.5 * (place.x - self.middle.x) / self.half.x;
+        self.opacity * if self.fades { part } else { 1.0 }
+    }
 }
 
 /// Whither its light goes, and the irradiance that it gives the table.
@@ -41,6 +55,7 @@ const LOW: Sheet = Sheet {
     albedo: 0.8,
     opacity: 0.5,
     is_round: false,
+    fades: false,
 };
 /// Before the other as the camera sees them.
 const HIGH: Sheet = Sheet {
@@ -49,6 +64,7 @@ const HIGH: Sheet = Sheet {
     albedo: 0.2,
     opacity: 0.3,
     is_round: false,
+    fades: false,
 };
 const SUNS: [Sun; 2] = [
     Sun {
@@ -60,6 +76,9 @@ const SUNS: [Sun; 2] = [
         irradiance: 0.5,
     },
 ];
+
+/// What is expected is the suns' light alone, and sheets reflect some of it.
+const NOTHING_REFLECTED: &str = "ambient_samples = 0\n";
 
 fn scene(sheets: &[Sheet], suns: &[Sun], keys: &str) -> Scene {
     let mut text = format!(
@@ -89,6 +108,16 @@ fn scene(sheets: &[Sheet], suns: &[Sun], keys: &str) -> Scene {
     for (thing, sheet) in scene.virtuals.iter_mut().zip(sheets) {
         thing.materials[0].coverage = Coverage::Blend;
         thing.materials[0].opacity = sheet.opacity;
+        if sheet.fades {
+            let mut mesh = (*thing.mesh).clone();
+            let look = |place: &Vec3| CornerLook {
+                color: Vec3::ONE.extend(0.5 + 0.5 * place.x / sheet.half.x as f32),
+                ..CornerLook::default()
+            };
+            mesh.looks = mesh.positions.iter().map(look).collect();
+            mesh.corner_looks = mesh.triangles.clone();
+            thing.mesh = Arc::new(mesh);
+        }
     }
     scene
 }
@@ -107,10 +136,11 @@ fn hit(sheet: &Sheet, from: DVec3, direction: DVec3) -> Option<DVec3> {
 /// Part of the suns' light that sheets let through to a place.
 fn arriving(sheets: &[Sheet], suns: &[Sun], place: DVec3) -> f64 {
     let of_sun = |sun: &Sun| {
-        let over = sheets
-            .iter()
-            .filter(|sheet| hit(sheet, place, -sun.direction).is_some());
-        sun.irradiance * over.map(|sheet| 1.0 - sheet.opacity).product::<f64>()
+        let passing = sheets.iter().map(|sheet| {
+            let met = hit(sheet, place, -sun.direction);
+            1.0 - met.map_or(0.0, |met| sheet.opacity_at(met))
+        });
+        sun.irradiance * passing.product::<f64>()
     };
     suns.iter().map(of_sun).sum()
 }
@@ -128,7 +158,8 @@ fn expected(sheets: &[Sheet], suns: &[Sun], direction: DVec3) -> Option<f64> {
                 return None;
             }
             let own = sheet.albedo / std::f64::consts::PI * whole;
-            light = sheet.opacity * own + (1.0 - sheet.opacity) * light;
+            let opacity = sheet.opacity_at(place);
+            light = opacity * own + (1.0 - opacity) * light;
         }
     }
     Some(light)
@@ -147,8 +178,14 @@ fn wrong(picture: &Picture, sheets: &[Sheet], suns: &[Sun]) -> (usize, usize) {
         let (x, y) = (f64::from(index % width), f64::from(index / width));
         let Some(light) = at(x, y) else { continue };
         let around = [(-1.5, -1.5), (1.5, -1.5), (-1.5, 1.5), (1.5, 1.5)];
+        // (What fades does so by less from pixel to pixel.)
+        let most = if sheets.iter().any(|sheet| sheet.fades) {
+            0.02
+        } else {
+            1e-9
+        };
         let same =
-            |(dx, dy): &(f64, f64)| at(x + dx, y + dy).is_some_and(|it| (it - light).abs() < 1e-9);
+            |(dx, dy): &(f64, f64)| at(x + dx, y + dy).is_some_and(|it| (it - light).abs() < most);
         if !around.iter().all(same) {
             continue;
         }
@@ -161,7 +198,7 @@ fn wrong(picture: &Picture, sheets: &[Sheet], suns: &[Sun]) -> (usize, usize) {
 }
 
 fn hold(name: &str, sheets: &[Sheet], suns: &[Sun], keys: &str) {
-    let scene = scene(sheets, suns, keys);
+    let scene = scene(sheets, suns, &format!("{keys}{NOTHING_REFLECTED}"));
     let mut renderer = Stage::of_scene(scene).renderer(CAMERA);
     renderer.draw(&[Some(look_at(EYE, DVec3::ZERO))], Shown::Composite);
     let picture = Picture::new(renderer.read_picture().expect("a picture"));
@@ -199,6 +236,52 @@ fn what_is_half_transparent_is_half_seen_and_throws_half_a_shadow() {
     );
 }
 
+/// Its shadow is as deep everywhere as it is opaque where the sun passes it.
+#[test]
+fn what_fades_throws_a_shadow_that_fades() {
+    let fading = Sheet {
+        opacity: 0.9,
+        fades: true,
+        ..LOW
+    };
+    hold(
+        "one sample",
+        &[fading],
+        &SUNS[..1],
+        "[shadows]\nsamples = 1\n",
+    );
+    hold(
+        "two sheets",
+        &[fading, HIGH],
+        &SUNS[..1],
+        "[shadows]\nsamples = 4\n",
+    );
+}
+
+/// Light from afar is known for the frame without a layer and with it, and a frame does not depend on those before it.
+#[test]
+fn under_a_sky_a_still_frame_with_a_layer_stays_as_it_is() {
+    let (low, high) = ([-0.03, -0.03, 0.0], [0.03, 0.03, 0.08]);
+    let solid = black_box("box", low, high, DAffine3::IDENTITY);
+    let mut scene = under_sky(0, Vec::new(), vec![solid, sheet_of_glass()]);
+    scene.shadows.samples = 1;
+    let mut renderer = Stage::of_scene(scene).renderer(CAMERA);
+    let mut shoot = |eye: DVec3| {
+        renderer.draw(&[Some(look_at(eye, DVec3::ZERO))], Shown::Composite);
+        renderer.read_picture().expect("a picture")
+    };
+    let first = shoot(EYE);
+    let _ = shoot(EYE + 0.05);
+    assert!(first == shoot(EYE), "a frame depends on the one before it");
+}
+
+/// Half transparent, above a table.
+fn sheet_of_glass() -> Object {
+    let scene = scene(&[HIGH], &SUNS, "");
+    let [sheet] = scene.virtuals.try_into().expect("one sheet");
+    sheet
+}
+
 /// The order in the scene says nothing of which sheet is before the other, and what is not there is not.
 #[test]
 fn sheets_are_sorted_and_a_frame_is_as_if_it_were_the_first() {
@@ -228,6 +311,7 @@ const DISC: Sheet = Sheet {
     albedo: 0.8,
     opacity: 1.0,
     is_round: true,
+    fades: false,
 };
 
 fn write_card(folder: &std::path::Path) {
@@ -258,10 +342,9 @@ fn what_a_mask_leaves_is_seen_and_throws_its_own_shadow() {
     let folder = tempfile::tempdir().expect("a folder");
     write_card(folder.path());
     for (suns, samples) in [(&SUNS[..1], 1), (&SUNS[..], 4)] {
-        // (What is expected is the suns' light alone, and the card reflects some of it.)
         let keys = format!(
             "[[virtual]]\nname = \"card\"\nmesh = {:?}\nposition_m = {:?}\n[shadows]\nsamples = {samples}\n\
-             ambient_samples = 0\n",
+             {NOTHING_REFLECTED}",
             folder.path().join("card.obj"),
             DISC.middle.to_array()
         );

@@ -11,7 +11,7 @@ mod pipelines;
 
 use std::sync::Arc;
 
-use glam::DAffine3;
+use glam::{DAffine3, Vec3};
 
 use crate::environment::distant_light::DistantLight;
 use crate::environment::finer;
@@ -34,6 +34,7 @@ use super::deforming::DeformingThing;
 use super::final_gather::FinalGather;
 use super::gpu::Gpu;
 use super::gpu_scene::{DrawnLight, GpuScene};
+use super::known_states::{KnownStates, Standing};
 use super::map_atlas::MapDraw;
 use super::mirrored_probe::MirroredProbe;
 use super::passes::Passes;
@@ -76,9 +77,8 @@ pub(super) struct Environment {
     is_glossy: bool,
     /// `None`: light has changed.
     mirrored: Option<MirroredProbe>,
-    /// What `placed` was worked out for: where anchors are in the world, and the compact lights.
-    placed_for: Option<(Vec<Option<DAffine3>>, Vec<Light>)>,
-    placed: Option<Placed>,
+    /// The present state's first.
+    placed: KnownStates<Standing, Placed>,
 }
 
 /// What depends on where things are.
@@ -89,6 +89,8 @@ struct Placed {
     disc_count: u32,
     /// Boxes around all things, in the world.
     bounds: Vec<Bounds>,
+    /// Of the corners of each batch whose light is known so.
+    irradiances: Vec<Option<[Vec<Vec3>; 2]>>,
     are_maps_drawn: bool,
 }
 
@@ -110,7 +112,7 @@ impl Environment {
             }
             EnvironmentMethod::Penumbrae | EnvironmentMethod::Maps => None,
         };
-        let budget = match scene.node_count() > 1 {
+        let budget = match scene.moves() {
             true => Budget::MOVING,
             false => Budget::STANDING,
         };
@@ -140,8 +142,7 @@ impl Environment {
             is_glossy: kinds.glossy,
             mirrored: None,
             settings,
-            placed_for: None,
-            placed: None,
+            placed: KnownStates::new(scene.moves()),
         }
     }
 
@@ -159,7 +160,7 @@ impl Environment {
         let scene = PlacedScene::new(things, world_from_anchor, &self.distant, compact);
         let bounds: Vec<Bounds> = scene.things.iter().map(|placed| placed.bounds()).collect();
         let discs = scene.reflecting();
-        self.own_light.write(gpu, gpu_scene, &scene, &discs);
+        let irradiances = self.own_light.irradiances(gpu_scene, &scene, &discs);
         let maps = casting.maps(&scene, &self.distant, self.things.len());
         let (seen_by, draws) = casting.draws(&maps);
         let regions = &self.distant.regions;
@@ -218,6 +219,7 @@ impl Environment {
             group,
             disc_count: discs.nodes.len() as u32,
             bounds,
+            irradiances,
             are_maps_drawn: false,
         }
     }
@@ -246,12 +248,18 @@ impl Environment {
             let glossy = self.is_glossy.then_some((rest, *exposure as f32));
             MirroredProbe::new(&gpu.device, &gpu.queue, glossy)
         });
-        let placed_for = (gpu_scene.light_from_anchor()?, gpu_scene.shining_in_light());
-        if self.placed_for.as_ref() != Some(&placed_for) {
-            let (anchors, compact) = &placed_for;
+        let standing = (gpu_scene.light_from_anchor()?, gpu_scene.shining_in_light());
+        let is_as_before = |(before, _): &(Standing, Placed)| *before == standing;
+        if !self.placed.last().is_some_and(is_as_before) {
             let made = (&casting, &mirrored);
-            self.placed = Some(self.place(gpu, gpu_scene, anchors, compact, made));
-            self.placed_for = Some(placed_for);
+            let mut placed = self.placed.take(&standing).unwrap_or_else(|| {
+                let (anchors, compact) = &standing;
+                self.place(gpu, gpu_scene, anchors, compact, made)
+            });
+            // Corners and maps have but one place, and the state before has it.
+            gpu_scene.write_indirect(&gpu.queue, &placed.irradiances);
+            placed.are_maps_drawn = false;
+            self.placed.keep(standing, placed);
         }
         (self.casting, self.mirrored) = (Some(casting), Some(mirrored));
         Some(())
@@ -330,7 +338,7 @@ impl BroadLight for Environment {
         }
         self.things = things(scene);
         self.casting = None;
-        self.placed_for = None;
+        self.placed.clear();
         true
     }
 
@@ -349,7 +357,7 @@ impl BroadLight for Environment {
             if let Some(known) = self.things.get_mut(deforming.number) {
                 *known = Some(thing);
             }
-            self.placed_for = None;
+            self.placed.clear();
         }
         if let Some(final_gather) = &mut self.final_gather {
             final_gather.deform(things);
@@ -366,7 +374,7 @@ impl BroadLight for Environment {
         self.follow_poses(gpu, gpu_scene)?;
         let gathered = self.final_gather.as_mut();
         let gathered = gathered.map(|gathered| gathered.update(gpu, gpu_scene));
-        let (placed, casting) = (self.placed.as_ref()?, self.casting.as_ref()?);
+        let ((_, placed), casting) = (self.placed.last()?, self.casting.as_ref()?);
         let is_real = |&&number: &&usize| {
             self.things[number]
                 .as_ref()
@@ -397,7 +405,11 @@ impl BroadLight for Environment {
     }
 
     fn draw_maps(&mut self, gpu: &Gpu, passes: &mut Passes<'_>) {
-        let Some(placed) = self.placed.as_mut().filter(|placed| !placed.are_maps_drawn) else {
+        let Some((_, placed)) = self
+            .placed
+            .last_mut()
+            .filter(|(_, placed)| !placed.are_maps_drawn)
+        else {
             return;
         };
         let Some(casting) = &self.casting else {
@@ -413,7 +425,7 @@ impl BroadLight for Environment {
         gpu_scene: &GpuScene,
         within: PixelRect,
     ) {
-        let Some(placed) = &self.placed else {
+        let Some((_, placed)) = self.placed.last() else {
             return;
         };
         pass.set_bind_group(2, &placed.group, &[]);

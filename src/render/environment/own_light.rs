@@ -12,6 +12,7 @@ use crate::environment::self_occlusion::{
 };
 use crate::environment::surroundings::{self, Budget};
 use crate::geometry::corner_points::corner_points;
+use crate::geometry::ray_caster::RayCaster;
 use crate::light::harmonics::Turn;
 use crate::light::irradiance_records::IrradianceRecords;
 use crate::scene::Object;
@@ -214,15 +215,14 @@ impl OwnLight {
         }
     }
 
-    /// Writes the irradiance of all corners: on virtual things of all broad light that they do not hide from themselves, on
-    /// real ones of what others reflect.
-    pub fn write(
+    /// The irradiance of the corners of each batch in which some get it so, and what of that is of what things reflect: on virtual things of
+    /// all broad light that they do not hide from themselves, on real ones of what others reflect.
+    pub fn irradiances(
         &self,
-        gpu: &Gpu,
         gpu_scene: &GpuScene,
         scene: &PlacedScene<'_>,
         discs: &DiscTree,
-    ) {
+    ) -> Vec<Option<[Vec<Vec3>; 2]>> {
         let world_from_anchor = gpu_scene.light_from_anchor().unwrap_or_default();
         let sizes: Vec<usize> = gpu_scene
             .corners()
@@ -251,11 +251,7 @@ impl OwnLight {
                 }
             }
         }
-        for (batch, values) in batches.iter().enumerate() {
-            if let Some([irradiances, reflected]) = values {
-                gpu_scene.write_indirect(&gpu.queue, batch, [irradiances, reflected]);
-            }
-        }
+        batches
     }
 }
 
@@ -303,7 +299,9 @@ impl PlacedCorners {
         if triangles.is_empty() {
             return None;
         }
-        let (points, point_of_corner) = corner_points(values, &triangles);
+        let places = |triangle: &[u32; 3]| triangle.map(|corner| values[corner as usize].0);
+        let surface = RayCaster::new(&triangles.iter().map(places).collect::<Vec<_>>());
+        let (points, point_of_corner) = corner_points(values, &triangles, &surface);
         let mut occlusion_of_point = vec![0; points.len()];
         let mut corners = Vec::new();
         // (Triangles come in one order wherever a thing stands.)

@@ -12,13 +12,16 @@ impl GpuScene {
 
     /// Where the anchors are in the world, which stands still to itself; `None` where the world has no pose.
     pub fn world_from_anchor(&self) -> Option<Vec<Option<DAffine3>>> {
-        let world_from_camera = (*self.camera_from_anchor.first()?)?.inverse();
+        let camera_from_world = (*self.camera_from_anchor.first()?)?;
+        let world_from_camera = camera_from_world.inverse();
+        let in_world = |camera_from_anchor: DAffine3| match camera_from_anchor == camera_from_world
+        {
+            // (As a layer does that stands in it.)
+            true => DAffine3::IDENTITY,
+            false => world_from_camera * camera_from_anchor,
+        };
         let anchors = self.camera_from_anchor.iter();
-        let mut placed: Vec<Option<DAffine3>> = anchors
-            .map(|pose| pose.map(|camera_from_anchor| world_from_camera * camera_from_anchor))
-            .collect();
-        placed[0] = Some(DAffine3::IDENTITY);
-        Some(placed)
+        Some(anchors.map(|pose| pose.map(in_world)).collect())
     }
 
     /// The turn of the space that light from afar is known in, from the world; `None` where what it turns with is not there.
@@ -48,7 +51,12 @@ impl GpuScene {
         }
     }
 
-    /// The lights that cast shadow volumes and shine, in the camera's space; none where the world has no pose.
+    /// The lights that cast shadow volumes and shine, in world space.
+    pub fn shining(&self) -> Vec<Light> {
+        self.lights.shining()
+    }
+
+    /// They in the camera's space; none where the world has no pose.
     pub fn shining_in_camera(&self) -> Vec<Light> {
         let camera_from_world = self.camera_from_anchor.first().copied().flatten();
         let shining = self.lights.shining().into_iter();

@@ -2,9 +2,9 @@
 
 use glam::DAffine3;
 
-use super::super::layered_scene::TranslucentLayer;
+use super::super::opacity_map::brightest;
 use super::super::shown::Shown;
-use super::super::translucent::Translucent;
+use super::super::translucent::{SeenOpacity, Translucent};
 use super::Renderer;
 
 impl Renderer {
@@ -24,17 +24,12 @@ impl Renderer {
         let translucent = self.translucent.take();
         let translucent = translucent
             .unwrap_or_else(|| Translucent::new(&self.gpu, &self.gpu_scene, &self.picture));
-        translucent.begin(&self.gpu, &self.picture);
+        translucent.begin(&self.gpu, &self.gpu_scene, &self.picture);
         let mut stale = self.stale;
         let mut pass_names = std::mem::take(&mut self.pass_names);
-        for TranslucentLayer {
-            stands_on,
-            node,
-            opacity,
-            ..
-        } in layers
-        {
-            nodes[node] = camera_from_node[stands_on];
+        for index in layers {
+            let (node, opacity) = self.layer_opacity(index, camera_from_node);
+            nodes[node] = camera_from_node[self.layers[index].stands_on];
             self.gpu_scene.set_unseen(Some(node));
             self.draw_once(&nodes, shown);
             pass_names.append(&mut self.pass_names);
@@ -42,7 +37,7 @@ impl Renderer {
             self.gpu_scene.set_unseen(None);
             self.draw_once(&nodes, shown);
             pass_names.append(&mut self.pass_names);
-            translucent.add(&self.gpu, &self.gpu_scene, opacity);
+            translucent.add(&self.gpu, &self.gpu_scene, &opacity);
             pass_names.extend(["opacity", "translucent"]);
             stale = stale.union(self.stale);
             nodes[node] = None;
@@ -73,20 +68,51 @@ impl Renderer {
         nodes
     }
 
+    /// A layer's node, and what it takes of the light.
+    fn layer_opacity(
+        &mut self,
+        index: usize,
+        camera_from_node: &[Option<DAffine3>],
+    ) -> (usize, SeenOpacity) {
+        let layer = &mut self.layers[index];
+        let mut opacity = SeenOpacity {
+            mean: layer.opacity,
+            by_place: None,
+        };
+        let poses = [layer.stands_on, 0].map(|node| camera_from_node[node]);
+        if let [Some(camera_from_layer), Some(camera_from_world)] = poses {
+            // (What stands in the world keeps its light to the last bit.)
+            let world_from_layer = match layer.stands_on {
+                0 => DAffine3::IDENTITY,
+                _ => camera_from_world.inverse() * camera_from_layer,
+            };
+            let place = world_from_layer.transform_point3(layer.middle);
+            let lights = self.gpu_scene.shining();
+            let light = brightest(&lights, place, &world_from_layer.inverse());
+            let map = light.and_then(|light| layer.opacity_map(light));
+            opacity.by_place = map.map(|map| {
+                let map_from_camera = map.map_from_camera(&camera_from_layer);
+                (map, map_from_camera)
+            });
+        }
+        (layer.node, opacity)
+    }
+
     /// The layers that are there, by the distance of their middles from the camera.
-    fn farthest_first(&self, camera_from_node: &[Option<DAffine3>]) -> Vec<TranslucentLayer> {
+    fn farthest_first(&self, camera_from_node: &[Option<DAffine3>]) -> Vec<usize> {
         if camera_from_node.first().copied().flatten().is_none() {
             return Vec::new();
         }
-        let there = self.layers.iter().filter(|layer| layer.visible);
-        let mut placed: Vec<(f64, &TranslucentLayer)> = there
-            .filter_map(|layer| {
+        let layers = self.layers.iter().enumerate();
+        let mut placed: Vec<(f64, usize)> = layers
+            .filter(|(_, layer)| layer.visible)
+            .filter_map(|(index, layer)| {
                 let camera_from_layer = camera_from_node[layer.stands_on]?;
                 let middle = camera_from_layer.transform_point3(layer.middle);
-                Some((middle.length(), layer))
+                Some((middle.length(), index))
             })
             .collect();
         placed.sort_by(|(a, _), (b, _)| b.total_cmp(a));
-        placed.into_iter().map(|(_, layer)| layer.clone()).collect()
+        placed.into_iter().map(|(_, index)| index).collect()
     }
 }
