@@ -186,9 +186,9 @@ fn is_inside(from: DVec2, to: DVec2, turn: f64, place: DVec2) -> bool {
 }
 
 /// Gives texels beside the layer what passes through those of it.
-fn grow(passing: &mut Vec<Option<f64>>) {
+fn grow(passing: &mut [Option<f64>]) {
     for _ in 0..BORDER {
-        let before = passing.clone();
+        let before = passing.to_vec();
         let at = |column: usize, row: usize| {
             let is_there = column < SIDE && row < SIDE;
             is_there.then(|| before[row * SIDE + column]).flatten()
