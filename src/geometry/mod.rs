@@ -13,6 +13,7 @@ pub mod corner_points;
 pub mod counting;
 pub mod cuboid;
 pub mod cut_edges;
+pub mod exact_side;
 pub mod homography;
 pub mod least_squares;
 pub mod lens;

@@ -4,6 +4,8 @@ mod deforming;
 mod drawing;
 mod spaces;
 
+pub(super) use spaces::world_from;
+
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -276,11 +278,12 @@ impl GpuScene {
         let Some(camera_from_world) = camera_from_anchor.first().copied().flatten() else {
             return;
         };
+        let world_from_anchor = self.world_from_anchor().unwrap_or_default();
         let world_virtuals = self
             .batch(Role::Virtual, 0)
             .map(|batch| batch.indirect.clone());
         if let (Some(indirect), Some(buffer)) = (&mut self.indirect, world_virtuals) {
-            indirect.update(queue, &buffer, camera_from_anchor, &camera_from_world);
+            indirect.update(queue, &buffer, &world_from_anchor);
         }
         self.choose_levels(camera_from_anchor);
         self.cut_lights(gpu, &camera_from_world);

@@ -103,19 +103,10 @@ impl Indirect {
         &mut self,
         queue: &wgpu::Queue,
         batch: &wgpu::Buffer,
-        camera_from_anchor: &[Option<DAffine3>],
-        camera_from_world: &DAffine3,
+        world_from_anchor: &[Option<DAffine3>],
     ) {
-        let world_from_camera = camera_from_world.inverse();
-        let pose = |anchor: usize| {
-            let camera_from_anchor = camera_from_anchor[anchor]?;
-            Some(match camera_from_anchor == *camera_from_world {
-                // (As a layer does that stands in the world.)
-                true => DAffine3::IDENTITY,
-                false => world_from_camera * camera_from_anchor,
-            })
-        };
-        let poses = self.movers.iter().map(|(anchor, _)| pose(*anchor));
+        let movers = self.movers.iter();
+        let poses = movers.map(|(anchor, _)| world_from_anchor[*anchor]);
         let poses: Vec<Option<DAffine3>> = poses.collect();
         let is_as_before = self
             .known

@@ -181,11 +181,6 @@ fn opacity_between(thing: &Object, triangle: usize, weights: [f32; 3]) -> f64 {
         return material.opacity.clamp(0.0, 1.0);
     };
     let look = CornerLook::blended(looks.map(|look| &thing.mesh.looks[look as usize]), weights);
-    let map = material.maps.color;
-    let picture = map.and_then(|map| Some((map, thing.textures.get(map.texture as usize)?)));
-    let of_picture = picture.map_or(1.0, |(map, texture)| {
-        let uv = look.uv[map.uv_set as usize & 1];
-        texture.sample(&map, uv, Encoding::Linear).w
-    });
+    let of_picture = thing.texel(material.maps.color, &look, Encoding::Linear).w;
     (material.opacity * of_picture * f64::from(look.color.w)).clamp(0.0, 1.0)
 }

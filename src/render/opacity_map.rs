@@ -1,8 +1,9 @@
 //! How opaque a translucent layer is as a light sees it, place by place: what of its whole shadow is really there.
 
 use glam::{DAffine3, DMat4, DVec2, DVec3, DVec4, Vec3};
-use robust::{Coord, orient2d};
 
+use crate::environment::placed::way_to;
+use crate::geometry::exact_side::exact_side;
 use crate::geometry::shadow_volume::LightPlace;
 use crate::light::{Light, irradiance};
 
@@ -94,11 +95,8 @@ pub(super) fn brightest(
     layer_from_world: &DAffine3,
 ) -> Option<LightPlace> {
     let given = |light: &Light| {
-        let towards = match *light {
-            Light::Point { position_m, .. } => position_m - place,
-            Light::Directional { direction, .. } => -direction,
-        };
-        irradiance(light, place, towards.normalize_or_zero()).element_sum()
+        let (towards, _) = way_to(light, place.as_vec3());
+        irradiance(light, place, towards.as_dvec3().normalize_or_zero()).element_sum()
     };
     let brightest = lights.iter().max_by(|a, b| given(a).total_cmp(&given(b)))?;
     Some(light_place(brightest, layer_from_world))
@@ -176,11 +174,7 @@ fn draw(
 /// Whether a place lies on the inner side of a triangle's edge, which is its left one where `turn` is positive. What lies on an edge
 /// that two triangles share is in one of them.
 fn is_inside(from: DVec2, to: DVec2, turn: f64, place: DVec2) -> bool {
-    let [a, b, at] = [from, to, place].map(|place| Coord {
-        x: place.x,
-        y: place.y,
-    });
-    let side = orient2d(a, b, at) * turn;
+    let side = exact_side(from, to, place) * turn;
     let along = (to - from) * turn;
     side > 0.0 || (side == 0.0 && (along.y > 0.0 || (along.y == 0.0 && along.x > 0.0)))
 }

@@ -1,7 +1,5 @@
 //! A scene as the floors below take it: what reflects light, what hides it, and the room around.
 
-use std::sync::Arc;
-
 use glam::{DVec3, DVec4, UVec2, Vec3};
 
 use super::{Object, ProbeScene, Scene, SplitLight};
@@ -92,28 +90,19 @@ impl Object {
         };
         let looks = looks.map(|look| &self.mesh.looks[look as usize]);
         let maps = &material.maps;
-        let [color, roughness, metallic] = [maps.color, maps.roughness, maps.metallic].map(|map| {
-            let map = map?;
-            Some((map, self.textures.get(map.texture as usize)?))
-        });
         let at = |weights: [f32; 3]| {
             let look = CornerLook::blended(looks, weights);
-            let texel = |picture: Option<(Map, &Arc<Texture>)>, encoding: Encoding| {
-                picture.map_or(DVec4::ONE, |(map, texture)| {
-                    let uv = look.uv[map.uv_set as usize & 1];
-                    texture.sample(&map, uv, encoding)
-                })
-            };
-            let tint = texel(color, Encoding::Srgb) * look.color.as_dvec4();
-            let rough = texel(roughness, Encoding::Linear).y;
+            let tint = self.texel(maps.color, &look, Encoding::Srgb) * look.color.as_dvec4();
+            let rough = self.texel(maps.roughness, &look, Encoding::Linear).y;
+            let metal = self.texel(maps.metallic, &look, Encoding::Linear).z;
             mean_reflectance(&Material {
                 albedo: material.albedo * tint.truncate(),
                 roughness: material.roughness.map(|alpha| alpha * rough * rough),
-                metallic: material.metallic * texel(metallic, Encoding::Linear).z,
+                metallic: material.metallic * metal,
                 ..*material
             })
         };
-        let texels = color.map_or(0.0, |(map, texture)| {
+        let texels = self.pictured(maps.color).map_or(0.0, |(map, texture)| {
             let [a, b, c] = looks.map(|look| {
                 let uv = look.uv[map.uv_set as usize & 1];
                 let place = map.picture_from_corner.transform_point2(uv);
@@ -125,6 +114,18 @@ impl Object {
         let places = middles(rows);
         let count = (rows * rows) as f64;
         places.map(at).sum::<DVec3>() / count
+    }
+
+    /// What a picture of it has at a corner, or between corners, that looks so; 1 without a picture.
+    pub fn texel(&self, map: Option<Map>, look: &CornerLook, encoding: Encoding) -> DVec4 {
+        self.pictured(map).map_or(DVec4::ONE, |(map, texture)| {
+            texture.sample(&map, look.uv[map.uv_set as usize & 1], encoding)
+        })
+    }
+
+    fn pictured(&self, map: Option<Map>) -> Option<(Map, &Texture)> {
+        let map = map?;
+        Some((map, self.textures.get(map.texture as usize)?))
     }
 
     /// The mean of [`Object::albedo`] over each material's surface.

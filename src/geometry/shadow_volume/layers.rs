@@ -6,9 +6,9 @@
 use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
-use robust::{Coord, orient2d};
 
 use super::{Caster, LightPlace, Silhouette};
+use crate::geometry::exact_side::exact_side;
 
 /// A direction along which no mesh has a reason to put a vertex.
 const SOME_DIRECTION: DVec3 = DVec3::new(
@@ -166,7 +166,7 @@ impl Cell {
             .filter(|edge| touches(edge, low, high))
             .collect();
         // A straight way from the center enters what lies beyond an edge on whose right it starts, and leaves it on its left.
-        let right_of = |[a, b]: &&[DVec2; 2]| side([*a, *b], center) < 0.0;
+        let right_of = |[a, b]: &&[DVec2; 2]| exact_side(*a, *b, center) < 0.0;
         let entered = within.iter().filter(right_of).count() as i64;
         let left = within.len() as i64 - entered;
         let most = (windings + entered).max(left - windings).max(0) as u32;
@@ -201,23 +201,15 @@ impl Cell {
     }
 }
 
-/// Positive for a point on the left of an edge, negative on its right; its sign is exact.
-fn side([a, b]: [DVec2; 2], point: DVec2) -> f64 {
-    let [a, b, point] = [a, b, point].map(|point| Coord {
-        x: point.x,
-        y: point.y,
-    });
-    orient2d(a, b, point)
-}
-
 /// 1 where the straight way from one point to another enters what an edge has on its left, -1 where it leaves it; else 0.
 fn crossing(edge: [DVec2; 2], from: DVec2, to: DVec2) -> i64 {
     let apart = |one: f64, other: f64| (one < 0.0) != (other < 0.0);
-    let [starts, ends] = [from, to].map(|point| side(edge, point));
+    let [a, b] = edge;
+    let [starts, ends] = [from, to].map(|point| exact_side(a, b, point));
     if !apart(starts, ends) {
         return 0;
     }
-    let [a, b] = edge.map(|end| side([from, to], end));
+    let [a, b] = edge.map(|end| exact_side(from, to, end));
     match apart(a, b) {
         true if starts < 0.0 => 1,
         true => -1,
@@ -339,7 +331,7 @@ mod tests {
                 .collect();
             let winding = |at: DVec2| {
                 let around = triangles.iter().map(|&[a, b, c]| {
-                    let sides = [[a, b], [b, c], [c, a]].map(|edge| side(edge, at));
+                    let sides = [[a, b], [b, c], [c, a]].map(|[a, b]| exact_side(a, b, at));
                     i64::from(sides.iter().all(|side| *side > 0.0))
                         - i64::from(sides.iter().all(|side| *side < 0.0))
                 });

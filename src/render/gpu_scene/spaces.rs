@@ -4,6 +4,18 @@ use super::GpuScene;
 use crate::light::Light;
 use glam::DAffine3;
 
+/// Where an anchor is in the world. What stands in that, as a layer may on a node of its own, does so to the last bit: no camera comes
+/// between.
+pub(in super::super) fn world_from(
+    camera_from_world: &DAffine3,
+    camera_from_anchor: &DAffine3,
+) -> DAffine3 {
+    match camera_from_anchor == camera_from_world {
+        true => DAffine3::IDENTITY,
+        false => camera_from_world.inverse() * *camera_from_anchor,
+    }
+}
+
 impl GpuScene {
     /// Where the anchors are.
     pub fn camera_from_anchor(&self) -> &[Option<DAffine3>] {
@@ -13,15 +25,9 @@ impl GpuScene {
     /// Where the anchors are in the world, which stands still to itself; `None` where the world has no pose.
     pub fn world_from_anchor(&self) -> Option<Vec<Option<DAffine3>>> {
         let camera_from_world = (*self.camera_from_anchor.first()?)?;
-        let world_from_camera = camera_from_world.inverse();
-        let in_world = |camera_from_anchor: DAffine3| match camera_from_anchor == camera_from_world
-        {
-            // (As a layer does that stands in it.)
-            true => DAffine3::IDENTITY,
-            false => world_from_camera * camera_from_anchor,
-        };
         let anchors = self.camera_from_anchor.iter();
-        Some(anchors.map(|pose| pose.map(in_world)).collect())
+        let in_world = anchors.map(|pose| Some(world_from(&camera_from_world, &(*pose)?)));
+        Some(in_world.collect())
     }
 
     /// The turn of the space that light from afar is known in, from the world; `None` where what it turns with is not there.

@@ -2,6 +2,7 @@
 
 use glam::DAffine3;
 
+use super::super::gpu_scene::world_from;
 use super::super::opacity_map::brightest;
 use super::super::shown::Shown;
 use super::super::translucent::{SeenOpacity, Translucent};
@@ -81,11 +82,7 @@ impl Renderer {
         };
         let poses = [layer.stands_on, 0].map(|node| camera_from_node[node]);
         if let [Some(camera_from_layer), Some(camera_from_world)] = poses {
-            // (What stands in the world keeps its light to the last bit.)
-            let world_from_layer = match layer.stands_on {
-                0 => DAffine3::IDENTITY,
-                _ => camera_from_world.inverse() * camera_from_layer,
-            };
+            let world_from_layer = world_from(&camera_from_world, &camera_from_layer);
             let place = world_from_layer.transform_point3(layer.middle);
             let lights = self.gpu_scene.shining();
             let light = brightest(&lights, place, &world_from_layer.inverse());
