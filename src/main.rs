@@ -3,6 +3,7 @@
 mod command_line;
 
 use std::collections::BTreeSet;
+use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -71,7 +72,19 @@ fn leave_misused(error: &clap::Error) -> ! {
             ));
             std::process::exit(error.exit_code())
         }
-        None => error.exit(),
+        None => leave_told(error),
+    }
+}
+
+/// Prints what clap has to say and ends the program; help that could not be written was not given.
+fn leave_told(error: &clap::Error) -> ! {
+    let written = error.print().and_then(|()| std::io::stdout().flush());
+    match written {
+        Err(failed) if failed.kind() != std::io::ErrorKind::BrokenPipe => {
+            talk::say(format_args!("gnomon: stdout: {failed}"));
+            std::process::exit(1)
+        }
+        _ => std::process::exit(error.exit_code()),
     }
 }
 

@@ -1,16 +1,21 @@
 //! A probe's light as it comes from afar: as regions, whose shadows are drawn, and as harmonics, for what a thing hides from
 //! itself.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use crate::light::harmonics::basis;
 use crate::light::probe::Probe;
 use crate::light::regions::{Region, regions};
 
-use super::self_occlusion::{TRANSFER_DEGREE, TRANSFERS};
+use super::self_occlusion::{TRANSFER_DEGREE, TRANSFERS, open_transfer};
 
 /// Of even numbers, so that no cell lies on both sides of the horizon.
 const COARSE_PX: [usize; 2] = [48, 24];
+/// Normals of which it is known what harmonics do not tell, ...
+const NORMALS_PX: [usize; 2] = [96, 48];
+/// ... and the cells that are summed up for that at most.
+const SUMMED_PX: [usize; 2] = [128, 64];
 
 /// Light from all directions, the same everywhere.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,6 +27,8 @@ pub struct DistantLight {
     pub harmonics: [DVec3; TRANSFERS],
     /// Its radiance, in cells about as large as the part of the sky that a ray stands for.
     pub coarse: Probe,
+    /// For each normal the irradiance that the harmonics do not tell.
+    beyond_harmonics: Probe,
 }
 
 impl Default for DistantLight {
@@ -30,6 +37,7 @@ impl Default for DistantLight {
             regions: Vec::new(),
             harmonics: [DVec3::ZERO; TRANSFERS],
             coarse: Probe::default(),
+            beyond_harmonics: Probe::default(),
         }
     }
 }
@@ -42,12 +50,47 @@ impl DistantLight {
             irradiance: region.irradiance * exposure,
             ..region
         };
+        let harmonics = harmonics(probe, exposure);
         Self {
             coarse: coarse_radiance(probe, exposure),
             regions: regions.into_iter().map(exposed).collect(),
-            harmonics: harmonics(probe, exposure),
+            beyond_harmonics: beyond(&harmonics, probe, exposure),
+            harmonics,
         }
     }
+
+    /// Irradiance of a surface with a unit normal that nothing hides, less what [`DistantLight::harmonics`] say of it: few of them
+    /// let the light of a lamp run over the edge of what it reaches.
+    pub fn beyond_harmonics(&self, normal: Vec3) -> Vec3 {
+        self.beyond_harmonics.radiance(normal.as_dvec3())
+    }
+}
+
+/// For each normal the irradiance of a probe's radiance times `exposure`, less that of its harmonics.
+fn beyond(harmonics: &[DVec3; TRANSFERS], probe: &Probe, exposure: f64) -> Probe {
+    let Some(grid) = Probe::new(NORMALS_PX, vec![Vec3::ZERO; NORMALS_PX[0] * NORMALS_PX[1]]) else {
+        return Probe::default();
+    };
+    let lit = probe.coarser(SUMMED_PX);
+    let parts = lit.rays().map(|(direction, radiance, solid_angle)| {
+        (
+            direction.as_vec3(),
+            radiance * (exposure * solid_angle) as f32,
+        )
+    });
+    let parts: Vec<(Vec3, Vec3)> = parts.collect();
+    let normals: Vec<DVec3> = grid.rays().map(|(normal, ..)| normal).collect();
+    let at_normal = |normal: &DVec3| {
+        let facing = normal.as_vec3();
+        let arriving = parts.iter();
+        let exact: Vec3 = arriving
+            .map(|(direction, light)| *light * direction.dot(facing).max(0.0))
+            .sum();
+        let parts = open_transfer(*normal).into_iter().zip(harmonics);
+        let told: DVec3 = parts.map(|(part, radiance)| *radiance * part).sum();
+        exact - told.as_vec3()
+    };
+    Probe::new(NORMALS_PX, normals.par_iter().map(at_normal).collect()).unwrap_or_default()
 }
 
 /// A probe's radiance times `exposure`, in cells about as large as the part of the sky that a ray stands for.

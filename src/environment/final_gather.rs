@@ -193,7 +193,7 @@ impl PlacedScene<'_> {
         Sample {
             without: without * weight + of_sky,
             with: with * weight + left_of_sky,
-            direct: self.direct(start, normal, how, 0)[0],
+            direct: self.direct(start, normal, how, 0, |_| Vec3::ONE)[0],
             is_inside_real,
             is_inside: is_inside_real || is_inside(is_virtual_caster),
         }
@@ -231,9 +231,9 @@ impl PlacedScene<'_> {
     /// Radiance that a surface reflects of the lights and of what is around it: without virtual things, and with them.
     fn reflected_by(&self, seen: &SeenSurface, how: &Gathering<'_>, number: usize) -> [Vec3; 2] {
         let start = seen.place + seen.normal * OFFSET_M;
-        let direct = self.direct(start, seen.normal, how, number);
+        let direct = self.direct_reflected(start, seen, how, number);
         let around = self.around(start, seen.normal, how, number);
-        [0, 1].map(|with| seen.albedo * (direct[with] + around[with]) * FRAC_1_PI)
+        [0, 1].map(|with| (direct[with] + seen.albedo * around[with]) * FRAC_1_PI)
     }
 
     /// Irradiance of a place that a ray with this number came to, but for the lights themselves: without virtual things, and with
@@ -248,9 +248,9 @@ impl PlacedScene<'_> {
                 return [Vec3::ZERO; 2];
             }
             let start = seen.place + seen.normal * OFFSET_M;
-            let direct = self.direct(start, seen.normal, how, number);
+            let direct = self.direct_reflected(start, seen, how, number);
             let of_sky = self.left_of_sky(start, seen.normal, how, number);
-            [0, 1].map(|with| seen.albedo * (direct[with] + of_sky[with]))
+            [0, 1].map(|with| direct[with] + seen.albedo * of_sky[with])
         };
         let axes = normal.any_orthonormal_pair();
         // Neighbouring rays look elsewhere.
@@ -294,9 +294,30 @@ impl PlacedScene<'_> {
         })
     }
 
+    /// What a surface reflects of the lights themselves along the ray that met it, π times its radiance.
+    fn direct_reflected(
+        &self,
+        start: Vec3,
+        seen: &SeenSurface,
+        how: &Gathering<'_>,
+        turn: usize,
+    ) -> [Vec3; 2] {
+        let surface = self.surface(seen);
+        self.direct(start, seen.normal, how, turn, |toward| {
+            surface.reflected(seen.normal, toward, seen.toward_viewer)
+        })
+    }
+
     /// Irradiance of a place of the lights themselves, without virtual things and with them, as that of their places whose turn
-    /// it is sees it.
-    fn direct(&self, start: Vec3, normal: Vec3, how: &Gathering<'_>, turn: usize) -> [Vec3; 2] {
+    /// it is sees it; times what `part` is for a unit direction to a light.
+    fn direct(
+        &self,
+        start: Vec3,
+        normal: Vec3,
+        how: &Gathering<'_>,
+        turn: usize,
+        part: impl Fn(Vec3) -> Vec3,
+    ) -> [Vec3; 2] {
         let mut arriving = [Vec3::ZERO; 2];
         for (light, places) in self.compact.iter().zip(&how.shining_from) {
             let given = irradiance(light, start.as_dvec3(), normal.as_dvec3()).as_vec3();
@@ -308,6 +329,7 @@ impl PlacedScene<'_> {
             if given == Vec3::ZERO || is_hidden(true) {
                 continue;
             }
+            let given = given * part(way.normalize_or_zero());
             arriving[0] += given;
             if !is_hidden(false) {
                 arriving[1] += given;

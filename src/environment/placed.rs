@@ -5,6 +5,7 @@ use std::f32::consts::FRAC_1_PI;
 use glam::{Affine3, DAffine3, DVec3, Vec3};
 
 use crate::geometry::bounds::Bounds;
+use crate::light::mean_surface::MeanSurface;
 use crate::light::regions::Region;
 use crate::light::{Light, irradiance};
 
@@ -48,7 +49,9 @@ pub struct SeenSurface {
     pub place: Vec3,
     /// Unit length, on the side that is seen.
     pub normal: Vec3,
-    /// Diffuse reflectance.
+    /// Back along the ray, unit length.
+    pub toward_viewer: Vec3,
+    /// Of light from everywhere, all around.
     pub albedo: Vec3,
     /// Along the ray, in units of its direction.
     pub distance: f32,
@@ -228,9 +231,15 @@ impl PlacedScene<'_> {
                 true => -normal,
                 false => normal,
             },
-            albedo: placed.thing.albedos[triangle],
+            toward_viewer: -direction,
+            albedo: placed.thing.surface(triangle).albedo.as_vec3(),
             distance,
         })
+    }
+
+    /// What a ray has met.
+    pub fn surface(&self, seen: &SeenSurface) -> &MeanSurface {
+        self.things[seen.thing].thing.surface(seen.triangle)
     }
 
     /// Whether something hides what lies `reach` along a direction: what casts shadows, or what is real and casts none, as a
@@ -271,48 +280,59 @@ impl PlacedScene<'_> {
     pub fn irradiance(&self, among: Among, place: Vec3, normal: Vec3) -> Vec3 {
         let start = place + normal * OFFSET_M;
         let regions = self.distant.regions.iter();
-        let broad: Vec3 = regions
-            .map(|region| self.of_region(among, start, normal, region))
-            .sum();
-        broad + self.of_compact(among, start, normal)
+        let broad = regions.filter_map(|region| self.of_region(among, start, normal, region));
+        let compact = self.of_compact(among, start, normal);
+        let all = broad.chain(compact);
+        all.map(|(_, irradiance)| irradiance).sum()
     }
 
-    /// What a surface that a ray met reflects; `turn` is the ray's number, and says which regions are asked for.
+    /// What a surface that a ray met reflects along it; `turn` is the ray's number, and says which regions are asked for.
     pub fn radiance(&self, among: Among, seen: &SeenSurface, turn: usize) -> Vec3 {
         let start = seen.place + seen.normal * OFFSET_M;
         let regions = &self.distant.regions;
         let asked = ASKED_REGIONS.min(regions.len());
-        let broad: Vec3 = (0..asked)
-            .map(|index| {
-                // Each asks for regions that lie far apart in their order, and rays beside each other for others.
-                let region = (turn + index * regions.len() / asked) % regions.len();
-                self.of_region(among, start, seen.normal, &regions[region])
-            })
-            .sum();
         let scale = regions.len() as f32 / asked.max(1) as f32;
-        let arriving = broad * scale + self.of_compact(among, start, seen.normal);
-        seen.albedo * arriving * FRAC_1_PI
+        let broad = (0..asked).filter_map(|index| {
+            // Each asks for regions that lie far apart in their order, and rays beside each other for others.
+            let region = (turn + index * regions.len() / asked) % regions.len();
+            let (toward, given) = self.of_region(among, start, seen.normal, &regions[region])?;
+            Some((toward, given * scale))
+        });
+        let arriving = broad.chain(self.of_compact(among, start, seen.normal));
+        let surface = self.surface(seen);
+        let reflected = arriving.map(|(toward, given)| {
+            given * surface.reflected(seen.normal, toward, seen.toward_viewer)
+        });
+        reflected.sum::<Vec3>() * FRAC_1_PI
     }
 
-    fn of_region(&self, among: Among, start: Vec3, normal: Vec3, region: &Region) -> Vec3 {
+    /// The direction of a region and the irradiance of a place of it; `None` where that is none.
+    fn of_region(
+        &self,
+        among: Among,
+        start: Vec3,
+        normal: Vec3,
+        region: &Region,
+    ) -> Option<(Vec3, Vec3)> {
         let toward = region.toward.as_vec3();
         let cosine = toward.dot(normal);
-        match cosine > 0.0 && !self.is_hidden(among, start, toward, f32::INFINITY) {
-            true => region.irradiance.as_vec3() * cosine,
-            false => Vec3::ZERO,
-        }
+        let arrives = cosine > 0.0 && !self.is_hidden(among, start, toward, f32::INFINITY);
+        arrives.then(|| (toward, region.irradiance.as_vec3() * cosine))
     }
 
-    fn of_compact(&self, among: Among, start: Vec3, normal: Vec3) -> Vec3 {
-        let of_light = |light: &Light| {
+    /// For each compact light that reaches a place its direction and its irradiance.
+    fn of_compact(
+        &self,
+        among: Among,
+        start: Vec3,
+        normal: Vec3,
+    ) -> impl Iterator<Item = (Vec3, Vec3)> {
+        self.compact.iter().filter_map(move |light| {
             let (way, reach) = way_to(light, start);
             let arriving = irradiance(light, start.as_dvec3(), normal.as_dvec3());
-            match arriving == DVec3::ZERO || self.is_hidden(among, start, way, reach) {
-                true => Vec3::ZERO,
-                false => arriving.as_vec3(),
-            }
-        };
-        self.compact.iter().map(of_light).sum()
+            let arrives = arriving != DVec3::ZERO && !self.is_hidden(among, start, way, reach);
+            arrives.then(|| (way.normalize_or_zero(), arriving.as_vec3()))
+        })
     }
 }
 

@@ -241,15 +241,9 @@ impl OwnRays {
     }
 }
 
-/// What nothing hides, less what the thing does: so the error of the rays is in the hidden part alone.
-fn occlusion(
-    start: Vec3,
-    normal: DVec3,
-    rays: &[(DVec3, Vec<f64>)],
-    caster: &RayCaster,
-) -> SelfOcclusion {
+/// The transfer of a unit normal above which all is open.
+pub fn open_transfer(normal: DVec3) -> [f64; TRANSFERS] {
     let mut transfer = [0.0; TRANSFERS];
-    let mut visibility = [0.0; VISIBILITIES];
     let values = basis(normal, TRANSFER_DEGREE);
     for l in 0..=TRANSFER_DEGREE {
         let band = l * l..(l + 1) * (l + 1);
@@ -257,6 +251,18 @@ fn occlusion(
             *sum = cosine_lobe(l) * value;
         }
     }
+    transfer
+}
+
+/// What nothing hides, less what the thing does: so the error of the rays is in the hidden part alone.
+fn occlusion(
+    start: Vec3,
+    normal: DVec3,
+    rays: &[(DVec3, Vec<f64>)],
+    caster: &RayCaster,
+) -> SelfOcclusion {
+    let mut transfer = open_transfer(normal);
+    let mut visibility = [0.0; VISIBILITIES];
     // The harmonic of degree 0 of a constant 1.
     visibility[0] = (4.0 * PI).sqrt();
     let weight = 4.0 * PI / rays.len() as f64;
@@ -285,13 +291,20 @@ fn occlusion(
 }
 
 impl SelfOcclusion {
-    /// Irradiance of the corner from radiance whose coefficients are in the same space (Tamura et al. 2005, equation 2); never
-    /// negative, which a sum of few harmonics may be.
-    pub fn irradiance(&self, radiance: &[DVec3; TRANSFERS]) -> Vec3 {
+    /// Irradiance of the corner from radiance whose coefficients are in the same space (Tamura et al. 2005, equation 2), with what
+    /// they do not tell of an open corner's; never negative, which a sum of few harmonics may be.
+    pub fn irradiance(&self, radiance: &[DVec3; TRANSFERS], beyond_harmonics: Vec3) -> Vec3 {
         let parts = self.transfer.iter().zip(radiance);
         let sum: DVec3 = parts
             .map(|(&part, &radiance)| radiance * f64::from(part))
             .sum();
-        sum.max(DVec3::ZERO).as_vec3()
+        (sum.as_vec3() + beyond_harmonics * self.open_part()).max(Vec3::ZERO)
+    }
+
+    /// The part of light from everywhere that arrives.
+    fn open_part(&self) -> f32 {
+        // (All of it: the cosine lobe's degree 0 times the harmonic of that.)
+        let all = cosine_lobe(0) / (4.0 * PI).sqrt();
+        (self.transfer[0] / all as f32).clamp(0.0, 1.0)
     }
 }

@@ -8,6 +8,7 @@ use crate::geometry::bounds::Bounds;
 use crate::geometry::corner_points::is_buried;
 use crate::geometry::ray_caster::RayCaster;
 use crate::geometry::solid::holes;
+use crate::light::mean_surface::MeanSurface;
 use crate::shafts::bounding::Ball;
 use crate::shafts::casters::Occluder;
 use crate::shafts::surfels::{Surfel, surfels_of_triangles};
@@ -25,8 +26,9 @@ pub struct Thing {
     pub anchor: usize,
     /// Its triangles, in the anchor's space, metres.
     pub triangles: Vec<[Vec3; 3]>,
-    /// Mean diffuse reflectance of each.
-    pub albedos: Vec<Vec3>,
+    /// For each the number of its surface.
+    surface_numbers: Vec<u32>,
+    surfaces: Vec<MeanSurface>,
     /// Rays against them.
     pub caster: RayCaster,
     /// What has an inside but for holes: the same with these closed.
@@ -49,10 +51,10 @@ impl Thing {
         if !thing.visible {
             return None;
         }
-        let with_albedo = thing.simplified_in_anchor();
-        let own = Self::of_triangles(thing, is_real, &with_albedo)?;
+        let triangles = thing.simplified_in_anchor();
+        let own = Self::of_triangles(thing, is_real, &triangles)?;
         let (surfels, surfels_on) = match thing.casts {
-            true => surfels_of_triangles(&with_albedo, SURFELS),
+            true => surfels_of_triangles(&thing.with_albedos(&triangles), SURFELS),
             false => Default::default(),
         };
         Some(Self {
@@ -89,12 +91,18 @@ impl Thing {
         solid.is_some_and(|solid| is_buried(solid, place, normal, self.is_mirrored))
     }
 
+    /// What a triangle's surface is.
+    pub fn surface(&self, triangle: usize) -> &MeanSurface {
+        &self.surfaces[self.surface_numbers[triangle] as usize]
+    }
+
     fn of_triangles(
         thing: &Occluder<'_>,
         is_real: bool,
-        with_albedo: &[([Vec3; 3], Vec3)],
+        triangles: &[([Vec3; 3], u32)],
     ) -> Option<Self> {
-        let (triangles, albedos): (Vec<[Vec3; 3]>, Vec<Vec3>) = with_albedo.iter().copied().unzip();
+        let (triangles, surface_numbers): (Vec<[Vec3; 3]>, Vec<u32>) =
+            triangles.iter().copied().unzip();
         let corners = || triangles.iter().flatten();
         let bounds = Bounds::around(corners().map(|corner| corner.as_dvec3()))?;
         let solid = holes(thing.mesh).map(|holes| {
@@ -119,7 +127,8 @@ impl Thing {
             surfels: Vec::new(),
             surfels_on: Vec::new(),
             triangles,
-            albedos,
+            surface_numbers,
+            surfaces: thing.surfaces.clone(),
         })
     }
 }

@@ -10,7 +10,7 @@
 
 mod picture_shift;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use glam::{DVec3, Vec3};
 use meshopt::{SimplifyOptions, VertexDataAdapter, simplify_with_attributes_and_locks};
@@ -53,6 +53,10 @@ const PICTURE_WEIGHT: f64 = 3.0;
 const COLOR_WEIGHT: f32 = 0.2;
 /// Colours at corners are nowhere off by more, of 1.
 const LARGEST_COLOR_ERROR: f32 = 0.04;
+/// Where more corners than these meet in a vertex, ...
+const MOST_CORNERS: usize = 256;
+/// ... those whose faces are turned alike to a part of this count as one.
+const DIRECTION_STEPS: f64 = 16.0;
 /// The mean error may be this part of the largest one that a pixel allows: a mask is right to 0.02 % only if its edges
 /// are right to a tenth of a pixel nearly everywhere.
 const MEAN_TO_MAX: f64 = 1.0 / 12.0;
@@ -168,7 +172,7 @@ struct Simplifier<'a> {
     /// 1 where each corner has the normal of its face, as phantoms do, -1 where each has the opposite, as mirrored
     /// phantoms do; `None` otherwise.
     flat: Option<f64>,
-    /// For each vertex its corners, from `corner_starts[vertex]` on: triangle and corner.
+    /// For each vertex its corners, or such as stand for them, from `corner_starts[vertex]` on: triangle and corner.
     corners: Vec<(u32, usize)>,
     corner_starts: Vec<usize>,
 }
@@ -235,6 +239,29 @@ impl<'a> Simplifier<'a> {
                 .collect(),
             corner_starts,
         }
+        .with_fewer_corners()
+    }
+
+    /// With one corner of each direction alone at vertices where many triangles meet, as in a disc's middle: each triangle there
+    /// looks through all of them.
+    fn with_fewer_corners(mut self) -> Self {
+        let mut corners = Vec::with_capacity(self.corners.len());
+        let mut starts = vec![0];
+        for range in self.corner_starts.windows(2) {
+            let all = &self.corners[range[0]..range[1]];
+            let mut directions = HashSet::new();
+            let is_new = |&&(triangle, _): &&(u32, usize)| {
+                let direction = self.face_normals[triangle as usize] * DIRECTION_STEPS;
+                directions.insert(direction.round().as_ivec3())
+            };
+            match all.len() > MOST_CORNERS {
+                true => corners.extend(all.iter().filter(is_new)),
+                false => corners.extend(all),
+            }
+            starts.push(corners.len());
+        }
+        (self.corners, self.corner_starts) = (corners, starts);
+        self
     }
 
     /// Indices of a coarser mesh with about `triangles` triangles.

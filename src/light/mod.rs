@@ -10,6 +10,7 @@ pub mod harmonics;
 pub mod irradiance_records;
 pub mod layer_albedo;
 pub mod material;
+pub mod mean_surface;
 pub mod pieces;
 pub mod prefiltered;
 pub mod probe;

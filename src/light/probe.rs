@@ -39,10 +39,17 @@ impl Probe {
 
     /// Each pixel, row by row, as what it sends: the unit direction of its middle, its radiance, its solid angle in steradians.
     pub fn rays(&self) -> impl Iterator<Item = (DVec3, Vec3, f64)> {
+        (0..self.size_px[1]).flat_map(|row| self.rays_of_row(row))
+    }
+
+    /// The same of one row of pixels.
+    ///
+    /// # Panics
+    /// If there is no such row.
+    pub fn rays_of_row(&self, row: usize) -> impl Iterator<Item = (DVec3, Vec3, f64)> {
         let [width, _] = self.size_px;
-        let pixels = self.radiance.iter().enumerate();
-        pixels.map(move |(index, &radiance)| {
-            let (column, row) = (index % width, index / width);
+        let pixels = self.radiance[row * width..(row + 1) * width].iter();
+        pixels.enumerate().map(move |(column, &radiance)| {
             let direction = self.direction(column as f64 + 0.5, row as f64 + 0.5);
             (direction, radiance, self.pixel_solid_angle(row))
         })

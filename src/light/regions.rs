@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::REC_709;
@@ -12,6 +12,10 @@ use super::probe::Probe;
 /// Steps by which regions are evened out (Lloyd 1982) each time that some were cut, and at the end.
 const STEPS_BETWEEN: usize = 3;
 const STEPS_AT_LAST: usize = 24;
+
+/// Middles are found among so many columns and rows of pixels at most, each the mean of what lies in it; what regions have is
+/// summed up over all pixels then.
+const FINEST_PX: [usize; 2] = [1024, 512];
 
 /// A part of all directions, as one light.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,18 +52,10 @@ struct Pixel {
 /// middle, along the line on which it lies widest, and all middles move to where their light comes from, so that the same light
 /// is cut alike however the probe is turned.
 pub fn regions(probe: &Probe, count: usize) -> Vec<Region> {
-    let pixels: Vec<Pixel> = probe
-        .rays()
-        .map(|(direction, radiance, solid_angle)| {
-            let radiance = radiance.as_dvec3();
-            Pixel {
-                direction,
-                solid_angle,
-                power: radiance.dot(REC_709) * solid_angle,
-                radiance,
-            }
-        })
-        .collect();
+    let [width, height] = probe.size_px();
+    let is_fine = width > FINEST_PX[0] || height > FINEST_PX[1];
+    let coarser = is_fine.then(|| probe.coarser(FINEST_PX));
+    let pixels = pixels(coarser.as_ref().unwrap_or(probe).rays());
     let whole: DVec3 = pixels.iter().map(|it| it.direction * it.power).sum();
     let mut middles = vec![whole.try_normalize().unwrap_or(DVec3::Z)];
     loop {
@@ -81,8 +77,43 @@ pub fn regions(probe: &Probe, count: usize) -> Vec<Region> {
             break;
         }
     }
-    let sums = sums(&pixels, &middles);
+    let sums = match is_fine {
+        true => sums_of_rows(probe, &middles),
+        false => sums(&pixels, &middles),
+    };
     sums.iter().filter_map(Sum::region).collect()
+}
+
+fn pixels(rays: impl Iterator<Item = (DVec3, Vec3, f64)>) -> Vec<Pixel> {
+    let pixel = |(direction, radiance, solid_angle): (DVec3, Vec3, f64)| {
+        let radiance = radiance.as_dvec3();
+        Pixel {
+            direction,
+            solid_angle,
+            power: radiance.dot(REC_709) * solid_angle,
+            radiance,
+        }
+    };
+    rays.map(pixel).collect()
+}
+
+/// Sums the pixels of a fine probe up that are nearest to each middle, a row at a time: all of them at once take gigabytes.
+fn sums_of_rows(probe: &Probe, middles: &[DVec3]) -> Vec<Sum> {
+    let rows = 0..probe.size_px()[1];
+    let of_row = |row: usize| sums(&pixels(probe.rays_of_row(row)), middles);
+    let rows: Vec<Vec<Sum>> = rows.into_par_iter().map(of_row).collect();
+    added_up(rows.iter(), middles.len())
+}
+
+/// Adds up what is known of each region.
+fn added_up<'a>(parts: impl Iterator<Item = &'a Vec<Sum>>, count: usize) -> Vec<Sum> {
+    let mut all = vec![Sum::NONE; count];
+    for part in parts {
+        for (sum, part) in all.iter_mut().zip(part) {
+            *sum = sum.and(part);
+        }
+    }
+    all
 }
 
 /// What is known of all pixels of a region.
@@ -174,13 +205,7 @@ fn sums(pixels: &[Pixel], middles: &[DVec3]) -> Vec<Sum> {
         sums
     };
     let chunks: Vec<Vec<Sum>> = pixels.par_chunks(CHUNK).map(of_chunk).collect();
-    let mut all = vec![Sum::NONE; middles.len()];
-    for chunk in &chunks {
-        for (sum, part) in all.iter_mut().zip(chunk) {
-            *sum = sum.and(part);
-        }
-    }
-    all
+    added_up(chunks.iter(), middles.len())
 }
 
 /// The middles, with their numbers, one of which is the nearest to any of the pixels: what is nearest to a pixel is no farther
@@ -260,8 +285,6 @@ fn widest(spread: &DMat3) -> DVec3 {
 mod tests {
     use super::*;
     use std::f64::consts::PI;
-
-    use glam::Vec3;
 
     /// A sky with a bright side and a lamp.
     fn sky(turned_px: usize) -> Probe {
@@ -343,6 +366,35 @@ mod tests {
             few < 0.2 && more < 0.06 && many < 0.015,
             "{few} {more} {many}"
         );
+    }
+
+    /// Regions of a fine probe are those of a coarser one, with all of its light.
+    #[test]
+    fn a_fine_probe_loses_nothing() {
+        let size_px = [2048, 1024];
+        let grid = Probe::new(size_px, vec![Vec3::ZERO; 2048 * 1024]).unwrap();
+        let lamp = DVec3::new(0.5, -0.6, 0.7).normalize();
+        let radiance = |way: DVec3| match way.dot(lamp) > 0.999_99 {
+            true => 2e4,
+            false => 1.0 + way.z.max(0.0),
+        };
+        let pixels = grid
+            .rays()
+            .map(|(way, ..)| Vec3::splat(radiance(way) as f32));
+        let probe = Probe::new(size_px, pixels.collect()).unwrap();
+        let regions = regions(&probe, 32);
+        assert_eq!(regions.len(), 32);
+        let found: DVec3 = regions.iter().map(|it| it.toward * it.irradiance.x).sum();
+        let parts = probe.rays();
+        let exact: DVec3 = parts
+            .map(|(way, radiance, solid_angle)| way * f64::from(radiance.x) * solid_angle)
+            .sum();
+        assert!(
+            found.distance(exact) < 1e-9 * exact.length(),
+            "{found} {exact}"
+        );
+        let solid_angle: f64 = regions.iter().map(|it| it.solid_angle_sr).sum();
+        assert!((solid_angle / (4.0 * PI) - 1.0).abs() < 1e-9);
     }
 
     #[test]

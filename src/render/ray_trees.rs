@@ -137,7 +137,7 @@ fn triangles(occluder: &Occluder<'_>, fitting: usize) -> Vec<([Vec3; 3], Vec3)> 
     if triangles.len() > fitting {
         triangles.clear();
     }
-    triangles
+    occluder.with_albedos(&triangles)
 }
 
 impl RayTrees {

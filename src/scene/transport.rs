@@ -6,8 +6,8 @@ use super::{Object, ProbeScene, Scene, SplitLight};
 use crate::geometry::bounds::Bounds;
 use crate::geometry::mesh::{CornerLook, Mesh};
 use crate::light::bounce::Reflector;
-use crate::light::layer_albedo::mean_reflectance;
 use crate::light::material::{Encoding, Map, Material};
+use crate::light::mean_surface::{MeanSurface, PlacesOfSurface};
 use crate::light::texture::Texture;
 use crate::shafts::casters::Occluder;
 use crate::shafts::patches::RoomTriangle;
@@ -57,10 +57,9 @@ impl Object {
 
     /// It as it hides light.
     pub fn occluder(&self) -> Occluder<'_> {
-        let albedos = self.mean_albedos();
         Occluder {
             mesh: &self.mesh,
-            albedos: albedos.iter().map(|albedo| albedo.as_vec3()).collect(),
+            surfaces: self.mean_surfaces(),
             anchor: self.anchor,
             anchor_from_object: self.anchor_from_object,
             casts: self.casts,
@@ -84,36 +83,59 @@ impl Object {
     /// # Panics
     /// If there is no such triangle.
     pub fn albedo(&self, triangle: usize) -> DVec3 {
+        let mut places = PlacesOfSurface::default();
+        for material in self.places(triangle) {
+            places.add(&material, 1.0);
+        }
+        places.mean().map_or(DVec3::ZERO, |mean| mean.albedo)
+    }
+
+    /// What a triangle's material is at some places of it, which stand for like parts of it.
+    fn places(&self, triangle: usize) -> impl Iterator<Item = Material> {
         let material = &self.materials[self.mesh.triangle_materials[triangle] as usize];
-        let Some(looks) = self.mesh.corner_looks.get(triangle) else {
-            return mean_reflectance(material);
-        };
-        let looks = looks.map(|look| &self.mesh.looks[look as usize]);
-        let maps = &material.maps;
-        let at = |weights: [f32; 3]| {
-            let look = CornerLook::blended(looks, weights);
-            let tint = self.texel(maps.color, &look, Encoding::Srgb) * look.color.as_dvec4();
-            let rough = self.texel(maps.roughness, &look, Encoding::Linear).y;
-            let metal = self.texel(maps.metallic, &look, Encoding::Linear).z;
-            mean_reflectance(&Material {
-                albedo: material.albedo * tint.truncate(),
-                roughness: material.roughness.map(|alpha| alpha * rough * rough),
-                metallic: material.metallic * metal,
-                ..*material
-            })
-        };
-        let texels = self.pictured(maps.color).map_or(0.0, |(map, texture)| {
-            let [a, b, c] = looks.map(|look| {
-                let uv = look.uv[map.uv_set as usize & 1];
-                let place = map.picture_from_corner.transform_point2(uv);
-                place * UVec2::from_array(texture.size_px).as_vec2()
-            });
-            (b - a).perp_dot(c - a).abs() / 2.0
+        let looks = self.mesh.corner_looks.get(triangle);
+        let looks = looks.map(|looks| looks.map(|look| &self.mesh.looks[look as usize]));
+        let plain = looks.is_none().then_some(*material);
+        let pictured = looks.into_iter().flat_map(move |looks| {
+            let places = middles(self.rows(material, looks));
+            places.map(move |weights| self.pictured_at(material, looks, weights))
         });
-        let rows = ((texels / TEXELS_A_PLACE).sqrt() as usize).clamp(2, MOST_ROWS);
-        let places = middles(rows);
-        let count = (rows * rows) as f64;
-        places.map(at).sum::<DVec3>() / count
+        plain.into_iter().chain(pictured)
+    }
+
+    /// Into how many rows of like places a triangle whose corners look so is cut.
+    fn rows(&self, material: &Material, looks: [&CornerLook; 3]) -> usize {
+        let texels = self
+            .pictured(material.maps.color)
+            .map_or(0.0, |(map, texture)| {
+                let [a, b, c] = looks.map(|look| {
+                    let uv = look.uv[map.uv_set as usize & 1];
+                    let place = map.picture_from_corner.transform_point2(uv);
+                    place * UVec2::from_array(texture.size_px).as_vec2()
+                });
+                (b - a).perp_dot(c - a).abs() / 2.0
+            });
+        ((texels / TEXELS_A_PLACE).sqrt() as usize).clamp(2, MOST_ROWS)
+    }
+
+    /// A material with what its pictures show between corners that look so.
+    fn pictured_at(
+        &self,
+        material: &Material,
+        looks: [&CornerLook; 3],
+        weights: [f32; 3],
+    ) -> Material {
+        let maps = &material.maps;
+        let look = CornerLook::blended(looks, weights);
+        let tint = self.texel(maps.color, &look, Encoding::Srgb) * look.color.as_dvec4();
+        let rough = self.texel(maps.roughness, &look, Encoding::Linear).y;
+        let metal = self.texel(maps.metallic, &look, Encoding::Linear).z;
+        Material {
+            albedo: material.albedo * tint.truncate(),
+            roughness: material.roughness.map(|alpha| alpha * rough * rough),
+            metallic: material.metallic * metal,
+            ..*material
+        }
     }
 
     /// What a picture of it has at a corner, or between corners, that looks so; 1 without a picture.
@@ -128,29 +150,27 @@ impl Object {
         Some((map, self.textures.get(map.texture as usize)?))
     }
 
-    /// The mean of [`Object::albedo`] over each material's surface.
-    pub fn mean_albedos(&self) -> Vec<DVec3> {
+    /// For each material what stands for its surface.
+    fn mean_surfaces(&self) -> Vec<MeanSurface> {
         let mesh = &self.mesh;
-        if mesh.looks.is_empty() {
-            return self.materials.iter().map(mean_reflectance).collect();
-        }
-        let mut sums = vec![(DVec3::ZERO, 0.0); self.materials.len()];
-        for (number, triangle) in mesh.triangles.iter().enumerate() {
+        let mut places = vec![PlacesOfSurface::default(); self.materials.len()];
+        // (What has no pictures is the same at all places.)
+        let pictured = match mesh.looks.is_empty() {
+            true => &[],
+            false => mesh.triangles.as_slice(),
+        };
+        for (number, triangle) in pictured.iter().enumerate() {
             let [a, b, c] = triangle.map(|index| mesh.positions[index as usize].as_dvec3());
             let area = (b - a).cross(c - a).length();
-            let sum = &mut sums[mesh.triangle_materials[number] as usize];
-            sum.0 += self.albedo(number) * area;
-            sum.1 += area;
+            let of_material = &mut places[mesh.triangle_materials[number] as usize];
+            let of_triangle: Vec<Material> = self.places(number).collect();
+            for material in &of_triangle {
+                of_material.add(material, area / of_triangle.len() as f64);
+            }
         }
-        let of_materials = sums.into_iter().zip(&self.materials);
+        let of_materials = places.iter().zip(&self.materials);
         of_materials
-            .map(|((sum, area), material)| {
-                if area > 0.0 {
-                    sum / area
-                } else {
-                    mean_reflectance(material)
-                }
-            })
+            .map(|(places, material)| places.mean().unwrap_or(MeanSurface::plain(material)))
             .collect()
     }
 

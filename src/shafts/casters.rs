@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use crate::geometry::levels::levels;
 use crate::geometry::mesh::Mesh;
 use crate::geometry::ray_caster::RayCaster;
+use crate::light::mean_surface::MeanSurface;
 
 use super::bounding::{Aabb, Ball};
 use super::room_transport::RoomTransport;
@@ -33,8 +34,8 @@ const MOST_PARTS: u32 = 10;
 pub struct Occluder<'a> {
     /// Its triangles, in its own space.
     pub mesh: &'a Mesh,
-    /// Mean diffuse reflectances of what `mesh.triangle_materials` names.
-    pub albedos: Vec<Vec3>,
+    /// What `mesh.triangle_materials` names.
+    pub surfaces: Vec<MeanSurface>,
     /// Number of its anchor.
     pub anchor: usize,
     /// Where it stands there.
@@ -48,9 +49,9 @@ pub struct Occluder<'a> {
 }
 
 impl Occluder<'_> {
-    /// Its triangles in its own space, simplified as far as nobody sees it in soft shadows, with their albedos. What changes
-    /// its shape has all of them: each frame would take as long to simplify as it takes to draw many.
-    pub fn simplified(&self) -> Vec<([Vec3; 3], Vec3)> {
+    /// Its triangles in its own space, simplified as far as nobody sees it in soft shadows, with the numbers of their surfaces. What
+    /// changes its shape has all of them: each frame would take as long to simplify as it takes to draw many.
+    pub fn simplified(&self) -> Vec<([Vec3; 3], u32)> {
         if self.deforms {
             return self.whole();
         }
@@ -60,37 +61,37 @@ impl Occluder<'_> {
         let coarse_enough = coarser
             .into_iter()
             .rfind(|level| level.max_error_m <= COARSE_PART * f64::from(size));
-        self.with_albedos(&coarse_enough.map_or(shape, |level| level.mesh))
+        of_mesh(&coarse_enough.map_or(shape, |level| level.mesh))
     }
 
-    /// All its triangles in its own space, with their albedos.
-    pub fn whole(&self) -> Vec<([Vec3; 3], Vec3)> {
-        self.with_albedos(self.mesh)
+    /// All its triangles in its own space, with the numbers of their surfaces.
+    pub fn whole(&self) -> Vec<([Vec3; 3], u32)> {
+        of_mesh(self.mesh)
     }
 
-    /// Its simplified triangles in its anchor's space.
-    pub fn simplified_in_anchor(&self) -> Vec<([Vec3; 3], Vec3)> {
+    /// Its simplified triangles in its anchor's space, with the numbers of their surfaces.
+    pub fn simplified_in_anchor(&self) -> Vec<([Vec3; 3], u32)> {
         self.in_anchor(self.simplified())
     }
 
-    /// All its triangles in its anchor's space, with their albedos.
-    pub fn whole_in_anchor(&self) -> Vec<([Vec3; 3], Vec3)> {
+    /// All its triangles in its anchor's space, with the numbers of their surfaces.
+    pub fn whole_in_anchor(&self) -> Vec<([Vec3; 3], u32)> {
         self.in_anchor(self.whole())
     }
 
-    fn with_albedos(&self, mesh: &Mesh) -> Vec<([Vec3; 3], Vec3)> {
-        let triangles = mesh.triangles.iter();
-        let corners =
-            triangles.map(|triangle| triangle.map(|index| mesh.positions[index as usize]));
-        let materials = mesh.triangle_materials.iter();
-        let albedos = materials.map(|&material| self.albedos[material as usize]);
-        corners.zip(albedos).collect()
+    /// Triangles with the albedos of their surfaces.
+    pub fn with_albedos(&self, triangles: &[([Vec3; 3], u32)]) -> Vec<([Vec3; 3], Vec3)> {
+        let albedo = |surface: u32| self.surfaces[surface as usize].albedo.as_vec3();
+        let triangles = triangles.iter();
+        triangles
+            .map(|&(corners, surface)| (corners, albedo(surface)))
+            .collect()
     }
 
-    fn in_anchor(&self, triangles: Vec<([Vec3; 3], Vec3)>) -> Vec<([Vec3; 3], Vec3)> {
+    fn in_anchor(&self, triangles: Vec<([Vec3; 3], u32)>) -> Vec<([Vec3; 3], u32)> {
         let triangles = triangles.into_iter();
         let placed = |corner: Vec3| self.corner_in_anchor(corner);
-        let placed = triangles.map(|(corners, albedo)| (corners.map(placed), albedo));
+        let placed = triangles.map(|(corners, surface)| (corners.map(placed), surface));
         placed.collect()
     }
 
@@ -100,11 +101,19 @@ impl Occluder<'_> {
     }
 }
 
+fn of_mesh(mesh: &Mesh) -> Vec<([Vec3; 3], u32)> {
+    let triangles = mesh.triangles.iter();
+    let corners = triangles.map(|triangle| triangle.map(|index| mesh.positions[index as usize]));
+    corners
+        .zip(mesh.triangle_materials.iter().copied())
+        .collect()
+}
+
 /// A virtual thing, simplified, which hides light if it casts.
 struct SimplifiedCaster {
     casts: bool,
-    /// Simplified, in its own space, with albedos.
-    coarse: Vec<([Vec3; 3], Vec3)>,
+    /// Simplified, in its own space, with the numbers of their surfaces.
+    coarse: Vec<([Vec3; 3], u32)>,
     anchor: usize,
     /// In the anchor's space; none while it is not visible.
     triangles: Vec<[Vec3; 3]>,
@@ -231,7 +240,7 @@ impl SimplifiedCaster {
             self.surfels.clear();
             return;
         }
-        let with_albedo = thing.in_anchor(self.coarse.clone());
+        let with_albedo = thing.with_albedos(&thing.in_anchor(self.coarse.clone()));
         self.surfels = match self.casts {
             true => surfels(&with_albedo, surfel_count),
             false => Vec::new(),

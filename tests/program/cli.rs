@@ -895,6 +895,59 @@ fn check_warns_of_what_shows_nothing() {
 }
 
 #[test]
+fn check_tells_which_light_is_not_used() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = lamp_scene_with(folder.path(), &project_file("recordings/lamp"));
+    let good = text(PathBuf::from(&scene));
+    let without_lights = good.split("[[light]]").next().unwrap();
+    let torus = good.find("[[virtual]]").unwrap();
+    std::fs::copy(
+        project_file("recordings/sky/probe.hdr"),
+        folder.path().join("probe.hdr"),
+    )
+    .unwrap();
+    let probe = "[probe]\nimage = \"probe.hdr\"\nposition_m = [0, 0, 0.06]\n";
+    let ambient = "[ambient]\nradiance = 0.2\n";
+    let volumes = "[shadows]\ntechnique = \"volumes\"\n";
+    let dark = "nothing lights the scene";
+    for (added, says) in [
+        (
+            format!("{probe}{ambient}"),
+            Some("[ambient] radiance is not used"),
+        ),
+        (
+            format!("{probe}{ambient}{volumes}"),
+            Some("the probe is not used"),
+        ),
+        (format!("{probe}{volumes}"), Some(dark)),
+        (probe.to_owned(), None),
+    ] {
+        let written = format!("{without_lights}{added}{}", &good[torus..]);
+        std::fs::write(&scene, written).unwrap();
+        let said = checked(folder.path(), &scene);
+        match says {
+            Some(says) => assert!(said.contains(says), "{added}: {said}"),
+            None => assert!(!said.contains("not used") && !said.contains(dark), "{said}"),
+        }
+    }
+}
+
+#[test]
+fn help_that_cannot_be_written_was_not_given() {
+    let folder = tempfile::tempdir().unwrap();
+    for argument in ["--help", "--version"] {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full");
+        let output = gnomon(folder.path())
+            .arg(argument)
+            .stdout(full.unwrap())
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(1), "{argument}");
+        assert!(stderr(&output).contains("No space left"), "{argument}");
+    }
+}
+
+#[test]
 fn shells_and_man_get_what_they_need() {
     let folder = tempfile::tempdir().unwrap();
     for (arguments, part) in [

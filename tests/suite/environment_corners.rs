@@ -3,6 +3,7 @@
 
 use glam::{DAffine3, DVec2, DVec3, Vec3};
 use gnomon::geometry::ray_caster::RayCaster;
+use gnomon::light::material::Material;
 use gnomon::light::probe::Probe;
 use gnomon::render::VIRTUAL;
 use gnomon::scene::{EnvironmentMethod, Object, Scene};
@@ -47,7 +48,7 @@ fn ball_under(probe: Probe, above: Option<Object>, method: EnvironmentMethod) ->
 }
 
 /// Light of one radiance.
-fn even(radiance: f32) -> Probe {
+pub(crate) fn even(radiance: f32) -> Probe {
     Probe::new([96, 48], vec![Vec3::splat(radiance); 96 * 48]).expect("pixels")
 }
 
@@ -112,6 +113,57 @@ fn off(picture: &Picture, expected: impl Fn(usize, DVec3, DVec3) -> f64) -> f64 
     (squares / f64::from(count)).sqrt() / (sum / f64::from(count))
 }
 
+/// A sun, 7° wide, in a dim sky.
+fn wide_sun() -> Probe {
+    let size_px = [256, 128];
+    let grid = Probe::new(size_px, vec![Vec3::ZERO; 256 * 128]).expect("pixels");
+    let toward = DVec3::new(0.6, -0.5, 0.45).normalize();
+    let radiance = |direction: DVec3| match direction.angle_between(toward) < 3.5_f64.to_radians() {
+        true => 45.0,
+        false => 0.15,
+    };
+    let pixels = grid.rays().map(|(way, ..)| Vec3::splat(radiance(way)));
+    Probe::new(size_px, pixels.collect()).expect("pixels")
+}
+
+/// Few harmonics let the sun's light run on to what it does not reach.
+#[test]
+fn a_wide_sun_ends_on_a_ball_where_it_does() {
+    let mut ball = glossy_ball();
+    ball.materials[0] = Material::matt(DVec3::ONE);
+    let mut scene = under_sky(0, Vec::new(), vec![ball]);
+    scene.phantoms.clear();
+    scene.probe = Some(probe_scene(wide_sun()));
+    let probe = scene.probe.as_mut().expect("a probe");
+    probe.exposure = 1.0;
+    let lit = probe.probe.clone();
+    let (_, _, picture) = gains(&scene, camera());
+    let expected = |normal: DVec3| -> f64 {
+        let parts = lit.rays();
+        let parts = parts.map(|(way, radiance, solid_angle)| {
+            f64::from(radiance.y) * way.dot(normal).max(0.0) * solid_angle
+        });
+        parts.sum::<f64>() / std::f64::consts::PI
+    };
+    let on_ball = on_ball();
+    let all = on_ball.iter().map(|(index, normal, _)| {
+        let expected = expected(*normal);
+        (expected, picture.linear(*index).y - expected)
+    });
+    let all: Vec<(f64, f64)> = all.collect();
+    let brightest = all
+        .iter()
+        .map(|(expected, _)| *expected)
+        .fold(0.0, f64::max);
+    let worst = all.iter().map(|(_, off)| off.abs()).fold(0.0, f64::max);
+    assert!(
+        all.len() > 200 && brightest < 1.0,
+        "{} {brightest}",
+        all.len()
+    );
+    assert!(worst < 0.02 * brightest, "{worst} of {brightest}");
+}
+
 #[test]
 fn even_light_is_mirrored_alike_by_both_lobes() {
     let [rays, maps] = [EnvironmentMethod::Rays, EnvironmentMethod::Maps]
@@ -161,7 +213,7 @@ const LOW_X: f64 = -0.075;
 const HIGH_X: f64 = 0.065;
 
 /// A shelf: a floor and a wall behind it in one mesh of twenty triangles.
-fn shelf() -> Object {
+pub(crate) fn shelf() -> Object {
     let profile = [
         [0.0, 0.0],
         [0.16, 0.0],
@@ -352,7 +404,7 @@ fn a_white_shelf_is_as_bright_in_its_corner_as_radiosity_says() {
 }
 
 /// The pixel that shows a place.
-fn pixel_of(place: DVec3) -> usize {
+pub(crate) fn pixel_of(place: DVec3) -> usize {
     let seen = camera().transform_point3(place);
     let pixel = CAMERA.focal_px * seen.truncate() / seen.z + CAMERA.center_px;
     pixel.y.round() as usize * 120 + pixel.x.round() as usize

@@ -29,6 +29,7 @@ mod motion;
 mod picture;
 mod probe;
 mod probe_light;
+mod reflected_gloss;
 mod reflections;
 mod scene;
 mod shading;

@@ -1,9 +1,9 @@
 //! Values that are allowed but hardly meant: markers as large as houses, virtual things in the dark.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use crate::light::Light;
-use crate::scene::Scene;
+use crate::scene::{Scene, ShadowTechnique};
 
 /// Nobody prints larger markers, metres.
 const LARGEST_MARKER_M: f64 = 2.0;
@@ -33,7 +33,27 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
                 .to_owned(),
         );
     }
+    warnings.extend(unused_light(scene));
     warnings
+}
+
+/// Of the light from all around what the technique does not take.
+fn unused_light(scene: &Scene) -> Option<String> {
+    scene.probe.as_ref()?;
+    let has_ambient = scene.ambient_radiance != DVec3::ZERO;
+    match takes_probe(scene) {
+        true => has_ambient.then(|| {
+            "[ambient] radiance is not used: all light from around comes from the probe".to_owned()
+        }),
+        false => Some(
+            "the probe is not used: technique = \"volumes\" takes the lights and the [ambient] light alone"
+                .to_owned(),
+        ),
+    }
+}
+
+fn takes_probe(scene: &Scene) -> bool {
+    scene.probe.is_some() && scene.chosen_technique().0 != ShadowTechnique::Volumes
 }
 
 fn is_dark(scene: &Scene) -> bool {
@@ -46,5 +66,14 @@ fn is_dark(scene: &Scene) -> bool {
     });
     let mut materials = scene.virtuals.iter().flat_map(|thing| &thing.materials);
     let glows = materials.any(|material| material.emission != DVec3::ZERO);
-    !shines && !glows && scene.probe.is_none() && scene.ambient_radiance == DVec3::ZERO
+    let probe = scene.probe.as_ref().filter(|_| takes_probe(scene));
+    let is_around = match probe {
+        Some(probe) => probe
+            .probe
+            .pixels()
+            .iter()
+            .any(|pixel| *pixel != Vec3::ZERO),
+        None => scene.ambient_radiance != DVec3::ZERO,
+    };
+    !shines && !glows && !is_around
 }

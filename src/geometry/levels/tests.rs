@@ -450,6 +450,32 @@ fn creases_stay_creases() {
     }
 }
 
+/// A can whose lids are fans about their middles: where so many triangles meet, some of them stand for all.
+#[test]
+fn the_lids_of_a_round_can_stay_flat() {
+    let slices = 3 * MOST_CORNERS as u32;
+    let place = |u: f32, v: f32| {
+        let (sine, cosine) = turn(u);
+        let radius = if v == 0.0 || v == 1.0 { 0.0 } else { 1.0 };
+        let height = if v < 0.5 { -0.5 } else { 0.5 };
+        Vec3::new(radius * cosine, radius * sine, height)
+    };
+    let can = patch([slices, 3], 30.0_f64.to_radians(), place, |_, _| 0);
+    assert!(can.closed_and_consistent());
+    let levels = levels(&can);
+    assert!(!levels.is_empty());
+    for level in &levels {
+        assert!(level.mesh.closed_and_consistent());
+        for (corners, normals) in corners(&level.mesh).zip(&level.mesh.corner_normals) {
+            let [a, b, c] = corners;
+            let face = (b - a).cross(c - a).normalize();
+            let off = normals.map(|normal| normal.as_dvec3().distance(face));
+            let most = if face.z.abs() > 0.9 { 1e-3 } else { 0.3 };
+            assert!(off.iter().all(|off| *off < most), "{face}: {normals:?}");
+        }
+    }
+}
+
 #[test]
 fn a_rim_is_part_of_the_outline_and_its_error_counts() {
     // A flat disc: only its rim can be off.

@@ -54,6 +54,8 @@ struct PlacedCorners {
     anchor: usize,
     /// For each point the number of its self-occlusion.
     occlusion_of_point: Vec<usize>,
+    /// For each point its unit normal, in the anchor's space.
+    normals: Vec<Vec3>,
     /// The batch's corners, each with its point.
     corners: Vec<(usize, usize)>,
     /// Where it is told what the points get from what stands around, in the anchor's space.
@@ -274,10 +276,13 @@ impl OwnLitThing {
         let world_from_own = world_from_anchor.matrix3 * self.anchor_from_own;
         let turn = Turn::new(world_from_own.transpose(), TRANSFER_DEGREE);
         let from_afar = turn.turned(&scene.distant.harmonics);
-        let points = placed.occlusion_of_point.iter().zip(&around);
+        let in_world = world_from_anchor.matrix3.as_mat3();
+        let points = placed.occlusion_of_point.iter().zip(&placed.normals);
         points
-            .map(|(&occlusion, around)| {
-                let from_afar = self.own.occlusions[occlusion].irradiance(&from_afar);
+            .zip(&around)
+            .map(|((&occlusion, &normal), around)| {
+                let beyond = scene.distant.beyond_harmonics(in_world * normal);
+                let from_afar = self.own.occlusions[occlusion].irradiance(&from_afar, beyond);
                 let left = (from_afar - around.kept_off).max(Vec3::ZERO);
                 [left + around.reflected, around.reflected]
             })
@@ -317,6 +322,7 @@ impl PlacedCorners {
             anchor,
             records: IrradianceRecords::new(&points, budget.places),
             occlusion_of_point,
+            normals: points.iter().map(|(_, normal)| normal.as_vec3()).collect(),
             corners,
         })
     }

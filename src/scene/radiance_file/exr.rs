@@ -32,7 +32,10 @@ struct Layer {
 /// # Errors
 /// Words that follow a path: broken, no colours, several layers and none asked for, sizes that the file cannot hold.
 pub fn read(bytes: Vec<u8>, wanted: Option<&str>) -> Result<Pixels, String> {
-    let broken = |error: exr::error::Error| format!("broken as OpenEXR: {error}");
+    let broken = |error: exr::error::Error| match error {
+        exr::error::Error::NotSupported(what) => format!("not read of OpenEXR: {what}"),
+        error => format!("broken as OpenEXR: {error}"),
+    };
     let length = bytes.len();
     let reader = exr::block::read(Cursor::new(bytes), false).map_err(broken)?;
     let layers = layers(reader.headers());
@@ -46,6 +49,17 @@ pub fn read(bytes: Vec<u8>, wanted: Option<&str>) -> Result<Pixels, String> {
         length,
     )?;
     let corner = header.own_attributes.layer_position - window.position;
+    let inside = [
+        overlap(corner.x(), header.layer_size.width(), size_px[0]),
+        overlap(corner.y(), header.layer_size.height(), size_px[1]),
+    ];
+    let held = (inside[0] * inside[1]) as f64 / (size_px[0] * size_px[1]) as f64;
+    if held == 0.0 {
+        return Err(
+            "its data window lies beside its display window: nothing of the picture is in the file"
+                .to_owned(),
+        );
+    }
     let mut pixels = vec![Vec3::ZERO; size_px[0] * size_px[1]];
     let full = Vec2(0, 0);
     let mut chunks = reader
@@ -107,7 +121,24 @@ pub fn read(bytes: Vec<u8>, wanted: Option<&str>) -> Result<Pixels, String> {
     Ok(Pixels {
         size_px,
         pixels,
-        notes: Vec::new(),
+        notes: missing(held).into_iter().collect(),
+    })
+}
+
+/// How many of a picture's `count` columns or rows so many from a place on cover.
+fn overlap(from: i32, covering: usize, count: usize) -> usize {
+    let (from, count) = (i64::from(from), count as i64);
+    let to = from.saturating_add(i64::try_from(covering).unwrap_or(i64::MAX));
+    usize::try_from(to.min(count) - from.max(0)).unwrap_or(0)
+}
+
+/// What to say of a file that holds a part of its picture.
+fn missing(part: f64) -> Option<String> {
+    (part < 1.0).then(|| {
+        format!(
+            "{:.0} % of the picture (its display window) is not in the file (its data window), and is black",
+            (100.0 * (1.0 - part)).max(1.0)
+        )
     })
 }
 
@@ -325,6 +356,15 @@ mod tests {
             [3, 4, 5],
             "one row and three columns of it are in the window"
         );
+        assert!(read.notes[0].contains("88 %"), "{:?}", read.notes);
+    }
+
+    #[test]
+    fn a_data_window_beside_the_display_window_holds_nothing() {
+        let mut beside = layer(None, "", 1.0);
+        beside.attributes.layer_position = Vec2(100, -50);
+        let refused = read(file(vec![beside], whole()), None).unwrap_err();
+        assert!(refused.contains("nothing of the picture"), "{refused}");
     }
 
     #[test]

@@ -157,7 +157,8 @@ fn header(bytes: &[u8]) -> Result<Header, String> {
             // A comment, or the command that made the picture.
             continue;
         };
-        header.take(key.trim(), value.trim())?;
+        // (What begins with a blank is of pictures that this one was made of.)
+        header.take(key.trim_end(), value.trim())?;
     }
     let order = lines
         .next()
@@ -317,6 +318,8 @@ mod tests {
             Vec3::splat(0.5),
         );
         same(&format!("{PLAIN}\nEXPOSURE=0"), Vec3::ONE);
+        // A picture that this one was made of, whose exposure is in the pixels.
+        same(&format!("{PLAIN}\n\tEXPOSURE=4"), Vec3::ONE);
         same(
             &format!("{PLAIN}\nCOLORCORR= 2 1 .5"),
             Vec3::new(0.5, 1.0, 2.0),
