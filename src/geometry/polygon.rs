@@ -1,6 +1,6 @@
 //! Polygons in space, cut into triangles.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 
 use earcut::Earcut;
@@ -8,6 +8,9 @@ use glam::{DVec2, DVec3, Vec3};
 
 /// Twice the area that a fan may have too much, as a part of the polygon's own, before it is no fan.
 const FAN_SLACK: f64 = 1e-9;
+
+/// Polygons of fewer corners cost nothing, whatever they are.
+const FEWEST_LOOKED_AT: usize = 16;
 
 /// What cuts polygons. A fan starts at a corner, so the same polygon twice, or once from each side, could be cut along
 /// different diagonals; here copies are cut as the first one was.
@@ -29,6 +32,18 @@ impl PolygonCutter {
     pub fn triangles(&mut self, corners: &[Vec3], triangles: &mut Vec<[u32; 3]>) {
         let count = corners.len();
         if count < 3 {
+            return;
+        }
+        if let Some(kept) = once_each(corners) {
+            let places: Vec<Vec3> = kept
+                .iter()
+                .map(|corner| corners[*corner as usize])
+                .collect();
+            let first = triangles.len();
+            self.triangles(&places, triangles);
+            for corner in triangles[first..].iter_mut().flatten() {
+                *corner = kept[*corner as usize];
+            }
             return;
         }
         // A triangle has no diagonal.
@@ -73,8 +88,6 @@ impl PolygonCutter {
 
     /// The corner that a polygon's cuts begin at, and whether they go against its own way.
     fn begin_alike(&mut self, corners: &[Vec3]) -> (usize, bool) {
-        // Adding 0 makes 0 of -0, which is the same place.
-        let place = |corner: &Vec3| (*corner + Vec3::ZERO).to_array().map(f32::to_bits);
         let places: Vec<Place> = corners.iter().map(place).collect();
         let mut sorted = places.clone();
         sorted.sort_unstable();
@@ -92,6 +105,24 @@ impl PolygonCutter {
             places[(start + 1) % count] != next && places[(start + count - 1) % count] == next;
         (start, is_reversed)
     }
+}
+
+/// A corner's place: adding 0 makes 0 of -0, which is the same.
+fn place(corner: &Vec3) -> Place {
+    (*corner + Vec3::ZERO).to_array().map(f32::to_bits)
+}
+
+/// The first corners at each of a polygon's places, if it has more than twice as many corners as places. A bridge to a hole
+/// repeats two corners and brings three, so no polygon has that many; ears of one that has are looked for forever.
+fn once_each(corners: &[Vec3]) -> Option<Vec<u32>> {
+    if corners.len() < FEWEST_LOOKED_AT {
+        return None;
+    }
+    let mut known: HashSet<Place> = HashSet::new();
+    let numbered = corners.iter().enumerate();
+    let firsts = numbered.filter(|(_, corner)| known.insert(place(corner)));
+    let firsts: Vec<u32> = firsts.map(|(index, _)| index as u32).collect();
+    (firsts.len() * 2 < corners.len()).then_some(firsts)
 }
 
 /// Twice the area of a polygon, along its normal (Newell's).
@@ -228,6 +259,28 @@ mod tests {
         }
         diagonals.dedup();
         assert_eq!(diagonals.len(), 1);
+    }
+
+    /// What ears were looked for in for minutes: the corners of a square, again and again.
+    #[test]
+    fn a_polygon_of_repeated_corners_is_cut_once() {
+        let square = [[0., 0., 0.], [2., 0., 0.], [2., 2., 0.], [0., 2., 0.]];
+        let (corners, cut) = triangles(&square.repeat(50_000));
+        assert_eq!(cut.len(), 2);
+        assert!((areas(&corners, &cut).0 - DVec3::Z * 4.0).length() < 1e-9);
+        // Two places, or one, have no area; how they are cut matters to nobody.
+        assert!(triangles(&square[..2].repeat(100)).1.is_empty());
+        // A ring: a bridge leads to the hole and back.
+        let circle = |radius: f32, turn: f32| {
+            (0..=12).map(move |step| {
+                let angle = turn * std::f32::consts::TAU * (step % 12) as f32 / 12.0;
+                [radius * angle.cos(), radius * angle.sin(), 0.]
+            })
+        };
+        let ring: Vec<[f32; 3]> = circle(2.0, 1.0).chain(circle(1.0, -1.0)).collect();
+        let (corners, cut) = triangles(&ring);
+        let area = 12.0 * 0.5 * 3.0 * (std::f64::consts::TAU / 12.0).sin();
+        assert!((areas(&corners, &cut).0.z - area).abs() < 1e-5);
     }
 
     #[test]

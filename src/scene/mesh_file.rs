@@ -9,6 +9,7 @@ use glam::{DMat3, DMat4, DVec3, Vec3};
 use super::animation::{Animation, WantedAnimation};
 use super::error::SceneError;
 use super::in_its_place::in_place_of;
+use super::kept_pictures::KeptPictures;
 use super::loading::LoadStage;
 use super::mask_cut::cut_masks;
 use super::model_cache::ModelCache;
@@ -163,10 +164,8 @@ fn read(
         MeshFormat::Obj => obj::read(path, &bytes, note_read)?,
         MeshFormat::Stl => stl::read(path, &bytes)?,
         MeshFormat::Ply => {
-            let (mut model, texture) = ply::read(path, &bytes)?;
-            if let Some((name, line)) = texture {
-                add_picture(&mut model, path, &name, line, note_read);
-            }
+            let (mut model, named) = ply::read(path, &bytes)?;
+            add_pictures(&mut model, path, &named, note_read);
             model
         }
         MeshFormat::Other(what) => {
@@ -439,35 +438,38 @@ fn place(model: &mut RawModel, path: &Path, up: Up, fit_m: Option<f64>) -> Resul
     Ok(scale)
 }
 
-/// The picture that a PLY file names for all of it.
-fn add_picture(
+/// The pictures that a PLY file names: that of a number is of the material of that number.
+fn add_pictures(
     model: &mut RawModel,
     path: &Path,
-    name: &str,
-    line: usize,
+    named: &[(String, usize)],
     note_read: &dyn Fn(&Path),
 ) {
     let folder = path.parent().unwrap_or(Path::new(""));
-    let picture = named_file(folder, name);
-    note_read(&picture.clone().unwrap_or_else(|| folder.join(name)));
-    let texture = match &picture {
-        Some(picture) => texture_file::read(picture),
-        None => Err("is not there".to_owned()),
-    };
-    match texture {
-        Ok(texture) => {
-            model.textures = vec![Arc::new(texture)];
-            for given in &mut model.materials {
-                given.material.maps.color = Some(Map::of(0));
+    let mut kept = KeptPictures::default();
+    for ((name, line), given) in named.iter().zip(&mut model.materials) {
+        let picture = named_file(folder, name);
+        note_read(&picture.clone().unwrap_or_else(|| folder.join(name)));
+        let texture = match &picture {
+            Some(picture) => texture_file::read(picture),
+            None => Err("is not there".to_owned()),
+        };
+        match texture {
+            Ok(texture) => {
+                given.material.maps.color = Some(Map::of(kept.keep(texture)));
                 given.material.albedo = DVec3::ONE;
                 given.is_given = true;
             }
-        }
-        Err(message) => {
-            let message = format!("line {line}: the picture \"{name}\" {message}; not used");
-            model.notes.add_of(path, message);
+            Err(message) => {
+                let message = format!("line {line}: the picture \"{name}\" {message}; not used");
+                model.notes.add_of(path, message);
+            }
         }
     }
+    if let Some(told) = kept.told() {
+        model.notes.add_of(path, told);
+    }
+    model.textures = kept.into_pictures();
 }
 
 #[cfg(test)]

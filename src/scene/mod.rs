@@ -28,6 +28,7 @@ mod file_stamp;
 pub mod format;
 pub mod gltf;
 pub mod in_its_place;
+mod kept_pictures;
 mod laid_picture;
 mod lights;
 mod load;

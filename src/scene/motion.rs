@@ -207,15 +207,19 @@ pub fn motion(table: &Table, anchor: usize) -> Result<Option<Motion>, SceneError
         }
         Some(value) => DVec3::Z * value.number(&TURN)?.to_radians(),
     };
-    let path = match MOTION.path.value(table) {
-        None => Vec::new(),
-        Some(value) => stations(&value)?,
+    let path_end = MOTION.path_end.read(table)?;
+    let path = match (MOTION.path.value(table), MOTION.path_end.value(table)) {
+        (Some(value), _) => stations(&value)?,
+        (None, Some(end)) => {
+            return Err(end.error("it moves along no path; allowed: along with path"));
+        }
+        (None, None) => Vec::new(),
     };
     let motion = Motion {
         anchor,
         turn_rad_per_s,
         path,
-        path_end: MOTION.path_end.read(table)?,
+        path_end,
     };
     Ok((!motion.is_none()).then_some(motion))
 }

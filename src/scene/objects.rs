@@ -128,7 +128,7 @@ const fn shown_of_thing(
     mesh: &'static str,
     [position_m, rotation_deg, scale]: [&'static str; 3],
     material: &'static str,
-) -> [(&'static str, Example); 21] {
+) -> [(&'static str, Example); 22] {
     [
         ("name", Example::Live(name)),
         ("mesh", Example::Live(mesh)),
@@ -156,6 +156,7 @@ const fn shown_of_thing(
             "path",
             Example::Aside("[{ time_s = 0 }, { time_s = 2, position_m = [0.1, 0, 0] }]"),
         ),
+        ("path_end", Example::Aside("\"return\"")),
         ("animation", Example::Aside("\"Walk\"")),
         ("animation_speed", Example::Aside("0.5")),
         ("animation_loop", Example::Aside("false")),

@@ -15,6 +15,14 @@ pub const DEFAULT_ALBEDO: f64 = 0.5;
 /// Smoothest surface that is kept apart from a mirror.
 pub const LEAST_ROUGHNESS: f64 = 0.01;
 
+/// GGX's α of a file's roughness, which is its root.
+pub fn alpha(roughness: f64) -> f64 {
+    (roughness * roughness).clamp(LEAST_ROUGHNESS, 1.0)
+}
+
+/// What is said where a picture is asked for and nothing says where it lies.
+pub const NO_COORDINATES: &str = "texture coordinates of a picture that are not there or no numbers: faces there are of one colour";
+
 /// A model as its file has it, in the file's own units and axes.
 #[derive(Debug, Default)]
 pub struct RawModel {
@@ -54,6 +62,27 @@ pub struct RawMotion {
     pub rig: Rig,
     /// For each position a number; those that have one number are one place, always.
     pub together: Vec<u32>,
+}
+
+/// What of a file has no surface.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct WithoutSurface {
+    /// There are points.
+    pub points: bool,
+    /// There are lines.
+    pub lines: bool,
+}
+
+impl WithoutSurface {
+    /// What is said of a file that has no surface; empty where it has nothing at all.
+    pub fn told(self) -> &'static str {
+        match (self.points, self.lines) {
+            (true, false) => ": it is a cloud of points, which has no surface",
+            (false, true) => ": it is made of lines, which have no surface",
+            (true, true) => ": it is made of points and lines, which have no surface",
+            (false, false) => "",
+        }
+    }
 }
 
 /// A material with what the file says of it.

@@ -4,7 +4,7 @@ use std::io::Cursor;
 use std::path::Path;
 
 use image::imageops::FilterType;
-use image::{ColorType, DynamicImage, ImageFormat, ImageReader};
+use image::{ColorType, DynamicImage, ImageBuffer, ImageFormat, ImageReader, Rgba};
 
 use super::in_its_place::in_place_of;
 use super::plain_file::{self, MOST_PICTURE};
@@ -12,7 +12,9 @@ use super::tiff_header;
 use crate::light::texture::{Texture, srgb_from_linear};
 
 /// What is read.
-const ALLOWED: &str = "PNG, JPEG, WebP, TGA, BMP, TIFF, GIF, DDS (DXT1 to DXT5), PNM, HDR";
+const ALLOWED: &str = "PNG, JPEG, WebP, TGA, BMP, TIFF, GIF, DDS (DXT1, DXT3, DXT5), PNM, HDR";
+/// What is read of DDS.
+const DDS_KINDS: &str = "DXT1, DXT3, DXT5 (BC1 to BC3)";
 /// Longest side of a picture that is read, pixels.
 const MOST_SIDE_PX: u32 = 16384;
 /// Longest side of a picture that is kept; a larger one is scaled down.
@@ -55,6 +57,9 @@ pub fn decode(name: String, bytes: &[u8], format: Option<ImageFormat>) -> Result
         );
     }
     let failed = |error: &dyn std::fmt::Display| match error.to_string() {
+        said if bytes.starts_with(b"DDS ") => {
+            format!("cannot be read: {said}; allowed of DDS: {DDS_KINDS}")
+        }
         said if said.contains("not supported") || said.contains("could not be determined") => {
             format!("cannot be read: {said}; allowed: {ALLOWED}")
         }
@@ -97,6 +102,21 @@ pub fn decode(name: String, bytes: &[u8], format: Option<ImageFormat>) -> Result
         size_px: [rgba.width(), rgba.height()],
         rgba: rgba.into_raw(),
     })
+}
+
+/// A picture in another size, at least 1 each way.
+pub fn resized(texture: &Texture, [width, height]: [u32; 2]) -> Texture {
+    let [from_width, from_height] = texture.size_px;
+    let texels: Option<ImageBuffer<Rgba<u8>, &[u8]>> =
+        ImageBuffer::from_raw(from_width, from_height, &texture.rgba);
+    match texels {
+        Some(texels) => Texture {
+            name: texture.name.clone(),
+            size_px: [width, height],
+            rgba: image::imageops::resize(&texels, width, height, FilterType::Triangle).into_raw(),
+        },
+        None => texture.clone(),
+    }
 }
 
 /// Colours as all other pictures have them, of one whose numbers are in proportion to light (Radiance HDR).
@@ -193,5 +213,28 @@ mod tests {
         ] {
             assert!(decode("bad".to_owned(), bytes, None).is_err());
         }
+    }
+
+    /// One of plain bytes, as GIMP writes it where no compression is chosen.
+    #[test]
+    fn of_dds_it_is_said_which_kinds_are_read() {
+        let mut bytes = b"DDS ".to_vec();
+        let head: [u32; 31] = std::array::from_fn(|word| match word {
+            0 => 124,
+            1 => 0x100f,
+            2 | 3 => 2,
+            18 => 32,
+            19 => 0x40,
+            21 => 24,
+            26 => 0x1000,
+            _ => 0,
+        });
+        bytes.extend(head.iter().flat_map(|word| word.to_le_bytes()));
+        bytes.extend([99; 12]);
+        let error = decode("a.dds".to_owned(), &bytes, None).unwrap_err();
+        assert!(
+            error.ends_with("allowed of DDS: DXT1, DXT3, DXT5 (BC1 to BC3)"),
+            "{error}"
+        );
     }
 }

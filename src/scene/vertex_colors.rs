@@ -4,6 +4,9 @@ use glam::Vec3;
 
 use crate::light::texture::linear_from_srgb;
 
+/// What is said of colours that turn out to be of bytes.
+pub const ABOVE_ONE: &str = "vertex colours above 1 are taken for 0 to 255";
+
 /// Colours as files have them, encoded as sRGB has it (as most that read such files take them), made linear; and whether
 /// they are of bytes, since one is above 1.
 pub fn linear_colors(colors: Vec<[f32; 3]>) -> (Vec<Vec3>, bool) {

@@ -228,7 +228,7 @@ fn without_an_animation_a_file_is_in_its_rest_pose_and_its_animations_are_not_lo
 #[test]
 fn hostile_animations_are_errors_with_their_place() {
     type Spoil = fn(&mut Value);
-    let spoiled: [(&str, Spoil, &str); 14] = [
+    let spoiled: [(&str, Spoil, &str); 15] = [
         (
             "joint",
             |j| j["skins"][0]["joints"] = json!([1]),
@@ -283,6 +283,14 @@ fn hostile_animations_are_errors_with_their_place() {
             "path",
             |j| j["animations"][0]["channels"][0]["target"]["path"] = json!("pointer"),
             "animations[0].channels[0].target.path: not read; allowed: translation",
+        ),
+        (
+            "nothing but a pointer",
+            |j| {
+                let target = json!({"path": "pointer"});
+                j["animations"][0]["channels"] = json!([{"sampler": 0, "target": target}]);
+            },
+            "animations[0]: no channel of it moves a node",
         ),
         (
             "weights of nothing",

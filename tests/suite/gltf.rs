@@ -314,11 +314,156 @@ fn hostile_files_are_errors_with_their_place() {
     assert!(message.contains("element 0 is not finite"), "{message}");
 }
 
+/// A file that no thing can be made of says what it is of instead.
+#[test]
+fn what_has_no_surface_or_another_version_is_told_as_such() {
+    for (modes, part) in [
+        ([0, 0], "no triangles: it is a cloud of points"),
+        ([1, 3], "no triangles: it is made of lines"),
+        ([0, 2], "no triangles: it is made of points and lines"),
+    ] {
+        let (mut json, data) = square();
+        json["meshes"][0]["primitives"] =
+            json!(modes.map(|mode| json!({"attributes": {"POSITION": 0}, "mode": mode})));
+        let message = read(&json, &[("a b.bin", &data)]).unwrap_err();
+        assert!(message.contains(part), "{message}");
+    }
+    // The first version's one chunk has its kind behind its length as a number.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.glb");
+    for (version, part) in [
+        (1, "glTF of version 1; version 2 is read"),
+        (3, "glTF of version 3"),
+    ] {
+        let mut bytes = b"glTF".to_vec();
+        bytes.extend([version, 28, 8, 0].map(u32::to_le_bytes).concat());
+        bytes.extend(b"{\"a\": 1}");
+        std::fs::write(&path, bytes).unwrap();
+        let message = read_file(&path, "virtual").unwrap_err();
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+fn png(picture: &image::RgbaImage) -> Vec<u8> {
+    let mut png = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut png, image::ImageFormat::Png).unwrap();
+    png.into_inner()
+}
+
+/// Pictures lie by coordinates that are not there: that is told once.
+#[test]
+fn pictures_without_texture_coordinates_are_told() {
+    let (mut json, data) = square();
+    let picture = png(&image::RgbaImage::from_pixel(
+        1,
+        1,
+        image::Rgba([9, 9, 9, 255]),
+    ));
+    let files: [(&str, &[u8]); 2] = [("a b.bin", &data), ("p.png", &picture)];
+    json["images"] = json!([{"uri": "p.png"}]);
+    json["textures"] = json!([{"source": 0}]);
+    let told = |json: &Value| read(json, &files).unwrap().notes.join("\n");
+    for (map, of) in [
+        ("pbrMetallicRoughness", "baseColorTexture"),
+        ("normalTexture", ""),
+    ] {
+        let mut json = json.clone();
+        match of {
+            "" => json["materials"][0][map] = json!({"index": 0}),
+            of => json["materials"][0][map][of] = json!({"index": 0}),
+        }
+        assert!(!told(&json).contains("TEXCOORD"), "{map}");
+        let primitive = json["meshes"][0]["primitives"][0].clone();
+        json["meshes"][0]["primitives"]
+            .as_array_mut()
+            .unwrap()
+            .push(primitive);
+        for primitive in json["meshes"][0]["primitives"].as_array_mut().unwrap() {
+            primitive["attributes"]
+                .as_object_mut()
+                .unwrap()
+                .remove("TEXCOORD_0");
+        }
+        let notes = told(&json);
+        let expected = "meshes[0].primitives[0]: TEXCOORD_0 is not there, and pictures lie by it: each of them is of one \
+                        colour (and 1 more such)";
+        assert!(notes.contains(expected), "{notes}");
+    }
+    json["materials"][0]["emissiveTexture"] = json!({"index": 0, "texCoord": 1});
+    let notes = told(&json);
+    assert!(
+        notes.contains("primitives[0]: TEXCOORD_1 is not there"),
+        "{notes}"
+    );
+}
+
+/// Red paint, and polished gold beside it, say in metal and roughness what they are, by texels or by factors.
+#[test]
+fn specular_and_glossiness_become_metal_and_roughness_texel_by_texel() {
+    const EXTENSION: &str = "KHR_materials_pbrSpecularGlossiness";
+    let (mut json, data) = square();
+    let row = |left: [u8; 4], right: [u8; 4]| {
+        png(&image::RgbaImage::from_fn(2, 1, |x, _| {
+            image::Rgba([left, right][x as usize])
+        }))
+    };
+    // (56 is 0.04 of sRGB: what dielectrics mirror.)
+    let diffuse = row([200, 0, 0, 99], [0, 0, 0, 255]);
+    let layer = row([56, 56, 56, 64], [255, 200, 80, 255]);
+    let files: [(&str, &[u8]); 3] = [("a b.bin", &data), ("d.png", &diffuse), ("s.png", &layer)];
+    json["images"] = json!([{"uri": "d.png"}, {"uri": "s.png"}]);
+    json["textures"] = json!([{"source": 0}, {"source": 1}]);
+    json["extensionsUsed"] = json!([EXTENSION]);
+    json["materials"][0] = json!({"extensions": {EXTENSION: {
+        "diffuseTexture": {"index": 0}, "specularGlossinessTexture": {"index": 1}}}});
+    let thing = read(&json, &files).unwrap();
+    assert!(thing.notes.is_empty(), "{:?}", thing.notes);
+    let material = thing.materials[0];
+    assert_eq!((material.albedo, material.metallic), (DVec3::ONE, 1.0));
+    assert_eq!(material.roughness, Some(1.0));
+    let maps = material.maps;
+    let picture = |map: Option<gnomon::light::material::Map>| {
+        &thing.textures[map.expect("a map").texture as usize].rgba
+    };
+    let close = |found: &[u8], expected: [u8; 4]| {
+        let mut pairs = found.iter().zip(expected);
+        assert!(
+            pairs.all(|(a, b)| a.abs_diff(b) <= 2),
+            "{found:?} {expected:?}"
+        );
+    };
+    let (color, layer) = (picture(maps.color), picture(maps.metallic));
+    close(&color[..4], [200, 0, 0, 99]);
+    close(&color[4..], [255, 200, 80, 255]);
+    close(&layer[..4], [255, 191, 0, 255]);
+    close(&layer[4..], [255, 0, 255, 255]);
+    assert_eq!(maps.roughness, maps.metallic);
+    // A material of the same pictures and factors is of the same ones made.
+    let again = json["materials"][0].clone();
+    json["materials"].as_array_mut().unwrap().push(again);
+    let mut primitive = json["meshes"][0]["primitives"][0].clone();
+    primitive["material"] = json!(1);
+    json["meshes"][0]["primitives"]
+        .as_array_mut()
+        .unwrap()
+        .push(primitive);
+    assert_eq!(read(&json, &files).unwrap().textures.len(), 2);
+    // A picture of paint alone, below a dielectric's layer, stays as it is.
+    json["materials"][0]["extensions"][EXTENSION] = json!({"diffuseTexture": {"index": 0},
+        "specularFactor": [0.03, 0.03, 0.03], "glossinessFactor": 0.5});
+    let paint = read(&json, &files).unwrap();
+    assert_eq!(
+        (paint.materials[0].metallic, paint.materials[0].roughness),
+        (0.0, Some(0.25))
+    );
+    assert!(paint.materials[0].maps.color.is_some() && paint.materials[0].maps.metallic.is_none());
+}
+
 /// What exporters write that no shape depends on: the thing is the same.
 #[test]
 fn what_does_not_matter_refuses_no_model() {
     type Spoiled = (&'static str, fn(&mut Value));
-    let spoiled: [Spoiled; 11] = [
+    let spoiled: [Spoiled; 16] = [
         ("extras", |j| {
             j["nodes"][0]["extras"] = json!(5);
             j["extras"] = json!("made by hand");
@@ -335,6 +480,32 @@ fn what_does_not_matter_refuses_no_model() {
             j["nodes"][0]["camera"] = json!(7);
         }),
         ("strides", |j| j["bufferViews"][1]["byteStride"] = json!(0)),
+        ("strides of what indices are long", |j| {
+            j["bufferViews"][1]["byteStride"] = json!(1)
+        }),
+        // As Blender writes a shape key that moves nothing.
+        ("a morph of zeros that lie nowhere", |j| {
+            let zeros = json!({"componentType": 5126, "count": 4, "type": "VEC3"});
+            j["accessors"].as_array_mut().unwrap().push(zeros);
+            j["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": 4}]);
+            j["meshes"][0]["weights"] = json!([0.5]);
+        }),
+        ("a primitive of nothing", |j| {
+            let nothing = json!({"componentType": 5126, "count": 0, "type": "VEC3"});
+            j["accessors"].as_array_mut().unwrap().push(nothing);
+            let primitives = j["meshes"][0]["primitives"].as_array_mut().unwrap();
+            primitives.push(json!({"attributes": {"POSITION": 4}, "material": 0}));
+        }),
+        ("a pointer", |j| {
+            let target = json!({"path": "pointer",
+                "extensions": {"KHR_animation_pointer": {"pointer": "/materials/0/alphaCutoff"}}});
+            j["animations"] = json!([{"channels": [{"sampler": 0, "target": target}],
+                "samplers": [{"input": 3, "output": 3}]}]);
+        }),
+        ("a channel without a node", |j| {
+            j["animations"] = json!([{"channels": [{"sampler": 0, "target": {"path": "scale"}}],
+                "samplers": [{"input": 3, "output": 0}]}]);
+        }),
         (
             "samplers",
             |j| {

@@ -18,7 +18,7 @@ use crate::scene::gltf::copies::with_files_named;
 use crate::scene::mesh_file::MeshFormat;
 use crate::scene::obj::libraries::{with_libraries_named, with_maps_named};
 use crate::scene::plain_file::{self, MOST_MESH};
-use crate::scene::ply::with_picture_named;
+use crate::scene::ply::with_pictures_named;
 use crate::scene::{FileKind, NamedFile, Scene};
 
 /// The name of the scene in its folder.
@@ -197,7 +197,7 @@ impl Copies<'_> {
             MeshFormat::Stl => return self.put(format!("{folder}/mesh.stl"), &bytes),
             MeshFormat::Ply => {
                 let pictures = OwnNames::default();
-                let named = with_picture_named(mesh, &bytes, |picture| {
+                let named = with_pictures_named(mesh, &bytes, |picture| {
                     self.copy_picture(picture, folder, &pictures)
                 })?;
                 return self.put(format!("{folder}/mesh.ply"), &named);

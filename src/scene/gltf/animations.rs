@@ -41,6 +41,10 @@ pub(super) fn clip(
     let Some(animation) = document.animations().nth(number) else {
         return Err(file.error(&format!("animations[{number}]"), "it is not there"));
     };
+    if animation.channels().next().is_none() {
+        let message = "no channel of it moves a node";
+        return Err(file.error(&format!("animations[{number}]"), message));
+    }
     check_targets(file, document, number)?;
     let mut channels: Vec<Channel> = Vec::new();
     for channel in animation.channels() {

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use base64::Engine as _;
 use base64::alphabet;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use gltf::json::validation::{Error as Fault, Validate as _};
 use gltf::json::{self, Root};
 use gltf::{Document, Glb};
 use serde_json::Value;
@@ -22,6 +23,9 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
     &alphabet::STANDARD,
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
 );
+
+/// What is said of a file of the format's first version.
+const VERSION_1: &str = "glTF of version 1; version 2 is read (any viewer saves it so)";
 
 /// A file that was read, with what was told of it so far.
 pub(super) struct GltfFile<'a> {
@@ -51,8 +55,8 @@ impl<'a> GltfFile<'a> {
         // They were checked; the crate knows fewer of them.
         root.extensions_required.clear();
         give_bounds(&mut root).map_err(failed)?;
-        let document = Document::from_json(root)
-            .map_err(|error| failed(format!("not a valid glTF file: {error}")))?;
+        let document =
+            checked(root).map_err(|error| failed(format!("not a valid glTF file: {error}")))?;
         let mut file = Self {
             path,
             bytes: bytes.len(),
@@ -219,12 +223,13 @@ fn parts(bytes: &[u8]) -> Result<Parts<'_>, String> {
         Some(length) => return Err(format!("not a whole .glb file: its length is {length}")),
         None => return Err("not a whole .glb file: it ends in its head".to_owned()),
     }
-    let glb = Glb::from_slice(bytes).map_err(|error| match error {
-        gltf::Error::Binary(gltf::binary::Error::Version(version)) => {
-            format!("glTF of version {version}; version 2 is read")
-        }
-        error => format!("not a whole .glb file: {error}"),
-    })?;
+    // Chunks of another version are others, so the version is asked for first.
+    match u32::from_le_bytes([bytes[4], bytes[5], bytes[6], bytes[7]]) {
+        2 => {}
+        1 => return Err(VERSION_1.to_owned()),
+        version => return Err(format!("glTF of version {version}; version 2 is read")),
+    }
+    let glb = Glb::from_slice(bytes).map_err(|error| format!("not a whole .glb file: {error}"))?;
     Ok((glb.json, glb.bin))
 }
 
@@ -244,8 +249,7 @@ fn parsed(path: &Path, text: &[u8], notes: &mut Vec<String>) -> Result<Root, Sce
             .iter()
             .any(|key| value[key].is_object())
         {
-            let message = "glTF of version 1; version 2 is read (any viewer saves it so)";
-            return Err(SceneError::of_file(path, message));
+            return Err(SceneError::of_file(path, VERSION_1));
         }
         if lenient::mend(&mut value, notes) {
             return json::deserialize::from_value(value)
@@ -267,6 +271,23 @@ fn parsed(path: &Path, text: &[u8], notes: &mut Vec<String>) -> Result<Root, Sce
             _ => SceneError::of_file(path, message),
         }
     })
+}
+
+/// The document of a JSON, with what the crate checks of it but for one thing: an accessor without a view is all zeros.
+fn checked(root: Root) -> Result<Document, gltf::Error> {
+    let mut faults = Vec::new();
+    root.validate(&root, json::Path::new, &mut |path, fault| {
+        faults.push((path(), fault));
+    });
+    faults.retain(|(path, fault)| {
+        let of_zeros =
+            path.as_str().starts_with("accessors[") && path.as_str().ends_with("].bufferView");
+        !of_zeros || *fault != Fault::Missing
+    });
+    match faults.is_empty() {
+        true => Ok(Document::from_json_without_validation(root)),
+        false => Err(gltf::Error::Validation(faults)),
+    }
 }
 
 /// Gives positions bounds where exporters have left them out: nothing here reads them.

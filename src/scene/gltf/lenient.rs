@@ -1,6 +1,8 @@
 //! What exporters write into the JSON of glTF files and nothing here depends on, mended before the `gltf` crate refuses the
 //! whole file for it.
 
+use std::collections::HashMap;
+
 use serde_json::{Map, Value, json};
 
 /// Semantics of attributes that the format has, and those that it numbers.
@@ -52,6 +54,8 @@ pub(super) fn mend(root: &mut Value, notes: &mut Vec<String>) -> bool {
             }
         }
     }
+    is_mended |= mend_strides(root);
+    is_mended |= without_nodeless_channels(root, notes);
     for (number, material) in entries(root, "materials").enumerate() {
         let mode = material.get("alphaMode").and_then(Value::as_str);
         if let Some(mode) = mode.filter(|mode| !["OPAQUE", "MASK", "BLEND"].contains(mode)) {
@@ -63,6 +67,60 @@ pub(super) fn mend(root: &mut Value, notes: &mut Vec<String>) -> bool {
         }
     }
     is_mended
+}
+
+/// Takes away strides that are shorter than the format has them where they say nothing: all that is read of the view is of that
+/// size, as indices are.
+fn mend_strides(root: &mut Map<String, Value>) -> bool {
+    let of_key = |table: &Map<String, Value>, key: &str| table.get(key).and_then(Value::as_u64);
+    let mut size_of_view: HashMap<u64, Option<u64>> = HashMap::new();
+    for accessor in entries(root, "accessors") {
+        let Some(view) = of_key(accessor, "bufferView") else {
+            continue;
+        };
+        let kind = accessor.get("type").and_then(Value::as_str);
+        let size = match (kind, of_key(accessor, "componentType")) {
+            (Some("SCALAR"), Some(5120 | 5121)) => Some(1),
+            (Some("SCALAR"), Some(5122 | 5123)) | (Some("VEC2"), Some(5120 | 5121)) => Some(2),
+            (Some("VEC3"), Some(5120 | 5121)) => Some(3),
+            _ => None,
+        };
+        let known = size_of_view.entry(view).or_insert(size);
+        *known = known.filter(|known| Some(*known) == size);
+    }
+    let mut is_mended = false;
+    for (number, view) in entries(root, "bufferViews").enumerate() {
+        let stride = of_key(view, "byteStride");
+        let size = size_of_view.get(&(number as u64)).copied().flatten();
+        if stride.is_some() && stride == size {
+            view.remove("byteStride");
+            is_mended = true;
+        }
+    }
+    is_mended
+}
+
+/// Takes channels of animations away that move no node: the format says so, and those of KHR_animation_pointer move something
+/// else.
+fn without_nodeless_channels(root: &mut Map<String, Value>, notes: &mut Vec<String>) -> bool {
+    let mut count = 0;
+    for animation in entries(root, "animations") {
+        let Some(channels) = animation.get_mut("channels").and_then(Value::as_array_mut) else {
+            continue;
+        };
+        let before = channels.len();
+        channels.retain(|channel| {
+            let target = channel.get("target").and_then(Value::as_object);
+            target.is_none_or(|target| target.contains_key("node"))
+        });
+        count += before - channels.len();
+    }
+    if count > 0 {
+        notes.push(format!(
+            "channels of animations that move no node (KHR_animation_pointer) are passed over: {count}"
+        ));
+    }
+    count > 0
 }
 
 fn entries<'a>(

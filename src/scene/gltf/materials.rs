@@ -3,14 +3,15 @@
 use std::path::Path;
 
 use glam::DVec3;
-use gltf::material::{AlphaMode, PbrSpecularGlossiness};
+use gltf::material::AlphaMode;
 
 use super::file::GltfFile;
-use super::textures::Textures;
+use super::specular_glossiness;
+use super::textures::{Textures, transform_of};
 use crate::light::Material;
 use crate::light::material::{Coverage, Maps, Shading};
 use crate::scene::error::SceneError;
-use crate::scene::raw_model::{GivenMaterial, LEAST_ROUGHNESS};
+use crate::scene::raw_model::{GivenMaterial, alpha};
 
 /// Most that one channel of emission may be; what is above would be no number in the picture's sums.
 const MOST_EMISSION: f64 = 1e6;
@@ -29,7 +30,8 @@ pub(super) fn material(
     let place = format!("materials[{index}]");
     let mut material = metallic_roughness(file, textures, given, note_read)?;
     if let Some(specular) = given.pbr_specular_glossiness() {
-        specular_glossiness(file, textures, &mut material, (&specular, note_read))?;
+        let given = (&specular, note_read);
+        specular_glossiness::convert(file, textures, &mut material, given)?;
     }
     material.coverage = match given.alpha_mode() {
         AlphaMode::Opaque => Coverage::Opaque,
@@ -85,17 +87,6 @@ pub(super) fn material(
 
 const TRANSFORM: &str = "KHR_texture_transform";
 
-/// The transform of a texture's use, which the crate has taken out of the extensions.
-fn transform_of(info: &gltf::texture::Info<'_>) -> Option<serde_json::Value> {
-    let transform = info.texture_transform()?;
-    Some(serde_json::json!({
-        "offset": transform.offset(),
-        "rotation": transform.rotation(),
-        "scale": transform.scale(),
-        "texCoord": transform.tex_coord(),
-    }))
-}
-
 fn metallic_roughness(
     file: &mut GltfFile<'_>,
     textures: &mut Textures,
@@ -125,55 +116,4 @@ fn metallic_roughness(
         maps,
         ..Material::matt(DVec3::new(red, green, blue).clamp(DVec3::ZERO, DVec3::ONE))
     })
-}
-
-/// GGX's α of a file's roughness, which is its root.
-fn alpha(roughness: f64) -> f64 {
-    (roughness * roughness).clamp(LEAST_ROUGHNESS, 1.0)
-}
-
-/// Says specular and glossiness as metal and roughness, as far as that goes: the split that Khronos's own converter makes
-/// (KHR_materials_pbrSpecularGlossiness, appendix).
-fn specular_glossiness(
-    file: &mut GltfFile<'_>,
-    textures: &mut Textures,
-    material: &mut Material,
-    (given, note_read): (&PbrSpecularGlossiness<'_>, &dyn Fn(&Path)),
-) -> Result<(), SceneError> {
-    /// Of a dielectric.
-    const F0: f64 = 0.04;
-    let [red, green, blue, opacity] = given.diffuse_factor().map(f64::from);
-    let diffuse = DVec3::new(red, green, blue).clamp(DVec3::ZERO, DVec3::ONE);
-    let specular = DVec3::from_array(given.specular_factor().map(f64::from));
-    let specular = specular.clamp(DVec3::ZERO, DVec3::ONE);
-    let brightness = |color: DVec3| (color * color).dot(DVec3::new(0.299, 0.587, 0.114)).sqrt();
-    let left = 1.0 - specular.max_element();
-    let (of_diffuse, of_specular) = (brightness(diffuse), brightness(specular));
-    let metallic = match of_specular < F0 {
-        true => 0.0,
-        false => {
-            let b = of_diffuse * left / (1.0 - F0) + of_specular - 2.0 * F0;
-            let c = F0 - of_specular;
-            ((-b + (b * b - 4.0 * F0 * c).max(0.0).sqrt()) / (2.0 * F0)).clamp(0.0, 1.0)
-        }
-    };
-    let from_diffuse = diffuse * left / (1.0 - F0) / (1.0 - metallic).max(1e-6);
-    let from_specular = (specular - F0 * (1.0 - metallic)) / metallic.max(1e-6);
-    let albedo = from_diffuse.lerp(from_specular, metallic * metallic);
-    material.albedo = albedo.clamp(DVec3::ZERO, DVec3::ONE);
-    material.metallic = metallic;
-    material.opacity = opacity.clamp(0.0, 1.0);
-    material.roughness = Some(alpha(1.0 - f64::from(given.glossiness_factor())));
-    material.maps.color = None;
-    material.maps.roughness = None;
-    material.maps.metallic = None;
-    if let Some(info) = given.diffuse_texture() {
-        let transform = transform_of(&info);
-        let at = (info.tex_coord(), transform.as_ref());
-        material.maps.color = textures.map(file, &info.texture(), at, note_read)?;
-    }
-    if given.specular_glossiness_texture().is_some() {
-        file.note("specularGlossinessTexture is passed over; its factors stand for it".to_owned());
-    }
-    Ok(())
 }

@@ -12,6 +12,7 @@ mod meshopt_views;
 mod nodes;
 mod primitives;
 mod skins;
+mod specular_glossiness;
 mod tangents;
 mod textures;
 
@@ -56,18 +57,23 @@ pub fn read(
         }
     }
     builder.note_passed_over(&mut file);
+    if let Some(told) = builder.textures.kept.told() {
+        file.note(told);
+    }
     if builder.triangles.is_empty() {
-        return Err(SceneError::of_file(
-            path,
-            "no triangles; a glTF model with a mesh in its scene is expected",
-        ));
+        let (kinds, _) = builder.without_surface;
+        let message = format!(
+            "no triangles{}; a glTF model with a mesh in its scene is expected",
+            kinds.told()
+        );
+        return Err(SceneError::of_file(path, message));
     }
     let mut model = RawModel {
         positions: builder.positions,
         triangles: builder.triangles,
         looks: builder.looks,
         materials: builder.materials,
-        textures: builder.textures.kept,
+        textures: builder.textures.kept.into_pictures(),
         motion: clip.zip(builder.moving).map(|(clip, moving)| RawMotion {
             clip,
             rig: Rig {

@@ -18,7 +18,7 @@ use crate::geometry::mesh::{CornerLook, RawLooks, RawTriangle, RigPoint};
 use crate::geometry::rig::RigVertices;
 use crate::geometry::rig::surface::{AlwaysTogether, Holding, MorphTarget, RigSurface};
 use crate::scene::error::SceneError;
-use crate::scene::raw_model::GivenMaterial;
+use crate::scene::raw_model::{GivenMaterial, WithoutSurface};
 
 /// Corners that all primitives have together at most, where the file itself has no more bytes.
 const MOST_CORNERS: usize = 12_000_000;
@@ -33,8 +33,10 @@ pub(super) struct Builder {
     pub textures: Textures,
     /// By the file's number, and whether corners have colours.
     index_of_material: HashMap<(Option<usize>, bool), u32>,
-    /// Primitives of points or lines.
-    without_surface: usize,
+    /// What primitives there are of points or lines, and how many.
+    pub without_surface: (WithoutSurface, usize),
+    /// Primitives whose pictures have no texture coordinates: the first, in words, and how many there are.
+    without_coordinates: Option<(String, usize)>,
     /// Where the model is to move.
     pub moving: Option<Moving>,
 }
@@ -78,11 +80,16 @@ impl Builder {
     ) -> Result<(), SceneError> {
         for primitive in mesh.primitives() {
             let place = format!("meshes[{}].primitives[{}]", mesh.index(), primitive.index());
-            if matches!(
+            let is_of_points = primitive.mode() == Mode::Points;
+            let is_of_lines = matches!(
                 primitive.mode(),
-                Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip
-            ) {
-                self.without_surface += 1;
+                Mode::Lines | Mode::LineLoop | Mode::LineStrip
+            );
+            if is_of_points || is_of_lines {
+                let (kinds, count) = &mut self.without_surface;
+                kinds.points |= is_of_points;
+                kinds.lines |= is_of_lines;
+                *count += 1;
                 continue;
             }
             let vertices = vertices(file, &place, &primitive)?;
@@ -94,6 +101,7 @@ impl Builder {
                 return Err(file.error(&place, format!("more than {MOST_CORNERS} corners in all")));
             }
             let material = self.material(file, &primitive, vertices.has_colors, note_read)?;
+            self.look_for_coordinates(&place, &primitive, material);
             let held = (&place[..], &primitive, vertices.positions.len());
             let surface = RigSurface {
                 holding: match node.skin() {
@@ -132,13 +140,31 @@ impl Builder {
         })
     }
 
-    /// Tells what has no surface.
+    /// Whether a primitive has the texture coordinates that its material's pictures lie by.
+    fn look_for_coordinates(&mut self, place: &str, primitive: &Primitive<'_>, material: u32) {
+        let maps = self.materials[material as usize].material.maps;
+        let mut sets = maps.used().map(|(map, _)| map.uv_set);
+        let missing = sets.find(|set| primitive.get(&Semantic::TexCoords(*set)).is_none());
+        let Some(set) = missing else { return };
+        let told = || format!("{place}: TEXCOORD_{set} is not there, and pictures lie by it");
+        let (_, count) = self.without_coordinates.get_or_insert_with(|| (told(), 0));
+        *count += 1;
+    }
+
+    /// Tells what has no surface, and what no picture can lie on.
     pub fn note_passed_over(&self, file: &mut GltfFile<'_>) {
-        if self.without_surface > 0 {
+        let (_, count) = self.without_surface;
+        if count > 0 {
             file.note(format!(
-                "primitives of points or lines, which have no surface, are passed over: {}",
-                self.without_surface
+                "primitives of points or lines, which have no surface, are passed over: {count}"
             ));
+        }
+        if let Some((first, count)) = &self.without_coordinates {
+            let others = match count - 1 {
+                0 => String::new(),
+                others => format!(" (and {others} more such)"),
+            };
+            file.note(format!("{first}: each of them is of one colour{others}"));
         }
     }
 

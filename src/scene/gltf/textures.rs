@@ -2,7 +2,6 @@
 
 use std::collections::HashMap;
 use std::path::Path;
-use std::sync::Arc;
 
 use glam::{Affine2, Vec2};
 use gltf::texture::{MagFilter, WrappingMode};
@@ -12,98 +11,122 @@ use super::file::GltfFile;
 use crate::light::material::{Filter, Map, Wrap};
 use crate::light::texture::Texture;
 use crate::scene::error::SceneError;
+use crate::scene::kept_pictures::KeptPictures;
 use crate::scene::texture_file;
-
-/// Memory that all pictures of a file may take, bytes.
-const MOST_BYTES: usize = 1 << 30;
 
 /// What was decoded so far.
 #[derive(Default)]
 pub(super) struct Textures {
-    pub kept: Vec<Arc<Texture>>,
+    pub kept: KeptPictures,
     /// By the image's number; `None` for one that is passed over.
     index_of_image: HashMap<usize, Option<u32>>,
+    /// Pictures that were made of others, by all that they were made of.
+    pub converted: HashMap<String, Option<[u32; 2]>>,
 }
 
+/// Which of a material's texture coordinates a texture lies by, and its KHR_texture_transform.
+pub(super) type Laid<'a> = (u32, Option<&'a Value>);
+
 impl Textures {
-    /// A texture as a material uses it; `None` where it has no picture that is read. `extension` is its
-    /// KHR_texture_transform.
+    /// A texture as a material uses it; `None` where it has no picture that is read.
     pub fn map(
         &mut self,
         file: &mut GltfFile<'_>,
         texture: &gltf::Texture<'_>,
-        (uv_set, extension): (u32, Option<&Value>),
+        laid: Laid<'_>,
         note_read: &dyn Fn(&Path),
     ) -> Result<Option<Map>, SceneError> {
-        let webp = texture
-            .extension_value("EXT_texture_webp")
-            .and_then(|webp| webp.get("source")?.as_u64());
-        let image = webp
-            .map(|image| image as usize)
-            .or_else(|| Some(texture.source()?.index()));
-        let place = format!("textures[{}]", texture.index());
-        let Some(image) = image else {
-            file.note(format!(
-                "{place} has no picture that is read (PNG, JPEG, WebP) and is left out"
-            ));
+        let Some(image) = image_of(file, texture) else {
             return Ok(None);
         };
-        let known = self.index_of_image.get(&image).copied();
-        let index = match known {
-            Some(index) => index,
-            None => self.kept_picture(file, &place, image, note_read)?,
+        let index = match self.index_of_image.get(&image) {
+            Some(known) => *known,
+            None => {
+                let decoded = decoded(file, &place_of(texture), image, note_read)?;
+                let index = decoded.map(|picture| self.kept.keep(picture));
+                self.index_of_image.insert(image, index);
+                index
+            }
         };
-        let Some(index) = index else { return Ok(None) };
-        let transform = extension.map(Transform::of).unwrap_or_default();
-        let mut uv_set = transform.uv_set.unwrap_or(uv_set);
-        if uv_set > 1 {
-            file.note(format!(
-                "TEXCOORD_{uv_set} is not read; TEXCOORD_0 stands for it"
-            ));
-            uv_set = 0;
-        }
-        let sampler = texture.sampler();
-        let wrap = |mode| match mode {
-            WrappingMode::Repeat => Wrap::Repeat,
-            WrappingMode::MirroredRepeat => Wrap::Mirror,
-            WrappingMode::ClampToEdge => Wrap::Clamp,
-        };
-        Ok(Some(Map {
-            texture: index,
-            uv_set,
-            picture_from_corner: transform.picture_from_corner,
-            wrap: [wrap(sampler.wrap_s()), wrap(sampler.wrap_t())],
-            filter: match sampler.mag_filter() {
-                Some(MagFilter::Nearest) => Filter::Pixels,
-                Some(MagFilter::Linear) | None => Filter::Smooth,
-            },
-        }))
+        Ok(index.map(|index| placed(file, texture, laid, index)))
     }
 }
 
-impl Textures {
-    /// Decodes a picture and keeps it; `None` where that is told as not to be used.
-    fn kept_picture(
-        &mut self,
-        file: &mut GltfFile<'_>,
-        place: &str,
-        image: usize,
-        note_read: &dyn Fn(&Path),
-    ) -> Result<Option<u32>, SceneError> {
-        let Some(decoded) = decoded(file, place, image, note_read)? else {
-            self.index_of_image.insert(image, None);
-            return Ok(None);
-        };
-        let bytes: usize = self.kept.iter().map(|texture| texture.bytes()).sum();
-        if bytes + decoded.bytes() > MOST_BYTES {
-            let message = format!("the pictures take more than {MOST_BYTES} bytes of memory");
-            return Err(file.error(place, message));
-        }
-        let index = self.kept.len() as u32;
-        self.kept.push(Arc::new(decoded));
-        self.index_of_image.insert(image, Some(index));
-        Ok(Some(index))
+/// A texture's picture, which is not kept; `None` where it has none that is read.
+pub(super) fn picture(
+    file: &mut GltfFile<'_>,
+    texture: &gltf::Texture<'_>,
+    note_read: &dyn Fn(&Path),
+) -> Result<Option<Texture>, SceneError> {
+    match image_of(file, texture) {
+        Some(image) => decoded(file, &place_of(texture), image, note_read),
+        None => Ok(None),
     }
+}
+
+fn place_of(texture: &gltf::Texture<'_>) -> String {
+    format!("textures[{}]", texture.index())
+}
+
+/// The number of a texture's image; where there is none that is told.
+pub(super) fn image_of(file: &mut GltfFile<'_>, texture: &gltf::Texture<'_>) -> Option<usize> {
+    let webp = texture
+        .extension_value("EXT_texture_webp")
+        .and_then(|webp| webp.get("source")?.as_u64());
+    let image = webp
+        .map(|image| image as usize)
+        .or_else(|| Some(texture.source()?.index()));
+    if image.is_none() {
+        file.note(format!(
+            "{} has no picture that is read (PNG, JPEG, WebP) and is left out",
+            place_of(texture)
+        ));
+    }
+    image
+}
+
+/// A kept picture as a texture lays it.
+pub(super) fn placed(
+    file: &mut GltfFile<'_>,
+    texture: &gltf::Texture<'_>,
+    (uv_set, extension): Laid<'_>,
+    index: u32,
+) -> Map {
+    let transform = extension.map(Transform::of).unwrap_or_default();
+    let mut uv_set = transform.uv_set.unwrap_or(uv_set);
+    if uv_set > 1 {
+        file.note(format!(
+            "TEXCOORD_{uv_set} is not read; TEXCOORD_0 stands for it"
+        ));
+        uv_set = 0;
+    }
+    let sampler = texture.sampler();
+    let wrap = |mode| match mode {
+        WrappingMode::Repeat => Wrap::Repeat,
+        WrappingMode::MirroredRepeat => Wrap::Mirror,
+        WrappingMode::ClampToEdge => Wrap::Clamp,
+    };
+    Map {
+        texture: index,
+        uv_set,
+        picture_from_corner: transform.picture_from_corner,
+        wrap: [wrap(sampler.wrap_s()), wrap(sampler.wrap_t())],
+        filter: match sampler.mag_filter() {
+            Some(MagFilter::Nearest) => Filter::Pixels,
+            Some(MagFilter::Linear) | None => Filter::Smooth,
+        },
+    }
+}
+
+/// The transform of a texture's use, which the crate has taken out of the extensions.
+pub(super) fn transform_of(info: &gltf::texture::Info<'_>) -> Option<serde_json::Value> {
+    let transform = info.texture_transform()?;
+    Some(serde_json::json!({
+        "offset": transform.offset(),
+        "rotation": transform.rotation(),
+        "scale": transform.scale(),
+        "texCoord": transform.tex_coord(),
+    }))
 }
 
 /// KHR_texture_transform.

@@ -71,6 +71,100 @@ fn bad_meshes_say_what_is_expected() {
     );
 }
 
+/// What has no surface is named.
+#[test]
+fn points_and_lines_are_told_as_such() {
+    for (text, part) in [
+        ("v 0 0 0\nv 1 0 0\n", "no faces: it is a cloud of points"),
+        ("v 0 0 0\nv 1 0 0\nl 1 2\n", "no faces: it is made of lines"),
+        (
+            "v 0 0 0\nv 1 0 0\nl 1 2\np 1\n",
+            "no faces: it is made of points and lines",
+        ),
+        ("g a\n", "no faces; a mesh is expected"),
+    ] {
+        assert!(failure(text).contains(part), "{text}");
+    }
+}
+
+const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+
+/// A picture where the file does not say how it lies, which is told and not torn.
+#[test]
+fn pictures_without_texture_coordinates_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.obj");
+    let picture =
+        image::RgbImage::from_fn(2, 2, |x, y| image::Rgb([200 * x as u8, 90 * y as u8, 9]));
+    picture.save(folder.path().join("a.png")).unwrap();
+    let library = "newmtl a\nmap_Kd -colorspace sRGB a.png\nnewmtl plain\nKd 1 0 0\n";
+    std::fs::write(folder.path().join("a.mtl"), library).unwrap();
+    let read = |vertices: &str, face: &str| {
+        let text = format!("mtllib a.mtl\n{vertices}usemtl a\n{face}\nusemtl plain\nf 1 2 3\n");
+        read_text(&path, &text, SMOOTH).unwrap()
+    };
+    let whole = read(SQUARE, "f 1/1 2/2 3/3 4/4");
+    assert_eq!((whole.notes, whole.textures.len()), (vec![], 1));
+    let note = "vt: texture coordinates of a picture that are not there or no numbers: faces there are of one colour";
+    for (vertices, face, line) in [
+        (&SQUARE[..32], "f 1 2 3 4", 7),
+        (SQUARE, "f 1 2 3 4", 11),
+        (SQUARE, "f 1/1 2/2 3/3 4", 11),
+        (SQUARE, "f 1/0/0 2/0/0 3/0/0 4/0/0", 11),
+        (SQUARE, "f 1/1 2/2 3/7 4/4", 11),
+        (
+            &SQUARE.replace("vt 1 1", "vt nan 1"),
+            "f 1/1 2/2 3/3 4/4",
+            11,
+        ),
+        (&SQUARE.replace("vt 1 1", "vt x 1"), "f 1/1 2/2 3/3 4/4", 11),
+    ] {
+        let loaded = read(vertices, face);
+        assert_eq!(
+            loaded.notes,
+            [format!("{}:{line}: {note}", path.display())],
+            "{face}"
+        );
+        for (corners, material) in loaded
+            .mesh
+            .corner_looks
+            .iter()
+            .zip(&loaded.mesh.triangle_materials)
+        {
+            let [a, b, c] = corners.map(|look| loaded.mesh.looks[look as usize].uv[0]);
+            assert!(*material == 1 || (a == b && b == c), "{face}");
+        }
+    }
+}
+
+/// Polypaint in comments goes by the vertices, the mask in front of it for nothing.
+#[test]
+fn colors_of_zbrush_are_read() {
+    let text = format!(
+        "{}#MRGB ffff0000000000ff7f00ff00\n#MRGB 00ffffff\n#MRGB 00fff\n#End of MRGB block\nf 1 2 3 4\n",
+        &SQUARE[..32]
+    );
+    let loaded = read_text(Path::new("a.obj"), &text, SMOOTH).unwrap();
+    let note = "a.obj:7: #MRGB: not used; eight digits a vertex are expected";
+    assert_eq!(loaded.notes, [note]);
+    let expected = [[1., 0., 0.], [0., 0., 1.], [0., 1., 0.], [1., 1., 1.]];
+    let corners = loaded.mesh.triangles.iter().zip(&loaded.mesh.corner_looks);
+    for (vertices, looks) in corners {
+        for (vertex, look) in vertices.iter().zip(looks) {
+            let place = loaded.mesh.positions[*vertex as usize];
+            let number = match [place.x, place.y] {
+                [0., 0.] => 0,
+                [1., 0.] => 1,
+                [1., 1.] => 2,
+                _ => 3,
+            };
+            let color = loaded.mesh.looks[*look as usize].color;
+            assert_eq!(color.truncate().to_array(), expected[number]);
+        }
+    }
+    assert_eq!(loaded.materials, [Material::matt(DVec3::ONE)]);
+}
+
 #[test]
 fn materials_come_from_the_mtl_file() {
     let folder = tempfile::tempdir().unwrap();

@@ -60,7 +60,10 @@ impl Libraries {
                 known.push(path);
             }
         }
-        found.textures = converter.textures();
+        if let Some(told) = converter.pictures.told() {
+            notes.add_of(mesh, told);
+        }
+        found.textures = converter.pictures.into_pictures();
         Ok(found)
     }
 

@@ -1,10 +1,10 @@
 //! MTL materials as the renderer knows materials.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use glam::{Affine2, DVec3, Mat2, Vec2};
 
+use super::super::kept_pictures::KeptPictures;
 use super::super::notes::Notes;
 use super::super::raw_model::{DEFAULT_ALBEDO, GivenMaterial, LEAST_ROUGHNESS};
 use super::super::texture_file;
@@ -17,7 +17,10 @@ use crate::light::texture::Texture;
 /// Makes materials of what MTL files say, and reads each picture once.
 #[derive(Debug, Default)]
 pub struct Converter {
-    textures: Vec<(PictureKey, Arc<Texture>)>,
+    /// What the materials' maps name.
+    pub pictures: KeptPictures,
+    /// Where each of them comes from.
+    keys: Vec<PictureKey>,
     /// What could not be read.
     unread: Vec<PathBuf>,
 }
@@ -29,14 +32,6 @@ type PictureKey = (PathBuf, Option<PathBuf>);
 type Library<'a> = (&'a Path, &'a str);
 
 impl Converter {
-    /// What the materials' maps name.
-    pub fn textures(self) -> Vec<Arc<Texture>> {
-        self.textures
-            .into_iter()
-            .map(|(_, texture)| texture)
-            .collect()
-    }
-
     /// The material that an MTL file describes. Its gloss comes from `Pr` (squared, as is usual) or else from `Ns`, unless
     /// `Ks` is black: roughness² = 2 / (Ns + 2), which gives Blinn's lobe and GGX's the same width.
     pub fn material(
@@ -123,7 +118,7 @@ impl Converter {
                 return None;
             }
         };
-        if map.role == MapRole::Bump && !is_of_normals(&self.textures[texture as usize].1) {
+        if map.role == MapRole::Bump && !is_of_normals(self.pictures.picture(texture)) {
             let message =
                 format!("{keyword}: a picture of heights is not used; allowed: of normals");
             notes.add_at(library, text, map.at, message);
@@ -140,7 +135,7 @@ impl Converter {
         role: MapRole,
     ) -> Result<Option<u32>, String> {
         let key = (path.to_owned(), opacity.map(Path::to_owned));
-        if let Some(known) = self.textures.iter().position(|(known, _)| *known == key) {
+        if let Some(known) = self.keys.iter().position(|known| *known == key) {
             return Ok(Some(known as u32));
         }
         if self.unread.iter().any(|unread| unread == path) {
@@ -153,8 +148,8 @@ impl Converter {
         });
         match texture {
             Ok(texture) => {
-                self.textures.push((key, Arc::new(texture)));
-                Ok(Some(self.textures.len() as u32 - 1))
+                self.keys.push(key);
+                Ok(Some(self.pictures.keep(texture)))
             }
             Err(message) => {
                 self.unread.push(path.to_owned());
@@ -173,7 +168,7 @@ impl Converter {
     ) -> Option<(usize, String)> {
         let of_role = |role| mtl.maps.iter().find(|map| map.role == role);
         let opacity = of_role(MapRole::Opacity)?;
-        let texture = &self.textures[color.texture as usize].1;
+        let texture = self.pictures.picture(color.texture);
         let alphas = || texture.rgba.iter().skip(3).step_by(4);
         if alphas().all(|alpha| *alpha == 255) {
             let is_same = of_role(MapRole::Diffuse).is_some_and(|map| map.file == opacity.file);

@@ -14,7 +14,7 @@ use glam::{Vec2, Vec3};
 
 use super::error::SceneError;
 use super::notes::Notes;
-use super::raw_model::RawModel;
+use super::raw_model::{RawModel, WithoutSurface};
 use libraries::Libraries;
 use text::{Record, number, records};
 
@@ -42,8 +42,17 @@ pub fn read(path: &Path, bytes: &[u8], note_read: &dyn Fn(&Path)) -> Result<RawM
         reader.add(&record)?;
     }
     if reader.faces.is_empty() {
-        let message = "no faces; a mesh is expected: OBJ with f records, PLY, STL or glTF";
+        let mut without = reader.without_surface;
+        without.points |= !reader.positions.is_empty() && !without.lines;
+        let message = format!(
+            "no faces{}; a mesh is expected: OBJ with f records, PLY, STL or glTF",
+            without.told()
+        );
         return Err(SceneError::of_file(path, message));
+    }
+    if reader.colors.is_empty() {
+        reader.colors = std::mem::take(&mut reader.polypaint);
+        reader.colors.truncate(reader.positions.len());
     }
     let libraries = Libraries::read(path, &text, &reader.libraries, &mut reader.notes, note_read)?;
     reader.model(&libraries)
@@ -58,11 +67,14 @@ struct Reader<'a> {
     nowhere: BTreeMap<u32, usize>,
     /// Of the first vertices, as they are written; the rest have none.
     colors: Vec<[f32; 3]>,
+    /// The same as ZBrush writes them, in comments.
+    polypaint: Vec<[f32; 3]>,
     texture_places: Vec<Vec2>,
     /// NaN where the file gives none.
     normals: Vec<Vec3>,
     corners: Vec<Corner>,
     faces: Vec<Face>,
+    without_surface: WithoutSurface,
     /// The records that choose a material: their names and where they are.
     uses: Vec<(String, usize)>,
     /// The index of the record that holds for the next face, one more than in `uses`.
@@ -98,10 +110,12 @@ impl<'a> Reader<'a> {
             positions: Vec::new(),
             nowhere: BTreeMap::new(),
             colors: Vec::new(),
+            polypaint: Vec::new(),
             texture_places: Vec::new(),
             normals: Vec::new(),
             corners: Vec::new(),
             faces: Vec::new(),
+            without_surface: WithoutSurface::default(),
             uses: Vec::new(),
             use_now: 0,
             libraries: Vec::new(),
@@ -123,10 +137,12 @@ impl<'a> Reader<'a> {
         match record.keyword().to_ascii_lowercase().as_str() {
             "v" => self.add_vertex(record),
             "vt" => {
-                let mut numbers = record
-                    .words()
-                    .map(|word| number(word).unwrap_or(0.0) as f32);
-                let mut next = || numbers.next().unwrap_or(0.0);
+                let mut numbers = record.words().map(number);
+                // (What is not there is 0, and what is no number is no place.)
+                let mut next = || {
+                    let written = numbers.next().unwrap_or(Some(0.0));
+                    written.map_or(f32::NAN, |part| part as f32)
+                };
                 self.texture_places.push(Vec2::new(next(), next()));
             }
             "vn" => {
@@ -153,13 +169,39 @@ impl<'a> Reader<'a> {
                 let at = record.at(record.line.trim_start());
                 self.libraries.push((record.rest().to_owned(), at));
             }
-            "l" | "p" => self.note(record, "lines and points have no surface: not used"),
+            keyword @ ("l" | "p") => {
+                self.without_surface.lines |= keyword == "l";
+                self.without_surface.points |= keyword == "p";
+                self.note(record, "lines and points have no surface: not used");
+            }
             "curv" | "curv2" | "surf" | "cstype" => {
                 self.note(record, "free-form curves and surfaces are not read");
             }
+            "" => self.add_polypaint(record),
             _ => {}
         }
         Ok(())
+    }
+
+    /// ZBrush's comment of up to 64 vertices, each the mask, which is passed over, red, green and blue by two digits.
+    fn add_polypaint(&mut self, record: &Record) {
+        let Some(written) = record.line.trim().strip_prefix("#MRGB ") else {
+            return;
+        };
+        let (entries, rest) = written.trim().as_bytes().as_chunks::<8>();
+        let color = |entry: &[u8; 8]| {
+            let bits = u32::from_str_radix(std::str::from_utf8(entry).ok()?, 16).ok()?;
+            let [_, color @ ..] = bits.to_be_bytes();
+            Some(color.map(|part| f32::from(part) / 255.0))
+        };
+        let colors: Option<Vec<[f32; 3]>> = entries.iter().map(color).collect();
+        match colors.filter(|_| rest.is_empty()) {
+            Some(colors) => self.polypaint.extend(colors),
+            None => self.note(
+                record,
+                "#MRGB: not used; eight digits a vertex are expected",
+            ),
+        }
     }
 
     /// Three numbers; a weight or a colour behind them.

@@ -232,9 +232,21 @@ pub fn map(record: &Record, role: MapRole) -> MtlMap {
 }
 
 /// The options that pictures have.
-const OPTIONS: [&str; 13] = [
-    "-s", "-o", "-t", "-mm", "-bm", "-boost", "-texres", "-clamp", "-blendu", "-blendv",
-    "-imfchan", "-type", "-cc",
+const OPTIONS: [&str; 14] = [
+    "-s",
+    "-o",
+    "-t",
+    "-mm",
+    "-bm",
+    "-boost",
+    "-texres",
+    "-clamp",
+    "-blendu",
+    "-blendv",
+    "-imfchan",
+    "-type",
+    "-cc",
+    "-colorspace",
 ];
 
 /// An option at the beginning of a text, and what is behind it. A name may begin with `-` as well.
@@ -371,6 +383,7 @@ mod tests {
                 "C:\\maps\\x y.tga",
             ),
             ("map_Kd -odd.png", "-odd.png"),
+            ("map_Kd -colorspace sRGB a.png", "a.png"),
             ("map_Kd \"in quotes.png\"", "in quotes.png"),
             ("map_Kd #1.png", "#1.png"),
         ] {

@@ -10,8 +10,8 @@ use super::{Corner, FARTHEST, Face, NONE, Reader};
 use crate::geometry::mesh::{CornerLook, RawLooks, RawTriangle};
 use crate::geometry::polygon::PolygonCutter;
 use crate::scene::error::SceneError;
-use crate::scene::raw_model::{GivenMaterial, RawModel};
-use crate::scene::vertex_colors::linear_colors;
+use crate::scene::raw_model::{GivenMaterial, NO_COORDINATES, RawModel};
+use crate::scene::vertex_colors::{ABOVE_ONE, linear_colors};
 
 impl Reader<'_> {
     /// What the whole file has.
@@ -27,9 +27,10 @@ impl Reader<'_> {
             ..RawModel::default()
         };
         let (mut cutter, mut places, mut cut) = (PolygonCutter::default(), Vec::new(), Vec::new());
-        let mut lost_normals = None;
+        let (mut lost_normals, mut lost_places) = (None, None);
         for face in &faces {
             let corners = self.corners_of(face);
+            let material = material_of_use.of_use[&face.material_use];
             places.clear();
             places.extend(
                 corners
@@ -43,12 +44,20 @@ impl Reader<'_> {
             if lost_normals.is_none() && corners.iter().any(asks_in_vain) {
                 lost_normals = Some(face.at as usize);
             }
+            let sole_place = Looks::sole_place(looks.as_ref(), corners);
+            let mut maps = model.materials[material as usize].material.maps.used();
+            if lost_places.is_none() && sole_place.is_some() && maps.next().is_some() {
+                lost_places = Some(face.at as usize);
+            }
             for triangle in &cut {
-                let corners = triangle.map(|corner| corners[corner as usize]);
+                let mut corners = triangle.map(|corner| corners[corner as usize]);
+                if let Some(place) = sole_place {
+                    (corners.iter_mut()).for_each(|corner| corner.texture_place = place);
+                }
                 model.triangles.push(RawTriangle {
                     vertices: corners.map(|corner| corner.vertex),
                     normals: corners.map(|corner| self.normal(corner)),
-                    material: material_of_use.of_use[&face.material_use],
+                    material,
                 });
                 if let Some(looks) = &mut looks {
                     looks.add(corners);
@@ -57,6 +66,10 @@ impl Reader<'_> {
         }
         if let Some(at) = lost_normals {
             let message = "vn: normals that are not there or no directions are made anew";
+            self.notes.add_at(self.path, self.text, at, message);
+        }
+        if let Some(at) = lost_places {
+            let message = format!("vt: {NO_COORDINATES}");
             self.notes.add_at(self.path, self.text, at, message);
         }
         model.looks = looks.map(|looks| looks.looks).unwrap_or_default();
@@ -197,8 +210,7 @@ impl Looks {
         }
         let (colors, is_of_bytes) = linear_colors(std::mem::take(&mut reader.colors));
         if is_of_bytes {
-            let message = "vertex colours above 1 are taken for 0 to 255";
-            reader.notes.add_of(reader.path, message);
+            reader.notes.add_of(reader.path, ABOVE_ONE);
         }
         Some(Self {
             looks: RawLooks::default(),
@@ -206,6 +218,21 @@ impl Looks {
             texture_places: std::mem::take(&mut reader.texture_places),
             colors,
         })
+    }
+
+    /// The one texture place that all corners of a face get where one of them has none: a picture between a place and none
+    /// would be torn. `None`: each has its own.
+    fn sole_place(looks: Option<&Self>, corners: &[Corner]) -> Option<u32> {
+        let has_place = |corner: &&Corner| {
+            let places = looks.map_or(&[][..], |looks| &looks.texture_places);
+            let place = places.get(corner.texture_place as usize);
+            place.is_some_and(|place| place.is_finite())
+        };
+        if corners.iter().all(|corner| has_place(&corner)) {
+            return None;
+        }
+        let first = corners.iter().find(has_place);
+        Some(first.map_or(NONE, |corner| corner.texture_place))
     }
 
     fn add(&mut self, corners: [Corner; 3]) {

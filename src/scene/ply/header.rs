@@ -111,8 +111,10 @@ impl Element {
 pub struct Header {
     pub format: Format,
     pub elements: Vec<Element>,
-    /// The picture that MeshLab names in a comment.
-    pub texture: Option<(String, usize)>,
+    /// The pictures that MeshLab names in comments, each with its line.
+    pub textures: Vec<(String, usize)>,
+    /// What is no line of a head, each with what is said of it.
+    pub passed_over: Vec<String>,
     /// The byte that the first element begins at.
     pub body: usize,
 }
@@ -123,7 +125,8 @@ const MOST: usize = 1 << 20;
 /// Reads the head.
 pub fn read(bytes: &[u8]) -> Result<Header, PlyError> {
     let mut lines = Lines { bytes, at: 0 };
-    let (mut format, mut elements, mut texture) = (None, Vec::<Element>::new(), None);
+    let (mut format, mut elements) = (None, Vec::<Element>::new());
+    let (mut textures, mut passed_over) = (Vec::new(), Vec::new());
     let mut number = 0;
     while let Some(line) = lines.next() {
         number += 1;
@@ -135,7 +138,7 @@ pub fn read(bytes: &[u8]) -> Result<Header, PlyError> {
         let words: Vec<&str> = text.split_whitespace().collect();
         match words.as_slice() {
             ["ply"] | [] | ["obj_info", ..] => {}
-            ["comment", "TextureFile", name @ ..] => texture = Some((name.join(" "), number)),
+            ["comment", "TextureFile", name @ ..] => textures.push((name.join(" "), number)),
             ["comment", ..] => {}
             ["format", name, ..] => {
                 format = Some(match *name {
@@ -170,11 +173,17 @@ pub fn read(bytes: &[u8]) -> Result<Header, PlyError> {
                 return Ok(Header {
                     format,
                     elements,
-                    texture,
+                    textures,
+                    passed_over,
                     body: lines.at,
                 });
             }
-            _ => return Err(error(format!("\"{text}\" is no line of a PLY file's head"))),
+            ["format" | "element", ..] => {
+                return Err(error(format!("\"{text}\" is no line of a PLY file's head")));
+            }
+            _ => passed_over.push(format!(
+                "line {number}: no line of a PLY file's head: not used"
+            )),
         }
         if lines.at > MOST {
             break;

@@ -6,16 +6,16 @@ mod header;
 
 use std::path::Path;
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3};
 
 use super::error::{SceneError, TextPlace};
 use super::notes::Notes;
 use super::obj::FARTHEST;
 use super::obj::files::named_file;
-use super::raw_model::{GivenMaterial, RawModel};
+use super::raw_model::{GivenMaterial, NO_COORDINATES, RawModel, WithoutSurface};
+use super::vertex_colors::{ABOVE_ONE, linear_colors};
 use crate::geometry::mesh::{CornerLook, RawLooks, RawTriangle};
 use crate::geometry::polygon::PolygonCutter;
-use crate::light::texture::linear_from_srgb;
 use body::Body;
 use header::{Element, Format, Header, Kind};
 
@@ -34,15 +34,18 @@ pub fn is_ply(bytes: &[u8]) -> bool {
     bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") || bytes.starts_with(b"ply ")
 }
 
-/// Reads it. Colours are taken as sRGB has them. A picture that it names is left to the caller, with its line.
+/// The pictures that a file names, each with its line; the material of that number is of it.
+pub type NamedPictures = Vec<(String, usize)>;
+
+/// Reads it. Colours are taken as sRGB has them. The pictures that it names are left to the caller.
 ///
 /// # Errors
 /// A head that cannot be read or counts what is not there; a vertex that a face needs and that is no place; no faces.
-pub fn read(path: &Path, bytes: &[u8]) -> Result<(RawModel, Option<(String, usize)>), SceneError> {
+pub fn read(path: &Path, bytes: &[u8]) -> Result<(RawModel, NamedPictures), SceneError> {
     let header = header::read(bytes);
     let read = header.and_then(|header| {
         let model = Reader::default().model(path, bytes, &header)?;
-        Ok((model, header.texture))
+        Ok((model, header.textures))
     });
     read.map_err(|PlyError { line, message }| {
         let mut error = SceneError::of_file(path, message);
@@ -56,32 +59,38 @@ pub fn read(path: &Path, bytes: &[u8]) -> Result<(RawModel, Option<(String, usiz
     })
 }
 
-/// A PLY file's bytes with the name that `name_of` gives to the picture that it names, if that is there. `mesh` is where the
+/// A PLY file's bytes with the names that `name_of` gives to the pictures that it names, if they are there. `mesh` is where the
 /// file lies.
 ///
 /// # Errors
 /// What `name_of` fails with.
-pub fn with_picture_named<E>(
+pub fn with_pictures_named<E>(
     mesh: &Path,
     bytes: &[u8],
-    name_of: impl FnOnce(&Path) -> Result<String, E>,
+    mut name_of: impl FnMut(&Path) -> Result<String, E>,
 ) -> Result<Vec<u8>, E> {
     let folder = mesh.parent().unwrap_or(Path::new(""));
-    let header = header::read(bytes).ok();
-    let named = header.and_then(|header| {
-        let (name, _) = header.texture?;
-        let written = format!("TextureFile {name}").into_bytes();
-        let head = &bytes[..header.body];
-        let at = head
-            .windows(written.len())
-            .position(|part| part == written)?;
-        Some((at, written.len(), named_file(folder, &name)?))
-    });
-    let Some((at, length, picture)) = named else {
+    let Ok(header) = header::read(bytes) else {
         return Ok(bytes.to_vec());
     };
-    let own = format!("TextureFile {}", name_of(&picture)?);
-    Ok([&bytes[..at], own.as_bytes(), &bytes[at + length..]].concat())
+    let (mut named, mut done) = (Vec::with_capacity(bytes.len()), 0);
+    for (name, _) in header.textures {
+        let written = format!("TextureFile {name}").into_bytes();
+        let mut parts = bytes[done..header.body].windows(written.len());
+        let Some(at) = parts.position(|part| part == written) else {
+            continue;
+        };
+        named.extend(&bytes[done..done + at]);
+        done += at + written.len();
+        match named_file(folder, &name) {
+            Some(picture) => {
+                named.extend(format!("TextureFile {}", name_of(&picture)?).into_bytes());
+            }
+            None => named.extend(written),
+        }
+    }
+    named.extend(&bytes[done..]);
+    Ok(named)
 }
 
 fn line_text(bytes: &[u8], line: usize) -> String {
@@ -97,7 +106,8 @@ fn line_text(bytes: &[u8], line: usize) -> String {
 struct Reader {
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
-    colors: Vec<Vec4>,
+    /// As [`linear_colors`] takes them.
+    colors: Vec<[f32; 3]>,
     texture_places: Vec<Vec2>,
     /// Corners of all polygons, one after the other, as the file has them.
     corners: Vec<u32>,
@@ -106,14 +116,20 @@ struct Reader {
     /// Texture coordinates of each of the corners, where the file has them there.
     corner_texture_places: Vec<Vec2>,
     /// The colour of each of the polygons, where the file has them there.
-    face_colors: Vec<Vec4>,
+    face_colors: Vec<[f32; 3]>,
+    /// The number of each polygon's picture, where the file has it there.
+    face_pictures: Vec<f64>,
     /// Faces of fewer than three corners.
     skipped: usize,
+    has_lines: bool,
     notes: Notes,
 }
 
 impl Reader {
     fn model(mut self, path: &Path, bytes: &[u8], header: &Header) -> Result<RawModel, PlyError> {
+        for message in &header.passed_over {
+            self.notes.add_of(path, message);
+        }
         let mut body = Body::new(bytes, header.body, header.format);
         for element in &header.elements {
             let least = element.least_bytes(header.format) as u64;
@@ -134,6 +150,7 @@ impl Reader {
                 "face" => self.add_faces(&mut body, element)?,
                 "tristrips" => self.add_strips(&mut body, element)?,
                 name => {
+                    self.has_lines |= name == "edge" && element.count > 0;
                     if element.count > 0 {
                         let message = format!("element {name}: not used");
                         self.notes.add_of(path, message);
@@ -153,7 +170,7 @@ impl Reader {
             );
             self.notes.add_of(path, message);
         }
-        self.finish()
+        self.finish(path, header)
     }
 
     fn add_vertices(&mut self, body: &mut Body, element: &Element) -> Result<(), PlyError> {
@@ -180,7 +197,7 @@ impl Reader {
                 self.normals.push(Vec3::from_array(normal.map(at)));
             }
             if let Some(color) = color {
-                self.colors.push(linear_color(color, element, &numbers));
+                self.colors.push(written_color(color, element, &numbers));
             }
             if let Some(place) = texture_place {
                 self.texture_places.push(Vec2::from_array(place.map(at)));
@@ -192,7 +209,7 @@ impl Reader {
     fn add_faces(&mut self, body: &mut Body, element: &Element) -> Result<(), PlyError> {
         let corners = element.index(&["vertex_indices", "vertex_index"]);
         let texture_places = element.index(&["texcoord"]);
-        let color = color_of(element);
+        let (color, picture) = (color_of(element), element.index(&["texnumber"]));
         let (mut numbers, mut written, mut places) = (Vec::new(), Vec::new(), Vec::new());
         for _ in 0..element.count {
             written.clear();
@@ -224,7 +241,10 @@ impl Reader {
             }
             if let Some(color) = color {
                 self.face_colors
-                    .push(linear_color(color, element, &numbers));
+                    .push(written_color(color, element, &numbers));
+            }
+            if let Some(picture) = picture {
+                self.face_pictures.push(numbers[picture]);
             }
         }
         Ok(())
@@ -256,19 +276,20 @@ impl Reader {
         Ok(())
     }
 
-    fn finish(self) -> Result<RawModel, PlyError> {
+    fn finish(self, path: &Path, header: &Header) -> Result<RawModel, PlyError> {
         let error = |message: String| PlyError {
             line: None,
             message,
         };
         if self.counts.is_empty() {
-            let message = match self.positions.is_empty() {
-                true => "no faces; a mesh is expected",
-                false => {
-                    "no faces: it is a cloud of points, which has no surface; a mesh is expected"
-                }
+            let kinds = WithoutSurface {
+                points: !self.positions.is_empty() && !self.has_lines,
+                lines: self.has_lines,
             };
-            return Err(error(message.to_owned()));
+            return Err(error(format!(
+                "no faces{}; a mesh is expected",
+                kinds.told()
+            )));
         }
         for &corner in &self.corners {
             let known = self.positions.len();
@@ -285,19 +306,22 @@ impl Reader {
                 )));
             }
         }
-        Ok(self.triangles())
+        Ok(self.triangles(path, header.textures.len()))
     }
 
-    fn triangles(self) -> RawModel {
-        let has_colors = !self.colors.is_empty() || !self.face_colors.is_empty();
+    /// The model, given how many pictures there are: each of them has a material, and one behind them is of none.
+    fn triangles(mut self, path: &Path, pictures: usize) -> RawModel {
+        let colors = self.linear_colors(path);
+        let has_colors = !colors.of_vertices.is_empty() || !colors.of_faces.is_empty();
         let has_looks =
             has_colors || !self.texture_places.is_empty() || !self.corner_texture_places.is_empty();
         let mut model = RawModel {
-            materials: vec![GivenMaterial::unknown(has_colors)],
+            materials: vec![GivenMaterial::unknown(has_colors); pictures.max(1)],
             ..RawModel::default()
         };
         let (mut cutter, mut cut) = (PolygonCutter::default(), Vec::new());
         let (mut places, mut first) = (Vec::new(), 0);
+        let (mut without_picture, mut without_place) = (0, 0);
         for (face, &count) in self.counts.iter().enumerate() {
             let corners = &self.corners[first..first + count as usize];
             places.clear();
@@ -308,17 +332,27 @@ impl Reader {
             );
             cut.clear();
             cutter.triangles(&places, &mut cut);
+            let material = self.material_of(face, pictures);
+            without_picture += usize::from(material as usize == model.materials.len());
+            // A picture between a place and none would be torn.
+            let of_corners = || (first..first + count as usize).map(|it| self.texture_place(it));
+            let sole_place = of_corners()
+                .any(|place| place.is_none())
+                .then(|| of_corners().flatten().next().unwrap_or_default());
+            without_place += usize::from(sole_place.is_some() && (material as usize) < pictures);
             for triangle in &cut {
                 let vertices = triangle.map(|corner| corners[corner as usize]);
                 model.triangles.push(RawTriangle {
                     vertices,
                     normals: vertices.map(|vertex| self.normal(vertex)),
-                    material: 0,
+                    material,
                 });
                 if has_looks {
                     let looks = triangle.map(|corner| {
-                        let look = self.look(face, first + corner as usize);
-                        model.looks.looks.push(look);
+                        let corner = first + corner as usize;
+                        let place = sole_place.or_else(|| self.texture_place(corner));
+                        let color = colors.of(face, self.corners[corner]);
+                        model.looks.looks.push(look(place, color));
                         model.looks.looks.len() as u32 - 1
                     });
                     model.looks.corners.push(looks);
@@ -326,10 +360,40 @@ impl Reader {
             }
             first += count as usize;
         }
+        if without_picture > 0 {
+            model.materials.push(GivenMaterial::unknown(has_colors));
+            let message =
+                format!("texnumber: {without_picture} faces are of no picture that is named");
+            self.notes.add_of(path, message);
+        }
+        if without_place > 0 {
+            self.notes.add_of(path, NO_COORDINATES);
+        }
         model.looks = merged(model.looks);
         model.positions = self.positions;
         model.notes = self.notes;
         model
+    }
+
+    fn linear_colors(&mut self, path: &Path) -> Colors {
+        let (of_vertices, vertices_of_bytes) = linear_colors(std::mem::take(&mut self.colors));
+        let (of_faces, faces_of_bytes) = linear_colors(std::mem::take(&mut self.face_colors));
+        if vertices_of_bytes || faces_of_bytes {
+            self.notes.add_of(path, ABOVE_ONE);
+        }
+        Colors {
+            of_vertices,
+            of_faces,
+        }
+    }
+
+    /// The number of a face's material: that of its picture, the first where nothing says which.
+    fn material_of(&self, face: usize, pictures: usize) -> u32 {
+        match self.face_pictures.get(face).filter(|_| pictures > 0) {
+            Some(number) if (0.0..pictures as f64).contains(number) => *number as u32,
+            Some(_) => pictures as u32,
+            None => 0,
+        }
     }
 
     fn normal(&self, vertex: u32) -> Option<Vec3> {
@@ -337,21 +401,35 @@ impl Reader {
         (normal.is_finite() && *normal != Vec3::ZERO).then_some(*normal)
     }
 
-    fn look(&self, face: usize, corner: usize) -> CornerLook {
+    /// Where a corner is in its picture, if the file says it.
+    fn texture_place(&self, corner: usize) -> Option<Vec2> {
         let vertex = self.corners[corner] as usize;
         let place = self.corner_texture_places.get(corner);
         let place = place.or_else(|| self.texture_places.get(vertex));
-        let place = place.copied().filter(|place| place.is_finite());
-        let color = self
-            .colors
-            .get(vertex)
-            .or_else(|| self.face_colors.get(face));
-        CornerLook {
-            // The file's v grows upwards.
-            uv: [place.map_or(Vec2::ZERO, |place| Vec2::new(place.x, 1.0 - place.y)); 2],
-            color: color.copied().unwrap_or(Vec4::ONE),
-            ..CornerLook::default()
-        }
+        place.copied().filter(|place| place.is_finite())
+    }
+}
+
+/// Linear colours, where the file has some.
+struct Colors {
+    of_vertices: Vec<Vec3>,
+    of_faces: Vec<Vec3>,
+}
+
+impl Colors {
+    fn of(&self, face: usize, vertex: u32) -> Vec3 {
+        let color = self.of_vertices.get(vertex as usize);
+        let color = color.or_else(|| self.of_faces.get(face));
+        color.copied().unwrap_or(Vec3::ONE)
+    }
+}
+
+fn look(place: Option<Vec2>, color: Vec3) -> CornerLook {
+    CornerLook {
+        // The file's v grows upwards.
+        uv: [place.map_or(Vec2::ZERO, |place| Vec2::new(place.x, 1.0 - place.y)); 2],
+        color: color.extend(1.0),
+        ..CornerLook::default()
     }
 }
 
@@ -394,23 +472,16 @@ fn color_of(element: &Element) -> Option<[usize; 3]> {
     all(names.map(|names| element.index(&names)))
 }
 
-/// Linear RGB, and 1.
-fn linear_color(color: [usize; 3], element: &Element, numbers: &[f64]) -> Vec4 {
-    let part = |index: usize| {
+/// A colour: whole numbers in [0, 1], those with a point as they are written. What is none is white.
+fn written_color(color: [usize; 3], element: &Element, numbers: &[f64]) -> [f32; 3] {
+    color.map(|index| {
         let white = match element.properties[index].kind {
             Kind::One(scalar) => scalar.white(),
             Kind::List { .. } => 1.0,
         };
-        // Numbers with a point that are above 1 are of bytes.
-        let white = if white == 1.0 && color.iter().any(|&index| numbers[index] > 1.0) {
-            255.0
-        } else {
-            white
-        };
-        linear_from_srgb((numbers[index] / white).clamp(0.0, 1.0)) as f32
-    };
-    let [red, green, blue] = color.map(part);
-    Vec4::new(red, green, blue, 1.0)
+        let part = (numbers[index] / white) as f32;
+        if part.is_finite() { part } else { 1.0 }
+    })
 }
 
 fn index_of(number: f64, body: &Body) -> Result<u32, PlyError> {

@@ -59,6 +59,7 @@ const MISTAKES: &[Mistake] = &[
     added("[[virtual]]\nname = \"v\"\nmesh = \"models/cube.obj\"\npath = [{ position_m = [0, 0, 0] }]\n", 9, 9, &["the time in seconds is expected"]),
     added("[[virtual]]\nname = \"v\"\nmesh = \"models/cube.obj\"\npath = [{ time_s = 1 }, { time_s = 1 }]\n", 9, 25, &["the place before it has time_s = 1; allowed: a later time"]),
     added("[[virtual]]\nname = \"v\"\nmesh = \"models/cube.obj\"\npath_end = \"loop\"\n", 9, 12, &["path_end", "stay, repeat, return"]),
+    added("[[virtual]]\nname = \"v\"\nmesh = \"models/cube.obj\"\npath_end = \"stay\"\n", 9, 12, &["path_end", "along with path"]),
     // Shapes
     added("[[virtual]]\nname = \"v\"\nmesh = \"models/cube.obj\"\nbox_m = [1, 1, 1]\n", 9, 9, &["virtual.box_m = [1, 1, 1]: the thing has a shape, mesh; allowed: one of mesh, box_m"]),
     added("[[phantom]]\nname = \"p\"\nsphere_m = 1\ncone_m = [1, 1]\n", 8, 12, &["sphere_m = 1: the thing has a shape, cone_m"]),
