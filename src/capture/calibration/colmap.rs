@@ -1,6 +1,6 @@
 //! COLMAP's `cameras.txt`: a camera a line, `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`.
 
-use super::values::UncheckedCalibration;
+use super::values::{Lens, UncheckedCalibration};
 use crate::geometry::camera::Distortion;
 
 /// COLMAP counts from the picture's corner: its first pixel's centre is at .5.
@@ -86,7 +86,10 @@ fn camera(line: &str) -> Result<(String, UncheckedCalibration), String> {
         size_px: Some([side(width)?, side(height)?]),
         focal_px: f,
         center_px: c.map(|center| center - CENTER_PX),
-        distortion,
+        lens: Lens {
+            distortion,
+            is_said: true,
+        },
     };
     Ok((id.to_owned(), calibration))
 }
