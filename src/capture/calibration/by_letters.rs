@@ -5,7 +5,9 @@ use serde_json::{Map, Value};
 
 use super::entries::{Entry, entries, entry};
 use super::lens::{LETTERS, lens_by};
-use super::values::{LensModel, UncheckedCalibration, model_of, normalised, number, side_px};
+use super::values::{
+    LensModel, UncheckedCalibration, bad_side, model_of, normalised, number, side_px,
+};
 
 const FOCAL: [[&str; 3]; 2] = [["fx", "flx", "focalx"], ["fy", "fly", "focaly"]];
 const CENTER: [[&str; 3]; 2] = [["cx", "ppx", "principalx"], ["cy", "ppy", "principaly"]];
@@ -44,8 +46,7 @@ fn of_letters(letters: &[Entry<'_>]) -> Result<UncheckedCalibration, String> {
     };
     let side = |names: &[&str]| {
         let side = entry(letters, names).map(|entry| side_px(entry.value).ok_or(names[0]));
-        side.transpose()
-            .map_err(|name| format!("{name} must be a whole number of pixels from 1 to 32768"))
+        side.transpose().map_err(bad_side)
     };
     let model = lens_model(letters)?;
     let lens = lens_by(letters, model.unwrap_or(LensModel::ByNumber))?;

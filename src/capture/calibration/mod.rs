@@ -1,8 +1,8 @@
 //! Calibration files: gnomon's own TOML or JSON, a session's JSON, OpenCV's FileStorage (YAML, XML, JSON), ROS's
 //! `CameraInfo` and `ost.txt`, Kalibr's camchain and EuRoC's sensors, PhotonVision's and calib.io's JSON, whatever names
 //! `fx`, `fy`, `cx`, `cy` (RealSense, ORB-SLAM, VINS, NeRF), NumPy's arrays (`numpy.rs`), COLMAP's `cameras.txt`. All but the
-//! last become the same tree of values first (`tree.rs`), so there is one place that knows the keys (`kinds.rs`; `by_letters.rs`
-//! for the letters).
+//! last become the same tree of values first (`tree.rs`), so there is one place that knows the keys (`kinds.rs`; `lens.rs` for the
+//! lens's; `by_letters.rs` for the letters).
 
 mod by_letters;
 mod colmap;
@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec2;
 
 use self::values::{Lens, UncheckedCalibration};
-use crate::geometry::camera::{Distortion, Intrinsics};
+use crate::geometry::camera::{Distortion, Intrinsics, MOST_SIDE_PX};
 use crate::scene::in_its_place::in_place_of;
 use crate::scene::obj::text::decoded;
 use crate::scene::plain_file::{self, MOST_TEXT};
@@ -243,9 +243,9 @@ impl UncheckedCalibration {
                 "focal lengths, centre and distortion must be finite numbers".to_owned(),
             );
         }
-        if size_px.contains(&0) || size_px.iter().any(|&side| side > 32768) {
+        if size_px.contains(&0) || size_px.iter().any(|&side| side > MOST_SIDE_PX) {
             return refuse(format!(
-                "the picture size {} x {} must be from 1 to 32768",
+                "the picture size {} x {} must be from 1 to {MOST_SIDE_PX}",
                 size_px[0], size_px[1]
             ));
         }

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::geometry::camera::Distortion;
+use crate::geometry::camera::{Distortion, MOST_SIDE_PX};
 
 /// What a file says, before it is known to make sense.
 #[derive(Debug, Clone, PartialEq)]
@@ -133,11 +133,11 @@ pub(super) fn normalised(key: &str) -> String {
 
 pub(super) fn side_px(value: &Value) -> Option<u32> {
     let side = number(value)?;
-    (side.fract() == 0.0 && (1.0..=32768.0).contains(&side)).then_some(side as u32)
+    (side.fract() == 0.0 && (1.0..=f64::from(MOST_SIDE_PX)).contains(&side)).then_some(side as u32)
 }
 
 pub(super) fn bad_side(what: &str) -> String {
-    format!("{what} must be whole numbers of pixels from 1 to 32768")
+    format!("{what} must be whole numbers of pixels from 1 to {MOST_SIDE_PX}")
 }
 
 /// A finite number, in quotes too.
