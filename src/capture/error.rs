@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use super::calibration::CalibrationError;
+use crate::geometry::camera::MOST_SIDE_PX;
 
 /// Why a recording cannot be opened or read on.
 #[derive(Debug, thiserror::Error)]
@@ -89,6 +90,17 @@ pub enum CaptureError {
     NoGoodFrame {
         /// The recording.
         path: PathBuf,
+    },
+    /// Pictures that are all longer or wider than any that is read.
+    #[error(
+        "{}: pictures of {} x {} pixels; a side has at most {}",
+        path.display(), size_px[0], size_px[1], MOST_SIDE_PX
+    )]
+    TooLong {
+        /// The recording.
+        path: PathBuf,
+        /// Width and height of the first such picture.
+        size_px: [u32; 2],
     },
     /// OpenCV failed where it has no reason to.
     #[error("{}: frame {frame}: {message}", path.display())]

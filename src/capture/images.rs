@@ -58,8 +58,13 @@ impl ImageFrames {
         let size_px = paths
             .iter()
             .find_map(|path| read_picture(path).map(|picture| pixels::size_of(&picture)))
-            .ok_or_else(|| CaptureError::NoGoodFrame {
-                path: folder.to_owned(),
+            .ok_or_else(|| {
+                let too_long = paths.iter().find_map(|path| pixels::too_long(path));
+                let path = folder.to_owned();
+                match too_long {
+                    Some(size_px) => CaptureError::TooLong { path, size_px },
+                    None => CaptureError::NoGoodFrame { path },
+                }
             })?;
         Ok(Self {
             paths,

@@ -21,8 +21,8 @@ use crate::geometry::quarter_turns::QuarterTurns;
 use crate::scene::plain_file;
 
 pub use calibration::{
-    CalibrationError, calibration_text, check_frame_size, load_calibration, load_calibration_among,
-    load_calibration_for,
+    Assumed, CalibrationError, calibration_text, check_frame_size, load_calibration,
+    load_calibration_among, load_calibration_for,
 };
 pub use error::{CaptureError, Notice, notices_told};
 

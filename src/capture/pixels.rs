@@ -8,6 +8,7 @@ use image::{ImageFormat, ImageReader};
 use opencv::core::{Mat, MatTraitConst, Vec4b};
 use opencv::{imgcodecs, imgproc};
 
+use crate::geometry::camera::MOST_SIDE_PX;
 use crate::geometry::quarter_turns::QuarterTurns;
 use crate::scene::plain_file::{self, MOST_PICTURE};
 use crate::scene::tiff_header;
@@ -71,12 +72,19 @@ fn read(path: &Path, flags: i32) -> Option<Mat> {
     }
     let (width, height) = reader.into_dimensions().ok()?;
     let most = SMALL_PIXELS.max(file.len().saturating_mul(MOST_PIXELS_PER_BYTE));
-    if u64::from(width) * u64::from(height) > most {
+    if u64::from(width) * u64::from(height) > most || width.max(height) > MOST_SIDE_PX {
         return None;
     }
     imgcodecs::imread(path, flags)
         .ok()
         .filter(|picture| !picture.empty())
+}
+
+/// Width and height of a picture's file where one is longer than any that is read.
+pub(super) fn too_long(path: &Path) -> Option<[u32; 2]> {
+    let reader = ImageReader::open(path).ok()?.with_guessed_format().ok()?;
+    let (width, height) = reader.into_dimensions().ok()?;
+    (width.max(height) > MOST_SIDE_PX).then_some([width, height])
 }
 
 /// Width and height of a picture.
@@ -96,6 +104,23 @@ pub(super) fn rgba_from_bgr(bgr: &Mat) -> opencv::Result<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::capture::FrameSource;
+
+    #[test]
+    fn a_picture_with_a_side_past_the_most_is_refused_by_its_size() {
+        let folder = tempfile::tempdir().unwrap();
+        let open = |width: u32, height: u32| {
+            let path = folder.path().join("a.png");
+            image::GrayImage::new(width, height).save(&path).unwrap();
+            FrameSource::open(&path.display().to_string())
+        };
+        assert_eq!(open(32_767, 2).unwrap().size_px(), [32_767, 2]);
+        for [width, height] in [[32_768, 2], [2, 40_000]] {
+            let said = open(width, height).err().unwrap().to_string();
+            let size = format!("pictures of {width} x {height} pixels; a side has at most 32767");
+            assert!(said.contains(&size), "{said}");
+        }
+    }
 
     #[test]
     fn a_small_file_with_a_huge_header_is_no_picture() {

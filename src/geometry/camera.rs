@@ -4,6 +4,9 @@ use glam::{DMat2, DVec2, DVec3, Mat4, Vec4};
 
 pub use super::lens::Distortion;
 
+/// Pixels of the longest side of a picture: libapriltag ends the program on a longer one.
+pub const MOST_SIDE_PX: u32 = 32_767;
+
 /// Intrinsics of a camera: the matrix K and the lens distortion, both as OpenCV defines them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intrinsics {

@@ -14,7 +14,6 @@ use crate::scene::{ArucoRefinement, Family, Ink, TrackingSettings};
 /// OpenCV's detector for some dictionaries.
 pub(super) struct ArucoDetector {
     searches: Vec<DictionarySearch>,
-    refinement: ArucoRefinement,
     /// The picture's negative.
     inverted: Vec<u8>,
 }
@@ -24,6 +23,7 @@ struct DictionarySearch {
     family: Family,
     /// The turn of the dictionary's pictures against the prints.
     quarter_turns: usize,
+    refinement: ArucoRefinement,
     refining: DetectorDictionary,
     /// The same without a refinement of corners, for pictures in which that fails.
     plain: DetectorDictionary,
@@ -53,7 +53,6 @@ impl ArucoDetector {
             .map(|&family| DictionarySearch::new(settings, family));
         Ok(Self {
             searches: searches.collect::<Result<_, _>>()?,
-            refinement: settings.aruco_refinement,
             inverted: Vec::new(),
         })
     }
@@ -69,18 +68,27 @@ impl ArucoDetector {
             self.inverted.extend(grey.iter().map(|level| 255 - level));
         }
         let mut detections = Vec::new();
+        let picture = Grey {
+            levels: grey,
+            size_px,
+        };
         for search in &self.searches {
+            // Black on white, for what is of the other ink is found as well.
             let levels = match is_inverted(search) {
                 true => &self.inverted,
                 false => grey,
             };
-            let picture = Grey { levels, size_px };
-            for found in search.found_in(picture, self.refinement) {
-                if !border_ends(picture, search.family.cells_across(), found.corners_px) {
+            let as_black = Grey { levels, size_px };
+            for found in search.found_in(picture) {
+                if !border_ends(as_black, search.family.cells_across(), found.corners_px) {
                     continue;
                 }
-                let corners =
-                    corners_from_aruco(found.corners_px, search.quarter_turns, found.refinement);
+                let corners = corners_from_aruco(
+                    found.corners_px,
+                    search.quarter_turns,
+                    found.refinement,
+                    search.family.ink(),
+                );
                 let Ok(id) = u32::try_from(found.id) else {
                     continue;
                 };
@@ -109,12 +117,16 @@ impl DictionarySearch {
                     .join(", "),
             })?;
         let bits = settings.corrected_bits.min(family.correctable_bits()) as i32;
-        let border_cells = family.border_cells() as i32;
-        let dictionary =
-            |refinement| DetectorDictionary::new(codes, border_cells, bits, refinement);
-        let refining = dictionary(settings.aruco_refinement)?;
+        let dictionary = |refinement| DetectorDictionary::new(codes, family, bits, refinement);
+        // OpenCV's refinement takes the outer edge of the black ring about a far one for its own.
+        let refinement = match family.ink() {
+            Ink::BlackOnWhite => settings.aruco_refinement,
+            Ink::WhiteOnBlack => ArucoRefinement::None,
+        };
+        let refining = dictionary(refinement)?;
         Ok(Self {
             family,
+            refinement,
             quarter_turns: quarter_turns(family, &refining)?,
             refining,
             plain: dictionary(ArucoRefinement::None)?,
@@ -123,7 +135,8 @@ impl DictionarySearch {
 
     /// The markers of a picture. OpenCV gives up a whole picture when one candidate in it is not to its taste; that
     /// candidate alone is left out.
-    fn found_in(&self, picture: Grey<'_>, refinement: ArucoRefinement) -> Vec<Found> {
+    fn found_in(&self, picture: Grey<'_>) -> Vec<Found> {
+        let refinement = self.refinement;
         if let Ok(found) = found(&self.refining, picture, refinement) {
             return found;
         }
@@ -255,8 +268,7 @@ pub fn rejected_quads(frame: &Frame, family: Family) -> Result<Vec<Quad>, Tracki
     };
     let mut grey = Vec::new();
     super::grey_from_rgba(frame, &mut grey)?;
-    let border_cells = family.border_cells() as i32;
-    let dictionary = DetectorDictionary::new(codes, border_cells, 0, ArucoRefinement::None)?;
+    let dictionary = DetectorDictionary::new(codes, family, 0, ArucoRefinement::None)?;
     let mut rejected = Vector::<Vector<Point2f>>::new();
     let image =
         Mat::new_rows_cols_with_data(frame.size_px[1] as i32, frame.size_px[0] as i32, &grey)?;

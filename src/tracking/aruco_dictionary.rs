@@ -9,7 +9,7 @@ use super::TrackingError;
 use super::apriltag;
 use super::conventions::quarter_turns_between;
 use super::printed_marker::{Cell, PrintedMarker};
-use crate::scene::{ArucoRefinement, Codes, Dictionary, Family};
+use crate::scene::{ArucoRefinement, Codes, Dictionary, Family, Ink};
 
 pub(super) use installed::DetectorDictionary;
 
@@ -21,8 +21,7 @@ pub(super) fn installed_marker(
     let Some(codes) = installed_codes(family.codes()).filter(|_| id < family.id_count()) else {
         return Ok(None);
     };
-    let border_cells = family.border_cells() as i32;
-    let dictionary = DetectorDictionary::new(codes, border_cells, 0, ArucoRefinement::None)?;
+    let dictionary = DetectorDictionary::new(codes, family, 0, ArucoRefinement::None)?;
     let side = family.cells_across();
     let white = dictionary.cells(id as i32, side as usize)?;
     let cells = white.into_iter().map(|white| match white {
@@ -98,6 +97,12 @@ fn byte_list(
     Ok(list)
 }
 
+/// Whether OpenCV looks for markers of both inks. Around a printed one in white on black lies a black ring, and of two outlines
+/// that near it drops the inner one, but in a search for both inks. Which ink one has is then told by its border's end.
+fn is_inverted(family: Family) -> bool {
+    family.ink() == Ink::WhiteOnBlack
+}
+
 /// `cv::aruco::CornerRefineMethod`, the same numbers in all releases.
 fn refinement_number(refinement: ArucoRefinement) -> i32 {
     match refinement {
@@ -124,8 +129,8 @@ mod installed {
     use opencv::core::{Mat, Point2f, Ptr, ToInputArray, Vector};
     use opencv::prelude::*;
 
-    use super::{InstalledCodes, byte_list, refinement_number, white_cells};
-    use crate::scene::ArucoRefinement;
+    use super::{InstalledCodes, byte_list, is_inverted, refinement_number, white_cells};
+    use crate::scene::{ArucoRefinement, Family};
 
     pub(in crate::tracking) struct DetectorDictionary {
         dictionary: Ptr<aruco::Dictionary>,
@@ -135,7 +140,7 @@ mod installed {
     impl DetectorDictionary {
         pub(in crate::tracking) fn new(
             codes: InstalledCodes,
-            border_cells: i32,
+            family: Family,
             corrected_bits: i32,
             refinement: ArucoRefinement,
         ) -> opencv::Result<Self> {
@@ -149,7 +154,8 @@ mod installed {
             };
             dictionary.set_max_correction_bits(corrected_bits);
             let mut parameters = aruco::DetectorParameters::create()?;
-            parameters.set_marker_border_bits(border_cells);
+            parameters.set_marker_border_bits(family.border_cells() as i32);
+            parameters.set_detect_inverted_marker(is_inverted(family));
             parameters.set_error_correction_rate(1.0);
             parameters.set_corner_refinement_method(refinement_number(refinement));
             Ok(Self {
@@ -197,8 +203,8 @@ mod installed {
     use opencv::objdetect;
     use opencv::prelude::*;
 
-    use super::{InstalledCodes, byte_list, refinement_number, white_cells};
-    use crate::scene::ArucoRefinement;
+    use super::{InstalledCodes, byte_list, is_inverted, refinement_number, white_cells};
+    use crate::scene::{ArucoRefinement, Family};
 
     pub(in crate::tracking) struct DetectorDictionary {
         dictionary: objdetect::Dictionary,
@@ -208,7 +214,7 @@ mod installed {
     impl DetectorDictionary {
         pub(in crate::tracking) fn new(
             codes: InstalledCodes,
-            border_cells: i32,
+            family: Family,
             corrected_bits: i32,
             refinement: ArucoRefinement,
         ) -> opencv::Result<Self> {
@@ -225,7 +231,8 @@ mod installed {
             };
             dictionary.set_max_correction_bits(corrected_bits);
             let mut parameters = objdetect::DetectorParameters::default()?;
-            parameters.set_marker_border_bits(border_cells);
+            parameters.set_marker_border_bits(family.border_cells() as i32);
+            parameters.set_detect_inverted_marker(is_inverted(family));
             parameters.set_error_correction_rate(1.0);
             parameters.set_corner_refinement_method(refinement_number(refinement));
             let refine = objdetect::RefineParameters::new_def()?;
@@ -270,8 +277,7 @@ mod tests {
 
     fn installed_dictionary(family: Family) -> DetectorDictionary {
         let codes = installed_codes(family.codes()).unwrap();
-        let border_cells = family.border_cells() as i32;
-        DetectorDictionary::new(codes, border_cells, 0, ArucoRefinement::None).unwrap()
+        DetectorDictionary::new(codes, family, 0, ArucoRefinement::None).unwrap()
     }
 
     #[test]

@@ -8,7 +8,7 @@
 
 use glam::DVec2;
 
-use crate::scene::{ArucoRefinement, Drawing};
+use crate::scene::{ArucoRefinement, Drawing, Ink};
 
 /// Corners as printed from those of libapriltag.
 pub(super) fn corners_from_apriltag(corners: [DVec2; 4]) -> [DVec2; 4] {
@@ -32,25 +32,31 @@ pub(super) fn corners_from_aruco(
     corners: [DVec2; 4],
     quarter_turns: usize,
     refinement: ArucoRefinement,
+    ink: Ink,
 ) -> [DVec2; 4] {
+    // Contours are of what is dark: within a black marker's edge, outside of a white one's.
+    let inside_px = match ink {
+        Ink::BlackOnWhite => 0.5,
+        Ink::WhiteOnBlack => -0.5,
+    };
     let corners = match refinement {
         ArucoRefinement::AprilTag => corners.map(|corner| corner - DVec2::splat(0.5)),
-        ArucoRefinement::None | ArucoRefinement::Contour => edge_from_contour(corners),
+        ArucoRefinement::None | ArucoRefinement::Contour => edge_from_contour(corners, inside_px),
         ArucoRefinement::Subpixel => corners,
     };
     std::array::from_fn(|k| corners[(k + quarter_turns) % 4])
 }
 
-/// Moves a contour's four sides outward by what they lie inside the edge: on average half a pixel along the axis that
+/// Moves a contour's four sides outward by what they lie inside the edge: on average `inside_px` along the axis that
 /// they cross.
-fn edge_from_contour(corners: [DVec2; 4]) -> [DVec2; 4] {
+fn edge_from_contour(corners: [DVec2; 4], inside_px: f64) -> [DVec2; 4] {
     let sides: [(DVec2, f64); 4] = std::array::from_fn(|k| {
         let along = (corners[(k + 1) % 4] - corners[k]).normalize_or_zero();
         // Clockwise with y down: outside is on the left hand.
         let outward = DVec2::new(along.y, -along.x);
         (
             outward,
-            outward.dot(corners[k]) + 0.5 * outward.abs().max_element(),
+            outward.dot(corners[k]) + inside_px * outward.abs().max_element(),
         )
     });
     std::array::from_fn(|k| {
@@ -115,7 +121,7 @@ mod tests {
         // Black pixels 10..=19: their centres' contour, and the edge of what they cover.
         let contour = [(10.0, 10.0), (19.0, 10.0), (19.0, 19.0), (10.0, 19.0)].map(DVec2::from);
         let edge = [(9.5, 9.5), (19.5, 9.5), (19.5, 19.5), (9.5, 19.5)].map(DVec2::from);
-        for (grown, corner) in edge_from_contour(contour).into_iter().zip(edge) {
+        for (grown, corner) in edge_from_contour(contour, 0.5).into_iter().zip(edge) {
             assert!((grown - corner).length() < 1e-12);
         }
     }
@@ -124,7 +130,12 @@ mod tests {
     fn the_top_left_of_the_print_comes_first() {
         let [a, b, c, d] = [0.0, 1.0, 2.0, 3.0].map(DVec2::splat);
         // The print turned by 90° clockwise: OpenCV's first corner (its top left) is the print's bottom left.
-        let as_printed = corners_from_aruco([d, a, b, c], 1, ArucoRefinement::Subpixel);
+        let as_printed = corners_from_aruco(
+            [d, a, b, c],
+            1,
+            ArucoRefinement::Subpixel,
+            Ink::BlackOnWhite,
+        );
         assert_eq!(as_printed, [a, b, c, d]);
     }
 }

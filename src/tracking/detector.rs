@@ -10,6 +10,7 @@ use super::apriltag::AprilTagDetector;
 use super::aruco::ArucoDetector;
 use super::belief::is_proven;
 use super::light::Grey;
+use super::reading::has_whole_border;
 use super::refine::refined;
 use crate::scene::format::{AnyKey, TRACKING};
 use crate::scene::{ArucoRefinement, DetectorKind, Family, TrackingSettings};
@@ -243,10 +244,11 @@ impl Detector {
         let mut detections = Vec::with_capacity(tags.len() + others.len());
         for (found, refines) in [(tags, self.refines.april_tag), (others, self.refines.aruco)] {
             let is_finite = |corners: &[DVec2; 4]| corners.iter().all(|corner| corner.is_finite());
-            let finite = found
-                .into_iter()
-                .filter(|found| is_finite(&found.corners_px));
-            detections.extend(finite.map(|mut detection| {
+            let whole = found.into_iter().filter(|found| {
+                is_finite(&found.corners_px)
+                    && has_whole_border(picture, found.family, found.corners_px)
+            });
+            detections.extend(whole.map(|mut detection| {
                 if refines {
                     let lighter_outside = detection.family.is_lighter_outside();
                     detection.corners_px = refined(picture, detection.corners_px, lighter_outside);

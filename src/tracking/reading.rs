@@ -15,7 +15,7 @@ use super::marker_template::MarkerTemplate;
 use super::printed_marker::PrintedMarker;
 use super::{Detection, TrackingError};
 use crate::geometry::homography::linear_homography;
-use crate::scene::{Family, Marker};
+use crate::scene::{Family, Ink, Marker};
 
 /// A cell of more pixels is looked at in more than one place for each sample.
 const SAMPLE_PX: f64 = 2.0;
@@ -117,7 +117,36 @@ pub(super) fn border_ends(picture: Grey<'_>, side: u32, corners_px: [DVec2; 4]) 
     ending.count() >= 2
 }
 
-/// The same, where `place` puts a point in cells from the square's top left corner, pixels.
+/// Whether a border of several cells is as wide as its family's: the rings of cells after the first are of its ink too. With a
+/// bit or two corrected, a code within one cell is read as one within two. What leaves the picture counts as there.
+pub(super) fn has_whole_border(picture: Grey<'_>, family: Family, corners_px: [DVec2; 4]) -> bool {
+    /// Of the way from the outer ring's level to that of the code's other ink.
+    const MOST: f32 = 0.25;
+    let side = f64::from(family.cells_across());
+    let Some(place) = place_by_corners(side, corners_px) else {
+        return true;
+    };
+    let levels = |ring: u32| {
+        let (first, last) = (f64::from(ring) + 0.5, side - f64::from(ring) - 0.5);
+        let along = (0..=(last - first) as u32).map(move |step| first + f64::from(step));
+        let cells = along.flat_map(move |at| [(at, first), (at, last), (first, at), (last, at)]);
+        let levels = cells.filter_map(|cell| picture.level(place(DVec2::from(cell))?));
+        match family.ink() {
+            Ink::BlackOnWhite => levels.collect(),
+            Ink::WhiteOnBlack => levels.map(|level| -level).collect::<Vec<f32>>(),
+        }
+    };
+    let mean = |levels: &[f32]| levels.iter().sum::<f32>() / levels.len() as f32;
+    let outer = mean(&levels(0));
+    let within = (1..family.cells_across() / 2).flat_map(levels);
+    let other_ink = within.fold(outer, f32::max);
+    (1..family.border_cells()).all(|ring| {
+        let seen = mean(&levels(ring)) - outer;
+        seen.is_nan() || seen <= MOST * (other_ink - outer)
+    })
+}
+
+/// The agreement of [`agreement_at_corners`], where `place` puts a point in cells from the square's top left corner, pixels.
 pub(super) fn agreement(
     picture: Grey<'_>,
     template: &MarkerTemplate,

@@ -359,6 +359,10 @@ fn mistakes_say_what_is_allowed_and_leave_nothing() {
         ),
         ("--board 3x2 --size-mm 45 --out x.pdf", "--gap-mm"),
         ("--ids 587 --size-mm 36 --out x.pdf", "it has 0 to 586"),
+        (
+            "--ids 17,18,17 --size-mm 36 --out x.pdf",
+            "--ids has 17 twice",
+        ),
         ("--ids 1 --size-mm 300 --out x.pdf", "does not fit"),
         ("--ids 1 --size-mm nan --out x.pdf", "allowed: 3 to 400"),
         (

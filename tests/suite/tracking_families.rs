@@ -13,7 +13,7 @@ const SIZE_M: f64 = 0.06;
 /// Samples of a pixel along each side.
 const SAMPLES: u32 = 4;
 
-/// A card with a marker, as printed and cut out with two cells of paper around it.
+/// A card with a marker, as printed and cut out with two cells of paper around it, of which white on black has one black.
 fn card(family: Family, id: u32, camera_from_card: &DAffine3) -> Frame {
     let printed = PrintedMarker::of(family, id).expect("a marker");
     let cell_m = SIZE_M / f64::from(printed.side());
@@ -29,7 +29,9 @@ fn card(family: Family, id: u32, camera_from_card: &DAffine3) -> Frame {
         if !on_paper.contains(&column) || !on_paper.contains(&row) {
             return 0.2;
         }
+        let in_ring = -printed.rim() - 1..printed.side() + printed.rim() + 1;
         match printed.cell(column, row) {
+            _ if !in_ring.contains(&column) || !in_ring.contains(&row) => 0.8,
             Cell::Black => 0.03,
             // Whoever prints an open cell leaves it as the paper is.
             Cell::White | Cell::Open => 0.8,
@@ -80,6 +82,52 @@ fn every_family_is_found_where_its_print_lies() {
             off_m < 0.001 && off_deg < 0.5,
             "{family}: {off_m} m, {off_deg}°"
         );
+    }
+}
+
+/// On a sheet each has a black ring about its white one, which is a frame too.
+#[test]
+fn inverted_markers_are_found_on_the_sheets_that_are_printed() {
+    let settings = TrackingSettings::default();
+    for name in ["DICT_7X7_50", "DICT_6X6_250", "ARUCO_MIP_36h12"] {
+        let family = Family::from_name(name).unwrap();
+        let inverted = family.with_ink(Ink::WhiteOnBlack);
+        for (id, height_m) in [(0, 0.3), (7, 0.38), (23, 0.5)] {
+            let pose = camera_above(25.0, 30.0, DVec3::new(0.0, 0.0, height_m));
+            for (printed, other) in [(inverted, family), (family, inverted)] {
+                let frame = card(printed, id, &pose);
+                let found = |of: Family| {
+                    let mut tracker =
+                        Tracker::of_every_marker(&settings, (of, SIZE_M), CAMERA).unwrap();
+                    tracker.track(&frame).unwrap().len()
+                };
+                let counts = (found(printed), found(other));
+                assert_eq!(counts, (1, 0), "{printed} {id} {height_m}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_marker_of_another_border_is_another_marker() {
+    let narrow = Family::TAG36H11;
+    let wide = narrow.with_border(2).unwrap();
+    let pose = camera_above(25.0, 30.0, DVec3::new(0.0, 0.0, 0.35));
+    let settings = TrackingSettings::default();
+    for id in 0..6 {
+        for (printed, other) in [(wide, narrow), (narrow, wide)] {
+            let frame = card(printed, id, &pose);
+            let found = |of: Family| {
+                let anchors = [Anchor::lone("card".into(), of, id, SIZE_M)];
+                let mut tracker = Tracker::new(&settings, &anchors, CAMERA).unwrap();
+                tracker.track(&frame).unwrap()[0].status != Status::Lost
+            };
+            assert_eq!(
+                (found(printed), found(other)),
+                (true, false),
+                "{printed} {id}"
+            );
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 
+use crate::app::talk;
 use crate::capture::live::{LiveOptions, is_live};
 use crate::capture::{CalibrationError, FrameSource, load_calibration, load_calibration_among};
 use crate::geometry::camera::Intrinsics;
@@ -23,12 +24,17 @@ impl LiveInput {
     /// A calibration that cannot be read.
     pub fn of(camera: &CameraSettings) -> Result<Self> {
         let calibration = match &camera.calibration {
-            Some(path) => Some(match (load_calibration(path), camera.wanted.size_px) {
-                (Err(CalibrationError::NoSize { .. }), Some(wanted_px)) => {
-                    load_calibration_among(path, wanted_px)?.0
+            Some(path) => {
+                let size_px = match (load_calibration(path), camera.wanted.size_px) {
+                    (Err(CalibrationError::NoSize { .. }), Some(wanted_px)) => wanted_px,
+                    (loaded, _) => loaded?.size_px,
+                };
+                let (intrinsics, assumed) = load_calibration_among(path, size_px)?;
+                for assumed in assumed {
+                    talk::say(assumed.told(path, size_px, &camera.source));
                 }
-                (loaded, _) => loaded?,
-            }),
+                Some(intrinsics)
+            }
             None if is_live(&camera.source) => None,
             None => FrameSource::open(&camera.source)?.calibration(),
         };

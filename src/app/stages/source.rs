@@ -72,14 +72,9 @@ pub(crate) fn open_as_it_is(camera: &CameraSettings) -> Result<(FrameSource, Opt
     }
     let calibration = match &camera.calibration {
         Some(path) => {
-            let [width, height] = source.size_px();
-            let (intrinsics, is_size_assumed) = load_calibration_among(path, [width, height])?;
-            if is_size_assumed {
-                talk::say(format!(
-                    "{} does not say for which picture size it holds; taken to be {width} x {height}, as {} has",
-                    path.display(),
-                    camera.source
-                ));
+            let (intrinsics, assumed) = load_calibration_among(path, source.size_px())?;
+            for assumed in assumed {
+                talk::say(assumed.told(path, source.size_px(), &camera.source));
             }
             Some(intrinsics)
         }

@@ -1,7 +1,7 @@
 //! COLMAP's `cameras.txt`: a camera a line, `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`.
 
-use super::values::UncheckedCalibration;
-use crate::geometry::camera::Distortion;
+use super::values::{Lens, UncheckedCalibration};
+use crate::geometry::camera::{Distortion, MOST_SIDE_PX};
 
 /// COLMAP counts from the picture's corner: its first pixel's centre is at .5.
 const CENTER_PX: f64 = 0.5;
@@ -38,8 +38,10 @@ fn camera(line: &str) -> Result<(String, UncheckedCalibration), String> {
         let side = word
             .parse::<u32>()
             .ok()
-            .filter(|side| (1..=32768).contains(side));
-        side.ok_or_else(|| format!("'{word}' must be a side of the picture, 1 to 32768 pixels"))
+            .filter(|side| (1..=MOST_SIDE_PX).contains(side));
+        side.ok_or_else(|| {
+            format!("'{word}' must be a side of the picture, 1 to {MOST_SIDE_PX} pixels")
+        })
     };
     let numbers: Vec<f64> = parameters
         .iter()
@@ -86,7 +88,10 @@ fn camera(line: &str) -> Result<(String, UncheckedCalibration), String> {
         size_px: Some([side(width)?, side(height)?]),
         focal_px: f,
         center_px: c.map(|center| center - CENTER_PX),
-        distortion,
+        lens: Lens {
+            distortion,
+            is_said: true,
+        },
     };
     Ok((id.to_owned(), calibration))
 }

@@ -1,10 +1,15 @@
 //! What the trees of calibration files mean: the one place that knows their keys.
 
+use std::borrow::Cow;
+use std::collections::HashMap;
+
 use serde_json::{Map, Value};
 
 use super::by_letters;
+use super::entries::{entries, entries_with, is_matrix};
+use super::lens::{LETTERS, is_of_lens, lens_of, matrix_numbers};
 use super::values::{
-    UncheckedCalibration, bad_side, by_number, distortion, flat_numbers, model_of, normalised,
+    Lens, UncheckedCalibration, bad_side, by_number, flat_numbers, is_model_key, normalised,
     side_px,
 };
 
@@ -23,15 +28,6 @@ const MATRIX_KEYS: [&str; 8] = [
     "cameraintrinsics",
     "k",
     "mtx",
-];
-const DISTORTION_KEYS: [&str; 7] = [
-    "distortioncoefficients",
-    "distcoeffs",
-    "distortioncoeffs",
-    "distcoeff",
-    "distortion",
-    "d",
-    "dist",
 ];
 const WIDTH_KEYS: [&str; 2] = ["imagewidth", "width"];
 const HEIGHT_KEYS: [&str; 2] = ["imageheight", "height"];
@@ -88,7 +84,8 @@ fn known_cameras(tree: &Map<String, Value>, levels: u32) -> Result<Named, String
         let cameras = tree.iter().filter(|(_, entry)| is_kalibr(entry));
         return cameras
             .map(|(name, entry)| {
-                let camera = entry.as_object().map(of_kalibr);
+                let camera = entry.as_object();
+                let camera = camera.map(|camera| of_kalibr(&with_model_of(tree, camera)));
                 let camera = camera.unwrap_or_else(|| Err("must be a table".to_owned()));
                 Ok((
                     name.clone(),
@@ -102,7 +99,7 @@ fn known_cameras(tree: &Map<String, Value>, levels: u32) -> Result<Named, String
     if tree.get("intrinsics").is_some_and(has_four) {
         return one(of_kalibr(tree)?);
     }
-    if find(tree, &MATRIX_KEYS).is_some_and(|(_, matrix)| data_of(matrix).is_array()) {
+    if find(tree, &MATRIX_KEYS).is_some_and(|(_, matrix)| matrix.is_array() || is_matrix(matrix)) {
         return one(of_opencv(tree)?);
     }
     if let Some(camera) = by_letters::camera(tree) {
@@ -119,7 +116,8 @@ fn of_inner_tables(tree: &Map<String, Value>, levels: u32) -> Result<Named, Stri
     }
     let size_px = size_of(tree)?;
     let mut look = |name: String, inner: &Map<String, Value>| {
-        let cameras = known_cameras(inner, levels - 1).map_err(|why| format!("{name}: {why}"))?;
+        let cameras = known_cameras(&with_model_of(tree, inner), levels - 1)
+            .map_err(|why| format!("{name}: {why}"))?;
         found.extend(cameras.into_iter().map(|(_, camera)| {
             let size_px = camera.size_px.or(size_px);
             (name.clone(), UncheckedCalibration { size_px, ..camera })
@@ -143,6 +141,26 @@ fn of_inner_tables(tree: &Map<String, Value>, levels: u32) -> Result<Named, Stri
     Ok(found)
 }
 
+/// A table within a tree, with the keys beside it that decide the lens's model where it has none of its own.
+fn with_model_of<'a>(
+    tree: &Map<String, Value>,
+    inner: &'a Map<String, Value>,
+) -> Cow<'a, Map<String, Value>> {
+    let is_model = |key: &str| is_model_key(&normalised(key));
+    let outer = tree
+        .iter()
+        .filter(|(key, value)| is_model(key) && !value.is_object());
+    let mut outer = outer
+        .map(|(key, value)| (key.clone(), value.clone()))
+        .peekable();
+    if outer.peek().is_none() || inner.keys().any(|key| is_model(key)) {
+        return Cow::Borrowed(inner);
+    }
+    let mut all = inner.clone();
+    all.extend(outer);
+    Cow::Owned(all)
+}
+
 /// `size_px = [640, 480]`, `focal_px`, `center_px`, `model = "fisheye"`, `distortion = [k1, k2, p1, p2, k3]`.
 fn of_own(tree: &Map<String, Value>) -> Result<UncheckedCalibration, String> {
     if let Some(unknown) = tree.keys().find(|key| !OWN_KEYS.contains(&key.as_str())) {
@@ -161,7 +179,7 @@ fn of_own(tree: &Map<String, Value>) -> Result<UncheckedCalibration, String> {
         size_px: tree.get("size_px").map(size).transpose()?,
         focal_px: pair("focal_px")?,
         center_px: pair("center_px")?,
-        distortion: distortion(model_of(tree)?, tree.get("distortion"))?,
+        lens: lens_of(&entries(tree, 0))?,
     })
 }
 
@@ -178,16 +196,17 @@ fn of_session(camera: &Map<String, Value>) -> Result<UncheckedCalibration, Strin
         size_px: camera.get("size").map(size).transpose()?,
         focal_px: [entry("fx")?, entry("fy")?],
         center_px: [entry("cx")?, entry("cy")?],
-        distortion: distortion(model_of(camera)?, camera.get("dist"))?,
+        lens: lens_of(&entries(camera, 0))?,
     })
 }
 
 /// What the calibration tools of OpenCV, ROS 1, ROS 2 and PhotonVision write.
 fn of_opencv(tree: &Map<String, Value>) -> Result<UncheckedCalibration, String> {
-    let model = model_of(tree)?;
+    let lens = lens_of(&entries_with(tree, is_of_lens))?;
     refuse_cut_pictures(tree)?;
     let (key, matrix) = find(tree, &MATRIX_KEYS).ok_or("the camera matrix is missing")?;
-    let [fx, skew, mut cx, s1, fy, mut cy, mut s2, mut s3, one] = numbers::<9>(data_of(matrix))
+    let [fx, skew, mut cx, s1, fy, mut cy, mut s2, mut s3, one] = matrix_numbers(key, matrix)?
+        .and_then(|numbers| <[f64; 9]>::try_from(numbers).ok())
         .ok_or_else(|| format!("{key} must be a matrix of 3 x 3 finite numbers"))?;
     // Open3D and MATLAB write columns where others write rows. No picture has its centre at its corner.
     if [cx, cy] == [0.0; 2] {
@@ -196,18 +215,17 @@ fn of_opencv(tree: &Map<String, Value>) -> Result<UncheckedCalibration, String> 
     if [skew, s1, s2, s3] != [0.0; 4] || one != 1.0 {
         return Err(format!("{key} must be [fx 0 cx; 0 fy cy; 0 0 1]"));
     }
-    let coefficients = find(tree, &DISTORTION_KEYS).map(|(_, value)| data_of(value));
     Ok(UncheckedCalibration {
         size_px: size_of(tree)?,
         focal_px: [fx, fy],
         center_px: [cx, cy],
-        distortion: distortion(model, coefficients)?,
+        lens,
     })
 }
 
 /// A camera of Kalibr's camchain: `camera_model`, `intrinsics`, `distortion_model`, `distortion_coeffs`, `resolution`.
 fn of_kalibr(camera: &Map<String, Value>) -> Result<UncheckedCalibration, String> {
-    let model = model_of(camera)?;
+    let lens = lens_of(&entries_with(camera, is_of_lens))?;
     let [fx, fy, cx, cy] = camera
         .get("intrinsics")
         .and_then(numbers::<4>)
@@ -216,10 +234,7 @@ fn of_kalibr(camera: &Map<String, Value>) -> Result<UncheckedCalibration, String
         size_px: size_of(camera)?,
         focal_px: [fx, fy],
         center_px: [cx, cy],
-        distortion: distortion(
-            model,
-            find(camera, &DISTORTION_KEYS).map(|(_, value)| value),
-        )?,
+        lens,
     })
 }
 
@@ -228,20 +243,41 @@ fn of_calib_io(list: &Value) -> Result<Named, String> {
     let list = list
         .as_array()
         .ok_or("Calibration.cameras must be a list")?;
-    let cameras = list.iter().enumerate().map(|(k, entry)| {
-        let name = format!("camera {k}");
-        let camera = of_calib_io_camera(entry).map_err(|why| format!("{name}: {why}"))?;
-        Ok((name, camera))
-    });
+    let kinds = calib_io_kinds(list);
+    let cameras = list
+        .iter()
+        .zip(kinds)
+        .enumerate()
+        .map(|(k, (entry, kind))| {
+            let name = format!("camera {k}");
+            let camera = of_calib_io_camera(entry, kind).map_err(|why| format!("{name}: {why}"))?;
+            Ok((name, camera))
+        });
     cameras.collect()
 }
 
-fn of_calib_io_camera(entry: &Value) -> Result<UncheckedCalibration, String> {
-    const COEFFICIENTS: [&str; 14] = [
-        "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tauX", "tauY",
-    ];
+/// The kinds of calib.io's cameras. Its library (cereal) writes a kind's name where it first occurs, with the top bit of its
+/// number set, and from then on the number alone.
+fn calib_io_kinds(list: &[Value]) -> Vec<&str> {
+    const NUMBER: u64 = 0x7fff_ffff;
+    let mut names = HashMap::new();
+    let mut kinds = Vec::with_capacity(list.len());
+    for entry in list {
+        let model = &entry["model"];
+        let number = model["polymorphic_id"].as_u64().map(|id| id & NUMBER);
+        let known = names.get(&number).copied();
+        let kind = model["polymorphic_name"]
+            .as_str()
+            .or(known)
+            .unwrap_or("none");
+        names.insert(number, kind);
+        kinds.push(kind);
+    }
+    kinds
+}
+
+fn of_calib_io_camera(entry: &Value, kind: &str) -> Result<UncheckedCalibration, String> {
     let model = &entry["model"];
-    let kind = model["polymorphic_name"].as_str().unwrap_or("none");
     if kind != "libCalib::CameraModelOpenCV" {
         return Err(format!(
             "the camera model '{kind}' is not supported; libCalib::CameraModelOpenCV is"
@@ -266,13 +302,13 @@ fn of_calib_io_camera(entry: &Value) -> Result<UncheckedCalibration, String> {
     let needed = |name: &str| value(name)?.ok_or_else(|| format!("{name} is missing"));
     let known = ["f", "ar", "cx", "cy"];
     let mut names = parameters.keys().map(String::as_str);
-    if let Some(other) = names.find(|name| !known.contains(name) && !COEFFICIENTS.contains(name))
+    if let Some(other) = names.find(|name| !known.contains(name) && !LETTERS.contains(name))
         && value(other)?.is_none_or(|value| value != 0.0)
     {
         return Err(format!("the parameter '{other}' is not supported"));
     }
     let mut all = [0.0; 14];
-    for (coefficient, name) in all.iter_mut().zip(COEFFICIENTS) {
+    for (coefficient, name) in all.iter_mut().zip(LETTERS) {
         *coefficient = value(name)?.unwrap_or(0.0);
     }
     let focal = needed("f")?;
@@ -282,7 +318,10 @@ fn of_calib_io_camera(entry: &Value) -> Result<UncheckedCalibration, String> {
         size_px: sides,
         focal_px: [focal, focal * value("ar")?.unwrap_or(1.0)],
         center_px: [needed("cx")?, needed("cy")?],
-        distortion: by_number(&all)?,
+        lens: Lens {
+            distortion: by_number(&all)?,
+            is_said: true,
+        },
     })
 }
 

@@ -1,12 +1,14 @@
 //! Calibration files: gnomon's own TOML or JSON, a session's JSON, OpenCV's FileStorage (YAML, XML, JSON), ROS's
 //! `CameraInfo` and `ost.txt`, Kalibr's camchain and EuRoC's sensors, PhotonVision's and calib.io's JSON, whatever names
 //! `fx`, `fy`, `cx`, `cy` (RealSense, ORB-SLAM, VINS, NeRF), NumPy's arrays (`numpy.rs`), COLMAP's `cameras.txt`. All but the
-//! last become the same tree of values first (`tree.rs`), so there is one place that knows the keys (`kinds.rs`; `by_letters.rs`
-//! for the letters).
+//! last become the same tree of values first (`tree.rs`), so there is one place that knows the keys (`kinds.rs`; `lens.rs` for the
+//! lens's; `by_letters.rs` for the letters).
 
 mod by_letters;
 mod colmap;
+mod entries;
 mod kinds;
+mod lens;
 mod numpy;
 mod ost;
 mod tree;
@@ -16,8 +18,8 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec2;
 
-use self::values::UncheckedCalibration;
-use crate::geometry::camera::{Distortion, Intrinsics};
+use self::values::{Lens, UncheckedCalibration};
+use crate::geometry::camera::{Distortion, Intrinsics, MOST_SIDE_PX};
 use crate::scene::in_its_place::in_place_of;
 use crate::scene::obj::text::decoded;
 use crate::scene::plain_file::{self, MOST_TEXT};
@@ -99,17 +101,45 @@ pub fn load_calibration(path: &Path) -> Result<Intrinsics, CalibrationError> {
     calibration.into_intrinsics(path, size_px)
 }
 
+/// What a calibration does not say and had to be assumed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Assumed {
+    /// The picture's size: that of the frames.
+    Size,
+    /// The lens: one that distorts nothing.
+    NoDistortion,
+}
+
+impl Assumed {
+    /// What to say of it, where the frames of a recording have a size.
+    pub fn told(self, path: &Path, frame_px: [u32; 2], frames_of: &str) -> String {
+        let (path, [width, height]) = (path.display(), frame_px);
+        match self {
+            Self::Size => format!(
+                "{path} does not say for which picture size it holds; taken to be {width} x {height}, as {frames_of} has"
+            ),
+            Self::NoDistortion => {
+                format!("{path} has no distortion in it; the lens is taken to have none")
+            }
+        }
+    }
+}
+
 /// As [`load_calibration`], for frames of a known size, which tells the camera that is meant where the file holds several. A file
 /// without a size, such as examples of OpenCV's write, is taken to hold for them where its principal point lies near their
-/// middle; whether that was so stands beside the calibration.
+/// middle. What was assumed stands beside the calibration.
 pub fn load_calibration_among(
     path: &Path,
     frame_px: [u32; 2],
-) -> Result<(Intrinsics, bool), CalibrationError> {
+) -> Result<(Intrinsics, Vec<Assumed>), CalibrationError> {
     // Half of the difference between two usual sizes is more, what lenses are off is less.
     const FARTHEST_OFF: f64 = 0.1;
     let calibration = read(path, Some(frame_px))?;
     let is_assumed = calibration.size_px.is_none();
+    let assumed = [
+        is_assumed.then_some(Assumed::Size),
+        (!calibration.lens.is_said).then_some(Assumed::NoDistortion),
+    ];
     let size_px = calibration.size_px.unwrap_or(frame_px);
     let intrinsics = calibration.into_intrinsics(path, size_px)?;
     let sides = DVec2::from_array(frame_px.map(f64::from));
@@ -121,7 +151,7 @@ pub fn load_calibration_among(
             frame_px,
         });
     }
-    Ok((intrinsics, is_assumed))
+    Ok((intrinsics, assumed.into_iter().flatten().collect()))
 }
 
 /// Reads a calibration for frames of a known size: one that says no size is taken to hold for them, one that says
@@ -201,7 +231,7 @@ impl UncheckedCalibration {
         let Self {
             focal_px,
             center_px,
-            distortion,
+            lens: Lens { distortion, .. },
             ..
         } = self;
         let mut numbers = focal_px
@@ -213,9 +243,9 @@ impl UncheckedCalibration {
                 "focal lengths, centre and distortion must be finite numbers".to_owned(),
             );
         }
-        if size_px.contains(&0) || size_px.iter().any(|&side| side > 32768) {
+        if size_px.contains(&0) || size_px.iter().any(|&side| side > MOST_SIDE_PX) {
             return refuse(format!(
-                "the picture size {} x {} must be from 1 to 32768",
+                "the picture size {} x {} must be from 1 to {MOST_SIDE_PX}",
                 size_px[0], size_px[1]
             ));
         }

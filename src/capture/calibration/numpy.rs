@@ -3,7 +3,8 @@
 
 use std::io::{Cursor, Read as _};
 
-use npyz::{DType, NpyFile, TypeChar};
+use half::f16;
+use npyz::{DType, Endianness, NpyFile, TypeChar, TypeStr};
 use serde_json::{Map, Value};
 use zip::ZipArchive;
 
@@ -52,7 +53,7 @@ pub(super) fn tree(bytes: &[u8]) -> Result<Map<String, Value>, String> {
     Ok(tree)
 }
 
-/// The numbers of an array in rows; `None` where it has others than numbers, or so many that it is no camera's.
+/// The numbers of an array in rows, or its truth or text where it has one; `None` where they are so many that it is no camera's.
 fn numbers(bytes: &[u8]) -> Result<Option<Value>, String> {
     // The header's length is trusted by whoever reads it: it must lie within the file.
     let length = match bytes.get(6..12) {
@@ -81,20 +82,31 @@ fn numbers(bytes: &[u8]) -> Result<Option<Value>, String> {
     }
     let in_columns = file.order() == npyz::Order::Fortran;
     let shape = file.shape().to_vec();
-    let DType::Plain(kind) = file.dtype() else {
-        return Ok(None);
+    let kind = match file.dtype() {
+        DType::Plain(kind) => kind,
+        other => return Ok(Some(unread(&other.descr()))),
     };
+    let data = &bytes[length..];
+    if let ([] | [1], Some(value)) = (shape.as_slice(), word(&kind, data)) {
+        return Ok(Some(value));
+    }
     let numbers: Result<Vec<f64>, _> = match (kind.type_char(), kind.num_bytes()) {
         (TypeChar::Float, Some(8)) => file.into_vec::<f64>(),
         (TypeChar::Float, Some(4)) => {
             (file.into_vec::<f32>()).map(|all| all.into_iter().map(f64::from).collect())
+        }
+        (TypeChar::Float, Some(2)) if kind.endianness() != Endianness::Big => {
+            let count = shape.iter().product::<u64>() as usize;
+            let halves = data.get(..2 * count).ok_or("the array is cut off")?;
+            let number = |half: &[u8]| f16::from_le_bytes([half[0], half[1]]).to_f64();
+            Ok(halves.chunks_exact(2).map(number).collect())
         }
         (TypeChar::Int, Some(4)) => {
             (file.into_vec::<i32>()).map(|all| all.into_iter().map(f64::from).collect())
         }
         (TypeChar::Int, Some(8)) => (file.into_vec::<i64>())
             .map(|all| all.into_iter().map(|number| number as f64).collect()),
-        _ => return Ok(None),
+        _ => return Ok(Some(unread(&file.dtype().descr()))),
     };
     let mut numbers = numbers.map_err(|error| error.to_string())?;
     if let (true, &[rows, columns]) = (in_columns, shape.as_slice()) {
@@ -105,6 +117,38 @@ fn numbers(bytes: &[u8]) -> Result<Option<Value>, String> {
         ([], &[number]) => Value::from(number),
         _ => numbers.into_iter().map(Value::from).collect(),
     }))
+}
+
+/// What stands for an array of a type that is not read: a word, which is refused by name where numbers are wanted.
+fn unread(kind: &str) -> Value {
+    Value::from(format!(
+        "an array of NumPy's type {kind}, which is not read"
+    ))
+}
+
+/// The truth or the text that an array of one is; `None` for one of another type.
+fn word(kind: &TypeStr, data: &[u8]) -> Option<Value> {
+    match (kind.type_char(), kind.num_bytes()?) {
+        (TypeChar::Bool, 1) => Some((*data.first()? != 0).into()),
+        (TypeChar::ByteStr, length) => {
+            let text = String::from_utf8_lossy(data.get(..length)?).into_owned();
+            Some(text.trim_end_matches('\0').into())
+        }
+        (TypeChar::UnicodeStr, length) if kind.endianness() != Endianness::Big => {
+            let letters = data.get(..length)?.chunks_exact(4);
+            let letters = letters.map_while(|letter| match letter {
+                &[a, b, c, d] => char::from_u32(u32::from_le_bytes([a, b, c, d])),
+                _ => None,
+            });
+            Some(
+                letters
+                    .take_while(|letter| *letter != '\0')
+                    .collect::<String>()
+                    .into(),
+            )
+        }
+        _ => None,
+    }
 }
 
 /// The tree of a text that is nothing but a matrix of 3 x 3 numbers, or KITTI's lines of a name and 3 x 4 numbers each.

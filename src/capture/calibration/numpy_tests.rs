@@ -76,3 +76,71 @@ fn kitti_s_projections_are_read() {
     assert_eq!(read.focal_px, DVec2::splat(718.856));
     assert_eq!(read.center_px, DVec2::new(607.1928, 185.2157));
 }
+
+/// An archive of arrays, each of a type, a shape and its bytes.
+fn archive(arrays: &[(&str, &str, &str, Vec<u8>)]) -> Vec<u8> {
+    let mut writer = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    for (name, kind, shape, data) in arrays {
+        let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n");
+        let options = zip::write::SimpleFileOptions::default();
+        writer.start_file(format!("{name}.npy"), options).unwrap();
+        let length = (header.len() as u16).to_le_bytes();
+        for part in [b"\x93NUMPY\x01\0", &length[..], header.as_bytes(), data] {
+            std::io::Write::write_all(&mut writer, part).unwrap();
+        }
+    }
+    writer.finish().unwrap().into_inner()
+}
+
+/// Coefficients of half the precision, and the truths and texts that name a lens's model.
+#[test]
+fn halves_truths_and_texts_of_numpy_s_are_read() {
+    let doubles = |numbers: &[f64]| numbers.iter().flat_map(|n| n.to_le_bytes()).collect();
+    let halves = [0.125, -0.25, 0.0, 0.5].map(|number| half::f16::from_f64(number).to_le_bytes());
+    let text = |text: &str| {
+        text.chars()
+            .flat_map(|c| u32::from(c).to_le_bytes())
+            .collect()
+    };
+    let matrix = (
+        "mtx",
+        "<f8",
+        "(3, 3)",
+        doubles(&[615.0, 0.0, 320.0, 0.0, 615.0, 240.0, 0.0, 0.0, 1.0]),
+    );
+    let dist = ("dist", "<f2", "(1, 4)", halves.concat());
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npz");
+    let read = |arrays: &[(&str, &str, &str, Vec<u8>)]| {
+        std::fs::write(&path, archive(arrays)).unwrap();
+        load_calibration_among(&path, [640, 480])
+            .map(|(read, _)| read.distortion)
+            .map_err(|error| error.to_string())
+    };
+    let plain = Distortion::Polynomial([0.125, -0.25, 0.0, 0.5, 0.0]);
+    let fisheye = Distortion::Fisheye([0.125, -0.25, 0.0, 0.5]);
+    for (model, expected) in [
+        (("fisheye", "|b1", "()", vec![1]), &fisheye),
+        (("fisheye", "|b1", "()", vec![0]), &plain),
+        (("model", "<U7", "()", text("fisheye")), &fisheye),
+        (("model", "|S7", "()", b"fisheye".to_vec()), &fisheye),
+        (("note", "<U3", "()", text("lab")), &plain),
+    ] {
+        let arrays = [matrix.clone(), dist.clone(), model];
+        assert_eq!(read(&arrays).as_ref(), Ok(expected), "{arrays:?}");
+    }
+    for (other, part) in [
+        (
+            ("model", "<U3", "()", text("mei")),
+            "'mei' is not supported",
+        ),
+        (("dist", "<c8", "(4,)", vec![0; 32]), "dist must be a list"),
+        (
+            ("dist_x", "<f8", "(1,)", doubles(&[1.0])),
+            "dist_x is not understood",
+        ),
+    ] {
+        let said = read(&[matrix.clone(), other]).unwrap_err();
+        assert!(said.contains(part), "{said}");
+    }
+}

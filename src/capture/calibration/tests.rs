@@ -152,8 +152,11 @@ fn without_a_size_the_frames_have_it_where_the_principal_point_is_theirs() {
         load_calibration_among(&path, frame_px).map_err(|error| error.to_string())
     };
     let sizeless = OWN.replace("size_px = [640, 480]\n", "");
-    assert_eq!(among(OWN, [640, 480]), Ok((lamp(), false)));
-    assert_eq!(among(&sizeless, [640, 480]), Ok((lamp(), true)));
+    assert_eq!(among(OWN, [640, 480]), Ok((lamp(), vec![])));
+    assert_eq!(
+        among(&sizeless, [640, 480]),
+        Ok((lamp(), vec![Assumed::Size]))
+    );
     for other_px in [[1280, 720], [320, 240], [640, 360], [800, 600]] {
         let message = among(&sizeless, other_px).unwrap_err();
         let [width, height] = other_px;
@@ -569,4 +572,183 @@ fn the_frames_tell_the_camera() {
         .unwrap_err()
         .to_string();
     assert!(none.contains("2 cameras (cam0, cam1)"), "{none}");
+}
+
+/// The same camera with its coefficients under other names, in other tables and as text.
+#[test]
+fn coefficients_are_read_under_any_of_their_names() {
+    let letters = "image_width: 640\nimage_height: 480\nfx: 615\nfy: 613\ncx: 321.4\ncy: 238.2\n";
+    let matrix =
+        "image_width: 640\nimage_height: 480\nmtx: [[615, 0, 321.4], [0, 613, 238.2], [0, 0, 1]]\n";
+    let list = "[0.08, -0.19, 0.0008, -0.0005, 0.05]";
+    for camera in [letters, matrix] {
+        for lens in [
+            format!("distortion_coefficients: {list}\n"),
+            format!("dist_coeff: {{rows: 1, cols: 5, data: {list}}}\n"),
+            "dist: \"0.08 -0.19 0.0008 -0.0005 0.05\"\n".to_owned(),
+            format!("dist: \"{list}\"\n"),
+            "radial_distortion: [0.08, -0.19, 0.05]\ntangential-distortion: [0.0008, -0.0005]\n"
+                .to_owned(),
+            "Radial: [0.08, -0.19, 0.05]\nTangential: [0.0008, -0.0005]\n".to_owned(),
+            "k1: 0.08\nk2: -0.19\np1: 0.0008\np2: -0.0005\nk3: 0.05\n".to_owned(),
+            "distortion: {k1: 0.08, k2: -0.19, p1: 0.0008, p2: -0.0005, k3: 0.05}\n".to_owned(),
+            format!("distortion_parameters: {list}\n"),
+            format!("dist_coefs: [{list}]\n"),
+            format!("distortionVector: {list}\n"),
+            format!("distortions: {list}\n"),
+        ] {
+            let found = load("a.yaml", &format!("{camera}{lens}"));
+            assert_eq!(found.unwrap(), lamp(), "{camera}{lens}");
+        }
+    }
+    let photonvision = r#"{"resolution": {"width": 640, "height": 480}, "lensmodel": "LENSMODEL_OPENCV",
+        "cameraIntrinsics": {"rows": 3, "cols": 3, "type": 6, "data": [615, 0, 321.4, 0, 613, 238.2, 0, 0, 1]},
+        "cameraExtrinsics": {"rows": 1, "cols": 5, "type": 6, "data": [0.08, -0.19, 0.0008, -0.0005, 0.05]}}"#;
+    assert_eq!(load("a.json", photonvision).unwrap(), lamp());
+}
+
+/// Coefficients that are not read are never taken for none without a word.
+#[test]
+fn a_lens_that_is_not_understood_is_refused_by_name() {
+    let matrix =
+        "image_width: 640\nimage_height: 480\nK: [615, 0, 321.4, 0, 613, 238.2, 0, 0, 1]\n";
+    for (lens, part) in [
+        (
+            "distortion_coeficients: [0.1, 0, 0, 0]\n",
+            "distortion_coeficients is not understood; allowed: distortion_coefficients,",
+        ),
+        ("distortion_model: plumb_bob\n", "coefficients are missing"),
+        (
+            "distortion_model: plumb_bob\ndistortion_coefficients:\n",
+            "distortion_coefficients is empty",
+        ),
+        (
+            "distortion_coefficients:\n",
+            "distortion_coefficients is empty",
+        ),
+        (
+            "D: {rows: 1, cols: 5, data: [0.1, 0, 0]}\n",
+            "1 x 5 numbers",
+        ),
+        (
+            "D: [0.1, 0, 0]\n",
+            "3 coefficients; 4, 5, 8, 12 or 14 are supported",
+        ),
+        (
+            "distortion_model: rational_polynomial\nD: [0.1, 0, 0, 0, 0, 1]\n",
+            "6 coefficients; 4, 5, 8, 12 or 14 are supported",
+        ),
+        ("distortion: strong\n", "distortion must be a list"),
+        ("radial: [1, 2, 3, 4]\n", "at most 3 numbers"),
+    ] {
+        let said = message("a.yaml", &format!("{matrix}{lens}"));
+        assert!(said.contains(part), "{lens}: {said}");
+    }
+    // What has none is said to have none.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.yaml");
+    for (lens, assumed) in [
+        ("", vec![Assumed::NoDistortion]),
+        ("min_distance: 3\n", vec![Assumed::NoDistortion]),
+        ("undistorted: true\n", vec![Assumed::NoDistortion]),
+        ("D: []\n", vec![]),
+        ("distortion_model: none\nD: [0, 0, 0]\n", vec![]),
+    ] {
+        std::fs::write(&path, format!("{matrix}{lens}")).unwrap();
+        let (found, said) = load_calibration_among(&path, [640, 480]).unwrap();
+        assert_eq!(
+            (found.distortion, said),
+            (Distortion::NONE, assumed),
+            "{lens}"
+        );
+    }
+}
+
+/// Whatever key names a model, and in which table about the camera, it is followed or refused.
+#[test]
+fn the_model_is_found_under_any_of_its_names() {
+    let camera = r#""image_width": 640, "image_height": 480, "camera_matrix": [[615, 0, 321.4], [0, 613, 238.2], [0, 0, 1]],
+        "dist": [0.08, -0.19, 0.0008, -0.0005]"#;
+    let letters = r#""w": 640, "h": 480, "fx": 615, "fy": 613, "cx": 321.4, "cy": 238.2, "dist": [0.08, -0.19, 0.0008, -0.0005]"#;
+    let fisheye = Distortion::Fisheye([0.08, -0.19, 0.0008, -0.0005]);
+    for camera in [camera, letters] {
+        for text in [
+            format!(r#"{{{camera}, "lens_model": "fisheye"}}"#),
+            format!(r#"{{{camera}, "projection_model": "KANNALA_BRANDT"}}"#),
+            format!(r#"{{"model": "fisheye", "cam": {{{camera}}}}}"#),
+            format!(r#"{{"cam": {{{camera}, "model": "fisheye"}}}}"#),
+            format!(r#"{{"fisheye": true, "about": 3, "cams": [{{{camera}}}]}}"#),
+        ] {
+            let found = load("a.json", &text).unwrap_or_else(|error| panic!("{text}: {error}"));
+            assert_eq!(found.distortion, fisheye, "{text}");
+        }
+        for key in ["lensmodel", "projection_model", "distortion_type"] {
+            let said = message(
+                "a.json",
+                &format!(r#"{{{camera}, "{key}": "LENSMODEL_STEREOGRAPHIC"}}"#),
+            );
+            let part = format!("{key}: the model 'LENSMODEL_STEREOGRAPHIC' is not supported");
+            assert!(said.contains(&part), "{said}");
+        }
+    }
+    // What another table calls a model is none of the lens.
+    let device = format!(r#"{{{letters}, "device": {{"model": "D435", "type": "usb"}}}}"#);
+    assert!(matches!(
+        load("a.json", &device).unwrap().distortion,
+        Distortion::Polynomial(_)
+    ));
+}
+
+/// calib.io's library names a kind of camera once and numbers it from then on.
+#[test]
+fn calib_ios_second_camera_is_of_the_first_ones_kind() {
+    let camera = |kind: &str, f: u32, width: u32| {
+        format!(
+            r#"{{"model": {{{kind}, "ptr_wrapper": {{"id": 1, "data": {{"parameters": {{"f": {{"val": {f}}},
+            "cx": {{"val": 320}}, "cy": {{"val": 240}}, "k1": {{"val": 0.1}}}}, "CameraModelCRT": {{"CameraModelBase":
+            {{"imageSize": {{"width": {width}, "height": 480}}}}}}}}}}}}}}"#
+        )
+    };
+    let first =
+        r#""polymorphic_id": 2147483649, "polymorphic_name": "libCalib::CameraModelOpenCV""#;
+    let two = |second: &str| {
+        let cameras = [camera(first, 600, 640), camera(second, 700, 800)].join(", ");
+        format!(r#"{{"Calibration": {{"cameras": [{cameras}]}}}}"#)
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.json");
+    std::fs::write(&path, two(r#""polymorphic_id": 1"#)).unwrap();
+    for (size_px, focal) in [([640, 480], 600.0), ([800, 480], 700.0)] {
+        let found = load_calibration_among(&path, size_px).unwrap().0;
+        assert_eq!(found.focal_px.x, focal);
+    }
+    let said = message("a.json", &two(r#""polymorphic_id": 2"#));
+    assert!(said.contains("'none' is not supported"), "{said}");
+}
+
+/// A comment parts no matrix, and of two matrices under one name none is taken.
+#[test]
+fn comments_and_keys_that_are_there_twice() {
+    let matrix = |f: u32, data: &str| {
+        format!(
+            "<K><rows>3</rows><cols>3</cols><data>{data}{f} 0 320 0 {f}<!-- fy --> 240 0 0 1</data></K>"
+        )
+    };
+    let file = |matrices: &str| {
+        format!(
+            "<opencv_storage><image_width>640</image_width><image_height>480</image_height>{matrices}</opencv_storage>"
+        )
+    };
+    let found = load("a.xml", &file(&matrix(600, "<!-- fx -->\n"))).unwrap();
+    assert_eq!(found.focal_px, DVec2::splat(600.0));
+    let json =
+        r#"{"width": 640, "K": [600, 0, 320, 0, 600, 240, 0, 0, 1], "in": {"K": 1, "K": 2}}"#;
+    for (name, text) in [
+        ("a.xml", file(&(matrix(600, "") + &matrix(700, "")))),
+        ("a.json", json.to_owned()),
+        ("a.yaml", "K: 1\nK: 2\n".to_owned()),
+    ] {
+        let said = message(name, &text);
+        assert!(said.contains("the key 'K' is there twice"), "{said}");
+    }
 }

@@ -1,8 +1,8 @@
 //! What the numbers and names of calibration files mean, whatever keys they stand behind.
 
-use serde_json::{Map, Value};
+use serde_json::Value;
 
-use crate::geometry::camera::Distortion;
+use crate::geometry::camera::{Distortion, MOST_SIDE_PX};
 
 /// What a file says, before it is known to make sense.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,7 +10,14 @@ pub(super) struct UncheckedCalibration {
     pub size_px: Option<[u32; 2]>,
     pub focal_px: [f64; 2],
     pub center_px: [f64; 2],
+    pub lens: Lens,
+}
+
+/// A lens, and whether the file says how it distorts; where it does not, it is taken not to.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Lens {
     pub distortion: Distortion,
+    pub is_said: bool,
 }
 
 /// Which formula a file's coefficients belong to.
@@ -24,15 +31,42 @@ pub(super) enum LensModel {
     Fisheye,
 }
 
-const MODEL_KEYS: [&str; 3] = ["distortionmodel", "cameramodel", "model"];
+const MODEL_KEYS: [&str; 8] = [
+    "distortionmodel",
+    "distortiontype",
+    "cameramodel",
+    "lensmodel",
+    "lenstype",
+    "projectionmodel",
+    "projectiontype",
+    "model",
+];
+const FISHEYE_KEYS: [&str; 3] = ["fisheyemodel", "fisheye", "isfisheye"];
+/// Numbers that OpenCV's coefficients come in.
+const COUNTS: [usize; 5] = [4, 5, 8, 12, 14];
+
+/// Whether a key (as keys are compared) decides which formula coefficients belong to.
+pub(super) fn is_model_key(name: &str) -> bool {
+    MODEL_KEYS.contains(&name) || FISHEYE_KEYS.contains(&name)
+}
+
+/// Whether a key of the lens's model has a value that wants coefficients.
+pub(super) fn names_a_lens(model: &Value) -> bool {
+    let name = model.as_str().map(normalised).unwrap_or_default();
+    !matches!(
+        name.as_str(),
+        "" | "none" | "pinhole" | "perspective" | "simplepinhole"
+    )
+}
 
 /// The lens model by all keys that decide it. What is not known is refused, never passed over.
-pub(super) fn model_of(tree: &Map<String, Value>) -> Result<LensModel, String> {
+pub(super) fn model_of<'a>(
+    entries: impl IntoIterator<Item = (&'a str, &'a Value)>,
+) -> Result<LensModel, String> {
     let mut found = LensModel::ByNumber;
-    for (key, value) in tree {
-        let name = normalised(key);
-        let is_fisheye = matches!(name.as_str(), "fisheyemodel" | "fisheye" | "isfisheye");
-        let model = if is_fisheye {
+    for (key, value) in entries {
+        let name = normalised(key.rsplit('.').next().unwrap_or_default());
+        let model = if FISHEYE_KEYS.contains(&name.as_str()) {
             match value {
                 Value::Null => LensModel::ByNumber,
                 value if value.as_bool() == Some(true) || value.as_f64() == Some(1.0) => {
@@ -72,9 +106,12 @@ fn model_by_name(key: &str, value: &Value) -> Result<LensModel, String> {
         Value::String(name) => name,
         other => return Err(format!("{key} must be a name, not {other}")),
     };
-    match normalised(name).as_str() {
+    let word = normalised(name);
+    // (PhotonVision and mrcal write LENSMODEL_OPENCV8.)
+    match word.strip_prefix("lensmodel").unwrap_or(&word) {
         "" | "pinhole" | "perspective" | "rationalpolynomial" | "rational" | "thinprism"
-        | "tilted" | "opencv" | "fullopencv" | "simplepinhole" => Ok(LensModel::ByNumber),
+        | "tilted" | "opencv" | "opencv4" | "opencv5" | "opencv8" | "opencv12" | "fullopencv"
+        | "simplepinhole" => Ok(LensModel::ByNumber),
         "plumbbob" | "radtan" | "radialtangential" | "brownconrady" | "brown" | "none" => {
             Ok(LensModel::Brown)
         }
@@ -96,11 +133,11 @@ pub(super) fn normalised(key: &str) -> String {
 
 pub(super) fn side_px(value: &Value) -> Option<u32> {
     let side = number(value)?;
-    (side.fract() == 0.0 && (1.0..=32768.0).contains(&side)).then_some(side as u32)
+    (side.fract() == 0.0 && (1.0..=f64::from(MOST_SIDE_PX)).contains(&side)).then_some(side as u32)
 }
 
 pub(super) fn bad_side(what: &str) -> String {
-    format!("{what} must be whole numbers of pixels from 1 to 32768")
+    format!("{what} must be whole numbers of pixels from 1 to {MOST_SIDE_PX}")
 }
 
 /// A finite number, in quotes too.
@@ -126,13 +163,13 @@ pub(super) fn flat_numbers(value: &Value) -> Option<Vec<f64>> {
     Some(found)
 }
 
-pub(super) fn distortion(model: LensModel, value: Option<&Value>) -> Result<Distortion, String> {
-    let given = match value {
-        None | Some(Value::Null) => Vec::new(),
-        Some(value) => flat_numbers(value)
-            .ok_or("the distortion must be a list of finite numbers k1, k2, p1, p2, k3")?,
-    };
+/// The distortion of a model by its coefficients; none are 0.
+///
+/// # Errors
+/// A number of them that the model does not have.
+pub(super) fn distortion(model: LensModel, given: &[f64]) -> Result<Distortion, String> {
     let past = |most: usize| given.iter().skip(most).find(|number| **number != 0.0);
+    let is_some = past(0).is_some();
     match model {
         LensModel::Fisheye => {
             if let Some(extra) = past(4) {
@@ -140,9 +177,15 @@ pub(super) fn distortion(model: LensModel, value: Option<&Value>) -> Result<Dist
                     "a fisheye has 4 coefficients k1, k2, k3, k4; {extra} is among those after them"
                 ));
             }
+            if is_some && given.len() < 4 {
+                return Err(format!(
+                    "a fisheye has 4 coefficients k1, k2, k3, k4, not {}",
+                    given.len()
+                ));
+            }
             let mut four = [0.0; 4];
             four.iter_mut()
-                .zip(&given)
+                .zip(given)
                 .for_each(|(to, from)| *to = *from);
             Ok(Distortion::Fisheye(four))
         }
@@ -150,13 +193,13 @@ pub(super) fn distortion(model: LensModel, value: Option<&Value>) -> Result<Dist
             "plumb_bob has 5 coefficients k1, k2, p1, p2, k3, not {}; name the model rational_polynomial",
             given.len()
         )),
-        LensModel::Brown | LensModel::ByNumber => by_number(&given),
+        LensModel::Brown | LensModel::ByNumber => by_number(given),
     }
 }
 
-/// OpenCV's order; missing coefficients are 0.
+/// OpenCV's order; coefficients that are left out at the end are 0.
 pub(super) fn by_number(given: &[f64]) -> Result<Distortion, String> {
-    if given.iter().skip(14).any(|number| *number != 0.0) {
+    if given.iter().any(|number| *number != 0.0) && !COUNTS.contains(&given.len()) {
         return Err(format!(
             "the distortion has {} coefficients; 4, 5, 8, 12 or 14 are supported",
             given.len()

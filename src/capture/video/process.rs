@@ -9,6 +9,7 @@ use std::time::Duration;
 use super::log::{ColourTags, FrameHead, Said, meaning};
 use super::planes::PixelLayout;
 use crate::capture::children::RunningChild;
+use crate::geometry::camera::MOST_SIDE_PX;
 
 /// Pixels of a frame at most, those of 8K video: a small file may say that it has more.
 pub(super) const MOST_PIXELS: u64 = 33_554_432;
@@ -221,7 +222,8 @@ impl Decoder {
             let layout = PixelLayout::by_ffmpeg_name(&head.pixels);
             let layout = layout.ok_or(ErrorKind::InvalidData)?;
             let [width, height] = head.size_px.map(u64::from);
-            if width * height > MOST_PIXELS {
+            let is_too_long = width.max(height) > u64::from(MOST_SIDE_PX);
+            if is_too_long || width * height > MOST_PIXELS {
                 return Err(ErrorKind::InvalidData.into());
             }
             self.layout = Some((layout, head.size_px));

@@ -6,6 +6,7 @@ mod pdf;
 mod png;
 mod svg;
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail, ensure};
@@ -276,6 +277,10 @@ fn lone(
 ) -> Result<(Vec<Page>, String)> {
     check_size("--size-mm", marker_mm)?;
     ensure!(!ids.is_empty(), "no ids");
+    let mut known = HashSet::new();
+    if let Some(id) = ids.iter().find(|id| !known.insert(**id)) {
+        bail!("--ids has {id} twice, and a scene takes each marker once");
+    }
     let cell_mm = marker_mm / f64::from(family.cells_across());
     let quiet_mm = (2.0 * QUIET_CELLS + cells_beyond(family)?) * cell_mm;
     let card_mm = [
