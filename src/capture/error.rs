@@ -86,10 +86,12 @@ pub enum CaptureError {
         message: String,
     },
     /// Not one frame could be decoded.
-    #[error("{}: not one frame can be decoded", path.display())]
+    #[error("{}: not one frame can be decoded{why}", path.display())]
     NoGoodFrame {
         /// The recording.
         path: PathBuf,
+        /// Why, after a colon, or nothing.
+        why: String,
     },
     /// Pictures that are all longer or wider than any that is read.
     #[error(
@@ -127,6 +129,13 @@ pub enum CaptureError {
     Calibration(#[from] CalibrationError),
 }
 
+/// What to say where no picture is read because all are too large.
+pub(super) fn too_many_pixels(most: u64) -> String {
+    format!(
+        ": it has pictures of more than {most} pixels, the most that are read of such a file; make them smaller"
+    )
+}
+
 /// What to say of a name that programs of other kinds take for many files.
 fn pattern_hint(path: &Path) -> &'static str {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -161,6 +170,15 @@ pub enum Notice {
         /// Width and height of the first frame.
         expected_px: [u32; 2],
     },
+    /// A picture of more pixels than are read of a file of its size.
+    TooLarge {
+        /// The picture.
+        path: PathBuf,
+        /// Index of the frame.
+        frame: u32,
+        /// The most pixels that are read of it.
+        most: u64,
+    },
     /// Frames of which parts could not be decoded and were guessed.
     Corrupt {
         /// The video.
@@ -169,6 +187,15 @@ pub enum Notice {
         first: u32,
         /// How many there are.
         count: u32,
+    },
+    /// Pictures of which the decoder could not decode all, though it gives them.
+    Faulty {
+        /// The video.
+        path: PathBuf,
+        /// Index of the frame that came next.
+        near: u32,
+        /// What FFmpeg says first.
+        said: String,
     },
     /// A video that gives fewer frames than its header says.
     EndedEarly {
@@ -188,8 +215,8 @@ impl Notice {
     pub fn lost_frames(&self) -> u32 {
         match self {
             Self::Broken { count, .. } => *count,
-            Self::OtherSize { .. } => 1,
-            Self::Corrupt { .. } => 0,
+            Self::OtherSize { .. } | Self::TooLarge { .. } => 1,
+            Self::Corrupt { .. } | Self::Faulty { .. } => 0,
             Self::EndedEarly {
                 ended_at,
                 announced,
@@ -244,9 +271,19 @@ impl fmt::Display for Notice {
                 "{}: frame {frame} is {width} x {height}, the first one was {first_width} x {first_height}; left out",
                 path.display()
             ),
+            Self::TooLarge { path, frame, most } => write!(
+                f,
+                "{}: frame {frame} has more than {most} pixels, the most that are read of such a file; left out",
+                path.display()
+            ),
             Self::Corrupt { path, first, count } => write!(
                 f,
                 "{}: {count} frames, the first of them {first}, have errors in them; what could not be decoded was guessed",
+                path.display()
+            ),
+            Self::Faulty { path, near, said } => write!(
+                f,
+                "{}: pictures near frame {near} have errors in them ({said}); what could not be decoded was guessed",
                 path.display()
             ),
             Self::EndedEarly {

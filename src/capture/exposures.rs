@@ -84,7 +84,8 @@ impl Bracket {
         let mut pictures = Vec::new();
         for path in paths {
             let picture = pixels::read_picture(path)
-                .ok_or_else(|| ExposureError::Unreadable { path: path.clone() })?;
+                .map_err(|_| ExposureError::Unreadable { path: path.clone() })?
+                .bgr;
             let found_px = pixels::size_of(&picture);
             if pictures.is_empty() {
                 size_px = found_px;

@@ -3,8 +3,8 @@
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
-use super::error::{CaptureError, Notice};
-use super::pixels::{self, read_picture, read_picture_as_taken, turn_when_shown};
+use super::error::{CaptureError, Notice, too_many_pixels};
+use super::pixels::{self, Unread, read_picture, read_picture_as_taken, turn_when_shown};
 use super::video::Place;
 use crate::geometry::quarter_turns::QuarterTurns;
 
@@ -55,17 +55,15 @@ impl ImageFrames {
             });
         }
         paths.sort_by(|a, b| natural_order(&name_of(a), &name_of(b)));
-        let size_px = paths
-            .iter()
-            .find_map(|path| read_picture(path).map(|picture| pixels::size_of(&picture)))
-            .ok_or_else(|| {
-                let too_long = paths.iter().find_map(|path| pixels::too_long(path));
-                let path = folder.to_owned();
-                match too_long {
-                    Some(size_px) => CaptureError::TooLong { path, size_px },
-                    None => CaptureError::NoGoodFrame { path },
-                }
-            })?;
+        let size_px = first_size_px(&paths).map_err(|unread| {
+            let path = folder.to_owned();
+            let why = match unread {
+                Unread::Undecodable => String::new(),
+                Unread::TooManyPixels(most) => too_many_pixels(most),
+                Unread::TooLong(size_px) => return CaptureError::TooLong { path, size_px },
+            };
+            CaptureError::NoGoodFrame { path, why }
+        })?;
         Ok(Self {
             paths,
             next_index: 0,
@@ -106,21 +104,34 @@ impl ImageFrames {
                 false => read_picture(path),
             };
             match read {
-                None => notices.push(Notice::Broken {
+                Err(Unread::Undecodable | Unread::TooLong(_)) => notices.push(Notice::Broken {
                     path: path.clone(),
                     first: index,
                     count: 1,
                     good_before: self.good_frames,
                 }),
-                Some(picture) if !self.as_taken && pixels::size_of(&picture) != self.size_px => {
+                Err(Unread::TooManyPixels(most)) => notices.push(Notice::TooLarge {
+                    path: path.clone(),
+                    frame: index,
+                    most,
+                }),
+                Ok(picture) if !self.as_taken && pixels::size_of(&picture.bgr) != self.size_px => {
                     notices.push(Notice::OtherSize {
                         path: path.clone(),
                         frame: index,
-                        size_px: pixels::size_of(&picture),
+                        size_px: pixels::size_of(&picture.bgr),
                         expected_px: self.size_px,
                     })
                 }
-                Some(picture) => {
+                Ok(picture) => {
+                    if picture.is_cut_off {
+                        notices.push(Notice::Corrupt {
+                            path: path.clone(),
+                            first: index,
+                            count: 1,
+                        });
+                    }
+                    let picture = picture.bgr;
                     self.good_frames += 1;
                     if self.as_taken {
                         self.shown_turn = turn_when_shown(path);
@@ -141,6 +152,18 @@ impl ImageFrames {
         }
         Ok(None)
     }
+}
+
+/// The size of the first picture that is read; else why the first one is not.
+fn first_size_px(paths: &[PathBuf]) -> Result<[u32; 2], Unread> {
+    let mut why = None;
+    for path in paths {
+        match read_picture(path) {
+            Ok(picture) => return Ok(pixels::size_of(&picture.bgr)),
+            Err(unread) => _ = why.get_or_insert(unread),
+        }
+    }
+    Err(why.unwrap_or(Unread::Undecodable))
 }
 
 fn name_of(path: &Path) -> String {

@@ -8,6 +8,7 @@ pub mod children;
 mod error;
 pub mod exposures;
 mod images;
+mod jpeg_end;
 pub mod linear;
 pub mod live;
 mod pixels;
@@ -63,6 +64,7 @@ pub struct FrameSource {
     pictures: PictureSource,
     times: FrameTimes,
     calibration: Option<Intrinsics>,
+    passed_over: Option<String>,
     notices: Vec<Notice>,
     good_frames: u32,
     mirrored: bool,
@@ -136,6 +138,7 @@ impl FrameSource {
                 .find(|file| file.file_name().is_some_and(|found| found == name))
         };
         let videos: Vec<&PathBuf> = files.iter().filter(|file| is_session_video(file)).collect();
+        let mut passed_over = None;
         let pictures = match videos.as_slice() {
             [] => {
                 let pictures: Vec<PathBuf> = files
@@ -149,6 +152,7 @@ impl FrameSource {
                         there: what_is_there(&files),
                     });
                 }
+                passed_over = passed_over_among(&files);
                 PictureSource::Images(ImageFrames::open(folder, pictures)?)
             }
             [video] => PictureSource::Video(Box::new(VideoFrames::open(video)?)),
@@ -170,7 +174,10 @@ impl FrameSource {
             .find_map(|name| named(name))
             .map(|file| calibration::load_calibration_or_fill(file, size_px))
             .transpose()?;
-        Ok(Self::new(folder, pictures, times, calibration))
+        Ok(Self {
+            passed_over,
+            ..Self::new(folder, pictures, times, calibration)
+        })
     }
 
     fn new(
@@ -184,6 +191,7 @@ impl FrameSource {
             pictures,
             times,
             calibration,
+            passed_over: None,
             notices: Vec::new(),
             good_frames: 0,
             mirrored: false,
@@ -242,6 +250,15 @@ impl FrameSource {
         self.times.fps().unwrap_or(nominal)
     }
 
+    /// The rate of the shortest steps between frames, for files that have no other times.
+    pub fn finest_fps(&self) -> f64 {
+        let by_stamps = match &self.pictures {
+            PictureSource::Video(video) if self.times.is_empty() => Some(video.finest_fps()),
+            _ => self.times.finest_fps(),
+        };
+        by_stamps.unwrap_or_else(|| self.fps())
+    }
+
     /// Width and height of every frame, pixels.
     pub fn size_px(&self) -> [u32; 2] {
         self.pictures.size_px()
@@ -288,18 +305,40 @@ impl FrameSource {
 
     /// What is done to the pictures, or guessed of them, that a user should know.
     pub fn remark(&self) -> Option<String> {
-        match &self.pictures {
-            PictureSource::Video(video) => video
-                .remark()
-                .map(|remark| format!("{}: {remark}", self.path.display())),
-            PictureSource::Images(images) => {
-                let missing = self.times.missing(images.frame_count())?;
-                Some(format!(
-                    "{}: {missing}",
-                    self.path.join(TIMES_NAME).display()
-                ))
-            }
-        }
+        let of_pictures = match &self.pictures {
+            PictureSource::Video(video) => video.remark(),
+            PictureSource::Images(_) => None,
+        };
+        let of_pictures = of_pictures.map(|remark| format!("{}: {remark}", self.path.display()));
+        let missing = self
+            .frame_count()
+            .and_then(|frames| self.times.missing(frames));
+        let of_times =
+            missing.map(|missing| format!("{}: {missing}", self.path.join(TIMES_NAME).display()));
+        let remarks = [of_pictures, of_times, self.passed_over()];
+        let remarks: Vec<String> = remarks.into_iter().flatten().collect();
+        (!remarks.is_empty()).then(|| remarks.join("; "))
+    }
+
+    /// The pictures of a folder that are of no kind that is read there, and what to do with them.
+    pub fn passed_over(&self) -> Option<String> {
+        let passed_over = self.passed_over.as_ref()?;
+        Some(format!("{}: {passed_over}", self.path.display()))
+    }
+
+    /// What is known of the frames' times once they were read: how many had none of their own.
+    pub fn remark_of_times(&self) -> Option<String> {
+        let PictureSource::Video(video) = &self.pictures else {
+            return None;
+        };
+        let moved = video.moved_frames();
+        (moved > 0 && self.times.is_empty()).then(|| {
+            format!(
+                "{}: {moved} frames had no time of their own, or one that does not increase; they are placed after the frame \
+                 before them",
+                self.path.display()
+            )
+        })
     }
 
     /// What went wrong so far without ending the recording; whole once [`FrameSource::next_frame`] gave `None`.
@@ -338,9 +377,47 @@ fn files_of(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
+/// What is said of pictures that nothing here reads.
+const TO_BE_SAVED: &str = "have to be saved as JPEG or PNG first";
+
+/// Pictures that are no frames beside those that are, in words.
+fn passed_over_among(files: &[PathBuf]) -> Option<String> {
+    const EXTENSIONS: [&str; 13] = [
+        "heic", "heif", "avif", "jxl", "jp2", "gif", "dng", "cr2", "cr3", "nef", "arw", "orf",
+        "rw2",
+    ];
+    let unread: Vec<&PathBuf> = files
+        .iter()
+        .filter(|file| has_extension(file, &EXTENSIONS))
+        .collect();
+    let count = unread.len();
+    let are = if count == 1 { "is" } else { "are" };
+    (count > 0).then(|| {
+        format!(
+            "{} {are} passed over: such pictures {TO_BE_SAVED}",
+            listed(&unread)
+        )
+    })
+}
+
+/// The names of the first files.
+fn listed(files: &[impl AsRef<Path>]) -> String {
+    const LISTED: usize = 3;
+    let name_of = |file: &Path| {
+        let name = file.file_name().unwrap_or_default();
+        name.to_string_lossy().into_owned()
+    };
+    let names: Vec<String> = files
+        .iter()
+        .take(LISTED)
+        .map(|file| name_of(file.as_ref()))
+        .collect();
+    let more = if files.len() > LISTED { ", …" } else { "" };
+    format!("{}{more}", names.join(", "))
+}
+
 /// What a folder has in place of a recording, in words that go on a sentence.
 fn what_is_there(files: &[PathBuf]) -> String {
-    const LISTED: usize = 3;
     let is_video = |file: &&PathBuf| has_extension(file, &VIDEO_EXTENSIONS);
     if let Some(video) = files.iter().find(is_video) {
         return format!(
@@ -348,27 +425,14 @@ fn what_is_there(files: &[PathBuf]) -> String {
             video.display()
         );
     }
-    let names: Vec<String> = files
-        .iter()
-        .take(LISTED)
-        .map(|file| {
-            file.file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned()
-        })
-        .collect();
-    let more = if files.len() > LISTED { ", …" } else { "" };
+    let names = listed(files);
     let is_heic = files
         .iter()
         .any(|file| has_extension(file, &["heic", "heif", "avif"]));
-    match (names.is_empty(), is_heic) {
+    match (files.is_empty(), is_heic) {
         (true, _) => "; it is empty".to_owned(),
-        (false, false) => format!("; it has {}{more}", names.join(", ")),
-        (false, true) => format!(
-            "; it has {}{more}, which have to be saved as JPEG or PNG first",
-            names.join(", ")
-        ),
+        (false, false) => format!("; it has {names}"),
+        (false, true) => format!("; it has {names}, which {TO_BE_SAVED}"),
     }
 }
 

@@ -295,6 +295,60 @@ fn hidden_files_are_no_frames_and_times_go_on() {
 }
 
 #[test]
+fn a_video_s_missing_times_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    make_video(&folder.path().join("video.mp4"), 5, "64x48");
+    let times = folder.path().join("times.csv");
+    fs::write(&times, "\u{feff}frame,time_s\n0,0\n1,0.1\n").unwrap();
+    let mut source = open(folder.path()).unwrap();
+    let remark = source.remark().unwrap();
+    assert!(
+        remark.contains("times.csv: it has times for 2 of 5 frames"),
+        "{remark}"
+    );
+    assert_eq!(indices(&mut source).len(), 5);
+    assert_eq!(source.remark_of_times(), None);
+}
+
+#[test]
+fn pictures_that_are_passed_over_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    make_images(folder.path(), 2);
+    assert_eq!(open(folder.path()).unwrap().remark(), None);
+    let heic = folder.path().join("a.heic");
+    fs::write(&heic, b"\0\0\0\x1cftypheic\0\0\0\0mif1heic").unwrap();
+    fs::write(folder.path().join("b.GIF"), "GIF89a").unwrap();
+    let remark = open(folder.path()).unwrap().remark().unwrap();
+    assert!(
+        remark.contains("a.heic, b.GIF are passed over: such pictures have to be saved as JPEG"),
+        "{remark}"
+    );
+    let refused = open(&heic).err().unwrap().to_string();
+    assert!(refused.contains("have to be saved as JPEG"), "{refused}");
+}
+
+/// A decoder fills up what a JPEG has lost; its end tells. What cameras add behind it is no harm.
+#[test]
+fn a_jpeg_that_is_cut_off_is_damaged() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = image::RgbImage::from_fn(64, 48, |x, y| image::Rgb([(x * y) as u8; 3]));
+    let whole = folder.path().join("0.jpg");
+    picture.save(&whole).unwrap();
+    let bytes = fs::read(&whole).unwrap();
+    let with_more = [&bytes[..], b"a camera's own"].concat();
+    fs::write(folder.path().join("1.jpg"), with_more).unwrap();
+    fs::write(folder.path().join("2.jpg"), &bytes[..bytes.len() * 2 / 3]).unwrap();
+    let mut source = open(folder.path()).unwrap();
+    assert_eq!(indices(&mut source), [0, 1, 2]);
+    let text = said(&source);
+    assert!(
+        text.contains("2.jpg: 1 frames, the first of them 2, have errors"),
+        "{text}"
+    );
+    assert_eq!(source.notices().len(), 1, "{text}");
+}
+
+#[test]
 fn a_folder_says_what_it_has_instead() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |source: &Path| open(source).err().unwrap().to_string();

@@ -11,6 +11,8 @@ const HEADER: &str = "frame,time_s";
 const LATEST_SECS: f64 = 1e9;
 /// No camera is as fast.
 const MOST_FPS: f64 = 1e5;
+/// Steps that are shorter are no rate, but stamps that tremble.
+const MOST_FINE_FPS: f64 = 1000.0;
 
 /// Times by frame; empty where the recording says nothing.
 #[derive(Debug, Default)]
@@ -32,7 +34,9 @@ impl FrameTimes {
     }
 
     fn parse(text: &str) -> Result<Self, (usize, String)> {
+        // (Spreadsheets begin a file with a mark of its encoding.)
         let mut lines = text
+            .trim_start_matches('\u{feff}')
             .lines()
             .enumerate()
             .map(|(number, line)| (number + 1, line.trim()));
@@ -90,6 +94,11 @@ impl FrameTimes {
         })
     }
 
+    /// Whether the recording says nothing of its times.
+    pub(super) fn is_empty(&self) -> bool {
+        self.secs_by_frame.is_empty()
+    }
+
     /// What to say where the file leaves out some of so many frames.
     pub(super) fn missing(&self, frames: u32) -> Option<String> {
         let there = self.secs_by_frame.range(..frames).count() as u32;
@@ -104,6 +113,18 @@ impl FrameTimes {
     pub(super) fn fps(&self) -> Option<f64> {
         self.mean_fps()
             .filter(|fps| (1e-3..=MOST_FPS).contains(fps))
+    }
+
+    /// The rate of the shortest step of all, if it is a camera's; `None` with less than two times.
+    pub(super) fn finest_fps(&self) -> Option<f64> {
+        let neighbours = self
+            .secs_by_frame
+            .iter()
+            .zip(self.secs_by_frame.iter().skip(1));
+        let steps_secs =
+            neighbours.map(|((first, from), (last, to))| (to - from) / f64::from(last - first));
+        let fps = 1.0 / steps_secs.min_by(f64::total_cmp)?;
+        (fps <= MOST_FINE_FPS).then_some(fps)
     }
 
     fn mean_fps(&self) -> Option<f64> {
@@ -127,7 +148,8 @@ mod tests {
 
     #[test]
     fn times_are_read() {
-        let times = FrameTimes::parse("frame,time_s\n0,0.0\n1,0.04\n\n3, 0.12\r\n").unwrap();
+        let times =
+            FrameTimes::parse("\u{feff}frame,time_s\n0,0.0\n1,0.04\n\n3, 0.12\r\n").unwrap();
         assert_eq!(times.time_secs(3, 0.1), Some(0.12));
         // Between its neighbours, and beyond the last by the rate.
         assert!((times.time_secs(2, 0.1).unwrap() - 0.08).abs() < 1e-12);

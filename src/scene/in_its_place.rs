@@ -1,5 +1,8 @@
 //! What is found where a file should be: pages, pointers and packages that a download leaves behind, told by their first bytes.
 
+/// How a picture of HEVC begins after four bytes (ISO/IEC 23008-12, annex B).
+const HEIC_BRANDS: [&[u8; 8]; 4] = [b"ftypheic", b"ftypheix", b"ftypheim", b"ftypheis"];
+
 /// What lies there in words, with what to do; `None` where it may be the file itself.
 pub fn in_place_of(bytes: &[u8]) -> Option<&'static str> {
     let head = &bytes[..bytes.len().min(256)];
@@ -23,6 +26,11 @@ pub fn in_place_of(bytes: &[u8]) -> Option<&'static str> {
         b"\xfd7zXZ\0",
     ]) {
         Some("an archive: unpack it")
+    } else if HEIC_BRANDS
+        .iter()
+        .any(|brand| head.get(4..12) == Some(&brand[..]))
+    {
+        Some("a HEIC picture: such pictures have to be saved as JPEG or PNG first")
     } else {
         None
     }
@@ -42,6 +50,7 @@ mod tests {
             (b"\xef\xbb\xbf \n<!DOCTYPE html>", "page"),
             (b"\x1f\x8b\x08", "gunzip"),
             (b"PK\x03\x04", "archive"),
+            (b"\0\0\0\x1cftypheic\0\0\0\0mif1", "HEIC"),
         ] {
             assert!(
                 in_place_of(bytes).is_some_and(|said| said.contains(word)),

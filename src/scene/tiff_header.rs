@@ -1,41 +1,103 @@
-//! The first directory of a TIFF file, as far as its counts go: decoders reserve memory for as many values as an entry says that
-//! it has.
+//! The first directory of a TIFF file: decoders reserve memory for as many values as an entry says that it has, and turn pictures.
+
+/// The tag of how the camera was held (TIFF 6.0, section 8).
+const ORIENTATION: u64 = 0x112;
+
+/// Where the first directory's entries are.
+struct Directory {
+    is_little: bool,
+    /// Of the first entry.
+    at: u64,
+    entries: u64,
+    entry_size: u64,
+    /// Bytes of a count and of an offset.
+    wide: u64,
+}
+
+impl Directory {
+    /// `None` where there is none, or it is no TIFF.
+    fn of(bytes: &[u8]) -> Option<Self> {
+        let is_little = match bytes.get(..2) {
+            Some(b"II") => true,
+            Some(b"MM") => false,
+            _ => return None,
+        };
+        // (Where the directory's offset stands, its width, that of the number of entries, and an entry's size.)
+        let (offset_at, wide, count_width, entry_size) = match number(bytes, is_little, 2, 2) {
+            Some(42) => (4, 4, 2, 12),
+            Some(43) => (8, 8, 8, 20),
+            _ => return None,
+        };
+        let directory = number(bytes, is_little, offset_at, wide)?;
+        let entries = number(bytes, is_little, directory, count_width).unwrap_or(0);
+        Some(Self {
+            is_little,
+            at: directory.saturating_add(count_width),
+            // (Entries beyond the end of the file are none.)
+            entries: entries.min(bytes.len() as u64 / entry_size),
+            entry_size,
+            wide,
+        })
+    }
+
+    /// Where each entry begins.
+    fn places(&self) -> impl Iterator<Item = u64> {
+        (0..self.entries).map(|entry| {
+            self.at
+                .saturating_add(entry.saturating_mul(self.entry_size))
+        })
+    }
+}
+
+fn number(bytes: &[u8], is_little: bool, at: u64, width: u64) -> Option<u64> {
+    let at = usize::try_from(at).ok()?;
+    let digits = bytes.get(at..)?.get(..width as usize)?;
+    let add = |sum: u64, digit: &u8| sum << 8 | u64::from(*digit);
+    Some(match is_little {
+        true => digits.iter().rev().fold(0, add),
+        false => digits.iter().fold(0, add),
+    })
+}
 
 /// Whether no entry of the first directory has more values than its file has bytes; so with all that is no TIFF.
 pub fn counts_fit(bytes: &[u8]) -> bool {
-    let little = match bytes.get(..2) {
-        Some(b"II") => true,
-        Some(b"MM") => false,
-        _ => return true,
-    };
-    let number = |at: u64, width: u64| -> Option<u64> {
-        let at = usize::try_from(at).ok()?;
-        let digits = bytes.get(at..)?.get(..width as usize)?;
-        let add = |sum: u64, digit: &u8| sum << 8 | u64::from(*digit);
-        Some(match little {
-            true => digits.iter().rev().fold(0, add),
-            false => digits.iter().fold(0, add),
-        })
-    };
-    // (Where the directory's offset stands, its width, that of the number of entries, and an entry's size.)
-    let (offset_at, wide, count_width, entry_size) = match number(2, 2) {
-        Some(42) => (4, 4, 2, 12),
-        Some(43) => (8, 8, 8, 20),
-        _ => return true,
-    };
-    let Some(directory) = number(offset_at, wide) else {
-        return true;
-    };
-    let entries = number(directory, count_width).unwrap_or(0);
     let most = bytes.len() as u64;
-    let fits = |entry: u64| {
-        let at = directory
-            .saturating_add(count_width)
-            .saturating_add(entry.saturating_mul(entry_size));
-        number(at.saturating_add(4), wide).is_none_or(|count| count <= most)
+    Directory::of(bytes).is_none_or(|directory| {
+        directory.places().all(|at| {
+            number(
+                bytes,
+                directory.is_little,
+                at.saturating_add(4),
+                directory.wide,
+            )
+            .is_none_or(|count| count <= most)
+        })
+    })
+}
+
+/// Says in place of how the camera was held that the picture is as it is shown.
+pub fn forget_orientation(bytes: &mut [u8]) {
+    let Some(directory) = Directory::of(bytes) else {
+        return;
     };
-    // (Entries beyond the end of the file are none.)
-    (0..entries.min(most / entry_size)).all(fits)
+    let is_little = directory.is_little;
+    for at in directory.places() {
+        if number(bytes, is_little, at, 2) != Some(ORIENTATION) {
+            continue;
+        }
+        // A short integer, in the first bytes of the room for a value.
+        let value_at = usize::try_from(at.saturating_add(4).saturating_add(directory.wide));
+        let value = value_at
+            .ok()
+            .and_then(|at| bytes.get_mut(at..)?.get_mut(..2));
+        if let Some(value) = value {
+            let as_shown = 1_u16;
+            value.copy_from_slice(&match is_little {
+                true => as_shown.to_le_bytes(),
+                false => as_shown.to_be_bytes(),
+            });
+        }
+    }
 }
 
 #[cfg(test)]

@@ -934,10 +934,9 @@ fn check_tells_which_light_is_not_used() {
 
 #[test]
 fn help_that_cannot_be_written_was_not_given() {
-    let folder = tempfile::tempdir().unwrap();
     for argument in ["--help", "--version"] {
         let full = std::fs::OpenOptions::new().write(true).open("/dev/full");
-        let output = gnomon(folder.path())
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_gnomon"))
             .arg(argument)
             .stdout(full.unwrap())
             .output()

@@ -500,6 +500,71 @@ fn what_only_has_a_weak_code_tells_nothing_of_the_camera() {
     assert!(!said.contains("turned left for right"), "{said}");
 }
 
+/// What a recording's stamps and its decoder say: a stamp that repeats is a word, a picture that was guessed is damage.
+#[test]
+fn repeated_times_are_told_and_guessed_pictures_are_damage() {
+    let folder = tempfile::tempdir().unwrap();
+    let lamp = project_file("recordings/lamp");
+    let made = |arguments: &str| {
+        let status = std::process::Command::new("ffmpeg")
+            .current_dir(folder.path())
+            .args(["-v", "error", "-nostdin", "-i"])
+            .arg(lamp.join("video.mp4"))
+            .args(arguments.split(' '))
+            .status();
+        assert!(status.expect("ffmpeg").success(), "{arguments}");
+    };
+    let repeated = "setts=ts=if(eq(N\\,3)\\,PREV_OUTPTS\\,TS)";
+    made(&format!(
+        "-frames:v 6 -c:v mjpeg -q:v 2 -bsf:v {repeated} repeated.mkv"
+    ));
+    made("-frames:v 6 -c:v libx264 -g 1 -bf 0 guessed.mp4");
+    let guessed = folder.path().join("guessed.mp4");
+    let mut bytes = std::fs::read(&guessed).expect("a video");
+    let begin = bytes.len() * 3 / 8;
+    let damaged = bytes.iter_mut().skip(begin).take(1500);
+    damaged
+        .zip(0_u32..)
+        .for_each(|(byte, k)| *byte = ((k * k * 7 + k * 31) % 251) as u8);
+    std::fs::write(&guessed, bytes).expect("a damaged video");
+    let calibration = lamp.join("camera.toml");
+    let track = |name: &str| {
+        let poses = format!("{name}.csv");
+        let output = gnomon(
+            folder.path(),
+            &[
+                "track",
+                name,
+                "--size-mm",
+                "44",
+                "--calibration",
+                plain(&calibration),
+                "--poses",
+                &poses,
+            ],
+        );
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        let times: BTreeMap<String, String> = (rows(&folder.path().join(&poses)).into_iter())
+            .map(|row| (row[0].clone(), row[1].clone()))
+            .collect();
+        (output.status.success(), said, times)
+    };
+    let (is_done, said, times) = track("repeated.mkv");
+    assert!(
+        is_done && said.contains("1 frames had no time of their own"),
+        "{said}"
+    );
+    let time_secs = |frame: &str| times[frame].parse::<f64>().expect("a time");
+    assert!(
+        time_secs("3") > time_secs("2") && time_secs("3") < time_secs("4"),
+        "{times:?}"
+    );
+    assert!((time_secs("5") - 5.0 / 30.0).abs() < 1e-3, "{times:?}");
+    let (is_done, said, times) = track("guessed.mp4");
+    assert!(!is_done && said.contains("damaged"), "{said}");
+    assert_eq!(times.len(), 6, "{said}");
+}
+
 /// Frames of the lamp as pictures, as they are and as a camera that mirrors gives them.
 fn picture_folders(folder: &Path) -> [PathBuf; 2] {
     let folders = ["as-is", "mirrored"].map(|name| folder.join(name));

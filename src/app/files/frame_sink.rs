@@ -39,8 +39,8 @@ impl FrameSink {
         Ok(ResultKind::Frames)
     }
 
-    /// Opens `path`: by its extension a video, else a folder of PNGs. Folders on the way are made. `fps` is the nominal rate;
-    /// frames of a video keep their times.
+    /// Opens `path`: by its extension a video, else a folder of PNGs. Folders on the way are made. `fps` is the rate of
+    /// the shortest steps; frames of a video keep their times.
     ///
     /// # Errors
     /// As [`FrameSink::kind_of`]; a place that cannot be written to.
@@ -274,6 +274,28 @@ mod tests {
             assert!(source.next_frame().unwrap().is_none(), "{name}");
             assert_eq!(source.notices(), [], "{name}");
         }
+    }
+
+    /// AVI has a rate and no times.
+    #[test]
+    fn avi_is_in_time_or_not_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.avi");
+        let written = |fps: f64| {
+            let mut sink = FrameSink::create(&path, [64, 48], fps).unwrap();
+            let times_secs = [0.0, 1.0, 1.033, 1.067, 1.1, 1.133];
+            let pushed = times_secs
+                .iter()
+                .zip(0..)
+                .try_for_each(|(&time_secs, index)| {
+                    sink.push((index, time_secs), [64, 48], &flat([64, 48], [9; 3]))
+                });
+            pushed.and_then(|()| sink.finish())
+        };
+        let refused = written(4.0).unwrap_err().to_string();
+        assert!(refused.contains("write .mkv or .mp4"), "{refused}");
+        assert_eq!(names_in(folder.path()), [""; 0]);
+        written(30.0).unwrap();
     }
 
     #[test]

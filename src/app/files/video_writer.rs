@@ -68,9 +68,9 @@ pub enum Pace {
         /// Frames per second.
         fps: f64,
     },
-    /// Each at its own time since the first; in AVI, which has no times, as near as its rate allows.
+    /// Each at its own time since the first; in AVI, which has no times, as near as its rate allows, or not at all.
     Stamped {
-        /// Frames per second, for the most part.
+        /// Frames per second where they follow each other most closely.
         nominal_fps: f64,
     },
 }
@@ -171,6 +171,7 @@ impl VideoWriter {
         let stamp_secs = self
             .pace
             .stamp_secs(&self.path, since_first_secs, self.last_secs);
+        self.check_that_it_is_in_time(since_first_secs, stamp_secs)?;
         self.last_secs = Some(stamp_secs);
         let written = self.encoder.as_mut().map(|encoder| match self.pace {
             Pace::Even { .. } => encoder.write_all(rgba),
@@ -183,6 +184,27 @@ impl VideoWriter {
             }
             // The pipe breaks when the encoder gives up; why, it says itself.
             Some(Err(_)) | None => Err(self.gave_up()),
+        }
+    }
+
+    /// AVI shows its frames one after the other at its rate. (The others have times of their own.)
+    fn check_that_it_is_in_time(&self, time_secs: f64, shown_secs: f64) -> Result<(), OutputError> {
+        /// Frames that are shown in its place, at most.
+        const MOST_OFF: f64 = 1.5;
+        match self.pace {
+            Pace::Stamped { nominal_fps }
+                if is_avi(&self.path) && (shown_secs - time_secs) * nominal_fps > MOST_OFF =>
+            {
+                let message = format!(
+                    "the frame of {time_secs:.3} s would be shown at {shown_secs:.3} s: AVI has no times of its own, but \
+                     {nominal_fps:.3} frames in each second; write .mkv or .mp4"
+                );
+                Err(OutputError::Picture {
+                    path: self.path.clone(),
+                    message,
+                })
+            }
+            _ => Ok(()),
         }
     }
 

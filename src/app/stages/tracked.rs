@@ -18,6 +18,7 @@ use crate::app::input::mailbox::Taken;
 use crate::app::input::mirror_watch::MirrorWatch;
 use crate::app::input::sightings::Sightings;
 use crate::app::stopwatch::Stopwatch;
+use crate::app::talk;
 use crate::capture::{Frame, FrameSource, Notice, check_frame_size};
 use crate::geometry::camera::Intrinsics;
 use crate::scene::Anchor;
@@ -175,6 +176,9 @@ fn capture_stage(
         if receiver_gone || last.is_some_and(|last| index >= last) {
             break;
         }
+    }
+    if let Some(remark) = source.remark_of_times() {
+        talk::say(remark);
     }
     let notices = source.notices().to_vec();
     Ok(Captured {

@@ -59,7 +59,8 @@ impl Colours {
             "bt709" => YuvStandardMatrix::Bt709,
             "bt470bg" | "smpte170m" => YuvStandardMatrix::Bt601,
             "bt2020nc" | "bt2020c" => YuvStandardMatrix::Bt2020,
-            "smpte240m" => YuvStandardMatrix::Smpte240,
+            // (The crate's own has them for each other.)
+            "smpte240m" => YuvStandardMatrix::Custom(0.212, 0.087),
             "fcc" => YuvStandardMatrix::Fcc,
             _ if lines >= LINES_OF_BT_709 => YuvStandardMatrix::Bt709,
             _ => YuvStandardMatrix::Bt601,
@@ -104,6 +105,31 @@ impl Colours {
     pub(super) fn is_srgb(self) -> bool {
         self.transfer == Transfer::Display && self.primaries == Primaries::Bt709
     }
+}
+
+/// What to say where the matrix is one that is not known here.
+pub(super) fn remark_of_matrix(tags: &ColourTags, layout: PixelLayout) -> Option<String> {
+    const KNOWN: [&str; 11] = [
+        "bt709",
+        "bt470bg",
+        "smpte170m",
+        "bt2020nc",
+        "bt2020c",
+        "smpte240m",
+        "fcc",
+        "gbr",
+        "unknown",
+        "unspecified",
+        "reserved",
+    ];
+    let is_coded = matches!(layout, PixelLayout::Planar { .. });
+    let matrix = tags.matrix.as_str();
+    (is_coded && !KNOWN.contains(&matrix)).then(|| {
+        format!(
+            "its colours are coded by {matrix}, which is not read: they are taken as if they were coded as usual, and are wrong; \
+             encode it anew by BT.709"
+        )
+    })
 }
 
 /// From R'G'B' of a stream that is not sRGB to sRGB: tables, made once.

@@ -12,6 +12,8 @@ pub enum Said {
     Stream,
     /// A video was found in it, and is decoded.
     Decoding,
+    /// The decoder that is at work, by FFmpeg's name of it.
+    Decoder(String),
     /// Of the frames that follow.
     TimeBase {
         /// Seconds that a tick of the time stamps lasts.
@@ -26,7 +28,12 @@ pub enum Said {
     /// The frame that comes next has errors in it.
     Corrupt,
     /// The reader or the decoder cannot make something of the file.
-    Complaint(String),
+    Complaint {
+        /// FFmpeg's name of the part that complains; empty where it is FFmpeg itself.
+        by: String,
+        /// What it says.
+        words: String,
+    },
     /// Nothing can be done with it at all.
     Fatal(String),
 }
@@ -62,8 +69,10 @@ pub fn meaning(line: &str) -> Option<Said> {
         return of_showinfo(said);
     }
     // A picture of its own that ends too soon is given all the same.
-    let is_half_jpeg =
-        line.starts_with("[mjpeg") && (line.contains("[error] ") || line.contains("EOI missing"));
+    let is_too_large = line.contains("max pixel count");
+    let is_half_jpeg = line.starts_with("[mjpeg")
+        && (line.contains("[error] ") || line.contains("EOI missing"))
+        && !is_too_large;
     if is_half_jpeg || line.contains("corrupt decoded frame") {
         return Some(Said::Corrupt);
     }
@@ -74,19 +83,77 @@ pub fn meaning(line: &str) -> Option<Said> {
     if let Some((_, words)) = line.split_once("[fatal] ") {
         return Some(Said::Fatal(words.trim().to_owned()));
     }
-    if let Some((_, words)) = line.split_once("[error] ") {
-        return Some(Said::Complaint(words.trim().to_owned()));
+    if let Some(words) = complaint_in(line) {
+        return (!is_harmless(words)).then(|| Said::Complaint {
+            by: speaker_of(line).to_owned(),
+            words: words.to_owned(),
+        });
     }
     if line.starts_with("[info] Stream mapping:") {
         return Some(Said::Decoding);
     }
     let stream = line.strip_prefix("[info]").map(str::trim_start);
+    if let Some((_, said)) = stream.and_then(|said| said.split_once(" -> #0:0 (")) {
+        return decoder_in(said).map(|name| Said::Decoder(name.to_owned()));
+    }
     // (What a cut-off index leaves is called data.)
     if let Some(said) = stream.filter(|said| said.starts_with("Stream #0:")) {
         let is_media = said.contains(": Audio:") || said.contains(": Video:");
         return is_media.then_some(Said::Stream);
     }
     line.starts_with("[info] Input #0").then_some(Said::Input)
+}
+
+/// What a line complains of. That parts of a picture were guessed is told as a mere information.
+fn complaint_in(line: &str) -> Option<&str> {
+    let error = line.split_once("[error] ").map(|(_, words)| words.trim());
+    let guessed = || {
+        let (_, words) = line.split_once("[info] ")?;
+        words.starts_with("concealing ").then_some(words.trim())
+    };
+    error.or_else(guessed)
+}
+
+/// Whether nothing of the pictures that the file has is lost by it: the decoder misses, or is told to forget, pictures before the
+/// first one. So it is where a recording was cut without being encoded anew.
+fn is_harmless(words: &str) -> bool {
+    const SIGNS: [&str; 6] = [
+        "mmco:",
+        "Missing reference picture",
+        "reference picture missing",
+        "co located POCs unavailable",
+        "Could not find ref with POC",
+        "Warning MVs not available",
+    ];
+    SIGNS.iter().any(|sign| words.starts_with(sign))
+}
+
+/// Whether a decoder complains that it was never told how a picture is coded, which it then does not give. So begins a stream that
+/// was taken up in its middle.
+pub fn is_of_missing_headers(words: &str) -> bool {
+    const SIGNS: [&str; 5] = [
+        "non-existing PPS",
+        "non-existing SPS",
+        "PPS id out of range",
+        "decode_slice_header error",
+        "no frame!",
+    ];
+    SIGNS.iter().any(|sign| words.starts_with(sign))
+}
+
+/// The part of FFmpeg that a line is of: `h264` in `[h264 @ 0x5] [error] …`.
+fn speaker_of(line: &str) -> &str {
+    let inside = line
+        .strip_prefix('[')
+        .and_then(|rest| rest.split_once(" @ "));
+    inside.map_or("", |(name, _)| name)
+}
+
+/// The decoder in `h264 (native) -> rawvideo (native))`, or in `av1 (libdav1d) -> …`.
+fn decoder_in(mapping: &str) -> Option<&str> {
+    let (codec, rest) = mapping.split_once(" (")?;
+    let (name, _) = rest.split_once(')')?;
+    Some(if name == "native" { codec } else { name })
 }
 
 fn of_showinfo(said: &str) -> Option<Said> {
@@ -153,6 +220,13 @@ mod tests {
         ));
     }
 
+    fn complaint(by: &str, words: &str) -> Said {
+        Said::Complaint {
+            by: by.to_owned(),
+            words: words.to_owned(),
+        }
+    }
+
     #[test]
     fn time_base_colours_and_complaints_are_read() {
         let base =
@@ -177,8 +251,24 @@ mod tests {
         let broken = "[h264 @ 0x5] [error] Invalid NAL unit size (1 > 0).";
         assert_eq!(
             meaning(broken),
-            Some(Said::Complaint("Invalid NAL unit size (1 > 0).".to_owned()))
+            Some(complaint("h264", "Invalid NAL unit size (1 > 0)."))
         );
+        let guessed = "[h264 @ 0x5] [info] concealing 9 DC, 9 AC, 9 MV errors in P frame";
+        let words = "concealing 9 DC, 9 AC, 9 MV errors in P frame";
+        assert_eq!(meaning(guessed), Some(complaint("h264", words)));
+        let by_itself = "[error] Error while decoding stream #0:0: Invalid data found";
+        let words = "Error while decoding stream #0:0: Invalid data found";
+        assert_eq!(meaning(by_itself), Some(complaint("", words)));
+        // A recording that was cut without being encoded anew.
+        let cut = "[h264 @ 0x5] [error] mmco: unref short failure";
+        assert_eq!(meaning(cut), None);
+        for (mapping, name) in [
+            ("h264 (native) -> rawvideo (native)", "h264"),
+            ("av1 (libdav1d) -> rawvideo (native)", "libdav1d"),
+        ] {
+            let line = format!("[info]   Stream #0:1 -> #0:0 ({mapping})");
+            assert_eq!(meaning(&line), Some(Said::Decoder(name.to_owned())));
+        }
         let sound = "[info]   Stream #0:0[0x1](und): Audio: aac (LC), 44100 Hz, mono";
         assert_eq!(meaning(sound), Some(Said::Stream));
         assert_eq!(

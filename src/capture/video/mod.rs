@@ -1,6 +1,7 @@
 //! A video file as a recording, decoded by an ffmpeg process: each frame with its own time stamp, its colours as the
 //! stream says, its picture as it is meant to be held. A decoder that crashes or hangs does not take gnomon with it.
 
+mod clock;
 mod colours;
 pub mod log;
 mod planes;
@@ -12,23 +13,34 @@ use std::ffi::OsString;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use super::error::{CaptureError, Notice};
+use super::error::{CaptureError, Notice, too_many_pixels};
 use crate::scene::in_its_place::in_place_of;
+use clock::Clock;
 use colours::{Colours, ToSrgb};
 use planes::{rgba8, rgba16};
 use probe::{Header, Packets, Probe};
-use process::{Decoder, MOST_PIXELS_OPTION, Next, NoDecoder, RawFrame};
+use process::{Decoder, MOST_PIXELS, MOST_PIXELS_OPTION, Next, NoDecoder, RawFrame};
 
 /// For videos that do not know their own.
 const ASSUMED_FPS: f64 = 30.0;
 /// A playlist from a stranger must not reach into the net, and no header asks for more pixels than a camera has.
-const INPUT_OPTIONS: [&str; 4] = [
+const INPUT_OPTIONS: [&str; 6] = [
     "-protocol_whitelist",
     "file",
+    CLOCK_OPTIONS[0],
+    CLOCK_OPTIONS[1],
     MOST_PIXELS_OPTION[0],
     MOST_PIXELS_OPTION[1],
 ];
-const PROBE_OPTIONS: [&str; 2] = ["-protocol_whitelist", "file"];
+const PROBE_OPTIONS: [&str; 4] = [
+    "-protocol_whitelist",
+    "file",
+    CLOCK_OPTIONS[0],
+    CLOCK_OPTIONS[1],
+];
+/// Stamps as they are stored: a step back, where recordings were put one after the other, would be taken for the overflow of a
+/// clock that runs for a day.
+const CLOCK_OPTIONS: [&str; 2] = ["-correct_ts_overflow", "0"];
 
 /// A frame's place in the recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,9 +72,22 @@ pub(super) struct VideoFrames {
 struct Damage {
     /// What ffmpeg said first; without it nothing is damaged.
     complaint: Option<String>,
+    /// What the decoder could not decode first, and the frame that came next.
+    fault: Option<(u32, String)>,
     packets: Option<Option<Packets>>,
     corrupt: u32,
     first_corrupt: u32,
+}
+
+impl Damage {
+    fn complained(&mut self, words: String) {
+        self.complaint.get_or_insert(words);
+    }
+
+    fn failed(&mut self, near: u32, words: String) {
+        self.fault.get_or_insert_with(|| (near, words.clone()));
+        self.complained(words);
+    }
 }
 
 impl VideoFrames {
@@ -87,11 +112,16 @@ impl VideoFrames {
         let waiting = loop {
             match decoder.next() {
                 Next::Frame(frame) => break frame,
-                Next::Complaint(words) => _ = damage.complaint.get_or_insert(words),
+                Next::Complaint(words) => damage.complained(words),
+                Next::Fault(words) => damage.failed(0, words),
                 Next::End => return Err(no_frame(path, &decoder, damage.complaint)),
             }
         };
         let header = probe.and_then(Probe::header).unwrap_or_default();
+        // A stream that was taken up in its middle begins with what cannot be decoded.
+        if header.container.contains("mpeg") {
+            damage.fault = None;
+        }
         // A text is a picture of letters to ffmpeg.
         if header.container == "tty" {
             return Err(no_video(path, None));
@@ -111,18 +141,22 @@ impl VideoFrames {
             good_frames: 0,
             ended: false,
         };
-        if let (Some(first), Some((_, layout, [_, lines]))) =
-            (&video.waiting, video.decoder.pixels())
-        {
-            let of_colours = Colours::of(&first.colours, layout, lines).remark();
-            let remarks: Vec<String> = of_colours
-                .map(str::to_owned)
-                .into_iter()
-                .chain(shape_remarks(&video.header))
-                .collect();
-            video.remark = (!remarks.is_empty()).then(|| remarks.join("; "));
-        }
+        video.remark = video.first_remark();
         Ok(video)
+    }
+
+    /// What the first frame and the header tell.
+    fn first_remark(&self) -> Option<String> {
+        let (_, layout, [_, lines]) = self.decoder.pixels()?;
+        let tags = &self.waiting.as_ref()?.colours;
+        let of_light = Colours::of(tags, layout, lines).remark();
+        let remarks: Vec<String> = of_light
+            .map(str::to_owned)
+            .into_iter()
+            .chain(colours::remark_of_matrix(tags, layout))
+            .chain(header_remarks(&self.header))
+            .collect();
+        (!remarks.is_empty()).then(|| remarks.join("; "))
     }
 
     /// Frames that the container counts, or else what its length and rate come to.
@@ -138,6 +172,11 @@ impl VideoFrames {
         self.header.fps.unwrap_or(ASSUMED_FPS)
     }
 
+    /// The rate that all steps of the time stamps are multiples of, where that is finer.
+    pub(super) fn finest_fps(&self) -> f64 {
+        self.header.fps_by_steps.unwrap_or(0.0).max(self.fps())
+    }
+
     pub(super) fn size_px(&self) -> [u32; 2] {
         self.size_px
     }
@@ -145,6 +184,11 @@ impl VideoFrames {
     /// What is done to it that a user should know.
     pub(super) fn remark(&self) -> Option<&str> {
         self.remark.as_deref()
+    }
+
+    /// How many frames so far had no time of their own.
+    pub(super) fn moved_frames(&self) -> u32 {
+        self.clock.moved_frames
     }
 
     pub(super) fn next_picture(
@@ -197,7 +241,8 @@ impl VideoFrames {
         loop {
             match self.decoder.next() {
                 Next::Frame(frame) => return Some(frame),
-                Next::Complaint(words) => _ = self.damage.complaint.get_or_insert(words),
+                Next::Complaint(words) => self.damage.complained(words),
+                Next::Fault(words) => self.damage.failed(self.next_index, words),
                 Next::End => return None,
             }
         }
@@ -209,8 +254,8 @@ impl VideoFrames {
         let Some(stamp_secs) = frame.stamp_secs else {
             return counted;
         };
-        // A stream that was taken up in its middle begins with what cannot be decoded.
-        let is_taken_up = counted == 0 && self.header.container.contains("mpeg");
+        // Nor is a frame lost that refers to others before a cut.
+        let is_taken_up = counted == 0 && self.damage.fault.is_none();
         if is_taken_up {
             return counted;
         }
@@ -245,6 +290,18 @@ impl VideoFrames {
     }
 
     fn tell_end(&mut self, notices: &mut Vec<Notice>) {
+        self.tell_what_ended(notices);
+        // What is told already needs no second word.
+        if let Some((near, said)) = self.damage.fault.take().filter(|_| notices.is_empty()) {
+            notices.push(Notice::Faulty {
+                path: self.path.clone(),
+                near,
+                said,
+            });
+        }
+    }
+
+    fn tell_what_ended(&mut self, notices: &mut Vec<Notice>) {
         if self.damage.corrupt > 0 {
             notices.push(Notice::Corrupt {
                 path: self.path.clone(),
@@ -280,8 +337,8 @@ impl VideoFrames {
     }
 }
 
-/// What a header says of its pixels that a calibration has to know.
-fn shape_remarks(header: &Header) -> impl Iterator<Item = String> {
+/// What a header says that a user has to know.
+fn header_remarks(header: &Header) -> impl Iterator<Item = String> {
     let aspect = header
         .pixel_aspect
         .filter(|aspect| (aspect - 1.0).abs() > 1e-3);
@@ -296,7 +353,13 @@ fn shape_remarks(header: &Header) -> impl Iterator<Item = String> {
          mends that)"
             .to_owned()
     });
-    of_aspect.into_iter().chain(of_fields)
+    let of_others = (header.videos > 1).then(|| {
+        format!(
+            "it holds {} videos, of which the first is taken (ffmpeg -i IN -map 0:V:1 -c copy OUT brings the second)",
+            header.videos
+        )
+    });
+    of_aspect.into_iter().chain(of_fields).chain(of_others)
 }
 
 /// From decoded pixels to sRGB.
@@ -327,52 +390,6 @@ impl Conversion {
             .filter(|known| known.fits(colours, largest))
             .unwrap_or_else(|| ToSrgb::new(colours, largest));
         Ok(self.to_srgb.insert(to_srgb).rgba(&coded))
-    }
-}
-
-/// Times since the first frame, from time stamps. Readers count on times that increase: where a stamp does not (recordings
-/// that were put one after the other), or there is none, time goes on by a frame.
-struct Clock {
-    frame_secs: f64,
-    /// What is taken from the stamps.
-    origin_secs: Option<f64>,
-    last_stamp_secs: Option<f64>,
-    last_secs: Option<f64>,
-}
-
-impl Clock {
-    fn new(frame_secs: f64) -> Self {
-        Self {
-            frame_secs,
-            origin_secs: None,
-            last_stamp_secs: None,
-            last_secs: None,
-        }
-    }
-
-    fn time_secs(&mut self, stamp_secs: Option<f64>) -> f64 {
-        let next_secs = self.last_secs.map_or(0.0, |last| last + self.frame_secs);
-        let time_secs = match stamp_secs {
-            None => next_secs,
-            Some(stamp_secs) => {
-                self.last_stamp_secs = Some(stamp_secs);
-                let origin_secs = *self.origin_secs.get_or_insert(stamp_secs - next_secs);
-                let by_stamp = stamp_secs - origin_secs;
-                if self.last_secs.is_none_or(|last| by_stamp > last) {
-                    by_stamp
-                } else {
-                    self.origin_secs = Some(stamp_secs - next_secs);
-                    next_secs
-                }
-            }
-        };
-        self.last_secs = Some(time_secs);
-        time_secs
-    }
-
-    /// To the end of the last frame.
-    fn length_secs(&self) -> f64 {
-        self.last_secs.map_or(0.0, |last| last + self.frame_secs)
     }
 }
 
@@ -417,6 +434,9 @@ fn no_frame(path: &Path, decoder: &Decoder, complaint: Option<String>) -> Captur
     match decoder.opened {
         true if decoder.has_video => CaptureError::NoGoodFrame {
             path: path.to_owned(),
+            why: complaint
+                .filter(|words| words.contains("max pixel count"))
+                .map_or(String::new(), |_| too_many_pixels(MOST_PIXELS)),
         },
         true if decoder.has_streams => CaptureError::SoundAlone {
             path: path.to_owned(),

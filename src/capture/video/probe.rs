@@ -27,6 +27,8 @@ pub struct Header {
     pub duration_secs: Option<f64>,
     /// Frames per second, on the average or as it is said.
     pub fps: Option<f64>,
+    /// The rate that the steps of its time stamps are multiples of, as far as FFmpeg has looked.
+    pub fps_by_steps: Option<f64>,
     /// Rows of a frame before it is turned.
     pub lines: Option<u32>,
     /// FFmpeg's names of the container.
@@ -35,6 +37,8 @@ pub struct Header {
     pub pixel_aspect: Option<f64>,
     /// Whether a frame's lines are of two moments.
     pub is_interlaced: bool,
+    /// How many videos there are, cover pictures not counted.
+    pub videos: usize,
 }
 
 #[derive(Deserialize)]
@@ -49,6 +53,7 @@ struct Answer {
 #[derive(Deserialize)]
 struct Stream {
     height: Option<u32>,
+    start_time: Option<String>,
     r_frame_rate: Option<String>,
     avg_frame_rate: Option<String>,
     duration: Option<String>,
@@ -79,15 +84,15 @@ pub(super) struct Probe {
 impl Probe {
     /// Begins to ask for the header; `None` where the program cannot be started.
     pub(super) fn start(input_options: &[&str], input: &OsStr) -> Option<Self> {
-        let entries = "stream=height,r_frame_rate,avg_frame_rate,duration,nb_frames,sample_aspect_ratio,field_order\
-                       :format=format_name,duration";
-        Self::ask(input_options, input, entries)
+        let entries = "stream=height,start_time,r_frame_rate,avg_frame_rate,duration,nb_frames,sample_aspect_ratio,\
+                       field_order:format=format_name,duration";
+        Self::ask(input_options, input, ["V", entries])
     }
 
-    fn ask(input_options: &[&str], input: &OsStr, entries: &str) -> Option<Self> {
+    fn ask(input_options: &[&str], input: &OsStr, [streams, entries]: [&str; 2]) -> Option<Self> {
         let mut command = Command::new("ffprobe");
         command
-            .args(["-v", "quiet", "-select_streams", "V:0", "-of", "json"])
+            .args(["-v", "quiet", "-select_streams", streams, "-of", "json"])
             .args(["-show_entries", entries])
             .args(input_options)
             .arg(input)
@@ -122,20 +127,31 @@ impl Probe {
 /// What an answer of ffprobe says of the header; `None` where it is none.
 pub fn header_of(answer: &str) -> Option<Header> {
     let answer: Answer = serde_json::from_str(answer).ok()?;
+    let videos = answer.streams.len();
     let stream = answer.streams.into_iter().next()?;
     let rate = |text: &Option<String>| {
         let rate = text.as_deref().and_then(ratio);
         rate.filter(|fps| (0.1..=1000.0).contains(fps))
     };
-    let container = answer.format;
-    let secs = |text: Option<&String>| text.and_then(|text| text.parse().ok());
-    let whole = container
-        .as_ref()
-        .and_then(|format| format.duration.as_ref());
+    let secs = |text: Option<&String>| text.and_then(|text| text.parse::<f64>().ok());
+    let start_secs = secs(stream.start_time.as_ref()).map_or(0.0, |start_secs| start_secs.max(0.0));
+    let container = answer.format.map(|format| {
+        let name = format.format_name.unwrap_or_default();
+        // Matroska's length is counted from 0, wherever its frames begin.
+        let before_secs = if name.contains("matroska") {
+            start_secs
+        } else {
+            0.0
+        };
+        let whole_secs = secs(format.duration.as_ref()).map(|end_secs| end_secs - before_secs);
+        (name, whole_secs)
+    });
+    let (container, whole_secs) = container.unwrap_or_default();
     Some(Header {
         counted_frames: stream.nb_frames.and_then(|count| count.parse().ok()),
-        duration_secs: secs(stream.duration.as_ref()).or_else(|| secs(whole)),
+        duration_secs: secs(stream.duration.as_ref()).or(whole_secs),
         fps: nominal_fps(rate(&stream.avg_frame_rate), rate(&stream.r_frame_rate)),
+        fps_by_steps: rate(&stream.r_frame_rate),
         lines: stream.height,
         pixel_aspect: stream
             .sample_aspect_ratio
@@ -143,9 +159,8 @@ pub fn header_of(answer: &str) -> Option<Header> {
         is_interlaced: stream
             .field_order
             .is_some_and(|order| matches!(order.as_str(), "tt" | "bb" | "tb" | "bt")),
-        container: container
-            .and_then(|format| format.format_name)
-            .unwrap_or_default(),
+        container,
+        videos,
     })
 }
 
@@ -167,7 +182,8 @@ impl Packets {
     /// Reads the whole file without decoding it.
     pub(super) fn of(input_options: &[&str], input: &OsString) -> Option<Self> {
         let entries = "packet=pts_time,dts_time,flags";
-        Self::of_answer(&Probe::ask(input_options, input, entries)?.answer(PATIENCE_WITH_PACKETS)?)
+        let probe = Probe::ask(input_options, input, ["V:0", entries])?;
+        Self::of_answer(&probe.answer(PATIENCE_WITH_PACKETS)?)
     }
 
     /// Those of an answer of ffprobe; `None` where it is none.

@@ -6,7 +6,7 @@ use std::process::{ChildStdout, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
-use super::log::{ColourTags, FrameHead, Said, meaning};
+use super::log::{ColourTags, FrameHead, Said, is_of_missing_headers, meaning};
 use super::planes::PixelLayout;
 use crate::capture::children::RunningChild;
 use crate::geometry::camera::MOST_SIDE_PX;
@@ -39,6 +39,8 @@ pub(super) enum Next {
     Frame(RawFrame),
     /// The reader or the decoder complained of something before the next frame.
     Complaint(String),
+    /// The decoder said that it cannot decode some of a picture, which is near the next frame: several are decoded at once.
+    Fault(String),
     /// Nothing more comes.
     End,
 }
@@ -56,6 +58,8 @@ pub(super) struct Decoder {
     running: RunningChild,
     frames_out: ChildStdout,
     said: Receiver<Said>,
+    /// FFmpeg's name of the decoder; empty before it is at work.
+    name: String,
     tick_secs: f64,
     /// The rate that the stream says.
     pub fps: Option<f64>,
@@ -125,6 +129,7 @@ impl Decoder {
             running,
             frames_out,
             said,
+            name: String::new(),
             tick_secs: 0.0,
             fps: None,
             head: None,
@@ -146,13 +151,15 @@ impl Decoder {
                 Ok(Said::Input) => self.opened = true,
                 Ok(Said::Stream) => self.has_streams = true,
                 Ok(Said::Decoding) => self.has_video = true,
+                Ok(Said::Decoder(name)) => self.name = name,
                 Ok(Said::TimeBase { tick_secs, fps }) => {
                     (self.tick_secs, self.fps) = (tick_secs, fps)
                 }
                 Ok(Said::Frame(head)) => self.head = Some(head),
                 // (While the file is looked through, it may be of a cover or of sound.)
                 Ok(Said::Corrupt) => self.corrupt |= self.has_video,
-                Ok(Said::Complaint(words) | Said::Fatal(words)) => return Next::Complaint(words),
+                Ok(Said::Complaint { by, words }) => return self.complaint(&by, words),
+                Ok(Said::Fatal(words)) => return Next::Complaint(words),
                 Ok(Said::Colours(colours)) => {
                     if let Some(head) = self.head.take() {
                         match self.take(&head, colours) {
@@ -175,6 +182,15 @@ impl Decoder {
             }
         }
         Next::End
+    }
+
+    /// (Before the decoder is named the file is only looked through.)
+    fn complaint(&self, by: &str, words: String) -> Next {
+        let is_fault = !by.is_empty() && by == self.name && !is_of_missing_headers(&words);
+        match is_fault {
+            true => Next::Fault(words),
+            false => Next::Complaint(words),
+        }
     }
 
     fn after_the_last(&mut self) -> Next {

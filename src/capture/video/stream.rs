@@ -66,7 +66,7 @@ impl VideoStream {
                         waiting: Some(frame),
                     });
                 }
-                Next::Complaint(_) => {}
+                Next::Complaint(_) | Next::Fault(_) => {}
                 Next::End => return None,
             }
         }
@@ -87,7 +87,7 @@ impl VideoStream {
             None => loop {
                 match self.decoder.next() {
                     Next::Frame(frame) => break frame,
-                    Next::Complaint(_) => {}
+                    Next::Complaint(_) | Next::Fault(_) => {}
                     Next::End => return Streamed::End,
                 }
             },

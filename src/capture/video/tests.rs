@@ -346,3 +346,191 @@ fn fields_and_oblong_pixels_are_told() {
         assert!(remark.contains(part), "{name}: {remark}");
     }
 }
+
+/// A lone stamp that does not increase moves its own frame and no other; what has no times at all is told.
+#[test]
+fn a_repeated_time_stamp_shifts_no_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let make = |arguments: &str| ffmpeg(folder.path(), arguments);
+    make(&format!("{SOURCE} -frames:v 10 -c:v mjpeg whole.mkv"));
+    make("-i whole.mkv -c copy -bsf:v setts=ts=if(eq(N\\,3)\\,67\\,TS) repeated.mkv");
+    make("-i whole.mkv -c copy -bsf:v setts=ts=0 zero.mkv");
+    let times = |name: &str| {
+        let mut source = FrameSource::open(folder.path().join(name).to_str().unwrap()).unwrap();
+        let mut times_secs = Vec::new();
+        while let Some(frame) = source.next_frame().unwrap() {
+            times_secs.push(frame.time_secs);
+        }
+        assert!(source.notices().is_empty(), "{:?}", source.notices());
+        (times_secs, source.remark_of_times())
+    };
+    let (whole, remark) = times("whole.mkv");
+    assert_eq!((whole.len(), remark), (10, None));
+    let (repeated, remark) = times("repeated.mkv");
+    for (k, (found, own)) in repeated.iter().zip(&whole).enumerate() {
+        let is_own = (found - own).abs() < 1e-9;
+        let is_between = *found > whole[2] && *found < whole[4];
+        assert!(if k == 3 { is_between } else { is_own }, "{repeated:?}");
+    }
+    let remark = remark.unwrap();
+    assert!(
+        remark.contains("repeated.mkv: 1 frames had no time"),
+        "{remark}"
+    );
+    let (zero, remark) = times("zero.mkv");
+    assert!(zero.windows(2).all(|pair| pair[0] < pair[1]), "{zero:?}");
+    let remark = remark.unwrap();
+    assert!(remark.contains("9 frames had no time"), "{remark}");
+}
+
+/// Recordings that were put one after the other: the second's stamps start again, far below the first's.
+#[test]
+fn joined_recordings_go_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for (name, offset) in [("late.ts", 100), ("early.ts", 0)] {
+        ffmpeg(
+            folder,
+            &format!("{SOURCE} -frames:v 12 -c:v mpeg2video -output_ts_offset {offset} {name}"),
+        );
+    }
+    let parts = ["late.ts", "early.ts"].map(|name| std::fs::read(folder.join(name)).unwrap());
+    std::fs::write(folder.join("joined.ts"), parts.concat()).unwrap();
+    let (frames, _) = all(&folder.join("joined.ts"));
+    assert!(frames.len() > 20, "{}", frames.len());
+    for pair in frames.windows(2) {
+        let step_secs = pair[1].time_secs - pair[0].time_secs;
+        assert!((0.01..0.2).contains(&step_secs), "{step_secs}");
+    }
+}
+
+/// Cut without being encoded anew, frames lack those that they refer to; and Matroska counts its length from 0, wherever it begins.
+#[test]
+fn what_was_cut_without_being_encoded_anew_is_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let make = |arguments: &str| ffmpeg(folder.path(), arguments);
+    let open = "open-gop=1:keyint=15:min-keyint=15:scenecut=0:bframes=3";
+    make(&format!(
+        "{SOURCE} -c:v libx264 -x264-params {open} open.mp4"
+    ));
+    make("-ss 0.6 -copyts -i open.mp4 -c copy late.mkv");
+    make("-ss 1.2 -i open.mp4 -c copy cut.mp4");
+    for name in ["late.mkv", "cut.mp4"] {
+        let path = folder.path().join(name);
+        let (frames, notices) = all(&path);
+        assert_eq!(notices, [], "{name}");
+        assert_eq!(frames.len(), probed_secs(&path).len(), "{name}");
+    }
+    let late = FrameSource::open(folder.path().join("late.mkv").to_str().unwrap()).unwrap();
+    assert_eq!(late.frame_count(), Some(105));
+}
+
+/// Pictures that the decoder gives though it could not decode all of them: whenever ffmpeg has a word, so has gnomon.
+#[test]
+fn what_was_guessed_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let noisy = "-vf noise=alls=20 -frames:v 20 -c:v libx264 -crf 20 -g 5 -pix_fmt yuv420p";
+    for name in ["a.mp4", "a.mkv"] {
+        ffmpeg(folder.path(), &format!("{SOURCE} {noisy} {name}"));
+        let path = folder.path().join(name);
+        assert_eq!(all(&path).1, [], "{name}");
+        let bytes = std::fs::read(&path).unwrap();
+        let (places, sizes) = (probed_packets(&path, "pos"), probed_packets(&path, "size"));
+        let largest = (1..sizes.len()).max_by_key(|&k| sizes[k]).unwrap();
+        let mut told = 0;
+        for part in [3, 4, 5, 6] {
+            let mut zeroed = bytes.clone();
+            let begin = places[largest] + sizes[largest] * part / 8;
+            zeroed[begin..begin + sizes[largest] / 8].fill(0);
+            let damaged = folder.path().join(format!("{part}_{name}"));
+            std::fs::write(&damaged, zeroed).unwrap();
+            let (frames, notices) = all(&damaged);
+            assert_eq!(frames.len(), 20, "{name} {part}");
+            assert!(
+                !notices.is_empty() || !is_complained_of(&damaged),
+                "{name} {part}"
+            );
+            told += usize::from(!notices.is_empty());
+        }
+        assert!(told > 0, "{name}");
+    }
+}
+
+/// Whether ffmpeg says anything of a damage.
+fn is_complained_of(path: &Path) -> bool {
+    let output = Command::new("ffmpeg")
+        .args(["-nostdin", "-nostats", "-i"])
+        .arg(path)
+        .args(["-f", "null", "-"])
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    ["error while", "concealing", "corrupt decoded"]
+        .iter()
+        .any(|sign| said.contains(sign))
+}
+
+/// What ffprobe tells of each packet.
+fn probed_packets(path: &Path, entry: &str) -> Vec<usize> {
+    let output = Command::new("ffprobe")
+        .args(["-v", "error", "-select_streams", "v:0", "-show_entries"])
+        .args([&format!("packet={entry}"), "-of", "csv=p=0"])
+        .arg(path)
+        .output()
+        .unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    text.lines()
+        .filter_map(|line| line.split(',').next()?.parse().ok())
+        .collect()
+}
+
+#[test]
+fn a_second_video_and_too_many_pixels_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let inside = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    ffmpeg(
+        folder.path(),
+        &format!(
+            "{SOURCE} -f lavfi -i testsrc=size=64x48 -map 0 -map 1 -frames:v 3 -pix_fmt yuv420p two.mp4"
+        ),
+    );
+    let remark = FrameSource::open(&inside("two.mp4")).unwrap().remark();
+    let remark = remark.unwrap_or_default();
+    assert!(remark.contains("it holds 2 videos"), "{remark}");
+    ffmpeg(
+        folder.path(),
+        "-f lavfi -i color=size=8192x6144 -frames:v 1 -c:v mjpeg -pix_fmt yuvj420p huge.avi",
+    );
+    let refused = FrameSource::open(&inside("huge.avi")).err().unwrap();
+    let refused = refused.to_string();
+    assert!(
+        refused.contains("not one frame") && refused.contains("more than 33554432 pixels"),
+        "{refused}"
+    );
+}
+
+/// SMPTE 240M beside BT.709, which it is near, and a matrix that is none of luma and two differences.
+#[test]
+fn rare_matrices_are_read_or_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let make = |matrix: &str, name: &str| {
+        let to = "scale=out_color_matrix=smpte240m:out_range=tv:flags=accurate_rnd+full_chroma_int";
+        ffmpeg(
+            folder.path(),
+            &format!(
+                "-f lavfi -i color=0x2832d2:size=64x48 -frames:v 1 -vf {to},format=yuv444p,setparams=range=tv:colorspace={matrix} -c:v ffv1 {name}"
+            ),
+        );
+        FrameSource::open(folder.path().join(name).to_str().unwrap()).unwrap()
+    };
+    let mut read = make("smpte240m", "a.mkv");
+    assert_eq!(read.remark(), None);
+    let frame = read.next_frame().unwrap().unwrap();
+    for (found, expected) in frame.rgba.iter().zip([0x28_u8, 0x32, 0xd2]) {
+        assert!(found.abs_diff(expected) <= 2, "{:?}", &frame.rgba[..3]);
+    }
+    for matrix in ["ycgco", "ictcp"] {
+        let remark = make(matrix, "b.mkv").remark().unwrap_or_default();
+        assert!(remark.contains(&format!("coded by {matrix}")), "{remark}");
+    }
+}

@@ -16,6 +16,7 @@ use crate::app::files::new_file::is_stdout;
 use crate::app::files::picture_files::{write_rgb_png, write_text};
 use crate::app::files::result_kind::ResultKind;
 use crate::app::stages::progress::Progress;
+use crate::app::talk;
 use crate::calibration::{
     CalibrateError, Calibration, Lack, Placing, Target, TargetLook, Views, coverage_picture, solve,
 };
@@ -214,6 +215,9 @@ impl SortedPictures {
         target: Target,
         stop: &AtomicBool,
     ) -> Result<()> {
+        if let Some(passed_over) = source.passed_over() {
+            talk::say(passed_over);
+        }
         let path = source.path().to_owned();
         let count = source.frame_count();
         let step = count.map_or(1, |count| count.div_ceil(MOST_FRAMES).max(1));

@@ -218,7 +218,7 @@ impl ReplayDrawing {
         let sink = request
             .out
             .as_ref()
-            .map(|out| FrameSink::create(out, source.size_px(), source.fps()))
+            .map(|out| FrameSink::create(out, source.size_px(), source.finest_fps()))
             .transpose()?;
         let sheet = request.sheet.as_ref().map(|_| ContactSheet::new(4, 3));
         Ok(Self {
