@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::light::harmonics::basis;
 use crate::light::probe::Probe;
-use crate::light::regions::{Region, regions};
+use crate::light::regions::{FINEST_PX, Region, regions};
 
 use super::self_occlusion::{TRANSFER_DEGREE, TRANSFERS, open_transfer};
 
@@ -50,11 +50,12 @@ impl DistantLight {
             irradiance: region.irradiance * exposure,
             ..region
         };
-        let harmonics = harmonics(probe, exposure);
+        let probe = probe.at_most(FINEST_PX);
+        let harmonics = harmonics(&probe, exposure);
         Self {
-            coarse: coarse_radiance(probe, exposure),
+            coarse: coarse_radiance(&probe, exposure),
             regions: regions.into_iter().map(exposed).collect(),
-            beyond_harmonics: beyond(&harmonics, probe, exposure),
+            beyond_harmonics: beyond(&harmonics, &probe, exposure),
             harmonics,
         }
     }

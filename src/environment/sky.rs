@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use crate::light::probe::Probe;
 use crate::light::radiance9::Radiance9;
-use crate::light::regions::{Region, regions};
+use crate::light::regions::{FINEST_PX, Region, regions};
 
 use super::distant_light::coarse_radiance;
 
@@ -31,6 +31,7 @@ impl Sky {
         for source in &mut sources {
             source.irradiance *= exposure;
         }
+        let probe = probe.at_most(FINEST_PX);
         for (direction, radiance, solid_angle) in probe.rays() {
             let light = radiance.as_dvec3() * (exposure * solid_angle);
             harmonics.add(direction.as_vec3(), light.as_vec3());
@@ -39,7 +40,7 @@ impl Sky {
             radiance: Vec3::ZERO,
             sources,
             harmonics,
-            coarse: coarse_radiance(probe, exposure),
+            coarse: coarse_radiance(&probe, exposure),
         }
     }
 

@@ -1,8 +1,10 @@
 //! A light probe: the radiance that arrives at one point from all directions, in world space (z up).
 
+use std::borrow::Cow;
 use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 /// Radiance by direction, linear RGB. Latitude-longitude: row 0 looks up (+z), u = (atan2(y, x) + π) / 2π.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -39,7 +41,8 @@ impl Probe {
 
     /// Each pixel, row by row, as what it sends: the unit direction of its middle, its radiance, its solid angle in steradians.
     pub fn rays(&self) -> impl Iterator<Item = (DVec3, Vec3, f64)> {
-        (0..self.size_px[1]).flat_map(|row| self.rays_of_row(row))
+        let columns = self.columns();
+        (0..self.size_px[1]).flat_map(move |row| self.row(row, Arc::clone(&columns)))
     }
 
     /// The same of one row of pixels.
@@ -47,12 +50,34 @@ impl Probe {
     /// # Panics
     /// If there is no such row.
     pub fn rays_of_row(&self, row: usize) -> impl Iterator<Item = (DVec3, Vec3, f64)> {
+        self.row(row, self.columns())
+    }
+
+    /// Unit vectors across the vertical towards the columns' middles.
+    fn columns(&self) -> Arc<[DVec2]> {
         let [width, _] = self.size_px;
+        let columns = (0..width).map(|column| across(column as f64 + 0.5, width));
+        columns.collect()
+    }
+
+    fn row(&self, row: usize, columns: Arc<[DVec2]>) -> impl Iterator<Item = (DVec3, Vec3, f64)> {
+        let [width, height] = self.size_px;
+        let (sine, cosine) = upright(row as f64 + 0.5, height);
+        let solid_angle = self.pixel_solid_angle(row);
         let pixels = self.radiance[row * width..(row + 1) * width].iter();
         pixels.enumerate().map(move |(column, &radiance)| {
-            let direction = self.direction(column as f64 + 0.5, row as f64 + 0.5);
-            (direction, radiance, self.pixel_solid_angle(row))
+            let direction = (sine * columns[column]).extend(cosine);
+            (direction, radiance, solid_angle)
         })
+    }
+
+    /// It where it has no more than so many columns and rows, or else the same light in these.
+    pub fn at_most(&self, most_px: [usize; 2]) -> Cow<'_, Self> {
+        let is_finer = (0..2).any(|axis| self.size_px[axis] > most_px[axis]);
+        match is_finer {
+            true => Cow::Owned(self.coarser(most_px)),
+            false => Cow::Borrowed(self),
+        }
     }
 
     /// The same light in no more than so many columns and rows, each pixel the mean of what lies in it.
@@ -101,9 +126,8 @@ impl Probe {
     /// Unit direction of a place in the picture, in pixels from its upper left corner.
     pub fn direction(&self, column: f64, row: f64) -> DVec3 {
         let [width, height] = self.size_px;
-        let azimuth = column / width as f64 * TAU - PI;
-        let (sine, cosine) = (row / height as f64 * PI).sin_cos();
-        DVec3::new(sine * azimuth.cos(), sine * azimuth.sin(), cosine)
+        let (sine, cosine) = upright(row, height);
+        (sine * across(column, width)).extend(cosine)
     }
 
     /// Solid angle of each pixel of a row, steradians.
@@ -112,6 +136,17 @@ impl Probe {
         let cosine = |row: usize| (row as f64 / height as f64 * PI).cos();
         TAU / width as f64 * (cosine(row) - cosine(row + 1))
     }
+}
+
+/// The unit vector across the vertical towards a place of so many columns.
+fn across(column: f64, width: usize) -> DVec2 {
+    let azimuth = column / width as f64 * TAU - PI;
+    DVec2::new(azimuth.cos(), azimuth.sin())
+}
+
+/// Sine and cosine of the angle between the vertical and a place of so many rows.
+fn upright(row: f64, height: usize) -> (f64, f64) {
+    (row / height as f64 * PI).sin_cos()
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! A probe's light cut into regions, each as one light from afar (Kollig & Keller 2003): as many as are asked for, smaller
 //! where more light comes from.
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3, Vec3};
@@ -15,7 +16,7 @@ const STEPS_AT_LAST: usize = 24;
 
 /// Middles are found among so many columns and rows of pixels at most, each the mean of what lies in it; what regions have is
 /// summed up over all pixels then.
-const FINEST_PX: [usize; 2] = [1024, 512];
+pub const FINEST_PX: [usize; 2] = [1024, 512];
 
 /// A part of all directions, as one light.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,10 +53,8 @@ struct Pixel {
 /// middle, along the line on which it lies widest, and all middles move to where their light comes from, so that the same light
 /// is cut alike however the probe is turned.
 pub fn regions(probe: &Probe, count: usize) -> Vec<Region> {
-    let [width, height] = probe.size_px();
-    let is_fine = width > FINEST_PX[0] || height > FINEST_PX[1];
-    let coarser = is_fine.then(|| probe.coarser(FINEST_PX));
-    let pixels = pixels(coarser.as_ref().unwrap_or(probe).rays());
+    let coarse = probe.at_most(FINEST_PX);
+    let pixels = pixels(coarse.rays());
     let whole: DVec3 = pixels.iter().map(|it| it.direction * it.power).sum();
     let mut middles = vec![whole.try_normalize().unwrap_or(DVec3::Z)];
     loop {
@@ -77,9 +76,9 @@ pub fn regions(probe: &Probe, count: usize) -> Vec<Region> {
             break;
         }
     }
-    let sums = match is_fine {
-        true => sums_of_rows(probe, &middles),
-        false => sums(&pixels, &middles),
+    let sums = match coarse {
+        Cow::Owned(_) => sums_of_rows(probe, &middles),
+        Cow::Borrowed(_) => sums(&pixels, &middles),
     };
     sums.iter().filter_map(Sum::region).collect()
 }
