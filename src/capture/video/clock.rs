@@ -6,6 +6,8 @@ const LEAST_RESTART_SECS: f64 = 0.5;
 /// What the stamps of a video come to.
 pub(super) struct Clock {
     frame_secs: f64,
+    /// The shortest step between two frames with times of their own, or `frame_secs`.
+    least_step_secs: f64,
     origin: Origin,
     /// The last stamp.
     pub(super) last_stamp_secs: Option<f64>,
@@ -29,6 +31,7 @@ impl Clock {
     pub(super) fn new(frame_secs: f64) -> Self {
         Self {
             frame_secs,
+            least_step_secs: frame_secs,
             origin: Origin::default(),
             last_stamp_secs: None,
             last_secs: None,
@@ -41,6 +44,10 @@ impl Clock {
     pub(super) fn time_secs(&mut self, stamp_secs: Option<f64>) -> f64 {
         let own_secs = stamp_secs.and_then(|stamp_secs| self.by_stamp(stamp_secs));
         let time_secs = own_secs.unwrap_or_else(|| self.beside_the_last(stamp_secs));
+        if let (Some(own_secs), Some(last_secs), false) = (own_secs, self.last_secs, self.is_moved)
+        {
+            self.least_step_secs = self.least_step_secs.min(own_secs - last_secs);
+        }
         self.is_moved = own_secs.is_none();
         self.moved_frames += u32::from(self.is_moved);
         self.last_stamp_secs = stamp_secs.or(self.last_stamp_secs);
@@ -77,8 +84,10 @@ impl Clock {
     fn beside_the_last(&self, stamp_secs: Option<f64>) -> f64 {
         let is_lone =
             stamp_secs.is_some() && !(self.is_moved && stamp_secs == self.last_stamp_secs);
-        let frames = if is_lone { 0.5 } else { 1.0 };
-        let step_secs = frames * self.frame_secs;
+        let step_secs = match is_lone {
+            true => 0.5 * self.least_step_secs,
+            false => self.frame_secs,
+        };
         self.last_secs.map_or(0.0, |last| last + step_secs)
     }
 
@@ -114,6 +123,8 @@ mod tests {
         assert_times(&[5.0, 5.1, 5.1, 5.3], &[0.0, 0.1, 0.15, 0.3], 1);
         assert_times(&[0.0, 0.1, 0.05, 0.2], &[0.0, 0.1, 0.15, 0.2], 1);
         assert_times(&[2.0, 2.0, 2.0, 2.0], &[0.0, 0.05, 0.15, 0.25], 3);
+        // Frames that come faster than the rate says.
+        assert_times(&[0.0, 0.02, 0.02, 0.04], &[0.0, 0.02, 0.03, 0.04], 1);
     }
 
     #[test]

@@ -469,9 +469,15 @@ fn the_lids_of_a_round_can_stay_flat() {
         for (corners, normals) in corners(&level.mesh).zip(&level.mesh.corner_normals) {
             let [a, b, c] = corners;
             let face = (b - a).cross(c - a).normalize();
-            let off = normals.map(|normal| normal.as_dvec3().distance(face));
-            let most = if face.z.abs() > 0.9 { 1e-3 } else { 0.3 };
-            assert!(off.iter().all(|off| *off < most), "{face}: {normals:?}");
+            let is_lid = face.z.abs() > 0.99;
+            for normal in normals {
+                let is_kept = match is_lid {
+                    true => normal.dot(face.as_vec3()) > 0.999,
+                    // (What a coarse level cuts off the crease is neither.)
+                    false => face.z.abs() > 0.5 || normal.z.abs() < 0.01,
+                };
+                assert!(is_kept, "{face}: {normals:?}");
+            }
         }
     }
 }
