@@ -9,6 +9,9 @@ use glam::{DVec2, DVec3, Vec3};
 /// Twice the area that a fan may have too much, as a part of the polygon's own, before it is no fan.
 const FAN_SLACK: f64 = 1e-9;
 
+/// A fan of more corners has a hub where too many slivers meet: what looks for the nearest of them looks at all.
+const MOST_OF_A_FAN: usize = 64;
+
 /// Polygons of fewer corners cost nothing, whatever they are.
 const FEWEST_LOOKED_AT: usize = 16;
 
@@ -28,7 +31,8 @@ type Place = [u32; 3];
 
 impl PolygonCutter {
     /// The triangles of a polygon with at least three corners, as indices of its corners, wound as it is. One that is
-    /// convex becomes a fan, another is cut by its ears (Eberly 2008) in its plane, whose normal is Newell's.
+    /// convex becomes a fan, or is halved again and again where it has many corners; another is cut by its ears (Eberly 2008) in
+    /// its plane, whose normal is Newell's.
     pub fn triangles(&mut self, corners: &[Vec3], triangles: &mut Vec<[u32; 3]>) {
         let count = corners.len();
         if count < 3 {
@@ -64,7 +68,10 @@ impl PolygonCutter {
         };
         let normal = newell_normal(&ordered);
         if is_fan(&ordered, normal) {
-            (1..count - 1).for_each(|step| add([0, step, step + 1]));
+            match count > MOST_OF_A_FAN && is_convex(&ordered, normal) {
+                true => halves(count, add),
+                false => (1..count - 1).for_each(|step| add([0, step, step + 1])),
+            }
             return;
         }
         let normal = normal.normalize_or_zero();
@@ -151,6 +158,27 @@ fn is_fan(corners: &[DVec3], normal: DVec3) -> bool {
     }
     // A fan may turn around its corner more than once.
     sum <= twice_area * (1.0 + FAN_SLACK) && turns_once(corners, normal)
+}
+
+/// Whether a polygon of which the fan is right turns one way at all corners.
+fn is_convex(corners: &[DVec3], normal: DVec3) -> bool {
+    let squared = normal.length_squared();
+    (0..corners.len()).all(|at| {
+        let [a, b, c] = [0, 1, 2].map(|step| corners[(at + step) % corners.len()]);
+        (b - a).cross(c - b).dot(normal) >= -FAN_SLACK * squared
+    })
+}
+
+/// The triangles of a convex polygon of so many corners, at each of which few meet.
+fn halves(count: usize, mut add: impl FnMut([usize; 3])) {
+    let mut rest = vec![(0, count - 1)];
+    while let Some((first, last)) = rest.pop() {
+        if last - first > 1 {
+            let middle = usize::midpoint(first, last);
+            add([first, middle, last]);
+            rest.extend([(first, middle), (middle, last)]);
+        }
+    }
 }
 
 /// Whether the directions from the first corner to the others turn by less than a whole turn.
@@ -262,6 +290,27 @@ mod tests {
     }
 
     /// What ears were looked for in for minutes: the corners of a square, again and again.
+    #[test]
+    fn a_round_lid_has_no_hub() {
+        let count = 1000;
+        let rim: Vec<[f32; 3]> = (0..count)
+            .map(|step| {
+                let (sine, cosine) = (step as f32 * std::f32::consts::TAU / count as f32).sin_cos();
+                [cosine, 0.6 * sine, 0.8 * sine]
+            })
+            .collect();
+        let (corners, triangles) = triangles(&rim);
+        assert_eq!(triangles.len(), count - 2);
+        let mut meeting = vec![0; count];
+        for corner in triangles.iter().flatten() {
+            meeting[*corner as usize] += 1;
+        }
+        assert!(meeting.iter().all(|&meeting| (1..24).contains(&meeting)));
+        let (sum, all) = areas(&corners, &triangles);
+        let expected = newell_normal(&corners.iter().map(|it| it.as_dvec3()).collect::<Vec<_>>());
+        assert!((sum - expected / 2.0).length() < 1e-6 && (all - sum.length()).abs() < 1e-6);
+    }
+
     #[test]
     fn a_polygon_of_repeated_corners_is_cut_once() {
         let square = [[0., 0., 0.], [2., 0., 0.], [2., 2., 0.], [0., 2., 0.]];
