@@ -289,7 +289,7 @@ mod tests {
         assert_eq!(diagonals.len(), 1);
     }
 
-    /// What ears were looked for in for minutes: the corners of a square, again and again.
+    /// A fan has one, where all of its slivers meet.
     #[test]
     fn a_round_lid_has_no_hub() {
         let count = 1000;
@@ -311,6 +311,7 @@ mod tests {
         assert!((sum - expected / 2.0).length() < 1e-6 && (all - sum.length()).abs() < 1e-6);
     }
 
+    /// What ears were looked for in for minutes: the corners of a square, again and again.
     #[test]
     fn a_polygon_of_repeated_corners_is_cut_once() {
         let square = [[0., 0., 0.], [2., 0., 0.], [2., 2., 0.], [0., 2., 0.]];
