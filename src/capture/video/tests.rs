@@ -25,9 +25,15 @@ fn probed_secs(path: &Path) -> Vec<Option<f64>> {
 
 /// What ffprobe tells of each frame; `None` where it does not know.
 fn probed(path: &Path, entry: &str) -> Vec<Option<f64>> {
+    let words = probed_words(path, &format!("frame={entry}"));
+    words.iter().map(|word| word.parse().ok()).collect()
+}
+
+/// The first word of each line that ffprobe prints of an entry, where there is one.
+fn probed_words(path: &Path, entry: &str) -> Vec<String> {
     let output = Command::new("ffprobe")
         .args(["-v", "error", "-select_streams", "v:0", "-show_entries"])
-        .args([&format!("frame={entry}"), "-of", "csv=p=0"])
+        .args([entry, "-of", "csv=p=0"])
         .arg(path)
         .output()
         .unwrap();
@@ -35,7 +41,7 @@ fn probed(path: &Path, entry: &str) -> Vec<Option<f64>> {
     text.lines()
         .filter_map(|line| line.split(',').next())
         .filter(|word| !word.is_empty())
-        .map(|word| word.parse().ok())
+        .map(str::to_owned)
         .collect()
 }
 
@@ -472,16 +478,8 @@ fn is_complained_of(path: &Path) -> bool {
 
 /// What ffprobe tells of each packet.
 fn probed_packets(path: &Path, entry: &str) -> Vec<usize> {
-    let output = Command::new("ffprobe")
-        .args(["-v", "error", "-select_streams", "v:0", "-show_entries"])
-        .args([&format!("packet={entry}"), "-of", "csv=p=0"])
-        .arg(path)
-        .output()
-        .unwrap();
-    let text = String::from_utf8(output.stdout).unwrap();
-    text.lines()
-        .filter_map(|line| line.split(',').next()?.parse().ok())
-        .collect()
+    let words = probed_words(path, &format!("packet={entry}"));
+    words.iter().filter_map(|word| word.parse().ok()).collect()
 }
 
 #[test]
