@@ -2,7 +2,6 @@
 //! itself.
 
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
 use crate::light::harmonics::basis;
 use crate::light::probe::Probe;
@@ -69,9 +68,6 @@ impl DistantLight {
 
 /// For each normal the irradiance of a probe's radiance times `exposure`, less that of its harmonics.
 fn beyond(harmonics: &[DVec3; TRANSFERS], probe: &Probe, exposure: f64) -> Probe {
-    let Some(grid) = Probe::new(NORMALS_PX, vec![Vec3::ZERO; NORMALS_PX[0] * NORMALS_PX[1]]) else {
-        return Probe::default();
-    };
     let lit = probe.coarser(SUMMED_PX);
     let parts = lit.rays().map(|(direction, radiance, solid_angle)| {
         (
@@ -80,25 +76,21 @@ fn beyond(harmonics: &[DVec3; TRANSFERS], probe: &Probe, exposure: f64) -> Probe
         )
     });
     let parts: Vec<(Vec3, Vec3)> = parts.collect();
-    let normals: Vec<DVec3> = grid.rays().map(|(normal, ..)| normal).collect();
-    let at_normal = |normal: &DVec3| {
+    Probe::by_direction(NORMALS_PX, |normal| {
         let facing = normal.as_vec3();
         let arriving = parts.iter();
         let exact: Vec3 = arriving
             .map(|(direction, light)| *light * direction.dot(facing).max(0.0))
             .sum();
-        let parts = open_transfer(*normal).into_iter().zip(harmonics);
+        let parts = open_transfer(normal).into_iter().zip(harmonics);
         let told: DVec3 = parts.map(|(part, radiance)| *radiance * part).sum();
         exact - told.as_vec3()
-    };
-    Probe::new(NORMALS_PX, normals.par_iter().map(at_normal).collect()).unwrap_or_default()
+    })
 }
 
 /// A probe's radiance times `exposure`, in cells about as large as the part of the sky that a ray stands for.
 pub fn coarse_radiance(probe: &Probe, exposure: f64) -> Probe {
-    let mut coarse = probe.coarser(COARSE_PX);
-    coarse.scale(exposure as f32);
-    coarse
+    probe.coarser(COARSE_PX).exposed(exposure as f32)
 }
 
 /// The integral of radiance times each harmonic.

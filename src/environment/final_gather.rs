@@ -13,7 +13,7 @@ use crate::light::irradiance_records::IrradianceRecords;
 use crate::light::{Light, irradiance};
 use crate::shafts::light_of_room::{hemisphere, over_hemisphere};
 
-use super::placed::{OFFSET_M, PlacedScene, PlacedThing, SeenSurface, way_to};
+use super::placed::{OFFSET_M, PlacedScene, PlacedThing, SeenSurface};
 use super::sky::Sky;
 
 /// Edges of real surfaces are at most this part of a virtual thing's size where they touch it, ...
@@ -321,7 +321,8 @@ impl PlacedScene<'_> {
         let mut arriving = [Vec3::ZERO; 2];
         for (light, places) in self.compact.iter().zip(&how.shining_from) {
             let given = irradiance(light, start.as_dvec3(), normal.as_dvec3()).as_vec3();
-            let (way, reach) = way_to(&places[turn % places.len()], start);
+            let (way, reach) = places[turn % places.len()].way_from(start.as_dvec3());
+            let way = way.as_vec3();
             let is_hidden = |is_real: bool| {
                 let counts = |placed: &PlacedThing<'_>| placed.thing.is_real == is_real;
                 self.is_hidden_by(counts, start, way, reach)

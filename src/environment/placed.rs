@@ -328,18 +328,11 @@ impl PlacedScene<'_> {
         normal: Vec3,
     ) -> impl Iterator<Item = (Vec3, Vec3)> {
         self.compact.iter().filter_map(move |light| {
-            let (way, reach) = way_to(light, start);
+            let (way, reach) = light.way_from(start.as_dvec3());
+            let way = way.as_vec3();
             let arriving = irradiance(light, start.as_dvec3(), normal.as_dvec3());
             let arrives = arriving != DVec3::ZERO && !self.is_hidden(among, start, way, reach);
             arrives.then(|| (way.normalize_or_zero(), arriving.as_vec3()))
         })
-    }
-}
-
-/// The way from a place to a light's middle, and how far along it that is.
-pub fn way_to(light: &Light, start: Vec3) -> (Vec3, f32) {
-    match *light {
-        Light::Point { position_m, .. } => (position_m.as_vec3() - start, 1.0),
-        Light::Directional { direction, .. } => (-direction.as_vec3(), f32::INFINITY),
     }
 }

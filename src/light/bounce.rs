@@ -200,7 +200,7 @@ impl Surroundings {
         };
         let place = start + direction * f64::from(hit.distance) + normal * self.start_offset_m;
         lit.extend(self.lights.iter().map(|light| {
-            let (to_light, reach) = way_to(light, place);
+            let (to_light, reach) = light.way_from(place);
             let hidden = self
                 .caster
                 .is_hidden(place.as_vec3(), to_light.as_vec3(), reach);
@@ -240,7 +240,7 @@ impl Gathering {
         let lit: DVec3 = self
             .lights
             .iter()
-            .map(|light| irradiance(light, center, way_to(light, center).0.normalize_or_zero()))
+            .map(|light| irradiance(light, center, light.way_from(center).0.normalize_or_zero()))
             .sum();
         PlacedMover {
             caster: &mover.caster,
@@ -270,7 +270,7 @@ impl Gathering {
                     continue;
                 }
                 let end = start + ray.direction * ray.distance_m;
-                let (to_light, reach) = way_to(light, end.as_dvec3());
+                let (to_light, reach) = light.way_from(end.as_dvec3());
                 if !movers
                     .iter()
                     .any(|m| m.hides(end, to_light.as_vec3(), reach))
@@ -295,14 +295,6 @@ impl PlacedMover<'_> {
         let origin = self.mover_from_world.transform_point3(origin);
         let direction = self.mover_from_world.transform_vector3(direction);
         self.caster.is_hidden(origin, direction, reach)
-    }
-}
-
-/// Vector to a light, and how far along it the light is.
-fn way_to(light: &Light, point: DVec3) -> (DVec3, f32) {
-    match *light {
-        Light::Point { position_m, .. } => (position_m - point, 1.0),
-        Light::Directional { direction, .. } => (-direction, f32::INFINITY),
     }
 }
 

@@ -137,6 +137,14 @@ impl Light {
         }
     }
 
+    /// The way from a place to its middle, and how far along it that is.
+    pub fn way_from(&self, place_m: DVec3) -> (DVec3, f32) {
+        match *self {
+            Self::Point { position_m, .. } => (position_m - place_m, 1.0),
+            Self::Directional { direction, .. } => (-direction, f32::INFINITY),
+        }
+    }
+
     /// The same light in another space, to which a rigid motion leads.
     pub fn moved(self, there_from_here: &DAffine3) -> Self {
         let turned = |way: DVec3| there_from_here.transform_vector3(way);

@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3, Vec3};
+use rayon::prelude::*;
 
 /// Radiance by direction, linear RGB. Latitude-longitude: row 0 looks up (+z), u = (atan2(y, x) + π) / 2π.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -19,6 +20,19 @@ impl Probe {
         let [width, height] = size_px;
         (width > 0 && radiance.len() == width.checked_mul(height)?)
             .then_some(Self { size_px, radiance })
+    }
+
+    /// Of so many pixels, by the radiance from the direction of each one's middle, a unit vector.
+    pub fn by_direction(size_px: [usize; 2], radiance: impl Fn(DVec3) -> Vec3 + Sync) -> Self {
+        let [width, height] = size_px;
+        let pixel = |index: usize| {
+            let (column, row) = ((index % width) as f64, (index / width) as f64);
+            radiance(direction(column + 0.5, row + 0.5, size_px))
+        };
+        Self {
+            size_px,
+            radiance: (0..width * height).into_par_iter().map(pixel).collect(),
+        }
     }
 
     /// The same radiance from everywhere.
@@ -80,29 +94,43 @@ impl Probe {
         }
     }
 
-    /// The same light in no more than so many columns and rows, each pixel the mean of what lies in it.
+    /// The same light in no more than so many columns and rows.
     pub fn coarser(&self, most_px: [usize; 2]) -> Self {
-        let size_px = [0, 1].map(|axis| self.size_px[axis].min(most_px[axis].max(1)));
-        let mut sums = vec![(Vec3::ZERO, 0.0_f32); size_px[0] * size_px[1]];
-        for (index, (_, radiance, solid_angle)) in self.rays().enumerate() {
-            let place = [index % self.size_px[0], index / self.size_px[0]];
-            let [column, row] = [0, 1].map(|axis| place[axis] * size_px[axis] / self.size_px[axis]);
-            let (sum, whole) = &mut sums[row * size_px[0] + column];
-            *sum += radiance * solid_angle as f32;
-            *whole += solid_angle as f32;
-        }
-        let means = sums.into_iter().map(|(sum, whole)| sum / whole);
+        self.resampled([0, 1].map(|axis| self.size_px[axis].min(most_px[axis].max(1))))
+    }
+
+    /// The same light in so many columns and rows, each pixel the mean over the solid angle that it is of. Of no pixels, none.
+    pub fn resampled(&self, size_px: [usize; 2]) -> Self {
+        let [width, height] = size_px;
+        let columns = overlaps(self.size_px[0], width, |part| part * TAU);
+        let rows = overlaps(self.size_px[1], height, |part| -(part * PI).cos());
+        let row = |over: &Vec<(usize, f64)>| {
+            let mut above = vec![DVec3::ZERO; self.size_px[0]];
+            for &(row, share) in over {
+                let pixels = &self.radiance[row * self.size_px[0]..][..self.size_px[0]];
+                for (sum, radiance) in above.iter_mut().zip(pixels) {
+                    *sum += radiance.as_dvec3() * share;
+                }
+            }
+            let means = columns.iter().map(|over| {
+                let parts = over.iter().map(|&(column, share)| above[column] * share);
+                parts.sum::<DVec3>().as_vec3()
+            });
+            means.collect::<Vec<Vec3>>()
+        };
         Self {
             size_px,
-            radiance: means.collect(),
+            radiance: rows.par_iter().flat_map_iter(row).collect(),
         }
     }
 
-    /// Makes all of it so many times as bright.
-    pub fn scale(&mut self, factor: f32) {
-        self.radiance
-            .iter_mut()
-            .for_each(|radiance| *radiance *= factor);
+    /// All of it so many times as bright.
+    #[must_use]
+    pub fn exposed(mut self, factor: f32) -> Self {
+        for radiance in &mut self.radiance {
+            *radiance *= factor;
+        }
+        self
     }
 
     /// Puts another radiance into a pixel.
@@ -125,9 +153,7 @@ impl Probe {
 
     /// Unit direction of a place in the picture, in pixels from its upper left corner.
     pub fn direction(&self, column: f64, row: f64) -> DVec3 {
-        let [width, height] = self.size_px;
-        let (sine, cosine) = upright(row, height);
-        (sine * across(column, width)).extend(cosine)
+        direction(column, row, self.size_px)
     }
 
     /// Solid angle of each pixel of a row, steradians.
@@ -136,6 +162,31 @@ impl Probe {
         let cosine = |row: usize| (row as f64 / height as f64 * PI).cos();
         TAU / width as f64 * (cosine(row) - cosine(row + 1))
     }
+}
+
+/// For each of `to` equal parts of a line those of its `from` equal parts that it overlaps, with their shares of it, which sum
+/// to 1, where the line up to a place (of 0 to 1) measures `measure`, which rises.
+fn overlaps(from: usize, to: usize, measure: impl Fn(f64) -> f64) -> Vec<Vec<(usize, f64)>> {
+    let part = |index: usize| {
+        // In units of a part of both kinds at once, ends are whole numbers.
+        let (start, end) = (index * from, (index + 1) * from);
+        let between = |a: usize, b: usize| {
+            measure(b as f64 / (from * to) as f64) - measure(a as f64 / (from * to) as f64)
+        };
+        let whole = between(start, end);
+        let parts = start / to..end.div_ceil(to);
+        let shares = parts.map(|at| {
+            let share = between(start.max(at * to), end.min((at + 1) * to)) / whole;
+            (at, share)
+        });
+        shares.collect()
+    };
+    (0..to).map(part).collect()
+}
+
+fn direction(column: f64, row: f64, [width, height]: [usize; 2]) -> DVec3 {
+    let (sine, cosine) = upright(row, height);
+    (sine * across(column, width)).extend(cosine)
 }
 
 /// The unit vector across the vertical towards a place of so many columns.
@@ -181,10 +232,21 @@ mod tests {
             let parts = parts.map(|(_, radiance, angle)| radiance.as_dvec3() * angle);
             parts.sum()
         };
-        for (most_px, size_px) in [([10, 6], [10, 6]), ([64, 32], [30, 18])] {
+        for (most_px, size_px) in [([10, 6], [10, 6]), ([64, 32], [30, 18]), ([7, 11], [7, 11])] {
             let coarser = probe.coarser(most_px);
             assert_eq!(coarser.size_px(), size_px);
             assert!((sum(&coarser) / sum(&probe) - 1.0).abs().max_element() < 1e-5);
+        }
+        // Finer too, and a small lamp gets neither brighter nor darker wherever it lies.
+        for at in [0, 135, 271, 539] {
+            let mut pixels = vec![Vec3::ZERO; 540];
+            pixels[at] = Vec3::ONE;
+            let lamp = Probe::new([30, 18], pixels).expect("pixels");
+            for size_px in [[8, 4], [29, 17], [64, 32], [45, 18]] {
+                let resampled = lamp.resampled(size_px);
+                assert_eq!(resampled.size_px(), size_px);
+                assert!((sum(&resampled) / sum(&lamp) - 1.0).abs().max_element() < 1e-5);
+            }
         }
         // What is above stays above: the rows' numbers rise as far below the horizon as they are low above it.
         let halves = probe.coarser([1, 2]);

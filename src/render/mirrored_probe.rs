@@ -25,7 +25,7 @@ impl MirroredProbe {
             .into_iter()
             .flat_map(|(probe, exposure)| prefiltered(probe, exposure));
         let mut halves: Vec<[f16; 4]> = pixels
-            .flat_map(|level| level.pixels)
+            .flat_map(|level| level.pixels().to_vec())
             .map(|pixel| pixel.extend(1.0).to_array().map(f16::from_f32))
             .collect();
         if glossy.is_none() {

@@ -2,7 +2,6 @@
 
 use glam::{DAffine3, DMat4, DVec2, DVec3, DVec4, Vec3};
 
-use crate::environment::placed::way_to;
 use crate::geometry::exact_side::exact_side;
 use crate::geometry::shadow_volume::LightPlace;
 use crate::light::{Light, irradiance};
@@ -95,8 +94,8 @@ pub(super) fn brightest(
     layer_from_world: &DAffine3,
 ) -> Option<LightPlace> {
     let given = |light: &Light| {
-        let (towards, _) = way_to(light, place.as_vec3());
-        irradiance(light, place, towards.as_dvec3().normalize_or_zero()).element_sum()
+        let (towards, _) = light.way_from(place);
+        irradiance(light, place, towards.normalize_or_zero()).element_sum()
     };
     let brightest = lights.iter().max_by(|a, b| given(a).total_cmp(&given(b)))?;
     Some(light_place(brightest, layer_from_world))

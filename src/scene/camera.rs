@@ -9,6 +9,7 @@ use super::reader::{Table, Value};
 use super::schema::key::Missing::{Is, Means};
 use super::schema::section::{Example, Section, Times};
 use super::schema::values::{InWords, Written};
+use crate::geometry::camera::MOST_SIDE_PX;
 
 choices! {
     /// How a webcam sends its pixels.
@@ -50,7 +51,7 @@ keys! {
     /// The camera mirrors its pictures: turn them back first.
     mirror: bool => Is(false);
     /// Ask a webcam for pictures of this size.
-    size_px: Option<[u32; 2]>, Whole::between(1, 32_768).unit("px") => Means(None, "the calibration's");
+    size_px: Option<[u32; 2]>, Whole::between(1, MOST_SIDE_PX).unit("px") => Means(None, "the calibration's");
     /// Ask a webcam for this rate, in pictures per second.
     fps: Option<u32>, Whole::between(1, 1000) => Means(None, "as good as the camera has it");
     /// Ask a webcam for this format.

@@ -8,6 +8,7 @@ use super::objects::{STANDING, StandingKeys, anchor_index};
 use super::placement::POSITION;
 use super::ranges::{Digits, Numbers};
 use super::reader::Table;
+use super::schema::choice::Choice as _;
 use super::schema::key::Missing::Is;
 use super::schema::key::{Key, Required};
 use super::schema::section::{Example, Section, Times};
@@ -302,7 +303,7 @@ pub fn lights(root: &Table, anchors: &[Anchor]) -> Result<Vec<SceneLight>, Scene
     }
     let read = |table: &Table| {
         let kind = LIGHT.kind.read(table)?;
-        table.allow(&kind.section().names())?;
+        table.allow_or(&kind.section().names(), |key| kind.of_others(key))?;
         let on = STANDING.on.value(table);
         Ok(SceneLight {
             anchor: on.map_or(Ok(0), |on| anchor_index(&on, anchors))?,
@@ -322,6 +323,15 @@ impl LightKind {
             Self::Sphere => &SPHERE_LIGHT_SECTION,
             Self::Rect => &RECT_LIGHT_SECTION,
         }
+    }
+
+    /// What there is to say of a key that lights of other kinds have; `None` where none has it.
+    fn of_others(self, key: &str) -> Option<String> {
+        let has_it = |(_, kind): &&(&str, Self)| kind.section().names().contains(&key);
+        let words = Self::WORDS.iter().filter(has_it).map(|(word, _)| *word);
+        let words: Vec<&str> = words.collect();
+        let of = words.join(" or ");
+        (!words.is_empty()).then(|| format!("of a light of kind {of}, and not {}", self.word()))
     }
 
     /// The kind of a light.

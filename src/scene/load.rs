@@ -80,7 +80,8 @@ impl Scene {
         let text = document.text;
         let tree = DeTable::parse(text).map_err(|error| {
             let span = error.span().unwrap_or(text.len()..text.len());
-            document.error(span, format!("not TOML: {}", error.message()))
+            let hint = number_hint(text, span.start);
+            document.error(span, format!("not TOML: {}{hint}", error.message()))
         })?;
         let root = Table::root(document, &tree, &format::section_names())?;
         let camera = camera::camera(&root)?;
@@ -103,5 +104,17 @@ impl Scene {
             probe,
             shadows,
         })
+    }
+}
+
+/// What to write for a number that begins or ends with its point, where a place in a text is in one; nothing elsewhere.
+fn number_hint(text: &str, at: usize) -> &'static str {
+    let is_digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
+    let (before, after) = text.split_at(at);
+    let begins = after.starts_with('.') && is_digit(after.chars().nth(1));
+    let ends = before.ends_with('.') && is_digit(before.chars().rev().nth(1));
+    match begins || ends {
+        true => "; a number has digits before and after its point, as in 0.5",
+        false => "",
     }
 }

@@ -88,16 +88,27 @@ impl<'a> Table<'a> {
 
     /// Refuses keys other than these.
     pub fn allow(&self, allowed: &[&str]) -> Result<(), SceneError> {
+        self.allow_or(allowed, |_| None)
+    }
+
+    /// Refuses keys other than these, and says `instead` of one that it knows more of.
+    pub fn allow_or(
+        &self,
+        allowed: &[&str],
+        instead: impl Fn(&str) -> Option<String>,
+    ) -> Result<(), SceneError> {
         let unknown = self
             .keys
             .keys()
             .find(|key| !allowed.contains(&key.get_ref().as_ref()));
         let Some(key) = unknown else { return Ok(()) };
         let name = self.name_of(key.get_ref());
-        Err(self.document.error(
-            key.span(),
-            format!("{name}: unknown key{}", suggestion(key.get_ref(), allowed)),
-        ))
+        let says = match instead(key.get_ref()) {
+            Some(instead) => format!("{instead}; allowed: {}", allowed.join(", ")),
+            None => format!("unknown key{}", suggestion(key.get_ref(), allowed)),
+        };
+        let message = format!("{name}: {says}");
+        Err(self.document.error(key.span(), message))
     }
 
     pub fn optional(&self, key: &str) -> Option<Value<'a>> {

@@ -920,6 +920,11 @@ fn check_tells_which_light_is_not_used() {
             Some("the probe is not used"),
         ),
         (format!("{probe}{volumes}"), Some(dark)),
+        (
+            "[environment]\nregions = 16\n".to_owned(),
+            Some("[environment] is not used"),
+        ),
+        (format!("{probe}[environment]\nregions = 16\n"), None),
         (probe.to_owned(), None),
     ] {
         let written = format!("{table}{added}");

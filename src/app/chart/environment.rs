@@ -24,7 +24,6 @@ use crate::environment::self_occlusion::{OwnSpace, OwnSurface, SelfOcclusion};
 use crate::geometry::camera::Intrinsics;
 use crate::geometry::ray_caster::RayCaster;
 use crate::light::Material;
-use crate::light::prefiltered::shrunk;
 use crate::light::probe::Probe;
 use crate::light::regions::regions;
 use crate::render::{REAL, Renderer, Shown};
@@ -314,8 +313,7 @@ struct Turning {
 
 impl Turning {
     fn new(corners: usize, is_glossy: bool, sky: &ProbeScene) -> Result<Self> {
-        let level = shrunk(&sky.probe, PROBE_PX, 1.0);
-        let probe = Probe::new(level.size_px, level.pixels).context("a probe has pixels")?;
+        let probe = sky.probe.resampled(PROBE_PX);
         // (A torus has twice as many triangles as corners.)
         let casters = vec![(torus(2 * corners, 1.0), TORUS_CENTER_M)];
         let mut stage = PeersStage::new(casters, &[], SIZE_PX, 4);

@@ -1,8 +1,10 @@
 //! What an environment cannot show, beside the technique that can and the truth.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use anyhow::Result;
+use glam::{DMat4, DQuat, DVec3};
 
 use super::AnyChart;
 use super::lab::Lab;
@@ -11,7 +13,11 @@ use super::shots::Shots;
 use crate::app::files::picture_files::write_rgb_png;
 use crate::app::stages::progress::Progress;
 use crate::app::truth::LinearPicture;
-use crate::scene::{EnvironmentMethod, Scene, Technique};
+use crate::geometry::mesh::{HeldCorner, HeldNormal, RigPoint};
+use crate::geometry::rig::posed::MeshPoser;
+use crate::geometry::rig::surface::{Holding, RigSurface};
+use crate::geometry::rig::{Clip, NodeParts, NodeTree, Rig, RigNode};
+use crate::scene::{Animation, EnvironmentMethod, Object, Scene, Technique};
 
 const NAME: &str = "environment-pictures";
 
@@ -25,7 +31,7 @@ struct Failure {
     holds: Way,
 }
 
-const FAILURES: [Failure; 3] = [
+const FAILURES: [Failure; 4] = [
     Failure {
         recording: "room",
         fails: ("light that is near: environment", |scene| {
@@ -51,7 +57,68 @@ const FAILURES: [Failure; 3] = [
         }),
         holds: ("its sun by volumes", |_| {}),
     },
+    Failure {
+        recording: "sky",
+        fails: ("things that may deform: fewer rays", |scene| {
+            scene.virtuals.iter_mut().for_each(play_nothing);
+        }),
+        holds: ("the same, rigid", |_| {}),
+    },
 ];
+
+/// Makes a thing one that plays an animation in which nothing moves: all that is worked out anew for what deforms is.
+fn play_nothing(thing: &mut Object) {
+    let mesh = Arc::make_mut(&mut thing.mesh);
+    // Each corner of a triangle is a vertex of the rig, with its own normal.
+    let corners = || mesh.triangles.iter().flatten();
+    let normals = mesh.corner_normals.as_flattened();
+    let surface = RigSurface {
+        positions: corners()
+            .map(|&vertex| mesh.positions[vertex as usize].as_dvec3())
+            .collect(),
+        normals: normals
+            .iter()
+            .map(|normal| Some(normal.as_dvec3()))
+            .collect(),
+        targets: Vec::new(),
+        node: 0,
+        holding: Holding::Node,
+    };
+    let root = RigNode {
+        parent: None,
+        parent_from_node: DMat4::IDENTITY,
+        parts: NodeParts {
+            translation: DVec3::ZERO,
+            rotation: DQuat::IDENTITY,
+            scale: DVec3::ONE,
+        },
+        weights: Vec::new(),
+    };
+    let Ok(tree) = NodeTree::new(vec![root]) else {
+        return;
+    };
+    let held = |triangle: usize| {
+        [0, 1, 2].map(|corner| HeldCorner {
+            point: RigPoint::at((3 * triangle + corner) as u32),
+            normal: HeldNormal::OfRig,
+        })
+    };
+    mesh.held = (0..mesh.triangles.len()).map(held).collect();
+    let rig = Rig {
+        tree,
+        surfaces: vec![surface],
+    };
+    let still = Clip {
+        channels: Vec::new(),
+        duration_s: 0.0,
+    };
+    thing.animation = Some(Animation {
+        number: 0,
+        speed: 1.0,
+        loops: true,
+        poser: Arc::new(MeshPoser::new((rig, still), mesh, DMat4::IDENTITY, 0.0)),
+    });
+}
 
 /// The pictures.
 pub struct EnvironmentPictures;

@@ -17,10 +17,11 @@ use crate::app::stages::progress::Progress;
 use crate::app::stages::source::{self, CalibrationNamed};
 use crate::app::talk;
 use crate::capture::{FrameSource, Notice, notices_told};
-use crate::scene::{Anchor, CameraSettings, Family, Marker, TrackingSettings};
+use crate::scene::{CameraSettings, Family, Marker, TrackingSettings};
 use crate::tracking::focal::{CameraLearner, LearntCamera};
 use crate::tracking::mapping::{
-    BoardShape, LearntBoard, LearntMarker, MapSettings, SpaceFrame, learn_board, off_in_words,
+    BoardShape, LearntBoard, LearntMarker, MapSettings, SpaceFrame, learn_board,
+    learn_board_and_camera, off_in_words,
 };
 use crate::tracking::{Detection, Detector, grey_from_rgba};
 
@@ -104,7 +105,9 @@ pub fn board(request: &BoardRequest, stop: &AtomicBool) -> Result<()> {
             |(learnt, camera_found)| {
                 let remark =
                     KnownCamera::Learnt(camera_found).remark(&camera.source, named.place());
-                talk::say_lines(&remark.unwrap_or_default());
+                if let Some(remark) = remark {
+                    talk::say(&remark);
+                }
                 learnt
             },
         ),
@@ -130,28 +133,19 @@ pub fn board(request: &BoardRequest, stop: &AtomicBool) -> Result<()> {
     Ok(())
 }
 
-/// The layout in the pictures of a camera that nobody has calibrated: by what each marker alone tells of the camera, and then
-/// anew by what the layout does.
+/// The layout in the pictures of a camera that nobody has calibrated: first by what each marker alone tells of the camera,
+/// and from there both together.
 fn learn_with_camera(
     request: &BoardRequest,
     settings: &TrackingSettings,
     size_px: [u32; 2],
     pictures: &[Vec<Detection>],
 ) -> Result<(LearntBoard, LearntCamera)> {
-    let camera_by = |mut learner: CameraLearner| {
-        pictures.iter().for_each(|seen| learner.look_at(seen));
-        learner.finish()
-    };
-    let by_each = CameraLearner::of_every_marker(settings, request.family, size_px)?;
-    let camera = camera_by(by_each);
-    let rough = learn_board(&camera.intrinsics, request.family, pictures, &request.map)?;
-    let anchor = Anchor {
-        name: request.name.clone(),
-        markers: rough.markers.iter().map(|learnt| learnt.marker).collect(),
-    };
-    let camera = camera_by(CameraLearner::of_anchors(settings, &[anchor], size_px)?);
-    let learnt = learn_board(&camera.intrinsics, request.family, pictures, &request.map)?;
-    Ok((learnt, camera))
+    let mut learner = CameraLearner::of_every_marker(settings, request.family, size_px)?;
+    pictures.iter().for_each(|seen| learner.look_at(seen));
+    let camera = learner.finish();
+    let learnt = learn_board_and_camera(&camera, request.family, pictures, &request.map)?;
+    Ok(learnt)
 }
 
 /// The markers that each frame that is looked at proves.

@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use crate::light::Light;
-use crate::scene::{Scene, ShadowTechnique};
+use crate::scene::{EnvironmentSettings, Scene, ShadowTechnique};
 
 /// Nobody prints larger markers, metres.
 const LARGEST_MARKER_M: f64 = 2.0;
@@ -34,6 +34,14 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
         );
     }
     warnings.extend(unused_light(scene));
+    let technique = scene.chosen_technique().0;
+    let is_set = scene.shadows.environment != EnvironmentSettings::default();
+    if is_set && technique != ShadowTechnique::Environment {
+        warnings.push(format!(
+            "[environment] is not used: it is for technique environment, and this scene's is {}",
+            technique.name()
+        ));
+    }
     warnings
 }
 

@@ -57,9 +57,15 @@ impl Section {
         }
     }
 
-    /// The names of its keys.
+    /// The names of its keys, each once: one may belong to several groups.
     pub fn names(&self) -> Vec<&'static str> {
-        self.keys().map(|key| key.name()).collect()
+        let mut names: Vec<&'static str> = Vec::new();
+        for key in self.keys() {
+            if !names.contains(&key.name()) {
+                names.push(key.name());
+            }
+        }
+        names
     }
 
     /// The one table of this name, whose keys are all known; `None` where it is not there.

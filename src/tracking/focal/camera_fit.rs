@@ -7,8 +7,11 @@
 
 use glam::{DAffine3, DMat3, DVec2};
 
+use super::free_camera::{
+    CAMERA_UNKNOWNS, FOCAL, FOCAL_PRIOR, LEAST_NOISE_PX, by_camera, priors, stepped,
+};
 use super::guessed_intrinsics;
-use crate::geometry::camera::{Distortion, Intrinsics};
+use crate::geometry::camera::Intrinsics;
 use crate::geometry::homography::{PointScale, linear_homography};
 use crate::geometry::least_squares::{LevenbergMarquardt, Linearized, NormalEquations, Problem};
 use crate::geometry::matrix::{Matrix, dot};
@@ -16,25 +19,13 @@ use crate::geometry::pose::{by_step, moved};
 use crate::geometry::robust::{huber_loss, huber_weight};
 use crate::tracking::pose::{self, CornerObservation};
 
-/// The camera's unknowns: the logarithm of the focal length, the principal point, k1, k2, and the part of their size by
-/// which markers are printed larger than they should be.
-const CAMERA: usize = 6;
+/// The camera's unknowns, and the part of their size by which markers are printed larger than they should be.
+const CAMERA: usize = CAMERA_UNKNOWNS + 1;
 const POSE: usize = 6;
 const BOTH: usize = CAMERA + POSE;
-const FOCAL: usize = 0;
 
-/// Standard deviation of the logarithm of the focal length that nobody has measured: two of them are angles of view from
-/// 32° to 98°.
-pub(super) const FOCAL_PRIOR: f64 = 0.35;
-/// Standard deviation of the principal point from the picture's middle, as a part of its longer side.
-const CENTER_PRIOR: f64 = 0.02;
-/// Standard deviations of k1 and k2.
-const LENS_PRIOR: [f64; 2] = [0.15, 0.2];
 /// Standard deviation of a print's scale.
 const SIZE_PRIOR: f64 = 0.02;
-/// Detectors' corners are no better than this, whatever fits: what blur, shade and compression do to one they do to its
-/// neighbours; pixels.
-const LEAST_NOISE_PX: f64 = 0.15;
 /// Corners farther off than so many standard deviations count less.
 const HUBER: f64 = 2.0;
 /// Times that poses are looked for anew with the camera that was found: the first ones rest on a rough one.
@@ -173,44 +164,23 @@ impl FittedCamera {
         }
     }
 
-    fn lens(&self) -> [f64; 2] {
-        let coefficients = self.intrinsics.distortion.coefficients();
-        [coefficients[0], coefficients[1]]
-    }
-
     fn board_m(&self, corner: &BoardCorner) -> DVec2 {
         corner.center_m + corner.from_center_m * (1.0 + self.size_error)
     }
 
     /// How far each unknown is from where its prior has it, in standard deviations, and those.
     fn priors(&self) -> [(f64, f64); CAMERA] {
-        let usual = guessed_intrinsics(self.intrinsics.size_px);
-        let [width, height] = self.intrinsics.size_px.map(f64::from);
-        let focal = (self.intrinsics.focal_px.x / usual.focal_px.x).ln();
-        let center_px = self.intrinsics.center_px - usual.center_px;
-        let center_deviation_px = CENTER_PRIOR * width.max(height);
-        let [k1, k2] = self.lens();
-        [
-            (focal, FOCAL_PRIOR),
-            (center_px.x, center_deviation_px),
-            (center_px.y, center_deviation_px),
-            (k1, LENS_PRIOR[0]),
-            (k2, LENS_PRIOR[1]),
-            (self.size_error, SIZE_PRIOR),
-        ]
-        .map(|(off, deviation)| (off / deviation, deviation))
+        let [focal, center_x, center_y, k1, k2] = priors(&self.intrinsics);
+        let size = (self.size_error / SIZE_PRIOR, SIZE_PRIOR);
+        [focal, center_x, center_y, k1, k2, size]
     }
 
     fn moved(&self, step: &[f64; CAMERA]) -> Self {
-        let [focal, center_x, center_y, by_k1, by_k2, size] = *step;
-        let mut camera = *self;
-        camera.intrinsics.focal_px *= focal.clamp(-0.5, 0.5).exp();
-        camera.intrinsics.center_px += DVec2::new(center_x, center_y);
-        let [k1, k2] = self.lens();
-        camera.intrinsics.distortion =
-            Distortion::Polynomial([k1 + by_k1, k2 + by_k2, 0.0, 0.0, 0.0]);
-        camera.size_error += size;
-        camera
+        let [ref of_camera @ .., size] = *step;
+        Self {
+            intrinsics: stepped(&self.intrinsics, of_camera),
+            size_error: self.size_error + size,
+        }
     }
 }
 
@@ -267,10 +237,8 @@ impl<'a> PosedView<'a> {
             let projection = intrinsics.project(in_camera_m)?;
             let missing_px = corner.pixel - projection.pixel;
             let weight = huber_weight(missing_px.length(), limit_px) / (noise_px * noise_px);
-            let ray = in_camera_m.truncate() / in_camera_m.z;
-            let by_focal = projection.pixel - intrinsics.center_px;
-            let by_k1 = intrinsics.focal_px * ray * ray.length_squared();
-            let by_k2 = by_k1 * ray.length_squared();
+            let [by_focal, by_x, by_y, by_k1, by_k2] =
+                by_camera(intrinsics, in_camera_m, projection.pixel);
             let by_size = projection.step_px(rotation * corner.from_center_m.extend(0.0));
             let [of_x, of_y] = projection
                 .gradients()
@@ -279,8 +247,8 @@ impl<'a> PosedView<'a> {
                 let [rx, ry, rz, tx, ty, tz] = of_pose;
                 [
                     by_focal[axis],
-                    DVec2::X[axis],
-                    DVec2::Y[axis],
+                    by_x[axis],
+                    by_y[axis],
                     by_k1[axis],
                     by_k2[axis],
                     by_size[axis],

@@ -5,6 +5,7 @@
 //! them.
 
 mod camera_fit;
+pub(super) mod free_camera;
 
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
@@ -17,12 +18,16 @@ use crate::capture::Frame;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::homography::{best_homography, mapped};
 use crate::scene::{Anchor, Face, Family, Marker, TrackingSettings};
-use camera_fit::{BoardCorner, FOCAL_PRIOR, fit, information};
+use camera_fit::{BoardCorner, fit, information};
+use free_camera::FOCAL_PRIOR;
 
 /// Tangent of half the angle that a camera nobody has calibrated is taken to see across: most webcams see about 60°.
 const GUESSED_HALF_WIDTH: f64 = 0.577;
 /// A focal length that is at least so certain is known, as a part of it.
 const SURE: f64 = 0.01;
+/// What a focal length is off, as a part of it, where the camera is not quite what is fitted: pixels that are no squares, a
+/// lens with more terms than two.
+const MODEL_ERROR: f64 = 0.002;
 /// From here on more pictures are not worth the time.
 const SURE_ENOUGH: f64 = 0.003;
 /// Fewer views are no judges of their own scatter.
@@ -66,6 +71,20 @@ impl LearntCamera {
             intrinsics: guessed_intrinsics(size_px),
             focal_deviation: FOCAL_PRIOR,
             basis: CameraBasis::Guess,
+        }
+    }
+
+    /// What so many views of markers tell; the deviation is the focal length's, as a part of it.
+    pub(super) fn of_views(intrinsics: Intrinsics, focal_deviation: f64, views: usize) -> Self {
+        // So few may agree by chance.
+        let least = match views < FEWEST_VIEWS {
+            true => 2.0 * SURE,
+            false => 0.0,
+        };
+        Self {
+            intrinsics,
+            focal_deviation: focal_deviation.hypot(MODEL_ERROR).max(least),
+            basis: CameraBasis::Views(views),
         }
     }
 
@@ -257,16 +276,8 @@ impl CameraLearner {
         let Some(fitted) = fit(self.camera.intrinsics.size_px, &views) else {
             return;
         };
-        let few = fitted.views < FEWEST_VIEWS;
-        self.camera = LearntCamera {
-            intrinsics: fitted.intrinsics,
-            // So few may agree by chance.
-            focal_deviation: match few {
-                true => fitted.focal_deviation.max(2.0 * SURE),
-                false => fitted.focal_deviation,
-            },
-            basis: CameraBasis::Views(fitted.views),
-        };
+        self.camera =
+            LearntCamera::of_views(fitted.intrinsics, fitted.focal_deviation, fitted.views);
         for view in &mut self.views {
             view.information = information(&self.camera.intrinsics, &view.corners);
         }

@@ -82,6 +82,7 @@ mod tests {
     fn seen(marker: usize, x_px: f64) -> MarkerObservation {
         MarkerObservation {
             marker,
+            seen_px: [DVec2::new(x_px, 0.0); 4],
             corners_px: [DVec2::new(x_px, 0.0); 4],
         }
     }

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3};
 
 use super::Detection;
+use super::focal::LearntCamera;
 use crate::geometry::camera::Intrinsics;
 use crate::scene::{Family, Marker};
 use bundle::{BoardView, Bundle, Certainty, MarkerFreedom, MarkerObservation};
@@ -194,6 +195,34 @@ pub fn learn_board(
     pictures: &[Vec<Detection>],
     settings: &MapSettings,
 ) -> Result<LearntBoard, MapError> {
+    Ok(learn(intrinsics, false, family, pictures, settings)?.0)
+}
+
+/// As [`learn_board`], by a camera that nobody has calibrated: it is learnt together with the layout, from about where it
+/// is thought to be. (A layout learnt first, by a camera that is wrong, would bear that camera out.)
+///
+/// # Errors
+/// As [`learn_board`].
+pub fn learn_board_and_camera(
+    camera: &LearntCamera,
+    family: Family,
+    pictures: &[Vec<Detection>],
+    settings: &MapSettings,
+) -> Result<(LearntBoard, LearntCamera), MapError> {
+    let (board, bundle, certainty) = learn(&camera.intrinsics, true, family, pictures, settings)?;
+    let views = bundle.views.len();
+    let camera = LearntCamera::of_views(bundle.intrinsics, certainty.focal_deviation, views);
+    Ok((board, camera))
+}
+
+/// The layout, and the adjustment that it comes from.
+fn learn(
+    intrinsics: &Intrinsics,
+    camera_is_free: bool,
+    family: Family,
+    pictures: &[Vec<Detection>],
+    settings: &MapSettings,
+) -> Result<(LearntBoard, Bundle, Certainty), MapError> {
     let seen = BoardObservations::of(intrinsics, family, pictures);
     let BoardObservations {
         ids,
@@ -233,6 +262,7 @@ pub fn learn_board(
     }
     let mut bundle = Bundle {
         intrinsics: *intrinsics,
+        camera_is_free,
         markers: placed.into_iter().flatten().collect(),
         views: views.into_iter().flatten().collect(),
         gauge,
@@ -246,14 +276,15 @@ pub fn learn_board(
         off_plane_m: off_plane_m[marker],
         ..bundle.learnt(marker, family, ids[marker], &certainty)
     });
-    Ok(LearntBoard {
+    let board = LearntBoard {
         markers: markers.collect(),
         shape,
         gauge: ids[gauge],
         pictures: bundle.views.len(),
         noise_px: certainty.noise_px,
         left_out,
-    })
+    };
+    Ok((board, bundle, certainty))
 }
 
 /// Adjusts a bundle in space, and then in the plane that its markers have in common, if that is what it is to have: how sure it
@@ -317,7 +348,7 @@ struct BoardObservations {
 
 impl BoardObservations {
     fn of(intrinsics: &Intrinsics, family: Family, pictures: &[Vec<Detection>]) -> Self {
-        let mut by_picture: Vec<BTreeMap<u32, [DVec2; 4]>> = pictures
+        let mut by_picture: Vec<BTreeMap<u32, SeenCorners>> = pictures
             .iter()
             .map(|picture| once_seen(intrinsics, family, picture))
             .collect();
@@ -339,10 +370,11 @@ impl BoardObservations {
         let pictures = by_picture
             .iter_mut()
             .map(|picture| {
-                let seen = picture.iter().filter_map(|(id, corners_px)| {
+                let seen = picture.iter().filter_map(|(id, corners)| {
                     Some(MarkerObservation {
                         marker: ids.binary_search(id).ok()?,
-                        corners_px: *corners_px,
+                        seen_px: corners.seen_px,
+                        corners_px: corners.undistorted_px,
                     })
                 });
                 seen.collect()
@@ -356,12 +388,18 @@ impl BoardObservations {
     }
 }
 
-/// Undistorted corners of the family's markers that a picture shows just once.
+/// A marker's corners as a picture shows them, pixels, and undistorted.
+struct SeenCorners {
+    seen_px: [DVec2; 4],
+    undistorted_px: [DVec2; 4],
+}
+
+/// Corners of the family's markers that a picture shows just once.
 fn once_seen(
     intrinsics: &Intrinsics,
     family: Family,
     picture: &[Detection],
-) -> BTreeMap<u32, [DVec2; 4]> {
+) -> BTreeMap<u32, SeenCorners> {
     let mut times: BTreeMap<u32, usize> = BTreeMap::new();
     for detection in picture {
         *times.entry(detection.id).or_default() += 1;
@@ -376,7 +414,11 @@ fn once_seen(
             let [Some(a), Some(b), Some(c), Some(d)] = corners else {
                 return None;
             };
-            Some((detection.id, [a, b, c, d]))
+            let corners = SeenCorners {
+                seen_px: detection.corners_px,
+                undistorted_px: [a, b, c, d],
+            };
+            Some((detection.id, corners))
         })
         .collect()
 }

@@ -48,6 +48,8 @@ const MISTAKES: &[Mistake] = &[
     // The file itself
     added("[light\n", 6, 7, &["not TOML", "unclosed table"]),
     added("x = \n", 6, 5, &["not TOML"]),
+    added("x = .5\n", 6, 5, &["not TOML", "digits before and after its point, as in 0.5"]),
+    added("x = [5., 1]\n", 6, 8, &["not TOML", "digits before and after its point, as in 0.5"]),
     changed("name = \"table\"", "name = \"table\"\nname = \"top\"", 5, 1, &["not TOML", "duplicate key"]),
     // What is no plain file is neither read without end nor waited for
     added("[[phantom]]\nname = \"p\"\nmesh = \"/dev/zero\"\n", 8, 8, &["phantom.mesh", "not a plain file"]),
@@ -130,7 +132,8 @@ const MISTAKES: &[Mistake] = &[
     added("[table]\nrect_m = [0, 0, 1, 1]\n[[virtual]]\nname = \"table\"\n", 9, 8, &["the name is taken on line 6"]),
     added("[[marker]]\nname = \"a, b\"\n", 7, 8, &["not a name"]),
     added("[[light]]\nkind = \"pont\"\n", 7, 8, &["unknown kind of light; did you mean \"point\"? allowed: point, directional"]),
-    added("[[light]]\nkind = \"directional\"\nposition_m = [0, 0, 1]\n", 8, 1, &["light.position_m: unknown key"]),
+    added("[[light]]\nkind = \"directional\"\nposition_m = [0, 0, 1]\n", 8, 1, &["light.position_m: of a light of kind point or spot or sphere or rect, and not directional; allowed: kind, on, direction"]),
+    added("[[light]]\nkind = \"point\"\nradius_m = 0.1\n", 8, 1, &["light.radius_m: of a light of kind sphere, and not point; allowed: kind, on, position_m, intensity"]),
     added("[tracking]\ndetector = \"apriltags\"\n", 7, 12, &["did you mean \"apriltag\"?"]),
     // Numbers
     changed("0.045", "-0.045", 5, 31, &["board.markers.size_m = -0.045: out of range; allowed: 0.0001 to 100 m"]),
