@@ -206,7 +206,11 @@ pub struct ReplayArgs {
     pub force: ForceArgs,
 }
 
+// A scene says which markers its anchors have.
 #[derive(Args)]
+#[command(mut_arg("family", |arg| arg.conflicts_with("anchors")))]
+#[command(mut_arg("border_cells", |arg| arg.conflicts_with("anchors")))]
+#[command(mut_arg("inverted", |arg| arg.conflicts_with("anchors")))]
 pub struct TrackArgs {
     /// Scene file (.toml), session, video, picture or folder of pictures, webcam (webcam:0) or address (http://…)
     pub source: PathBuf,
@@ -312,14 +316,21 @@ pub struct TargetArgs {
     #[arg(long, value_name = "MM", value_parser = mm_of, allow_negative_numbers = true)]
     pub square_mm: Option<f64>,
     /// Side of the black squares of a ChArUco board's markers
-    #[arg(long, value_name = "MM", value_parser = mm_of, allow_negative_numbers = true, requires = "charuco")]
+    #[arg(long, value_name = "MM", value_parser = mm_of, allow_negative_numbers = true, requires = "charuco", conflicts_with = "chessboard")]
     pub marker_mm: Option<f64>,
     /// Family of a ChArUco board's markers: DICT_4X4_50, DICT_6X6_250, tag36h11, …, or a dictionary's file (.yml)
-    #[arg(long, value_name = "NAME", default_value = "DICT_5X5_100", value_parser = family_of, requires = "charuco")]
+    #[arg(long, value_name = "NAME", default_value = "DICT_5X5_100", value_parser = family_of, requires = "charuco", conflicts_with = "chessboard")]
     pub dictionary: Family,
 }
 
+// What belongs to another kind of sheet is refused, not passed over.
 #[derive(Args)]
+#[command(mut_arg("family", |arg| arg.conflicts_with_all(["chessboard", "charuco"])))]
+#[command(mut_arg("border_cells", |arg| arg.conflicts_with_all(["chessboard", "charuco"])))]
+#[command(mut_arg("inverted", |arg| arg.conflicts_with_all(["chessboard", "charuco"])))]
+#[command(mut_arg("dictionary", |arg| arg.conflicts_with_all(["board", "cube", "ids"])))]
+#[command(mut_arg("marker_mm", |arg| arg.conflicts_with_all(["board", "cube", "ids"])))]
+#[command(mut_arg("square_mm", |arg| arg.conflicts_with_all(["board", "cube", "ids"])))]
 #[command(group = clap::ArgGroup::new("sheet").required(true).args(["board", "cube", "ids", "chessboard", "charuco"]))]
 pub struct MarkersArgs {
     /// The sheet: .pdf (true size), .svg or .png; what a scene file takes is written beside it as .toml
@@ -337,17 +348,20 @@ pub struct MarkersArgs {
     #[command(flatten)]
     pub target: TargetArgs,
     /// Side of the markers' black squares
-    #[arg(long, value_name = "MM", value_parser = mm_of, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", value_parser = mm_of, allow_negative_numbers = true, conflicts_with_all = ["chessboard", "charuco"])]
     pub size_mm: Option<f64>,
     /// White between the markers of a board
-    #[arg(long, value_name = "MM", value_parser = mm_of, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", value_parser = mm_of, allow_negative_numbers = true, conflicts_with_all = ["cube", "ids", "chessboard", "charuco"])]
     pub gap_mm: Option<f64>,
     /// Id of the board's upper left marker, the others follow row by row; or of a cube's front, then right, back, left, top
     /// and bottom
-    #[arg(long, value_name = "ID", default_value = "0")]
+    #[arg(long, value_name = "ID", default_value = "0", conflicts_with_all = ["ids", "chessboard", "charuco"])]
     pub first_id: u32,
     /// Name of the board or of the cube
-    #[arg(long, value_name = "NAME", default_value = "table", value_parser = |text: &str| ANCHOR_NAME.name.of_option(text))]
+    #[arg(
+        long, value_name = "NAME", default_value = "table", value_parser = |text: &str| ANCHOR_NAME.name.of_option(text),
+        conflicts_with_all = ["ids", "chessboard", "charuco"]
+    )]
     pub name: String,
     #[command(flatten)]
     pub family: FamilyArgs,

@@ -12,6 +12,15 @@ pub fn say(message: impl Display) {
     write_to(&mut stderr().lock(), &format!("{message}\n"));
 }
 
+/// `1 edge`, `2 edges`.
+pub fn counted(count: usize, noun: &str) -> String {
+    match (count, noun) {
+        (1, _) => format!("1 {noun}"),
+        (_, "vertex") => format!("{count} vertices"),
+        _ => format!("{count} {noun}s"),
+    }
+}
+
 /// Lines of talk, whose ends they bring along.
 pub fn say_lines(lines: &str) {
     write_to(&mut stderr().lock(), lines);

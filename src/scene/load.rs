@@ -39,6 +39,10 @@ impl Scene {
         let bytes = plain_file::read(path, MOST_TEXT).map_err(|error| {
             SceneError::of_file(path, format!("the scene cannot be read: {error}"))
         })?;
+        if is_utf16(&bytes) {
+            let message = "UTF-16 text; TOML has to be UTF-8: save it so";
+            return Err(SceneError::of_file(path, message.to_owned()));
+        }
         String::from_utf8(bytes).map_err(|error| {
             let valid = error.utf8_error().valid_up_to();
             let text = String::from_utf8_lossy(error.as_bytes());
@@ -105,6 +109,12 @@ impl Scene {
             shadows,
         })
     }
+}
+
+/// Whether a text begins as one of two bytes a character does: with their byte order mark, or with a zero in every second byte.
+fn is_utf16(bytes: &[u8]) -> bool {
+    let zeros = |first: usize| bytes.len() >= 4 && bytes[first] == 0 && bytes[first + 2] == 0;
+    bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) || zeros(0) || zeros(1)
 }
 
 /// What to write for a number that begins or ends with its point, where a place in a text is in one; nothing elsewhere.

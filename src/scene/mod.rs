@@ -69,7 +69,7 @@ pub use animation::Animation;
 pub use camera::{CameraSettings, PixelFormat, WantedFormat};
 pub use compact::{ProbeLight, ProbeLightKind, SplitLight};
 pub use dictionary::Dictionary;
-pub use error::{SceneError, TextPlace};
+pub use error::{SceneError, TextPlace, suggestion};
 pub use faces::Face;
 pub use family::{Codes, Drawing, Family, Ink};
 pub use file_stamp::FileStamp;

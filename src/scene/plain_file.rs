@@ -46,12 +46,17 @@ pub fn not_plain() -> io::Error {
     io::Error::new(ErrorKind::InvalidData, "not a plain file")
 }
 
-/// The same of UTF-8 text, of no more than [`MOST_TEXT`] bytes.
+/// The same of UTF-8 text, of no more than [`MOST_TEXT`] bytes, without the byte order mark that spreadsheets put before it.
 ///
 /// # Errors
 /// As [`read`] has them; what is not UTF-8.
 pub fn read_text(path: &Path) -> io::Result<String> {
-    String::from_utf8(read(path, MOST_TEXT)?)
+    const MARK: &[u8] = "\u{feff}".as_bytes();
+    let mut bytes = read(path, MOST_TEXT)?;
+    if bytes.starts_with(MARK) {
+        bytes.drain(..MARK.len());
+    }
+    String::from_utf8(bytes)
         .map_err(|error| io::Error::new(ErrorKind::InvalidData, format!("not UTF-8 text: {error}")))
 }
 

@@ -45,6 +45,7 @@ pub use light::grey_from_rgba;
 pub use printed_marker::{Cell, PrintedMarker};
 pub use prints::printed_cells;
 pub use survey::Survey;
+pub use tracked_anchor::predicted_visibility;
 pub use tracker::Tracker;
 
 /// How far a pose can be trusted.

@@ -447,7 +447,7 @@ impl TrackedAnchor {
         AnchorPose {
             status: Status::Predicted,
             camera_from_anchor: Some(self.shown_at(last, now_secs)),
-            visibility: ((FADED_SECS - age_secs) / (FADED_SECS - PREDICTED_SECS)).min(1.0),
+            visibility: predicted_visibility(age_secs),
             ..lost
         }
     }
@@ -518,6 +518,11 @@ fn turn_variance(covariance: &Matrix<6>) -> f64 {
 fn log_of_sum(a: f64, b: f64) -> f64 {
     let (more, less) = (a.max(b), a.min(b));
     more + (less - more).exp().ln_1p()
+}
+
+/// How much of what stands on an anchor is to be shown that was seen last so many seconds ago.
+pub fn predicted_visibility(age_secs: f64) -> f64 {
+    ((FADED_SECS - age_secs) / (FADED_SECS - PREDICTED_SECS)).clamp(0.0, 1.0)
 }
 
 /// A motion goes on from frame to frame, and dies down where none shows it: for how long it goes on as it was.

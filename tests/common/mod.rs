@@ -10,6 +10,7 @@ pub mod near_edges;
 pub mod photographs;
 pub mod prints;
 pub mod random;
+pub mod remembered;
 pub mod rigs;
 pub mod shapes;
 pub mod sheets;
@@ -30,6 +31,7 @@ use gnomon::light::{Light, Material};
 use gnomon::render::{Gpu, Layers, REAL, Renderer, Shown, VIRTUAL};
 use gnomon::scene::{Anchor, Bounces, Object, Scene, ShadowSettings, ShapeKind, Technique};
 
+use remembered::Remembered;
 use shapes::Soup;
 
 /// One device for all tests of a binary.
@@ -382,7 +384,8 @@ impl Stage {
             shadows,
             ..self.scene.clone()
         };
-        let mut renderer = Renderer::new(gpu(), &scene, intrinsics).expect("a renderer");
+        let renderer = Renderer::with_precomputation(gpu(), &scene, intrinsics, &Remembered);
+        let mut renderer = renderer.expect("a renderer");
         let frame = frame_of(intrinsics.size_px, |_| 255);
         renderer.upload(&frame).expect("an uploaded frame");
         renderer

@@ -38,6 +38,7 @@ use crate::app::files::job_files::{JobFiles, Replacing};
 use crate::app::files::picture_files::{write_rgb_png, write_text};
 use crate::app::files::result_kind::ResultKind;
 use crate::app::stages::progress::Progress;
+use crate::app::talk;
 use canvas::{bitmap, svg};
 use family::Chart;
 use lab::Lab;
@@ -167,8 +168,8 @@ pub fn chart(request: &ChartRequest, stop: &AtomicBool) -> Result<String> {
     progress.finish();
     write_text(&request.out.join("README.md"), &readme(&request.out))?;
     Ok(format!(
-        "{} charts in {}",
-        charts.len(),
+        "{} in {}",
+        talk::counted(charts.len(), "chart"),
         request.out.display()
     ))
 }

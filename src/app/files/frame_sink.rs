@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::frame_folder::{FrameFolder, frame_name};
 use super::layer_files::{Layer, write_layers};
+use super::new_file::ends_as_folder;
 use super::output_error::OutputError;
 use super::picture_files;
 use super::result_kind::ResultKind;
@@ -31,7 +32,8 @@ impl FrameSink {
             return Ok(ResultKind::Video);
         }
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-        if FOREIGN_FILES.iter().any(|foreign| extension == *foreign) && !path.is_dir() {
+        let is_folder = ends_as_folder(path) || path.is_dir();
+        if FOREIGN_FILES.iter().any(|foreign| extension == *foreign) && !is_folder {
             return Err(OutputError::UnknownFormat {
                 path: path.to_owned(),
             });

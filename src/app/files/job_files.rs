@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 pub use super::file_conflict::FileConflict;
 use super::file_identity::{FileIdentity, is_open_file, real_place};
-use super::new_file::is_stdout;
+use super::new_file::{ends_as_folder, is_stdout};
 use super::result_kind::{ResultKind, is_frame_name};
 use crate::scene::{CameraSettings, Codes, Family, Scene, SceneError};
 
@@ -187,8 +187,11 @@ impl Found {
         })
     }
 
-    /// Whether it is that folder or lies in it, however deep.
+    /// Whether it is that folder or lies in it, however deep; stdout lies in none.
     fn is_in(&self, folder: &FileIdentity) -> bool {
+        if is_stdout(&self.place) {
+            return self.identity == *folder;
+        }
         let is_folder = |place: &Path| FileIdentity::of(place).is_ok_and(|found| found == *folder);
         self.identity == *folder || self.place.ancestors().skip(1).any(is_folder)
     }
@@ -286,6 +289,9 @@ impl Output {
                 true => Ok(()),
                 false => unfit("that stands for stdout, which takes text alone; give it a name"),
             };
+        }
+        if ends_as_folder(&self.path) && !self.kind.is_folder() {
+            return unfit("a name that ends so is a folder's; a file is to be written");
         }
         let Ok(there) = fs::metadata(&own.place) else {
             let mut above = own.place.ancestors().skip(1);

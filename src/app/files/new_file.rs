@@ -37,6 +37,13 @@ enum WriteTarget {
     Stdout,
 }
 
+/// Whether a name ends as those of folders may.
+pub(super) fn ends_as_folder(path: &Path) -> bool {
+    let name = path.as_os_str().as_encoded_bytes();
+    let last = name.last().copied().map(char::from);
+    last.is_some_and(std::path::is_separator)
+}
+
 /// Whether a path stands for stdout.
 pub fn is_stdout(path: &Path) -> bool {
     path.as_os_str() == "-"

@@ -1,16 +1,16 @@
 //! Poses as CSV: a row per anchor and frame, `camera_from_anchor` as a translation in metres and a Rodrigues vector in
 //! radians, empty where there is no pose; the times stand in the first anchor's row.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::{Context as _, Result, bail, ensure};
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 
 use crate::geometry::pose::{pose_from_rodrigues, rodrigues_from_pose};
-use crate::scene::{Anchor, plain_file};
-use crate::tracking::{AnchorPose, Status};
+use crate::scene::{Anchor, plain_file, suggestion};
+use crate::tracking::{AnchorPose, Status, predicted_visibility};
 
 /// The header, and so the meaning, of every row.
 pub const HEADER: &str =
@@ -83,6 +83,13 @@ impl Default for PosesText {
     }
 }
 
+const STATUSES: [Status; 4] = [
+    Status::Tracked,
+    Status::Predicted,
+    Status::Ambiguous,
+    Status::Lost,
+];
+
 fn status_name(status: Status) -> &'static str {
     match status {
         Status::Tracked => "tracked",
@@ -92,9 +99,15 @@ fn status_name(status: Status) -> &'static str {
     }
 }
 
+fn status_of(name: &str) -> Result<Status> {
+    let found = STATUSES.into_iter().find(|it| status_name(*it) == name);
+    let names = STATUSES.map(status_name);
+    found.with_context(|| format!("status \"{name}\"{}", suggestion(name, &names)))
+}
+
 /// Poses by frame and anchor, read from a file.
 pub struct GivenPoses {
-    by_frame: HashMap<u32, Vec<AnchorPose>>,
+    by_frame: BTreeMap<u32, Vec<AnchorPose>>,
     anchor_count: usize,
 }
 
@@ -103,7 +116,7 @@ impl GivenPoses {
     /// must be there.
     ///
     /// # Errors
-    /// File and line of the first row that cannot be read.
+    /// File and line of the first row that cannot be read, or contradicts another or itself.
     pub fn read(path: &Path, anchors: &[Anchor]) -> Result<Self> {
         let text = plain_file::read_text(path)
             .with_context(|| format!("cannot read the poses {}", path.display()))?;
@@ -111,73 +124,45 @@ impl GivenPoses {
     }
 
     fn parse(text: &str, anchors: &[Anchor]) -> Result<Self> {
-        let mut lines = text.lines().enumerate();
-        let Some((_, header)) = lines.next() else {
-            bail!("the file is empty")
-        };
-        let columns: Vec<&str> = header.split(',').map(str::trim).collect();
-        let column = |name: &str| {
-            columns
-                .iter()
-                .position(|column| *column == name)
-                .with_context(|| {
-                    format!(
-                        "line 1: the column `{name}` is missing; the header is to be `{HEADER}`"
-                    )
-                })
-        };
-        let (frame, anchor) = (column("frame")?, column("anchor")?);
-        let pose = ["tx_m", "ty_m", "tz_m", "rx", "ry", "rz"].map(column);
-        let [tx, ty, tz, rx, ry, rz] = pose;
-        let pose = [tx?, ty?, tz?, rx?, ry?, rz?];
-        let (status, markers) = (column("status").ok(), column("markers").ok());
-
-        let mut by_frame: HashMap<u32, Vec<AnchorPose>> = HashMap::new();
-        for (line, row) in lines {
-            let line = line + 1;
-            if row.trim().is_empty() {
-                continue;
-            }
-            let fields: Vec<&str> = row.split(',').map(str::trim).collect();
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .flexible(true)
+            .from_reader(text.as_bytes());
+        let header = reader.headers()?.clone();
+        ensure!(!header.is_empty(), "the file is empty");
+        let columns = Columns::of(&header)?;
+        // Frame and anchor of each row, with its line.
+        let mut lines: HashMap<(u32, usize), u64> = HashMap::new();
+        let mut by_frame: BTreeMap<u32, Vec<GivenPose>> = BTreeMap::new();
+        for row in reader.records() {
+            let row = row?;
+            let line = row.position().map_or(0, csv::Position::line);
             ensure!(
-                fields.len() == columns.len(),
+                row.len() == header.len(),
                 "line {line}: {} fields where the header has {}",
-                fields.len(),
-                columns.len()
+                row.len(),
+                header.len()
             );
-            let index: u32 = fields[frame].parse().with_context(|| {
-                format!(
-                    "line {line}: frame \"{}\" is not a whole number",
-                    fields[frame]
-                )
-            })?;
-            let anchor = place_of(fields[anchor], anchors, line)?;
-            let poses = by_frame
-                .entry(index)
-                .or_insert_with(|| vec![lost(); anchors.len()]);
-            if pose.iter().all(|&column| fields[column].is_empty()) {
-                continue;
+            let (index, anchor, pose) = columns
+                .read(&row, anchors)
+                .with_context(|| format!("line {line}"))?;
+            if let Some(before) = lines.insert((index, anchor), line) {
+                bail!(
+                    "line {line}: frame {index} of \"{}\" is already on line {before}",
+                    anchors[anchor].name
+                );
             }
-            let numbers = finite_numbers(pose.map(|column| fields[column]), line)?;
-            let [tx, ty, tz, rx, ry, rz] = numbers;
-            let camera_from_anchor: DAffine3 =
-                pose_from_rodrigues(DVec3::new(tx, ty, tz), DVec3::new(rx, ry, rz));
-            poses[anchor] = AnchorPose {
-                status: match status.map(|column| fields[column]) {
-                    Some("ambiguous") => Status::Ambiguous,
-                    Some("predicted") => Status::Predicted,
-                    _ => Status::Tracked,
-                },
-                markers: markers
-                    .and_then(|column| fields[column].parse().ok())
-                    .unwrap_or(0),
-                camera_from_anchor: Some(camera_from_anchor),
-                visibility: 1.0,
-                ..lost()
-            };
+            let lost = || vec![GivenPose::lost(); anchors.len()];
+            by_frame.entry(index).or_insert_with(lost)[anchor] = pose;
         }
+        for anchor in 0..anchors.len() {
+            fade(by_frame.values_mut().map(|poses| &mut poses[anchor]));
+        }
+        let poses = by_frame.into_iter();
         Ok(Self {
-            by_frame,
+            by_frame: poses
+                .map(|(index, poses)| (index, poses.into_iter().map(|it| it.pose).collect()))
+                .collect(),
             anchor_count: anchors.len(),
         })
     }
@@ -189,30 +174,147 @@ impl GivenPoses {
             .cloned()
             .unwrap_or_else(|| vec![lost(); self.anchor_count])
     }
+
+    /// The frames that it says something of, in words.
+    pub fn frames_in_words(&self) -> String {
+        let mut frames = self.by_frame.keys();
+        match (frames.next(), frames.next_back()) {
+            (None, _) => "it has no row".to_owned(),
+            (Some(only), None) => format!("it has frame {only}"),
+            (Some(first), Some(last)) => format!("it has frames {first} to {last}"),
+        }
+    }
 }
 
-/// Which anchor of the scene a line speaks of.
-fn place_of(name: &str, anchors: &[Anchor], line: usize) -> Result<usize> {
+/// A row's pose, and its time.
+#[derive(Clone)]
+struct GivenPose {
+    pose: AnchorPose,
+    /// `None` where the file does not tell.
+    time_secs: Option<f64>,
+}
+
+impl GivenPose {
+    fn lost() -> Self {
+        Self {
+            pose: lost(),
+            time_secs: None,
+        }
+    }
+}
+
+/// Shows an anchor's predicted poses, frame by frame, as much as their age lets the tracker show them.
+fn fade<'a>(poses: impl Iterator<Item = &'a mut GivenPose>) {
+    let mut seen_secs = None;
+    for GivenPose { pose, time_secs } in poses {
+        match (pose.status, seen_secs, *time_secs) {
+            (Status::Predicted, Some(seen_secs), Some(now_secs)) => {
+                pose.visibility = predicted_visibility(now_secs - seen_secs);
+            }
+            (Status::Tracked | Status::Ambiguous, _, now_secs) => seen_secs = now_secs,
+            _ => {}
+        }
+    }
+}
+
+/// Where the columns stand that are read.
+struct Columns {
+    frame: usize,
+    anchor: usize,
+    pose: [usize; 6],
+    time: Option<usize>,
+    status: Option<usize>,
+    markers: Option<usize>,
+}
+
+impl Columns {
+    fn of(header: &csv::StringRecord) -> Result<Self> {
+        let optional = |name: &str| {
+            let mut found = (0..header.len()).filter(|&column| &header[column] == name);
+            let first = found.next();
+            ensure!(
+                found.next().is_none(),
+                "line 1: the column `{name}` is there twice"
+            );
+            Ok(first)
+        };
+        let column = |name: &str| {
+            optional(name)?.with_context(|| {
+                let separated = match &header[0] {
+                    alone if header.len() == 1 && alone.contains(';') => "; commas are to separate fields, not semicolons",
+                    alone if header.len() == 1 && alone.contains('\t') => "; commas are to separate fields, not tabs",
+                    _ => "",
+                };
+                format!("line 1: the column `{name}` is missing; the header is to be `{HEADER}`{separated}")
+            })
+        };
+        let [tx, ty, tz, rx, ry, rz] = ["tx_m", "ty_m", "tz_m", "rx", "ry", "rz"].map(column);
+        Ok(Self {
+            frame: column("frame")?,
+            anchor: column("anchor")?,
+            pose: [tx?, ty?, tz?, rx?, ry?, rz?],
+            time: optional("time_s")?,
+            status: optional("status")?,
+            markers: optional("markers")?,
+        })
+    }
+
+    /// The frame, the anchor and the pose of a row.
+    fn read(&self, row: &csv::StringRecord, anchors: &[Anchor]) -> Result<(u32, usize, GivenPose)> {
+        let frame = &row[self.frame];
+        let index = (frame.parse().ok())
+            .with_context(|| format!("frame \"{frame}\" is not a whole number"))?;
+        let anchor = place_of(&row[self.anchor], anchors)?;
+        let time_secs = self
+            .time
+            .map(|column| &row[column])
+            .filter(|it| !it.is_empty());
+        let time_secs = time_secs.map(finite_number).transpose()?;
+        let has_pose = self.pose.iter().any(|&column| !row[column].is_empty());
+        let status = self.status.map_or("", |column| &row[column]);
+        let status = match (status, has_pose) {
+            ("", true) => Status::Tracked,
+            ("", false) => Status::Lost,
+            _ => status_of(status)?,
+        };
+        ensure!(
+            has_pose == (status != Status::Lost),
+            "{} and {} pose",
+            status_name(status),
+            if has_pose { "a" } else { "no" }
+        );
+        let mut pose = AnchorPose { status, ..lost() };
+        if has_pose {
+            let mut numbers = [0.0; 6];
+            for (number, &column) in numbers.iter_mut().zip(&self.pose) {
+                *number = finite_number(&row[column])?;
+            }
+            let [tx, ty, tz, rx, ry, rz] = numbers;
+            let (shift_m, rotation) = (DVec3::new(tx, ty, tz), DVec3::new(rx, ry, rz));
+            let markers = self.markers.map_or("", |column| &row[column]);
+            pose.camera_from_anchor = Some(pose_from_rodrigues(shift_m, rotation));
+            pose.markers = markers.parse().unwrap_or(0);
+            pose.visibility = 1.0;
+        }
+        Ok((index, anchor, GivenPose { pose, time_secs }))
+    }
+}
+
+/// Which anchor of the scene is meant.
+fn place_of(name: &str, anchors: &[Anchor]) -> Result<usize> {
     let place = anchors.iter().position(|anchor| anchor.name == name);
     place.with_context(|| {
         let known: Vec<_> = anchors.iter().map(|anchor| anchor.name.as_str()).collect();
         format!(
-            "line {line}: the scene has no anchor \"{name}\"; it has {}",
+            "the scene has no anchor \"{name}\"; it has {}",
             known.join(", ")
         )
     })
 }
 
-fn finite_numbers(fields: [&str; 6], line: usize) -> Result<[f64; 6]> {
-    let mut numbers = [0.0; 6];
-    for (number, field) in numbers.iter_mut().zip(fields) {
-        *number = field
-            .parse()
-            .ok()
-            .filter(|number: &f64| number.is_finite())
-            .with_context(|| format!("line {line}: \"{field}\" is not a finite number"))?;
-    }
-    Ok(numbers)
+fn finite_number(field: &str) -> Result<f64> {
+    let number = field.parse().ok().filter(|number: &f64| number.is_finite());
+    number.with_context(|| format!("\"{field}\" is not a finite number"))
 }
 
 fn lost() -> AnchorPose {
@@ -260,8 +362,66 @@ mod tests {
     }
 
     #[test]
+    fn what_fades_fades_again_when_it_is_read() {
+        let pose = pose_from_rodrigues(DVec3::Z, DVec3::X);
+        let shown = |status, visibility| AnchorPose {
+            status,
+            camera_from_anchor: Some(pose),
+            visibility,
+            ..lost()
+        };
+        let times_secs: [f64; 5] = [0.1, 0.15, 0.25, 0.4, 0.45];
+        let written = times_secs.map(|time_secs| match time_secs == 0.1 {
+            true => shown(Status::Tracked, 1.0),
+            false => shown(Status::Predicted, predicted_visibility(time_secs - 0.1)),
+        });
+        assert!(written[1].visibility == 1.0 && written[4].visibility < 0.2);
+        let mut text = PosesText::new();
+        for (index, pose) in written.iter().enumerate() {
+            let frame = (index as u32, times_secs[index]);
+            text.add_frame(frame, &anchors(), &[pose.clone(), lost()], (None, None));
+        }
+        let read = GivenPoses::parse(text.as_str(), &anchors()).expect("poses");
+        for (index, pose) in written.iter().enumerate() {
+            let found = &read.of_frame(index as u32)[0];
+            assert_eq!(found.status, pose.status);
+            assert!((found.visibility - pose.visibility).abs() < 1e-5, "{index}");
+        }
+    }
+
+    #[test]
+    fn what_spreadsheets_write_is_read() {
+        let text = "\"frame\",\"anchor\",\"tx_m\",\"ty_m\",\"tz_m\",\"rx\",\"ry\",\"rz\"\r\n\"3\",\"card\",0,0,\"1.5\",0,0,0\r\n";
+        let read = GivenPoses::parse(text, &anchors()).expect("poses");
+        let card = read.of_frame(3)[1].camera_from_anchor.expect("a pose");
+        assert_eq!(card.translation, DVec3::new(0.0, 0.0, 1.5));
+        assert_eq!(read.frames_in_words(), "it has frame 3");
+    }
+
+    #[test]
     fn mistakes_name_their_line() {
         let mistakes = [
+            ("frame;anchor;tx_m\n0;table;1\n", "not semicolons"),
+            (
+                "frame,anchor,tx_m,ty_m,tz_m,rx,ry,rz,tx_m\n",
+                "line 1: the column `tx_m` is there twice",
+            ),
+            (
+                "frame,anchor,tx_m,ty_m,tz_m,rx,ry,rz\n0,card,0,0,1,0,0,0\n0,table,0,0,1,0,0,0\n0,card,,,,,,\n",
+                "line 4: frame 0 of \"card\" is already on line 2",
+            ),
+            (
+                "frame,anchor,status,tx_m,ty_m,tz_m,rx,ry,rz\n0,table,trakced,0,0,1,0,0,0\n",
+                "line 2: status \"trakced\"; did you mean \"tracked\"?",
+            ),
+            (
+                "frame,anchor,status,tx_m,ty_m,tz_m,rx,ry,rz\n0,table,lost,0,0,1,0,0,0\n",
+                "line 2: lost and a pose",
+            ),
+            (
+                "frame,anchor,status,tx_m,ty_m,tz_m,rx,ry,rz\n0,table,tracked,,,,,,\n",
+                "line 2: tracked and no pose",
+            ),
             ("", "empty"),
             ("frame,anchor\n", "`tx_m` is missing"),
             (

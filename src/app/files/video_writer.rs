@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::encoder::Encoder;
 use super::file_identity::is_at;
-use super::new_file::{NewFile, vanished};
+use super::new_file::{NewFile, ends_as_folder, vanished};
 use super::output_error::OutputError;
 use super::stamped_frames::{write_frame, write_head};
 
@@ -20,8 +20,11 @@ pub enum Codec {
 }
 
 impl Codec {
-    /// The codec for a file of this name; `None` where no video is meant.
+    /// The codec for a file of this name; `None` where no video is meant, or a folder.
     pub fn of_path(path: &Path) -> Option<Self> {
+        if ends_as_folder(path) {
+            return None;
+        }
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "mp4" | "mov" => Some(Self::H264),
             "mkv" | "avi" => Some(Self::Ffv1),

@@ -122,7 +122,7 @@ pub fn board(request: &BoardRequest, stop: &AtomicBool) -> Result<()> {
     let block = board_block(&learnt, &request.name);
     match &request.out {
         Some(path) => write_text(path, &block)?,
-        None => talk::give(&block),
+        None => talk::hand_out(&block).context("the layout cannot be written to stdout")?,
     }
     if !notices.is_empty() {
         bail!(

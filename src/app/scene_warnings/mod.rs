@@ -51,11 +51,3 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
     }
     warnings
 }
-
-/// `1 light`, `2 lights`.
-pub(crate) fn counted(count: usize, what: &str) -> String {
-    match count {
-        1 => format!("1 {what}"),
-        _ => format!("{count} {what}s"),
-    }
-}

@@ -1,6 +1,6 @@
 //! What a room's light does not take account of.
 
-use super::counted;
+use crate::app::talk::counted;
 use crate::scene::{Scene, ShadowTechnique};
 
 /// What of a scene has no part in a room's light.

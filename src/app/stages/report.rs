@@ -66,6 +66,15 @@ impl Report {
         }
     }
 
+    /// The same where only this was looked for and never found, in words.
+    #[must_use]
+    pub(crate) fn missing(self, never_found: Option<String>) -> Self {
+        Self {
+            never_found,
+            ..self
+        }
+    }
+
     /// Whether the job was done to its end, with what was done first if it was not.
     ///
     /// # Errors

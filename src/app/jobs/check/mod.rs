@@ -10,6 +10,7 @@ use glam::{DVec3, Vec3, Vec4};
 
 use crate::app::scene_warnings::sizes::{length, sides_m};
 use crate::app::scene_warnings::warnings;
+use crate::app::talk::counted;
 use crate::geometry::levels::{Level, levels};
 use crate::geometry::mesh::{CornerLook, HeldCorner, MeshReport};
 use crate::geometry::outline_scale::largest_scale;
@@ -454,15 +455,6 @@ fn mesh_notes(report: &MeshReport) -> Vec<String> {
         .filter(|(count, usual, _)| count > usual)
         .map(|(_, _, note)| note)
         .collect()
-}
-
-/// `1 edge`, `2 edges`.
-fn counted(count: usize, noun: &str) -> String {
-    let nouns = match noun {
-        "vertex" => "vertices".to_owned(),
-        _ => format!("{noun}s"),
-    };
-    format!("{count} {}", if count == 1 { noun } else { &nouns })
 }
 
 fn light_row(scene: &Scene, number: usize) -> TableRow {

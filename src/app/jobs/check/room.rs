@@ -1,8 +1,8 @@
 //! What `gnomon check` says of a room that shafts take their light from.
 
 use crate::app::precomputed;
-use crate::app::scene_warnings::counted;
 use crate::app::stopwatch::Stopwatch;
+use crate::app::talk::counted;
 use crate::scene::{
     EnvironmentMethod, ProbeLight, ProbeLightKind, ProbeScene, Scene, ShadowTechnique,
 };

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result, bail, ensure};
 use glam::DAffine3;
 
 use crate::capture::{Frame, FrameSource};
@@ -92,8 +92,13 @@ pub fn replay(request: &ReplayRequest, stop: &AtomicBool) -> Result<Report> {
         talk::say(remark);
     }
     let intrinsics = camera.intrinsics();
+    let mut given_frames = None;
     let poser = match &request.poses_from {
-        Some(path) => Poser::Given(GivenPoses::read(path, &scene.anchors)?),
+        Some(path) => {
+            let given = GivenPoses::read(path, &scene.anchors)?;
+            given_frames = Some(given.frames_in_words());
+            Poser::Given(given)
+        }
         None => Poser::tracker(
             Tracker::new(&scene.tracking, &scene.anchors, intrinsics)?,
             MirrorWatch::new(&scene.tracking, scene.families()),
@@ -140,14 +145,21 @@ pub fn replay(request: &ReplayRequest, stop: &AtomicBool) -> Result<Report> {
     if let Some(failure) = failure {
         return Err(failure);
     }
-    Ok(Report::new(
-        format!("{} frames, {} drawn", run.tally.frames, run.drawn),
+    let done = talk::counted(run.tally.frames as usize, "frame");
+    let report = Report::new(
+        format!("{done}, {} drawn", run.drawn),
         run.remarks(),
         &scene.anchors,
         (&ended, &mut run.tally),
         scene.camera.mirror,
         stop.load(Ordering::Relaxed),
-    ))
+    );
+    Ok(match given_frames {
+        Some(frames) => report.missing(run.never_given(&frames)),
+        // The video alone is whole without its anchors.
+        None if !run.needs_poses() => report.missing(None),
+        None => report,
+    })
 }
 
 impl ReplayRequest {
@@ -170,6 +182,14 @@ impl ReplayRequest {
 
     /// What is read besides the scene, and what is written.
     fn name_files(&self, files: &mut JobFiles) -> Result<()> {
+        if let Some(sheet) = &self.sheet {
+            let extension = sheet.extension().map(|it| it.to_ascii_lowercase());
+            ensure!(
+                extension.is_none_or(|extension| extension == "png"),
+                "--sheet {}: the sheet is a PNG (.png)",
+                sheet.display()
+            );
+        }
         if let Some(path) = &self.poses_from {
             files.reads(path);
         }
@@ -252,13 +272,41 @@ impl ReplayRun<'_> {
         if let (Some(controller), Some(times)) = (&self.controller, render) {
             remarks.push(budget_words(controller, times.p95_ms));
         }
-        if self.tally.lost[0] > 0 {
+        if self.tally.lost[0] > 0 && self.needs_poses() {
             remarks.push(format!(
                 "the world's anchor was not found in {} of them; there the video is shown alone",
                 self.tally.lost[0]
             ));
         }
+        if self.request.poses_from.is_some() {
+            let others = self.scene.anchors.iter().zip(&self.tally.lost).skip(1);
+            let never = others.filter(|(_, lost)| **lost == self.tally.frames);
+            remarks.extend(never.map(|(anchor, _)| {
+                format!(
+                    "no pose of \"{}\" is given for any frame played",
+                    anchor.name
+                )
+            }));
+        }
         remarks
+    }
+
+    /// Whether anything is made of poses: the video alone needs none.
+    fn needs_poses(&self) -> bool {
+        !self.request.bare || self.request.poses.is_some()
+    }
+
+    /// What to say where the given poses have none of the world's anchor for any frame played; `frames` are those that they have.
+    fn never_given(&self, frames: &str) -> Option<String> {
+        let path = self.request.poses_from.as_ref()?;
+        (self.needs_poses() && self.tally.lost[0] == self.tally.frames).then(|| {
+            format!(
+                "{} has no pose of \"{}\" for any of the {} played; {frames}",
+                path.display(),
+                self.scene.anchors[0].name,
+                talk::counted(self.tally.frames as usize, "frame"),
+            )
+        })
     }
 
     /// Capture → tracking → rendering (here) → writing.
@@ -405,8 +453,9 @@ impl ReplayRun<'_> {
         let last = last?;
         (self.tally.last_read < Some(last) && !stop.load(Ordering::Relaxed)).then(|| {
             format!(
-                "--frames asks for frame {last}, but {} ends after {} frames",
-                self.scene.camera.source, self.tally.frames
+                "--frames asks for frame {last}, but {} ends after {}",
+                self.scene.camera.source,
+                talk::counted(self.tally.frames as usize, "frame")
             )
         })
     }
