@@ -1,5 +1,5 @@
-//! Compiles the libapriltag shim against the installed header, tells which OpenCV module holds ArUco, and which tests have
-//! what they need.
+//! Compiles the libapriltag shim against the installed header, lists the shaders, tells which OpenCV module holds ArUco, and
+//! which tests have what they need.
 
 use std::path::{Path, PathBuf};
 
@@ -10,6 +10,7 @@ fn main() {
     if aruco_is_in_contrib() {
         println!("cargo::rustc-cfg=aruco_in_contrib");
     }
+    list_shaders();
     tell_what_tests_have();
 }
 
@@ -43,6 +44,27 @@ fn build_apriltag_shim() {
     for name in &library.libs {
         println!("cargo::rustc-link-lib={name}");
     }
+}
+
+/// Writes an array of the names and texts of all files `shaders/*.wgsl`, sorted by name, for `src/render/shader.rs`.
+fn list_shaders() {
+    println!("cargo::rerun-if-changed=shaders");
+    let from_cargo = |name| std::env::var_os(name).expect("cargo sets it");
+    let folder = Path::new(&from_cargo("CARGO_MANIFEST_DIR")).join("shaders");
+    let entries = std::fs::read_dir(&folder).expect("the shaders are there");
+    let mut paths: Vec<PathBuf> = entries
+        .map(|entry| entry.expect("the folder can be read").path())
+        .filter(|path| path.extension().is_some_and(|it| it == "wgsl"))
+        .collect();
+    paths.sort();
+    let mut text = String::from("[\n");
+    for path in &paths {
+        let name = path.file_name().unwrap_or_default();
+        text += &format!("({name:?}, include_str!({path:?})),\n");
+    }
+    text += "]\n";
+    let list = Path::new(&from_cargo("OUT_DIR")).join("shaders.rs");
+    std::fs::write(list, text).expect("cargo's folder can be written");
 }
 
 /// OpenCV moved ArUco from the contrib module `aruco` to `objdetect` with 4.7.

@@ -35,13 +35,9 @@ impl QualityController {
     /// Of a scene; `None` where it has no frame budget.
     pub(super) fn new(scene: &Scene, technique: ShadowTechnique) -> Option<Self> {
         let budget_ms = scene.shadows.frame_budget_ms?;
-        let (settings, costs): (Vec<Setting>, Vec<f64>) = match technique {
-            ShadowTechnique::Shafts | ShadowTechnique::Both => {
-                sources(scene.shadows.shafts.sources).unzip()
-            }
-            ShadowTechnique::Volumes | ShadowTechnique::Environment => {
-                outlines(scene.shadows.max_silhouette_error_px).unzip()
-            }
+        let (settings, costs): (Vec<Setting>, Vec<f64>) = match technique.has_shafts() {
+            true => sources(scene.shadows.shafts.sources).unzip(),
+            false => outlines(scene.shadows.max_silhouette_error_px).unzip(),
         };
         Some(Self {
             budget_ms,

@@ -3,51 +3,8 @@
 //! A line `//!include "NAME.wgsl"` stands for that file where it is met first. Lines between `//!if FLAG` and `//!end` are
 //! there where the flag is set, those between `//!else` and `//!end` where it is not.
 
-/// The files of a folder by their names.
-macro_rules! files {
-    ($($name:literal),+ $(,)?) => {
-        [$(($name, include_str!(concat!("../../shaders/", $name)))),+]
-    };
-}
-
-/// All files under `shaders/`.
-const FILES: [(&str, &str); 35] = files![
-    "area_lights.wgsl",
-    "background.wgsl",
-    "common.wgsl",
-    "composite.wgsl",
-    "depth_moments.wgsl",
-    "difference.wgsl",
-    "direct.wgsl",
-    "environment.wgsl",
-    "fade.wgsl",
-    "final_gather.wgsl",
-    "fullscreen.wgsl",
-    "harmonic_gloss.wgsl",
-    "layer_albedo.wgsl",
-    "layers.wgsl",
-    "light_sums.wgsl",
-    "linear_picture.wgsl",
-    "mapped_source.wgsl",
-    "materials.wgsl",
-    "mirrored.wgsl",
-    "occlusion_maps.wgsl",
-    "partly_covered.wgsl",
-    "pixel_sums.wgsl",
-    "ray_trees.wgsl",
-    "real_albedo.wgsl",
-    "reflections.wgsl",
-    "sampled_surface.wgsl",
-    "shading.wgsl",
-    "shaft_maps.wgsl",
-    "shaft_mips.wgsl",
-    "shafts.wgsl",
-    "surfaces.wgsl",
-    "tables.wgsl",
-    "translucent.wgsl",
-    "video.wgsl",
-    "volumes.wgsl",
-];
+/// All files under `shaders/` by their names, in the order of these; build.rs lists them.
+const FILES: &[(&str, &str)] = &include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 
 /// A mistake that keeps a shader from being put together.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
@@ -197,7 +154,8 @@ mod tests {
             .map(|entry| entry.unwrap().file_name().into_string().unwrap())
             .collect();
         names.sort();
-        assert_eq!(names, FILES.map(|(name, _)| name));
+        let listed: Vec<&str> = FILES.iter().map(|(name, _)| *name).collect();
+        assert_eq!(names, listed);
         let includes = |name: &str| {
             let line = format!("//!include \"{name}\"");
             FILES.iter().any(|(_, text)| text.contains(&line))

@@ -115,7 +115,8 @@ impl Scene {
                 self.split_light(probe).compact
             }
             (ShadowTechnique::Shafts, _) => Vec::new(),
-            _ => self.lights.clone(),
+            (ShadowTechnique::Volumes, _)
+            | (ShadowTechnique::Both | ShadowTechnique::Environment, None) => self.lights.clone(),
         }
     }
 

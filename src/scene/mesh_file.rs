@@ -12,19 +12,22 @@ use super::in_its_place::in_place_of;
 use super::kept_pictures::KeptPictures;
 use super::loading::LoadStage;
 use super::mask_cut::cut_masks;
+use super::mesh_format::MeshFormat;
 use super::model_cache::ModelCache;
 use super::named_files::FileKind;
 use super::obj::files::named_file;
 use super::plain_file::{self, MOST_MESH};
 use super::raw_model::{ClipInfo, RawModel};
 use super::reader::Value;
-use super::{gltf, obj, ply, stl, texture_file};
+use super::{gltf, obj, ply, texture_file};
 use crate::geometry::bounds::Bounds;
 use crate::geometry::mesh::{Mesh, MeshReport};
 use crate::geometry::rig::posed::MeshPoser;
 use crate::light::Material;
 use crate::light::material::{Coverage, Map};
 use crate::light::texture::Texture;
+
+mod stl;
 
 /// A mesh, what was done to it, and its materials (never none).
 #[derive(Debug, Clone)]
@@ -157,7 +160,23 @@ fn read(
     (note_read, enter): (&dyn Fn(&Path), EnterStage<'_>),
 ) -> Result<LoadedMesh, SceneError> {
     enter(LoadStage::Unpacking)?;
-    let format = MeshFormat::of(path, &bytes);
+    let format = match MeshContent::of(path, &bytes) {
+        MeshContent::Mesh(format) => format,
+        MeshContent::Other(what) => {
+            let allowed = MeshFormat::all_names();
+            let message = format!("{what} is not read; allowed: {allowed}");
+            return Err(SceneError::of_file(path, message));
+        }
+        MeshContent::InItsPlace(what) => {
+            let what = match what.contains("archive") {
+                true => "an archive (a ZIP file, 3MF, USDZ or what was downloaded): unpack it",
+                false => what,
+            };
+            let expected = MeshFormat::all_names();
+            let message = format!("{what}; a mesh is expected: {expected}");
+            return Err(SceneError::of_file(path, message));
+        }
+    };
     let choose = |clips: &[ClipInfo]| wanted.map(|wanted| wanted.choose(clips)).transpose();
     let mut model = match format {
         MeshFormat::Gltf => gltf::read(path, &bytes, note_read, &choose)?,
@@ -168,24 +187,12 @@ fn read(
             add_pictures(&mut model, path, &named, note_read);
             model
         }
-        MeshFormat::Other(what) => {
-            let message = format!("{what} is not read; allowed: glTF, OBJ, PLY, STL");
-            return Err(SceneError::of_file(path, message));
-        }
-        MeshFormat::InItsPlace(what) => {
-            let what = match what.contains("archive") {
-                true => "an archive (a ZIP file, 3MF, USDZ or what was downloaded): unpack it",
-                false => what,
-            };
-            let message = format!("{what}; a mesh is expected: glTF, OBJ, PLY, STL");
-            return Err(SceneError::of_file(path, message));
-        }
     };
     drop(bytes);
     enter(LoadStage::Joining)?;
     cut_masks(&mut model, path)?;
     note_coverage(&mut model, path, reading.normals);
-    let up = reading.up.unwrap_or(format.up());
+    let up = reading.up.unwrap_or(Up::of(format));
     let scale = place(&mut model, path, up, reading.fit_m)?;
     let number = choose(&model.clips)?;
     let motion = model.motion.take();
@@ -295,39 +302,36 @@ fn welded_as(
 
 /// What a mesh's file is, by its content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MeshFormat {
-    /// Khronos's, binary or not.
-    Gltf,
-    /// Wavefront's, and whatever is nothing else.
-    Obj,
-    /// Of text or of bytes.
-    Stl,
-    /// Of text or of bytes.
-    Ply,
+pub enum MeshContent {
+    /// One that is read.
+    Mesh(MeshFormat),
     /// One that is not read, in words.
     Other(&'static str),
     /// No model, in words, with what to do.
     InItsPlace(&'static str),
 }
 
-impl MeshFormat {
+impl MeshContent {
     /// Tells by the bytes, and where they do not by the name.
     pub fn of(path: &Path, bytes: &[u8]) -> Self {
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        let has_name_of = |format: MeshFormat| {
+            let mut own = format.extensions().iter();
+            own.any(|own| extension == *own)
+        };
         let head = String::from_utf8_lossy(&bytes[..bytes.len().min(512)]);
         let head = head.trim_start_matches('\u{feff}').trim_start();
         if let Some(what) = in_place_of(bytes) {
             Self::InItsPlace(what)
         } else if bytes.starts_with(b"glTF")
             || head.starts_with('{')
-            || extension == "glb"
-            || extension == "gltf"
+            || has_name_of(MeshFormat::Gltf)
         {
-            Self::Gltf
+            Self::Mesh(MeshFormat::Gltf)
         } else if ply::is_ply(bytes) {
-            Self::Ply
-        } else if stl::is_binary(bytes) || stl::is_text(bytes) || extension == "stl" {
-            Self::Stl
+            Self::Mesh(MeshFormat::Ply)
+        } else if stl::is_binary(bytes) || stl::is_text(bytes) || has_name_of(MeshFormat::Stl) {
+            Self::Mesh(MeshFormat::Stl)
         } else if head.starts_with("Kaydara FBX") || head.starts_with("; FBX") {
             Self::Other("an FBX file")
         } else if is_picture(bytes) {
@@ -358,15 +362,7 @@ impl MeshFormat {
         } else if head.starts_with("#VRML") {
             Self::Other("a VRML file")
         } else {
-            Self::Obj
-        }
-    }
-
-    /// Which axis points up, unless the scene says it.
-    fn up(self) -> Up {
-        match self {
-            Self::Gltf => Up::Y,
-            Self::Obj | Self::Stl | Self::Ply | Self::Other(_) | Self::InItsPlace(_) => Up::Z,
+            Self::Mesh(MeshFormat::Obj)
         }
     }
 }
@@ -398,6 +394,14 @@ impl Normals {
 }
 
 impl Up {
+    /// What points up in files of a format, unless the scene says it.
+    fn of(format: MeshFormat) -> Self {
+        match format {
+            MeshFormat::Gltf => Self::Y,
+            MeshFormat::Obj | MeshFormat::Ply | MeshFormat::Stl => Self::Z,
+        }
+    }
+
     /// From a file's axes to the mesh's.
     fn turn(self) -> DMat3 {
         match self {

@@ -3,6 +3,8 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
+use super::mesh_format::MeshFormat;
+
 /// What a file is that a scene names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FileKind {
@@ -10,9 +12,9 @@ pub enum FileKind {
     Recording,
     /// The camera's calibration.
     Calibration,
-    /// A phantom's or a virtual thing's mesh (glTF, OBJ, PLY or STL).
+    /// A phantom's or a virtual thing's mesh.
     Mesh,
-    /// A mesh of the room (glTF, OBJ, PLY or STL).
+    /// A mesh of the room.
     RoomMesh,
     /// A light probe's picture.
     Probe,
@@ -38,16 +40,17 @@ impl FileKind {
     ];
 
     /// What is expected, in words.
-    pub fn told(self) -> &'static str {
-        match self {
+    pub fn told(self) -> String {
+        let told = match self {
+            Self::Mesh | Self::RoomMesh => return MeshFormat::any_in_words(),
             Self::Recording => "a session, a video or a folder of pictures",
             Self::Calibration => "a calibration's file",
-            Self::Mesh | Self::RoomMesh => "a glTF, OBJ, PLY or STL file",
             Self::Probe => "a picture in linear radiance, .hdr or .exr",
             Self::Picture => "a picture: PNG, JPEG, WebP, TGA, BMP, TIFF, GIF",
             Self::Dictionary => "a dictionary of markers, .yml",
             Self::Bundles => "bundles of tags as apriltag_ros has them, .yaml",
-        }
+        };
+        told.to_owned()
     }
 }
 

@@ -4,6 +4,7 @@ use std::fs;
 use std::io::Read as _;
 use std::path::Path;
 
+use super::mesh_format::MeshFormat;
 use super::plain_file;
 
 /// What to say of a folder, a video, a picture or a model; `None` for all else, which is read as a scene.
@@ -68,9 +69,8 @@ impl Kind {
     /// The kind of a file by its first bytes, as the formats' specifications have them; that of a model, which may be any
     /// text, by its name.
     fn of(path: &Path, bytes: &[u8]) -> Option<Self> {
-        const MODELS: [&str; 5] = ["obj", "ply", "stl", "gltf", "glb"];
         let extension = path.extension().unwrap_or_default();
-        let names_model = MODELS
+        let names_model = MeshFormat::all_extensions()
             .iter()
             .any(|model| extension.eq_ignore_ascii_case(model));
         let at = |place: usize, expected: &[u8]| {

@@ -31,7 +31,31 @@ choices! {
 impl Technique {
     /// Whether a scene without a probe cannot have it.
     pub fn needs_probe(self) -> bool {
-        matches!(self, Self::Shafts | Self::Environment)
+        self.probe_in_words().is_some()
+    }
+
+    /// What a probe is to those that need one, for a message.
+    fn probe_in_words(self) -> Option<&'static str> {
+        match self {
+            Self::Auto | Self::Volumes => None,
+            Self::Shafts => Some("which shafts take their light from"),
+            Self::Environment => Some("which is the environment"),
+        }
+    }
+
+    /// Whether it has the light of a probe that turns with a marker.
+    fn follows_probe(self) -> bool {
+        match self {
+            Self::Auto | Self::Environment => true,
+            Self::Volumes | Self::Shafts => false,
+        }
+    }
+
+    /// The names of some, for a message.
+    fn names_of(is_one: impl Fn(Self) -> bool) -> String {
+        let some = Self::BY_NAME.iter().filter(|(_, it)| is_one(*it));
+        let names: Vec<&str> = some.map(|(name, _)| *name).collect();
+        names.join(", ")
     }
 }
 
@@ -103,12 +127,26 @@ impl ShadowTechnique {
 
     /// Whether a room's light is worked out for it.
     pub fn has_shafts(self) -> bool {
-        matches!(self, Self::Shafts | Self::Both)
+        match self {
+            Self::Shafts | Self::Both => true,
+            Self::Volumes | Self::Environment => false,
+        }
     }
 
     /// Whether lights of the probe are drawn beside its rest.
     pub fn has_compact_and_broad(self) -> bool {
-        matches!(self, Self::Both | Self::Environment)
+        match self {
+            Self::Both | Self::Environment => true,
+            Self::Volumes | Self::Shafts => false,
+        }
+    }
+
+    /// Whether its light from all around is a probe's, where the scene has one.
+    pub fn takes_probe(self) -> bool {
+        match self {
+            Self::Shafts | Self::Both | Self::Environment => true,
+            Self::Volumes => false,
+        }
     }
 }
 
@@ -352,16 +390,24 @@ fn check_technique(table: &Table, probe: Option<&ProbeScene>) -> Result<(), Scen
     let Some(value) = SHADOWS.technique.value(table) else {
         return Ok(());
     };
-    match (value.text()?, probe) {
-        ("environment", None) => Err(value
-            .error("the scene has no [probe], which is the environment; allowed: auto, volumes")),
-        ("shafts", None) => Err(value.error(
-            "the scene has no [probe], which shafts take their light from; allowed: auto, volumes",
-        )),
-        ("shafts", Some(probe)) if probe.anchor != 0 => Err(value.error(
-            "the probe turns with a marker (probe.on), which shafts cannot follow; allowed: auto, environment",
-        )),
-        _ => Ok(()),
+    let technique = SHADOWS.technique.read(table)?;
+    let Some(in_words) = technique.probe_in_words() else {
+        return Ok(());
+    };
+    match probe {
+        None => {
+            let allowed = Technique::names_of(|technique| !technique.needs_probe());
+            let message = format!("the scene has no [probe], {in_words}; allowed: {allowed}");
+            Err(value.error(message))
+        }
+        Some(probe) if probe.anchor != 0 && !technique.follows_probe() => {
+            let name = technique.name();
+            let allowed = Technique::names_of(Technique::follows_probe);
+            Err(value.error(format!(
+                "the probe turns with a marker (probe.on), which {name} cannot follow; allowed: {allowed}"
+            )))
+        }
+        Some(_) => Ok(()),
     }
 }
 

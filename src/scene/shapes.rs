@@ -28,7 +28,7 @@ keys! {
     /// The shape of a thing.
     pub static SHAPE: ShapeKeys;
 
-    /// Its shape from a file: glTF, OBJ, PLY or STL; a thing has one, or one of the shapes from box_m to revolved.
+    /// Its shape from a file; a thing has one, or one of the shapes from box_m to revolved.
     /// Counter-clockwise seen from outside; materials from its file or MTL file (Kd is taken as linear reflectance, Ns or Pr as
     /// roughness; see docs/models.md). A phantom is always flat: normals in the file are passed over.
     mesh: Option<PathBuf>, FileKind::Mesh => Means(None, "none: it has another shape");

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use glam::{DVec3, Vec2, Vec3};
 use gnomon::light::material::{Coverage, Shading, Wrap};
+use gnomon::scene::mesh_format::MeshFormat;
 use gnomon::scene::{Object, Scene};
 use serde_json::{Value, json};
 
@@ -732,8 +733,8 @@ fn khronos_samples_are_read() {
 #[test]
 fn what_fuzzing_found_is_read_or_refused() {
     let mut seen = 0;
-    for kind in ["obj", "ply", "stl", "gltf", "glb"] {
-        let folder = crate::common::project_file("fuzz/seeds").join(kind);
+    for extension in MeshFormat::all_extensions() {
+        let folder = crate::common::project_file("fuzz/seeds").join(extension);
         for entry in std::fs::read_dir(&folder).unwrap() {
             let path = entry.unwrap().path();
             seen += 1;

@@ -148,12 +148,12 @@ fn qualities(scene: &Scene) -> Ways {
     };
     match scene.chosen_technique().0 {
         ShadowTechnique::Environment => environment_ways(scene),
-        technique if technique.has_shafts() => {
+        ShadowTechnique::Shafts | ShadowTechnique::Both => {
             let ways = by_sources(scene).into_iter();
             ways.map(|(name, scene)| (format!("{name} sources"), scene))
                 .collect()
         }
-        _ => {
+        ShadowTechnique::Volumes => {
             let qualities = Quality::BY_NAME.into_iter();
             let technique = scene.shadows.technique;
             let shadows = |quality: Quality| ShadowSettings {

@@ -15,7 +15,8 @@ use toml_edit::{DocumentMut, Item, Table, Value};
 use crate::app::files::new_file::sync_folder;
 use crate::scene::format::{CAMERA, CAMERA_SECTION};
 use crate::scene::gltf::copies::with_files_named;
-use crate::scene::mesh_file::MeshFormat;
+use crate::scene::mesh_file::MeshContent;
+use crate::scene::mesh_format::FilesBeside;
 use crate::scene::obj::libraries::{with_libraries_named, with_maps_named};
 use crate::scene::plain_file::{self, MOST_MESH};
 use crate::scene::ply::with_pictures_named;
@@ -191,23 +192,31 @@ impl Copies<'_> {
     /// Copies a mesh with its materials and their pictures into a folder of its own.
     fn copy_mesh(&self, mesh: &Path, folder: &str) -> Result<String> {
         let bytes = read(mesh)?;
-        match MeshFormat::of(mesh, &bytes) {
-            MeshFormat::Obj => {}
-            MeshFormat::Gltf => return self.copy_gltf(mesh, &bytes, folder),
-            MeshFormat::Stl => return self.put(format!("{folder}/mesh.stl"), &bytes),
-            MeshFormat::Ply => {
-                let pictures = OwnNames::default();
-                let named = with_pictures_named(mesh, &bytes, |picture| {
-                    self.copy_picture(picture, folder, &pictures)
-                })?;
-                return self.put(format!("{folder}/mesh.ply"), &named);
-            }
-            MeshFormat::Other(what) | MeshFormat::InItsPlace(what) => {
+        let format = match MeshContent::of(mesh, &bytes) {
+            MeshContent::Mesh(format) => format,
+            MeshContent::Other(what) | MeshContent::InItsPlace(what) => {
                 bail!("{}: {what} is not copied", mesh.display())
             }
-        }
+        };
+        let with_own_names = match format.files_beside() {
+            FilesBeside::None => bytes,
+            FilesBeside::Parts => return self.copy_gltf(mesh, &bytes, folder),
+            FilesBeside::Libraries => self.copy_libraries(mesh, &bytes, folder)?,
+            FilesBeside::Pictures => {
+                let pictures = OwnNames::default();
+                with_pictures_named(mesh, &bytes, |picture| {
+                    self.copy_picture(picture, folder, &pictures)
+                })?
+            }
+        };
+        let extension = format.extensions()[0];
+        self.put(format!("{folder}/mesh.{extension}"), &with_own_names)
+    }
+
+    /// Copies an OBJ file's libraries and their pictures; the file as it names the copies.
+    fn copy_libraries(&self, mesh: &Path, bytes: &[u8], folder: &str) -> Result<Vec<u8>> {
         let (libraries, pictures) = (OwnNames::default(), OwnNames::default());
-        let with_own_names = with_libraries_named(mesh, &bytes, |library| {
+        with_libraries_named(mesh, bytes, |library| {
             let (number, is_new) = libraries.number(library);
             let name = format!("material-{number}.mtl");
             if is_new {
@@ -216,9 +225,8 @@ impl Copies<'_> {
                 })?;
                 self.put(format!("{folder}/{name}"), &text)?;
             }
-            Ok::<_, anyhow::Error>(name)
-        })?;
-        self.put(format!("{folder}/mesh.obj"), &with_own_names)
+            Ok(name)
+        })
     }
 
     /// Copies a picture unless that is done already; its name in the mesh's folder.

@@ -53,15 +53,15 @@ fn unused_light(scene: &Scene) -> Option<String> {
         true => has_ambient.then(|| {
             "[ambient] radiance is not used: all light from around comes from the probe".to_owned()
         }),
-        false => Some(
-            "the probe is not used: technique = \"volumes\" takes the lights and the [ambient] light alone"
-                .to_owned(),
-        ),
+        false => Some(format!(
+            "the probe is not used: technique = \"{}\" takes the lights and the [ambient] light alone",
+            scene.chosen_technique().0.name()
+        )),
     }
 }
 
 fn takes_probe(scene: &Scene) -> bool {
-    scene.probe.is_some() && scene.chosen_technique().0 != ShadowTechnique::Volumes
+    scene.probe.is_some() && scene.chosen_technique().0.takes_probe()
 }
 
 fn is_dark(scene: &Scene) -> bool {

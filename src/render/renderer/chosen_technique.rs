@@ -35,7 +35,10 @@ impl ChosenTechnique {
     pub fn known_levels(scene: &Scene, precomputation: &dyn Precomputation) -> KnownLevels {
         let finer = match (scene.chosen_technique().0, &scene.probe) {
             (ShadowTechnique::Environment, Some(_)) => finer_meshes(scene, precomputation),
-            _ => Vec::new(),
+            (ShadowTechnique::Environment, None)
+            | (ShadowTechnique::Volumes | ShadowTechnique::Shafts | ShadowTechnique::Both, _) => {
+                Vec::new()
+            }
         };
         KnownLevels::new(scene, finer, precomputation)
     }
@@ -76,7 +79,11 @@ impl ChosenTechnique {
                 (Self::Combined(Box::new(combined)), gpu_scene)
             }
             // (No scene that was read has shafts or an environment without a probe.)
-            (_, _) => {
+            (ShadowTechnique::Volumes, _)
+            | (
+                ShadowTechnique::Shafts | ShadowTechnique::Both | ShadowTechnique::Environment,
+                None,
+            ) => {
                 let gpu_scene = GpuScene::new(gpu, scene, intrinsics, LitBy::Lights, known);
                 let (samples, kinds) = (scene.shadows.samples, gpu_scene.kinds);
                 // (A lamp that moves along may be lost, and one of some size has soft shadows.)

@@ -65,10 +65,8 @@ fn bad_meshes_say_what_is_expected() {
         "{place}"
     );
     let fbx = failure("Kaydara FBX Binary  \0");
-    assert!(
-        fbx.contains("an FBX file is not read; allowed: glTF, OBJ, PLY, STL"),
-        "{fbx}"
-    );
+    let expected = "bad.obj: an FBX file is not read; allowed: glTF, OBJ, PLY, STL";
+    assert_eq!(fbx, expected);
 }
 
 /// What has no surface is named.

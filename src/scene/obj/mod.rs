@@ -13,6 +13,7 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 
 use super::error::SceneError;
+use super::mesh_format::MeshFormat;
 use super::notes::Notes;
 use super::raw_model::{RawModel, WithoutSurface};
 use libraries::Libraries;
@@ -45,8 +46,9 @@ pub fn read(path: &Path, bytes: &[u8], note_read: &dyn Fn(&Path)) -> Result<RawM
         let mut without = reader.without_surface;
         without.points |= !reader.positions.is_empty() && !without.lines;
         let message = format!(
-            "no faces{}; a mesh is expected: OBJ with f records, PLY, STL or glTF",
-            without.told()
+            "no faces{}; a mesh is expected: {} (OBJ with f records)",
+            without.told(),
+            MeshFormat::all_names()
         );
         return Err(SceneError::of_file(path, message));
     }

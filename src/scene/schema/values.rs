@@ -359,7 +359,7 @@ impl Described for PathBuf {
     }
 
     fn told(takes: &FileKind) -> String {
-        takes.told().to_owned()
+        takes.told()
     }
 
     fn file(takes: &FileKind) -> Option<FileKind> {

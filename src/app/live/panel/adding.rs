@@ -7,10 +7,8 @@ use eframe::egui::{Button, ComboBox, ProgressBar, Ui};
 
 use crate::app::live::adding::{WantedShape, WantedThing};
 use crate::app::live::command::{Commands, SceneCommand};
+use crate::scene::mesh_format::MeshFormat;
 use crate::scene::{LoadStage, Scene};
-
-/// Names of files that models have.
-const MODELS: [&str; 5] = ["glb", "gltf", "obj", "ply", "stl"];
 
 /// What was said so far of the next thing.
 #[derive(Debug, Default)]
@@ -64,7 +62,7 @@ impl Adding {
             });
             ui.horizontal(|ui| {
                 let browse = Button::new("Model …");
-                let hover = "a glTF, OBJ, PLY or STL file; or drop it on the picture";
+                let hover = format!("{}; or drop it on the picture", MeshFormat::any_in_words());
                 let browse = ui.add_enabled(self.dialog.is_none(), browse);
                 if browse.on_hover_text(hover).clicked() {
                     self.browse(ui);
@@ -116,7 +114,7 @@ impl Adding {
         std::thread::spawn(move || {
             let dialog = rfd::FileDialog::new()
                 .set_title("A model for the scene")
-                .add_filter("models", &MODELS)
+                .add_filter("models", &MeshFormat::all_extensions())
                 .add_filter("all files", &["*"]);
             // (Nobody waits for it where the window has closed meanwhile.)
             _ = sender.send(dialog.pick_file());

@@ -6,14 +6,14 @@ use std::path::Path;
 
 use glam::{Vec3, Vec4};
 
-use super::error::SceneError;
-use super::notes::Notes;
-use super::obj::FARTHEST;
-use super::obj::text::{decoded, number};
-use super::raw_model::{GivenMaterial, RawModel};
-use super::vertex_colors::linear_colors;
 use crate::geometry::mesh::{CornerLook, RawLooks, RawTriangle};
 use crate::geometry::polygon::PolygonCutter;
+use crate::scene::error::SceneError;
+use crate::scene::notes::Notes;
+use crate::scene::obj::FARTHEST;
+use crate::scene::obj::text::{decoded, number};
+use crate::scene::raw_model::{GivenMaterial, RawModel};
+use crate::scene::vertex_colors::linear_colors;
 
 const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
