@@ -875,3 +875,110 @@ fn an_interrupt_leaves_nothing_of_a_job_that_waits() {
         assert_eq!(names(&temporary), [""; 0], "{job:?}");
     }
 }
+
+#[test]
+fn stdout_lies_in_no_folder() {
+    let folder = tempdir().unwrap();
+    lamp_in(folder.path());
+    let inside = folder.path().join("recording");
+    let output = done(&inside, &["track", ".", "--size-mm", "44", "--poses", "-"]);
+    assert!(output.stdout.starts_with(b"frame,time_s,anchor"));
+}
+
+#[test]
+fn a_name_that_ends_as_a_folder_s_is_one() {
+    let folder = tempdir().unwrap();
+    lamp_in(folder.path());
+    let tracked = ["track", "recording", "--size-mm", "44", "--poses", "new/"];
+    refused(folder.path(), &tracked, &["--poses", "new/", "a folder's"]);
+    done(folder.path(), &quick(&["--out", "shots.mp4/"]));
+    assert!(folder.path().join("shots.mp4/000000.png").is_file());
+    refused(
+        folder.path(),
+        &quick(&["--sheet", "sheet.jpg"]),
+        &["sheet.jpg", "the sheet is a PNG"],
+    );
+}
+
+#[test]
+fn options_of_another_kind_of_sheet_or_job_are_refused() {
+    let folder = tempdir().unwrap();
+    lamp_in(folder.path());
+    let charuco = "markers --charuco 5x5 --square-mm 20 --marker-mm 12 --out a.svg";
+    let board = "markers --board 2x2 --size-mm 40 --gap-mm 20 --out a.svg";
+    let ids = "markers --ids 1,2 --size-mm 36 --out a.svg";
+    let chessboard = "markers --chessboard 6x5 --square-mm 20 --out a.svg";
+    let track = "track recording --anchors scene.toml --poses p.csv";
+    for (command, option) in [
+        (charuco, "--family tag36h11"),
+        (charuco, "--size-mm 12"),
+        (charuco, "--inverted"),
+        (charuco, "--first-id 30"),
+        (charuco, "--name foo"),
+        (board, "--dictionary DICT_4X4_50"),
+        (board, "--marker-mm 12"),
+        (ids, "--gap-mm 7"),
+        (ids, "--first-id 3"),
+        (chessboard, "--marker-mm 5"),
+        (chessboard, "--dictionary DICT_4X4_50"),
+        (track, "--family DICT_4X4_50"),
+        (track, "--border-cells 2"),
+        (track, "--inverted"),
+    ] {
+        let line = format!("{command} {option}");
+        let arguments: Vec<&str> = line.split(' ').collect();
+        let (named, _) = option.split_once(' ').unwrap_or((option, ""));
+        refused(folder.path(), &arguments, &["cannot be used with", named]);
+    }
+    for good in [charuco, board, ids, chessboard] {
+        let arguments: Vec<&str> = good.split(' ').collect();
+        done(folder.path(), &arguments);
+    }
+}
+
+#[test]
+fn poses_that_cover_no_frame_played_are_an_error_and_the_video_alone_needs_none() {
+    let folder = tempdir().unwrap();
+    let scene = lamp_in(folder.path());
+    let header = "frame,anchor,tx_m,ty_m,tz_m,rx,ry,rz\n";
+    for (rows, says) in [
+        ("", "it has no row"),
+        (
+            "1000,table,0,0,1,0,0,0\n1009,table,0,0,1,0,0,0\n",
+            "it has frames 1000 to 1009",
+        ),
+    ] {
+        fs::write(folder.path().join("given.csv"), format!("{header}{rows}")).unwrap();
+        let output = run(
+            folder.path(),
+            &quick(&["--poses-from", "given.csv", "--out", "a.mp4"]),
+        );
+        let said = said(&output);
+        assert!(!output.status.success(), "{said}");
+        assert!(
+            said.contains("has no pose of \"table\"") && said.contains(says),
+            "{said}"
+        );
+    }
+    let text = fs::read_to_string(&scene).unwrap();
+    fs::write(&scene, text.replace("tag36h11", "tag25h9")).unwrap();
+    let output = run(folder.path(), &quick(&["--out", "b.mp4"]));
+    assert!(said(&output).contains("never found") && !output.status.success());
+    done(folder.path(), &quick(&["--bare", "--out", "c.mp4"]));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_layout_that_a_full_stdout_does_not_take_was_not_given() {
+    let folder = tempdir().unwrap();
+    lamp_in(folder.path());
+    let full = fs::OpenOptions::new().write(true).open("/dev/full");
+    let mut command = gnomon(folder.path());
+    command.args(["board", "--from", "recording", "--size-mm", "44"]);
+    let output = command.stdout(full.unwrap()).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        !output.status.success() && said.contains("No space left"),
+        "{said}"
+    );
+}
