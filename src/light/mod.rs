@@ -20,14 +20,16 @@ pub mod radiance9;
 pub mod radiance_picture;
 pub mod regions;
 pub mod response;
+mod shape;
 pub mod texture;
 
 use std::f64::consts::PI;
 
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DAffine3, DVec3};
 
 pub use material::Material;
 use material::Shading;
+pub use shape::{Rect, Shape, ShapeFrame, spot_part, spot_ramp};
 
 /// Linear RGB's parts of luminance (ITU-R BT.709).
 pub(crate) const REC_709: DVec3 = DVec3::new(0.2126, 0.7152, 0.0722);
@@ -54,68 +56,6 @@ pub enum Light {
         /// Width of the disc that it comes from, radians; 0: it comes from one direction.
         angle_rad: f64,
     },
-}
-
-/// What shines at a [`Light::Point`]'s place.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Shape {
-    /// A point, to all sides alike.
-    Point,
-    /// A point, within a cone.
-    Spot {
-        /// Unit direction of the axis.
-        direction: DVec3,
-        /// Angle to the axis up to which the light is whole, radians.
-        inner_rad: f64,
-        /// Angle to the axis from which on there is none, radians; more than `inner_rad`.
-        outer_rad: f64,
-    },
-    /// A sphere of one radiance.
-    Sphere {
-        /// Metres.
-        radius_m: f64,
-    },
-    /// One side of a rectangle of one radiance.
-    Rect(Rect),
-}
-
-/// A rectangle that shines to one side.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rect {
-    /// Unit direction that it faces.
-    pub facing: DVec3,
-    /// Unit direction of its width, across `facing`.
-    pub along: DVec3,
-    /// Width and height, metres.
-    pub size_m: DVec2,
-}
-
-impl Rect {
-    /// A rectangle that faces a unit direction and whose height goes along `up`, but for what of that lies along `facing`; where
-    /// all of it does, along y or else x. `size_m`: width and height.
-    pub fn upright(facing: DVec3, up: DVec3, size_m: DVec2) -> Self {
-        let ups = [up.normalize_or_zero(), DVec3::Y, DVec3::X];
-        let sides = ups.map(|up| up.cross(facing));
-        let along = sides.iter().find(|side| side.length() > 1e-6);
-        Self {
-            facing,
-            along: along.map_or(DVec3::X, |side| side.normalize()),
-            size_m,
-        }
-    }
-
-    /// Unit direction of its height.
-    pub fn up(&self) -> DVec3 {
-        self.facing.cross(self.along)
-    }
-
-    /// Vectors from its middle to the middles of two of its sides, metres.
-    pub fn half_sides_m(&self) -> [DVec3; 2] {
-        [
-            self.along * (0.5 * self.size_m.x),
-            self.up() * (0.5 * self.size_m.y),
-        ]
-    }
 }
 
 impl Light {
@@ -156,23 +96,7 @@ impl Light {
             } => Self::Point {
                 position_m: there_from_here.transform_point3(position_m),
                 intensity,
-                shape: match shape {
-                    Shape::Point | Shape::Sphere { .. } => shape,
-                    Shape::Spot {
-                        direction,
-                        inner_rad,
-                        outer_rad,
-                    } => Shape::Spot {
-                        direction: turned(direction),
-                        inner_rad,
-                        outer_rad,
-                    },
-                    Shape::Rect(rect) => Shape::Rect(Rect {
-                        facing: turned(rect.facing),
-                        along: turned(rect.along),
-                        ..rect
-                    }),
-                },
+                shape: shape.moved(there_from_here),
             },
             Self::Directional {
                 direction,
@@ -189,11 +113,24 @@ impl Light {
     /// Whether its shadows have soft edges, however narrow.
     pub fn has_size(&self) -> bool {
         match *self {
-            Self::Point { shape, .. } => match shape {
-                Shape::Point | Shape::Spot { .. } => false,
-                Shape::Sphere { .. } | Shape::Rect(_) => true,
-            },
+            Self::Point { shape, .. } => shape.has_size(),
             Self::Directional { angle_rad, .. } => angle_rad > 0.0,
+        }
+    }
+
+    /// From its middle to its ends, metres; of distant light as parts of a unit of its way. None of what has no size.
+    pub fn half_extents(&self) -> Vec<DVec3> {
+        match *self {
+            Self::Point { shape, .. } => shape.half_extents_m(),
+            Self::Directional { angle_rad: 0.0, .. } => Vec::new(),
+            Self::Directional {
+                direction,
+                angle_rad,
+                ..
+            } => {
+                let (x, y) = direction.any_orthonormal_pair();
+                [x, y].map(|way| way * (0.5 * angle_rad).tan()).to_vec()
+            }
         }
     }
 }
@@ -206,28 +143,7 @@ pub fn irradiance(light: &Light, point: DVec3, normal: DVec3) -> DVec3 {
             position_m,
             intensity,
             shape,
-        } => {
-            let to_light = position_m - point;
-            let distance_squared = to_light.length_squared().max(1e-12);
-            let to_light = to_light / distance_squared.sqrt();
-            let of_point = normal.dot(to_light).max(0.0) / distance_squared;
-            intensity
-                * match shape {
-                    Shape::Point => of_point,
-                    Shape::Spot { direction, .. } => {
-                        of_point * spot_part(&shape, -to_light.dot(direction))
-                    }
-                    Shape::Sphere { radius_m } => {
-                        let area = PI * radius_m * radius_m;
-                        let sine_squared = radius_m * radius_m / distance_squared;
-                        form_factor::disc(normal.dot(to_light), sine_squared) / area
-                    }
-                    Shape::Rect(rect) => {
-                        form_factor::rect(&rect, position_m - point, normal)
-                            / (rect.size_m.x * rect.size_m.y)
-                    }
-                }
-        }
+        } => intensity * shape.irradiance_per_intensity(position_m - point, normal),
         Light::Directional {
             direction,
             irradiance,
@@ -244,27 +160,6 @@ pub fn irradiance(light: &Light, point: DVec3, normal: DVec3) -> DVec3 {
                 }
         }
     }
-}
-
-/// Part of a spot's intensity at an angle to its axis, of which the cosine is given; 1 for what is no spot. As lamps of glTF
-/// fall off (KHR_lights_punctual, "Inner and Outer Cone Angles").
-pub fn spot_part(shape: &Shape, cosine: f64) -> f64 {
-    let Shape::Spot {
-        inner_rad,
-        outer_rad,
-        ..
-    } = *shape
-    else {
-        return 1.0;
-    };
-    let [scale, offset] = spot_ramp(inner_rad, outer_rad);
-    (cosine * scale + offset).clamp(0.0, 1.0).powi(2)
-}
-
-/// Factor and summand that make a number from 0 at the outer angle to 1 at the inner of a cosine.
-pub fn spot_ramp(inner_rad: f64, outer_rad: f64) -> [f64; 2] {
-    let scale = 1.0 / (inner_rad.cos() - outer_rad.cos()).max(1e-6);
-    [scale, -outer_rad.cos() * scale]
 }
 
 /// The BRDF of a material for unit directions to the light and to the camera, without its pictures; the twin of

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::{Light, Rect, Shape};
+use super::Light;
 
 impl Light {
     /// The light as `count` small ones of equal power, which together give what it gives: itself where that is 1. They lie in
@@ -22,30 +22,13 @@ impl Light {
 
     fn piece(&self, index: usize, count: usize) -> Light {
         let share = 1.0 / count as f64;
-        let smaller = share.sqrt();
-        let side = if index.is_multiple_of(2) { 1.0 } else { -1.0 };
         match *self {
             Self::Point {
                 position_m,
                 intensity,
                 shape,
             } => {
-                let (aside_m, shape) = match shape {
-                    Shape::Point | Shape::Spot { .. } => (DVec3::ZERO, shape),
-                    Shape::Sphere { radius_m } => (
-                        in_sphere(spread(index / 2)) * (radius_m * side),
-                        Shape::Sphere {
-                            radius_m: radius_m * smaller,
-                        },
-                    ),
-                    Shape::Rect(rect) => {
-                        let [width, height] = rect.half_sides_m();
-                        let [across, up] = in_square(index, count);
-                        let aside = width * across + height * up;
-                        let size_m = rect.size_m * smaller;
-                        (aside, Shape::Rect(Rect { size_m, ..rect }))
-                    }
-                };
+                let (aside_m, shape) = shape.piece(index, count);
                 Self::Point {
                     position_m: position_m + aside_m,
                     intensity: intensity * share,
@@ -57,6 +40,7 @@ impl Light {
                 irradiance,
                 angle_rad,
             } => {
+                let side = if index.is_multiple_of(2) { 1.0 } else { -1.0 };
                 let (x, y) = direction.any_orthonormal_pair();
                 let [across, up, _] = in_sphere(spread(index / 2)).to_array();
                 let aside = (x * across + y * up) * ((0.5 * angle_rad).sin() * side);
@@ -66,7 +50,7 @@ impl Light {
                     direction: aside + direction * forth,
                     // A plane across the axis gets its share, one across this direction as much more as it lies straighter.
                     irradiance: irradiance * (share / forth.max(1e-3)),
-                    angle_rad: angle_rad * smaller,
+                    angle_rad: angle_rad * share.sqrt(),
                 }
             }
         }
@@ -75,7 +59,7 @@ impl Light {
 
 /// Three numbers from 0 to 1, of any number of such evenly spread (Roberts 2018, "The unreasonable effectiveness of quasirandom
 /// sequences": steps by the powers of the inverse of the root of x⁴ = x + 1).
-fn spread(index: usize) -> [f64; 3] {
+pub(super) fn spread(index: usize) -> [f64; 3] {
     const ROOT: f64 = 1.220_744_084_605_759_6;
     let step = index as f64 + 1.0;
     [1, 2, 3].map(|power| (0.5 + step / ROOT.powi(power)).fract())
@@ -83,7 +67,7 @@ fn spread(index: usize) -> [f64; 3] {
 
 /// One of `count` places evenly spread over the square from −1 to 1: a lattice by the golden ratio, alike on opposite sides of
 /// the middle. By what the pieces there have a size of their own they lie nearer the middle, so that their spread is the square's.
-fn in_square(index: usize, count: usize) -> [f64; 2] {
+pub(super) fn in_square(index: usize, count: usize) -> [f64; 2] {
     const GOLDEN: f64 = 0.618_033_988_749_895;
     let count = count as f64;
     let from_middle = index as f64 - 0.5 * (count - 1.0);
@@ -93,7 +77,7 @@ fn in_square(index: usize, count: usize) -> [f64; 2] {
 }
 
 /// A place in the unit sphere, see [`Light::pieces`].
-fn in_sphere([u, v, w]: [f64; 3]) -> DVec3 {
+pub(super) fn in_sphere([u, v, w]: [f64; 3]) -> DVec3 {
     let (sine, cosine) = (TAU * v).sin_cos();
     let radius = (1.0 - u).sqrt();
     DVec3::new(radius * cosine, radius * sine, u.sqrt() * (TAU * w).sin())
@@ -102,7 +86,7 @@ fn in_sphere([u, v, w]: [f64; 3]) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::light::irradiance;
+    use crate::light::{Rect, Shape, irradiance};
     use glam::DVec2;
     use std::f64::consts::PI;
 
@@ -120,6 +104,20 @@ mod tests {
             DVec3::Z,
             DVec2::new(0.3, 0.2),
         )
+    }
+
+    /// A shape of each kind, one after the other.
+    fn shapes() -> impl Iterator<Item = Shape> {
+        std::iter::successors(Some(Shape::Point), |before| match before {
+            Shape::Point => Some(Shape::Spot {
+                direction: rect().facing,
+                inner_rad: 0.3,
+                outer_rad: 0.6,
+            }),
+            Shape::Spot { .. } => Some(Shape::Sphere { radius_m: 0.05 }),
+            Shape::Sphere { .. } => Some(Shape::Rect(rect())),
+            Shape::Rect(_) => None,
+        })
     }
 
     /// By what a light is off that is cut into pieces, at some places on planes that are tilted.
@@ -155,11 +153,8 @@ mod tests {
             irradiance: DVec3::ONE,
             angle_rad: 0.2,
         };
-        for light in [
-            lamp(Shape::Sphere { radius_m: 0.05 }),
-            lamp(Shape::Rect(rect())),
-            sun,
-        ] {
+        let sized = shapes().filter(Shape::has_size).map(lamp);
+        for light in sized.chain([sun]) {
             assert!(
                 worst_off(&light, 16) < 0.02,
                 "{light:?}: {}",

@@ -6,10 +6,10 @@
 
 use std::ops::Range;
 
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 
 use crate::geometry::penumbra::SizedPlace;
-use crate::light::{Light, Shape};
+use crate::light::Light;
 use crate::scene::SceneLight;
 
 use super::gpu::Gpu;
@@ -191,27 +191,8 @@ fn uniforms(gpu: &Gpu, count: usize) -> (UniformRow, wgpu::BindGroup) {
 
 /// A light's middle and its half extents, in world space; none for a light without a size.
 pub(super) fn sized_place(light: &Light) -> SizedPlace {
-    let half_extents = match *light {
-        Light::Point { shape, .. } => match shape {
-            Shape::Point | Shape::Spot { .. } => Vec::new(),
-            Shape::Sphere { radius_m } => DVec3::AXES.map(|axis| axis * radius_m).to_vec(),
-            Shape::Rect(rect) => {
-                let [width, height] = rect.half_sides_m();
-                vec![width, height, width + height, width - height]
-            }
-        },
-        Light::Directional { angle_rad: 0.0, .. } => Vec::new(),
-        Light::Directional {
-            direction,
-            angle_rad,
-            ..
-        } => {
-            let (x, y) = direction.any_orthonormal_pair();
-            [x, y].map(|way| way * (0.5 * angle_rad).tan()).to_vec()
-        }
-    };
     SizedPlace {
         place: light_place(light, &DAffine3::IDENTITY),
-        half_extents,
+        half_extents: light.half_extents(),
     }
 }

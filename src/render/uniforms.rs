@@ -7,7 +7,7 @@ use crate::geometry::bounds::HalfSpace;
 use crate::geometry::camera::{Distortion, Intrinsics};
 use crate::geometry::lens;
 use crate::geometry::shadow_volume::LightPlace;
-use crate::light::{Light, Shape, spot_ramp};
+use crate::light::Light;
 
 use super::pipelines::{GroupLayout, filtered, sampler, texels, uniform};
 
@@ -67,51 +67,20 @@ pub(super) struct CameraLight {
 
 impl CameraLight {
     pub fn new(light: &Light, camera_from_world: &DAffine3) -> Self {
-        let plain = Self {
-            place_in_camera: Vec4::ZERO,
-            power: Vec4::ZERO,
-            axis_in_camera: Vec4::ZERO,
-            half_width: Vec4::ZERO,
-            half_height: Vec4::ZERO,
-        };
         match light.moved(camera_from_world) {
             Light::Point {
                 position_m,
                 intensity,
                 shape,
             } => {
-                let at = Self {
+                let frame = shape.frame();
+                let [half_width, half_height] = frame.half_sides_m;
+                Self {
                     place_in_camera: position_m.as_vec3().extend(1.0),
-                    power: intensity.as_vec3().extend(0.0),
-                    ..plain
-                };
-                match shape {
-                    Shape::Point => at,
-                    Shape::Sphere { radius_m } => Self {
-                        power: at.power.with_w(radius_m as f32),
-                        ..at
-                    },
-                    Shape::Spot {
-                        direction,
-                        inner_rad,
-                        outer_rad,
-                    } => {
-                        let [scale, offset] = spot_ramp(inner_rad, outer_rad);
-                        Self {
-                            axis_in_camera: direction.as_vec3().extend(0.0),
-                            half_width: Vec4::new(scale as f32, offset as f32, 0.0, 0.0),
-                            ..at
-                        }
-                    }
-                    Shape::Rect(rect) => {
-                        let [half_width, half_height] = rect.half_sides_m();
-                        Self {
-                            axis_in_camera: rect.facing.as_vec3().extend(0.0),
-                            half_width: half_width.as_vec3().extend(0.0),
-                            half_height: half_height.as_vec3().extend(0.0),
-                            ..at
-                        }
-                    }
+                    power: intensity.as_vec3().extend(frame.radius_m as f32),
+                    axis_in_camera: frame.axis.as_vec3().extend(0.0),
+                    half_width: half_width.as_vec3().extend(0.0),
+                    half_height: half_height.as_vec3().extend(0.0),
                 }
             }
             Light::Directional {
@@ -121,7 +90,9 @@ impl CameraLight {
             } => Self {
                 place_in_camera: -direction.as_vec3().extend(0.0),
                 power: irradiance.as_vec3().extend((0.5 * angle_rad).sin() as f32),
-                ..plain
+                axis_in_camera: Vec4::ZERO,
+                half_width: Vec4::ZERO,
+                half_height: Vec4::ZERO,
             },
         }
     }

@@ -1,5 +1,7 @@
 //! The scene's format as a whole: its sections, and every entry by its name.
 
+use std::sync::LazyLock;
+
 use super::schema::section::Section;
 
 pub use super::anchors::{
@@ -9,9 +11,8 @@ pub use super::anchors::{
 pub use super::animation::{ANIMATION, AnimationKeys};
 pub use super::camera::{CAMERA, CAMERA_SECTION};
 pub use super::lights::{
-    AIMED_LIGHT, AMBIENT, AMBIENT_SECTION, DIRECTIONAL_LIGHT, DIRECTIONAL_LIGHT_SECTION, LIGHT,
-    LIGHT_SECTION, LightKind, POINT_LIGHT, POINT_LIGHT_SECTION, RECT_LIGHT, RECT_LIGHT_SECTION,
-    SPHERE_LIGHT, SPHERE_LIGHT_SECTION, SPOT_LIGHT, SPOT_LIGHT_SECTION,
+    AMBIENT, AMBIENT_SECTION, DIRECTIONAL_LIGHT, LIGHT_SECTION, LIGHT_SECTIONS, LightKind,
+    POINT_LIGHT, ShapeKnobs, light_keys, turn_shape,
 };
 pub use super::motion::{MOTION, STATION, STATION_SECTION};
 pub use super::objects::{
@@ -28,25 +29,25 @@ pub use super::shapes::{PRISM, PRISM_SECTION, REVOLVED, REVOLVED_SECTION, SHAPE,
 pub use super::tracking::{TRACKING, TRACKING_SECTION};
 
 /// What may stand at the outermost level, in the reference's order; a light of each kind.
-pub const SECTIONS: [&Section; 17] = [
-    &CAMERA_SECTION,
-    &TRACKING_SECTION,
-    &BOARD_SECTION,
-    &MARKER_SECTION,
-    &PHANTOM_SECTION,
-    &VIRTUAL_SECTION,
-    &POINT_LIGHT_SECTION,
-    &DIRECTIONAL_LIGHT_SECTION,
-    &SPOT_LIGHT_SECTION,
-    &SPHERE_LIGHT_SECTION,
-    &RECT_LIGHT_SECTION,
-    &AMBIENT_SECTION,
-    &TABLE_SECTION,
-    &SHADOWS_SECTION,
-    &ENVIRONMENT_SECTION,
-    &PROBE_SECTION,
-    &ROOM_SECTION,
-];
+pub static SECTIONS: LazyLock<Vec<&Section>> = LazyLock::new(|| {
+    let before = [
+        &CAMERA_SECTION,
+        &TRACKING_SECTION,
+        &BOARD_SECTION,
+        &MARKER_SECTION,
+        &PHANTOM_SECTION,
+        &VIRTUAL_SECTION,
+    ];
+    let after = [
+        &AMBIENT_SECTION,
+        &TABLE_SECTION,
+        &SHADOWS_SECTION,
+        &ENVIRONMENT_SECTION,
+        &PROBE_SECTION,
+        &ROOM_SECTION,
+    ];
+    [&before[..], &LIGHT_SECTIONS, &after].concat()
+});
 
 /// The names of the sections, each once.
 pub fn section_names() -> Vec<&'static str> {

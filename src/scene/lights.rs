@@ -10,7 +10,7 @@ use super::ranges::{Digits, Numbers};
 use super::reader::Table;
 use super::schema::choice::Choice as _;
 use super::schema::key::Missing::Is;
-use super::schema::key::{Key, Required};
+use super::schema::key::{Key, NewKey, Required, new_key};
 use super::schema::section::{Example, Section, Times};
 use super::schema::values::Vectors;
 use crate::light::{Light, Rect, Shape};
@@ -185,7 +185,7 @@ pub static LIGHT_SECTION: Section = Section {
 };
 
 /// `[[light]]`, a point.
-pub static POINT_LIGHT_SECTION: Section = Section {
+static POINT_LIGHT_SECTION: Section = Section {
     name: "light",
     says: "Light from a point; up to 16 lights in all, default none.",
     times: Times::Any,
@@ -200,7 +200,7 @@ pub static POINT_LIGHT_SECTION: Section = Section {
 };
 
 /// `[[light]]`, from infinitely far away.
-pub static DIRECTIONAL_LIGHT_SECTION: Section = Section {
+static DIRECTIONAL_LIGHT_SECTION: Section = Section {
     name: "light",
     says: "Light from infinitely far away.",
     times: Times::Any,
@@ -216,7 +216,7 @@ pub static DIRECTIONAL_LIGHT_SECTION: Section = Section {
 };
 
 /// `[[light]]`, a spot.
-pub static SPOT_LIGHT_SECTION: Section = Section {
+static SPOT_LIGHT_SECTION: Section = Section {
     name: "light",
     says: "Light from a point within a cone; between the two angles it fades as lamps of glTF do.",
     times: Times::Any,
@@ -240,7 +240,7 @@ pub static SPOT_LIGHT_SECTION: Section = Section {
 };
 
 /// `[[light]]`, a sphere.
-pub static SPHERE_LIGHT_SECTION: Section = Section {
+static SPHERE_LIGHT_SECTION: Section = Section {
     name: "light",
     says: "A sphere that shines to all sides.",
     times: Times::Any,
@@ -261,7 +261,7 @@ pub static SPHERE_LIGHT_SECTION: Section = Section {
 };
 
 /// `[[light]]`, a rectangle.
-pub static RECT_LIGHT_SECTION: Section = Section {
+static RECT_LIGHT_SECTION: Section = Section {
     name: "light",
     says: "A rectangle that shines to one side.",
     times: Times::Any,
@@ -281,6 +281,17 @@ pub static RECT_LIGHT_SECTION: Section = Section {
         ("size_m", Example::Live("[0.8, 1.2]")),
     ],
     is_aside: false,
+};
+
+/// `[[light]]` of each kind.
+pub const LIGHT_SECTIONS: [&Section; LightKind::BY_NAME.len()] = {
+    let mut sections = [&LIGHT_SECTION; LightKind::BY_NAME.len()];
+    let mut index = 0;
+    while index < sections.len() {
+        sections[index] = LightKind::BY_NAME[index].1.section();
+        index += 1;
+    }
+    sections
 };
 
 /// `[ambient]`.
@@ -315,7 +326,7 @@ pub fn lights(root: &Table, anchors: &[Anchor]) -> Result<Vec<SceneLight>, Scene
 
 impl LightKind {
     /// The table of a light of this kind.
-    pub fn section(self) -> &'static Section {
+    pub const fn section(self) -> &'static Section {
         match self {
             Self::Point => &POINT_LIGHT_SECTION,
             Self::Directional => &DIRECTIONAL_LIGHT_SECTION,
@@ -344,6 +355,48 @@ impl LightKind {
                 Shape::Sphere { .. } => Self::Sphere,
                 Shape::Rect(_) => Self::Rect,
             },
+        }
+    }
+
+    /// A light of this kind where and as strong as another is, as far as kinds have that in common.
+    pub fn like(self, light: &Light) -> Light {
+        let (position_m, intensity, down) = match *light {
+            Light::Point {
+                position_m,
+                intensity,
+                ..
+            } => (position_m, intensity, unit_direction(-position_m)),
+            // From half a metre away, as bright at the origin.
+            Light::Directional {
+                direction,
+                irradiance,
+                ..
+            } => (-0.5 * direction, 0.25 * irradiance, direction),
+        };
+        let direction = match down == DVec3::ZERO {
+            true => DVec3::NEG_Z,
+            false => down,
+        };
+        let shape = match self {
+            Self::Directional => {
+                return Light::directional(
+                    direction,
+                    intensity / position_m.length_squared().max(1e-4),
+                );
+            }
+            Self::Point => Shape::Point,
+            Self::Spot => Shape::Spot {
+                direction,
+                inner_rad: 20_f64.to_radians(),
+                outer_rad: 30_f64.to_radians(),
+            },
+            Self::Sphere => Shape::Sphere { radius_m: 0.04 },
+            Self::Rect => Shape::Rect(Rect::upright(direction, DVec3::Z, DVec2::splat(0.3))),
+        };
+        Light::Point {
+            position_m,
+            intensity,
+            shape,
         }
     }
 }
@@ -401,6 +454,104 @@ fn direction(table: &Table, key: &Key<DVec3, Required>) -> Result<DVec3, SceneEr
             .require(table)?
             .error("no direction; allowed: any length but zero")),
         false => Ok(direction),
+    }
+}
+
+/// The keys of a light: three that all have, then those of its size.
+pub fn light_keys(light: &Light) -> Vec<NewKey> {
+    let kind = new_key(&LIGHT.kind, &LightKind::of(light));
+    match light {
+        Light::Point {
+            position_m,
+            intensity,
+            shape,
+        } => {
+            let mut keys = vec![
+                kind,
+                new_key(&POINT_LIGHT.position_m, position_m),
+                new_key(&POINT_LIGHT.intensity, intensity),
+            ];
+            keys.extend(shape_keys(shape));
+            keys
+        }
+        Light::Directional {
+            direction,
+            irradiance,
+            angle_rad,
+        } => {
+            let width = new_key(&DIRECTIONAL_LIGHT.angle_deg, &angle_rad.to_degrees());
+            let mut keys = vec![
+                kind,
+                new_key(&DIRECTIONAL_LIGHT.direction, direction),
+                new_key(&DIRECTIONAL_LIGHT.irradiance, irradiance),
+            ];
+            keys.extend((*angle_rad > 0.0).then_some(width));
+            keys
+        }
+    }
+}
+
+fn shape_keys(shape: &Shape) -> Vec<NewKey> {
+    match shape {
+        Shape::Point => Vec::new(),
+        Shape::Spot {
+            direction,
+            inner_rad,
+            outer_rad,
+        } => vec![
+            new_key(&AIMED_LIGHT.direction, direction),
+            new_key(&SPOT_LIGHT.outer_deg, &outer_rad.to_degrees()),
+            new_key(&SPOT_LIGHT.inner_deg, &inner_rad.to_degrees()),
+        ],
+        Shape::Sphere { radius_m } => vec![new_key(&SPHERE_LIGHT.radius_m, radius_m)],
+        Shape::Rect(rect) => vec![
+            new_key(&AIMED_LIGHT.direction, &rect.facing),
+            new_key(&RECT_LIGHT.size_m, &rect.size_m.to_array()),
+            new_key(&RECT_LIGHT.up, &rect.up()),
+        ],
+    }
+}
+
+/// Changes the numbers of a shape, each by its name; whether it has changed one.
+pub trait ShapeKnobs {
+    /// A unit direction.
+    fn direction(&mut self, name: &str, direction: &mut DVec3) -> bool;
+    /// An angle, which has to be allowed in degrees.
+    fn angle(&mut self, name: &str, angle_rad: &mut f64, allowed: &Numbers) -> bool;
+    /// A length, changed by small steps.
+    fn length(&mut self, name: &str, length_m: &mut f64, step_m: f64, allowed: &Numbers) -> bool;
+}
+
+/// Gives all numbers of a shape to what may change them; whether one has changed.
+pub fn turn_shape(shape: &mut Shape, knobs: &mut dyn ShapeKnobs) -> bool {
+    match shape {
+        Shape::Point => false,
+        Shape::Spot {
+            direction,
+            inner_rad,
+            outer_rad,
+        } => {
+            let turned = knobs.direction("towards", direction);
+            let outer = knobs.angle("outer", outer_rad, &SPOT_LIGHT.outer_deg.takes);
+            let mut inside = SPOT_LIGHT.inner_deg.takes;
+            inside.most = (outer_rad.to_degrees() - 0.01).max(0.0);
+            *inner_rad = inner_rad.min(inside.most.to_radians());
+            knobs.angle("inner", inner_rad, &inside) || outer || turned
+        }
+        Shape::Sphere { radius_m } => {
+            knobs.length("radius", radius_m, 0.001, &SPHERE_LIGHT.radius_m.takes)
+        }
+        Shape::Rect(rect) => {
+            let mut facing = rect.facing;
+            let turned = knobs.direction("towards", &mut facing);
+            let size = &RECT_LIGHT.size_m.takes;
+            let wider = knobs.length("width", &mut rect.size_m.x, 0.005, size);
+            let higher = knobs.length("height", &mut rect.size_m.y, 0.005, size);
+            if turned {
+                *rect = Rect::upright(facing, rect.up(), rect.size_m);
+            }
+            turned || wider || higher
+        }
     }
 }
 

@@ -159,7 +159,7 @@ mod tests {
 
     #[test]
     fn every_key_is_shown_with_what_it_is() {
-        for section in SECTIONS {
+        for section in SECTIONS.iter() {
             for (name, _) in section.shown {
                 assert!(section.names().contains(name), "{}.{name}", section.name);
             }

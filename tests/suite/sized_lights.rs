@@ -4,6 +4,7 @@ use glam::{DVec2, DVec3};
 use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::light::{Light, Rect, Shape};
 use gnomon::render::{REAL, Shown};
+use gnomon::scene::format::LightKind;
 use gnomon::scene::{Scene, SceneLight};
 
 use crate::common::{Picture, Stage, look_at, project_file};
@@ -36,7 +37,8 @@ fn drawn(scene: &Scene) -> (Picture, Vec<u8>) {
     (picture, renderer.layers().expect("layers").role)
 }
 
-fn lights() -> [Light; 3] {
+/// A light of each kind that has a size.
+fn lights() -> Vec<Light> {
     let lamp = |shape| Light::Point {
         position_m: DVec3::new(-0.26, 0.24, 0.46),
         intensity: DVec3::ONE,
@@ -49,11 +51,13 @@ fn lights() -> [Light; 3] {
         irradiance: DVec3::splat(3.0),
         angle_rad: 0.1,
     };
-    [
-        lamp(Shape::Sphere { radius_m: 0.06 }),
-        lamp(Shape::Rect(rect)),
-        sun,
-    ]
+    let of_kind = |(_, kind)| match kind {
+        LightKind::Point | LightKind::Spot => None,
+        LightKind::Directional => Some(sun),
+        LightKind::Sphere => Some(lamp(Shape::Sphere { radius_m: 0.06 })),
+        LightKind::Rect => Some(lamp(Shape::Rect(rect))),
+    };
+    LightKind::BY_NAME.into_iter().filter_map(of_kind).collect()
 }
 
 #[test]

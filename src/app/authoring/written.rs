@@ -6,17 +6,16 @@ use toml_edit::{Document, Item, Value};
 use super::edit::{AnimationName, Edit, NewForm, NewThing};
 use super::numbers::{self, number_of};
 use super::spliced::{Body, Spliced, bodies, parsed};
-use crate::light::{Light, Shape};
-use crate::scene::format::{AIMED_LIGHT, RECT_LIGHT, SPHERE_LIGHT, SPOT_LIGHT};
+use crate::light::Light;
 use crate::scene::format::{
     AMBIENT, AMBIENT_SECTION, ANIMATION, AnimationKeys, BOARD, BOARD_SECTION, CENTER,
-    DIRECTIONAL_LIGHT, LIGHT, LIGHT_SECTION, LightKind, MARKER, MARKER_SECTION, MATERIAL, ON_BOARD,
+    DIRECTIONAL_LIGHT, LIGHT_SECTION, LightKind, MARKER, MARKER_SECTION, MATERIAL, ON_BOARD,
     PHANTOM_SECTION, PLACEMENT, POINT_LIGHT, PlacementKeys, SHADOWS_SECTION, SHAPE, STANDING,
-    ShapeKeys, TABLE, TABLE_SECTION, THING, THING_NAME, VIRTUAL_SECTION,
+    ShapeKeys, TABLE, TABLE_SECTION, THING, THING_NAME, VIRTUAL_SECTION, light_keys,
 };
-use crate::scene::schema::key::{Absent, Key};
+use crate::scene::schema::key::{Absent, Key, NewKey, new_key};
 use crate::scene::schema::section::Section;
-use crate::scene::schema::values::{Described, quoted};
+use crate::scene::schema::values::quoted;
 use crate::scene::{Placement, Scene, ShadowChange, unit_direction};
 
 /// Why an edit does not fit a text.
@@ -35,9 +34,6 @@ pub enum Unfit {
     #[error("the scene's file is not TOML any more")]
     NotToml,
 }
-
-/// A key with its value, as the file is to have it.
-type NewKey = (&'static str, String);
 
 /// The text with an edit made in it; `scene` is what the text says.
 pub fn with_edit(text: &str, scene: &Scene, edit: &Edit) -> Result<String, Unfit> {
@@ -179,11 +175,6 @@ fn tables<'a>(document: &'a Document<&str>, section: &Section) -> Vec<Body<'a>> 
 fn add_table(spliced: &mut Spliced, document: &Document<&str>, section: &Section, keys: &[NewKey]) {
     let siblings = document.as_table().get(section.name);
     spliced.add_table(&section.head(), siblings, keys);
-}
-
-/// A key where there is none yet.
-fn new_key<T: Described, M>(key: &Key<T, M>, value: &T) -> NewKey {
-    (key.name, key.text(value).unwrap_or_default())
 }
 
 /// Writes three numbers, or one that stands for them where one is written.
@@ -395,61 +386,6 @@ fn set_same_kind(
         if !old_rest.contains(&(key, text.clone())) {
             spliced.set(body, key, text);
         }
-    }
-}
-
-/// The keys of a light: three that all have, then those of its size.
-fn light_keys(light: &Light) -> Vec<NewKey> {
-    let kind = new_key(&LIGHT.kind, &LightKind::of(light));
-    match light {
-        Light::Point {
-            position_m,
-            intensity,
-            shape,
-        } => {
-            let mut keys = vec![
-                kind,
-                new_key(&POINT_LIGHT.position_m, position_m),
-                new_key(&POINT_LIGHT.intensity, intensity),
-            ];
-            keys.extend(shape_keys(shape));
-            keys
-        }
-        Light::Directional {
-            direction,
-            irradiance,
-            angle_rad,
-        } => {
-            let width = new_key(&DIRECTIONAL_LIGHT.angle_deg, &angle_rad.to_degrees());
-            let mut keys = vec![
-                kind,
-                new_key(&DIRECTIONAL_LIGHT.direction, direction),
-                new_key(&DIRECTIONAL_LIGHT.irradiance, irradiance),
-            ];
-            keys.extend((*angle_rad > 0.0).then_some(width));
-            keys
-        }
-    }
-}
-
-fn shape_keys(shape: &Shape) -> Vec<NewKey> {
-    match shape {
-        Shape::Point => Vec::new(),
-        Shape::Spot {
-            direction,
-            inner_rad,
-            outer_rad,
-        } => vec![
-            new_key(&AIMED_LIGHT.direction, direction),
-            new_key(&SPOT_LIGHT.outer_deg, &outer_rad.to_degrees()),
-            new_key(&SPOT_LIGHT.inner_deg, &inner_rad.to_degrees()),
-        ],
-        Shape::Sphere { radius_m } => vec![new_key(&SPHERE_LIGHT.radius_m, radius_m)],
-        Shape::Rect(rect) => vec![
-            new_key(&AIMED_LIGHT.direction, &rect.facing),
-            new_key(&RECT_LIGHT.size_m, &rect.size_m.to_array()),
-            new_key(&RECT_LIGHT.up, &rect.up()),
-        ],
     }
 }
 

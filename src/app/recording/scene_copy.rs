@@ -364,7 +364,7 @@ mod tests {
 
         // The scene has every key that names a file.
         let document: toml::Table = text.parse().unwrap();
-        for section in SECTIONS {
+        for section in SECTIONS.iter() {
             for key in section.keys().filter(|key| key.file().is_some()) {
                 let table = match document.get(section.name) {
                     Some(toml::Value::Array(tables)) => tables[0].as_table(),

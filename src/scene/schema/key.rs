@@ -41,6 +41,14 @@ pub enum Missing<T> {
     },
 }
 
+/// A key's name with its value, as a file is to have it.
+pub type NewKey = (&'static str, String);
+
+/// A key where there is none yet.
+pub fn new_key<T: Described, M>(key: &Key<T, M>, value: &T) -> NewKey {
+    (key.name, key.text(value).unwrap_or_default())
+}
+
 impl<T: Described, M> Key<T, M> {
     /// The key's value in a table.
     pub fn value<'a>(&self, table: &Table<'a>) -> Option<Value<'a>> {

@@ -1,16 +1,16 @@
 //! The lights: where they stand, how strong they are.
 
 use eframe::egui::{ComboBox, Ui};
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
 use super::editing::{Editing, number, power, vector};
 use crate::app::authoring::Edit;
 use crate::app::live::command::{Commands, SceneCommand, Selected, WindowCommand};
 use crate::app::live::window_state::WindowState;
-use crate::light::{Light, Rect, Shape};
+use crate::light::{Light, Shape};
 use crate::scene::Numbers;
 use crate::scene::format::{
-    AMBIENT, DIRECTIONAL_LIGHT, LightKind, POINT_LIGHT, RECT_LIGHT, SPHERE_LIGHT, SPOT_LIGHT,
+    AMBIENT, DIRECTIONAL_LIGHT, LightKind, POINT_LIGHT, ShapeKnobs, turn_shape,
 };
 use crate::scene::{Scene, unit_direction};
 
@@ -63,7 +63,7 @@ pub fn show(
                     let moved = vector(ui, m.unit, position_m, 0.002, &m.unit(""));
                     let watts = &POINT_LIGHT.intensity.takes.numbers;
                     let stronger = power(ui, "W/sr", intensity, watts);
-                    show_shape(ui, shape) || stronger || moved
+                    turn_shape(shape, &mut ShapeFields(ui)) || stronger || moved
                 }
                 Light::Directional {
                     direction,
@@ -107,81 +107,23 @@ fn other_kind(ui: &mut Ui, light: &Light) -> Option<Light> {
                 ui.selectable_value(&mut chosen, kind, name);
             }
         });
-    (chosen != now).then(|| of_kind(chosen, light))
+    (chosen != now).then(|| chosen.like(light))
 }
 
-fn of_kind(kind: LightKind, light: &Light) -> Light {
-    let (position_m, intensity, down) = match *light {
-        Light::Point {
-            position_m,
-            intensity,
-            ..
-        } => (position_m, intensity, unit_direction(-position_m)),
-        // From half a metre away, as bright at the origin.
-        Light::Directional {
-            direction,
-            irradiance,
-            ..
-        } => (-0.5 * direction, 0.25 * irradiance, direction),
-    };
-    let direction = match down == DVec3::ZERO {
-        true => DVec3::NEG_Z,
-        false => down,
-    };
-    let shape = match kind {
-        LightKind::Directional => {
-            return Light::directional(
-                direction,
-                intensity / position_m.length_squared().max(1e-4),
-            );
-        }
-        LightKind::Point => Shape::Point,
-        LightKind::Spot => Shape::Spot {
-            direction,
-            inner_rad: 20_f64.to_radians(),
-            outer_rad: 30_f64.to_radians(),
-        },
-        LightKind::Sphere => Shape::Sphere { radius_m: 0.04 },
-        LightKind::Rect => Shape::Rect(Rect::upright(direction, DVec3::Z, DVec2::splat(0.3))),
-    };
-    Light::Point {
-        position_m,
-        intensity,
-        shape,
+/// The fields of a shape.
+struct ShapeFields<'a>(&'a mut Ui);
+
+impl ShapeKnobs for ShapeFields<'_> {
+    fn direction(&mut self, name: &str, direction: &mut DVec3) -> bool {
+        aim(self.0, name, direction)
     }
-}
 
-/// What belongs to a shape. Returns whether it was changed.
-fn show_shape(ui: &mut Ui, shape: &mut Shape) -> bool {
-    match shape {
-        Shape::Point => false,
-        Shape::Spot {
-            direction,
-            inner_rad,
-            outer_rad,
-        } => {
-            let turned = aim(ui, "towards", direction);
-            let outer = angle(ui, "outer", outer_rad, &SPOT_LIGHT.outer_deg.takes);
-            let mut inside = SPOT_LIGHT.inner_deg.takes;
-            inside.most = (outer_rad.to_degrees() - 0.01).max(0.0);
-            *inner_rad = inner_rad.min(inside.most.to_radians());
-            angle(ui, "inner", inner_rad, &inside) || outer || turned
-        }
-        Shape::Sphere { radius_m } => {
-            let radius = &SPHERE_LIGHT.radius_m.takes;
-            number(ui, "radius", radius_m, 0.001, radius).changed()
-        }
-        Shape::Rect(rect) => {
-            let mut facing = rect.facing;
-            let turned = aim(ui, "towards", &mut facing);
-            let size = &RECT_LIGHT.size_m.takes;
-            let wider = number(ui, "width", &mut rect.size_m.x, 0.005, size).changed();
-            let higher = number(ui, "height", &mut rect.size_m.y, 0.005, size).changed();
-            if turned {
-                *rect = Rect::upright(facing, rect.up(), rect.size_m);
-            }
-            turned || wider || higher
-        }
+    fn angle(&mut self, name: &str, angle_rad: &mut f64, allowed: &Numbers) -> bool {
+        angle(self.0, name, angle_rad, allowed)
+    }
+
+    fn length(&mut self, name: &str, length_m: &mut f64, step_m: f64, allowed: &Numbers) -> bool {
+        number(self.0, name, length_m, step_m, allowed).changed()
     }
 }
 
