@@ -878,7 +878,7 @@ fn an_interrupt_leaves_nothing_of_a_job_that_waits() {
 
 #[test]
 fn stdout_lies_in_no_folder() {
-    let folder = tempdir().unwrap();
+    let folder = tempfile::tempdir().unwrap();
     lamp_in(folder.path());
     let inside = folder.path().join("recording");
     let output = done(&inside, &["track", ".", "--size-mm", "44", "--poses", "-"]);
@@ -887,7 +887,7 @@ fn stdout_lies_in_no_folder() {
 
 #[test]
 fn a_name_that_ends_as_a_folder_s_is_one() {
-    let folder = tempdir().unwrap();
+    let folder = tempfile::tempdir().unwrap();
     lamp_in(folder.path());
     let tracked = ["track", "recording", "--size-mm", "44", "--poses", "new/"];
     refused(folder.path(), &tracked, &["--poses", "new/", "a folder's"]);
@@ -902,7 +902,7 @@ fn a_name_that_ends_as_a_folder_s_is_one() {
 
 #[test]
 fn options_of_another_kind_of_sheet_or_job_are_refused() {
-    let folder = tempdir().unwrap();
+    let folder = tempfile::tempdir().unwrap();
     lamp_in(folder.path());
     let charuco = "markers --charuco 5x5 --square-mm 20 --marker-mm 12 --out a.svg";
     let board = "markers --board 2x2 --size-mm 40 --gap-mm 20 --out a.svg";
@@ -938,7 +938,7 @@ fn options_of_another_kind_of_sheet_or_job_are_refused() {
 
 #[test]
 fn poses_that_cover_no_frame_played_are_an_error_and_the_video_alone_needs_none() {
-    let folder = tempdir().unwrap();
+    let folder = tempfile::tempdir().unwrap();
     let scene = lamp_in(folder.path());
     let header = "frame,anchor,tx_m,ty_m,tz_m,rx,ry,rz\n";
     for (rows, says) in [
@@ -970,7 +970,7 @@ fn poses_that_cover_no_frame_played_are_an_error_and_the_video_alone_needs_none(
 #[cfg(target_os = "linux")]
 #[test]
 fn a_layout_that_a_full_stdout_does_not_take_was_not_given() {
-    let folder = tempdir().unwrap();
+    let folder = tempfile::tempdir().unwrap();
     lamp_in(folder.path());
     let full = fs::OpenOptions::new().write(true).open("/dev/full");
     let mut command = gnomon(folder.path());

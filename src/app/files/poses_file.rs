@@ -136,7 +136,10 @@ impl GivenPoses {
         let mut by_frame: BTreeMap<u32, Vec<GivenPose>> = BTreeMap::new();
         for row in reader.records() {
             let row = row?;
-            let line = row.position().map_or(0, csv::Position::line);
+            let line = line_of(text, &row);
+            if row.iter().all(str::is_empty) {
+                continue;
+            }
             ensure!(
                 row.len() == header.len(),
                 "line {line}: {} fields where the header has {}",
@@ -184,6 +187,16 @@ impl GivenPoses {
             (Some(first), Some(last)) => format!("it has frames {first} to {last}"),
         }
     }
+}
+
+/// The number of a row's line. (The reader's position is before the blank lines that it passed over.)
+fn line_of(text: &str, row: &csv::StringRecord) -> u64 {
+    let Some(position) = row.position() else {
+        return 0;
+    };
+    let rest = &text.as_bytes()[position.byte() as usize..];
+    let blank = rest.iter().take_while(|byte| matches!(byte, b'\r' | b'\n'));
+    position.line() + blank.filter(|byte| **byte == b'\n').count() as u64
 }
 
 /// A row's pose, and its time.
