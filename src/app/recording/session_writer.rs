@@ -266,6 +266,7 @@ impl GrowingFile {
 mod tests {
     use super::*;
     use crate::app::files::poses_file::GivenPoses;
+    use crate::tracking::Status;
     use glam::{DAffine3, DVec3};
 
     fn frame(index: u32, time_secs: f64, size_px: [u32; 2]) -> Frame {
@@ -338,6 +339,7 @@ mod tests {
         };
         let mut writer = SessionWriter::create(&path, head).unwrap();
         let pose_at = |x_m: f64| AnchorPose {
+            status: Status::Tracked,
             camera_from_anchor: Some(DAffine3::from_translation(DVec3::new(x_m, 0.25, 0.5))),
             ..AnchorPose::LOST
         };

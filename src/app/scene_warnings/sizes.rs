@@ -34,10 +34,10 @@ pub fn warning(object: &Object) -> Option<String> {
     let advice = match likely {
         Some((unit, unit_m)) => {
             format!(
-                "if its file is in {unit}, write scale = {unit_m}; or its longest side, in metres, as fit_m"
+                "if its file is in {unit}, write scale = {unit_m}; or its longest side as fit_m"
             )
         }
-        None => "write its longest side, in metres, as fit_m".to_owned(),
+        None => "write its longest side as fit_m".to_owned(),
     };
     Some(format!(
         "\"{}\" is {} long: {advice}",

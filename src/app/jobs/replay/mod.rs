@@ -85,7 +85,7 @@ pub fn replay(request: &ReplayRequest, stop: &AtomicBool) -> Result<Report> {
     }
     request.name_files(&mut files)?;
     files.check()?;
-    request.check_layers()?;
+    request.check_pictures()?;
     let (source, camera) = source::open(&scene, stop)?;
     let place = CalibrationNamed::ByKey.place();
     if let Some(remark) = camera.remark(&scene.camera.source, place) {
@@ -163,8 +163,16 @@ pub fn replay(request: &ReplayRequest, stop: &AtomicBool) -> Result<Report> {
 }
 
 impl ReplayRequest {
-    /// Layers lie beside PNGs alone.
-    fn check_layers(&self) -> Result<()> {
+    /// A sheet is a PNG, and layers lie beside PNGs alone.
+    fn check_pictures(&self) -> Result<()> {
+        if let Some(sheet) = &self.sheet {
+            let extension = sheet.extension().map(|it| it.to_ascii_lowercase());
+            ensure!(
+                extension.is_none_or(|extension| extension == "png"),
+                "--sheet {}: the sheet is a PNG (.png)",
+                sheet.display()
+            );
+        }
         if !self.layers.is_empty() {
             match &self.out {
                 Some(out) if Codec::of_path(out).is_some() => bail!(
@@ -182,14 +190,6 @@ impl ReplayRequest {
 
     /// What is read besides the scene, and what is written.
     fn name_files(&self, files: &mut JobFiles) -> Result<()> {
-        if let Some(sheet) = &self.sheet {
-            let extension = sheet.extension().map(|it| it.to_ascii_lowercase());
-            ensure!(
-                extension.is_none_or(|extension| extension == "png"),
-                "--sheet {}: the sheet is a PNG (.png)",
-                sheet.display()
-            );
-        }
         if let Some(path) = &self.poses_from {
             files.reads(path);
         }
