@@ -45,7 +45,7 @@ test: setup-tests
 	cargo fmt --check
 	cargo clippy --release --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps
-	cargo test --release
+	cargo test --release --no-fail-fast
 
 # All that is drawn under Vulkan's validation layer, and the C shim under Valgrind (an hour; not in CI).
 test-deep: setup-deep

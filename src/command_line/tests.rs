@@ -18,7 +18,7 @@ fn options_take_what_the_keys_of_their_names_take() {
         (track, "--border-cells 3", "1 to 2"),
         (record, "--fps 0", "1 to 1000"),
         (record, "--fps 1001", "1 to 1000"),
-        (record, "--size 40000x480", "1 to 32768"),
+        (record, "--size 40000x480", "1 to 32767"),
         (record, "--size 640", "WIDTHxHEIGHT"),
         (record, "--format YUV", "MJPEG, YUYV"),
         (
