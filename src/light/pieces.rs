@@ -40,10 +40,9 @@ impl Light {
                 irradiance,
                 angle_rad,
             } => {
-                let side = if index.is_multiple_of(2) { 1.0 } else { -1.0 };
                 let (x, y) = direction.any_orthonormal_pair();
-                let [across, up, _] = in_sphere(spread(index / 2)).to_array();
-                let aside = (x * across + y * up) * ((0.5 * angle_rad).sin() * side);
+                let [across, up, _] = in_sphere(index).to_array();
+                let aside = (x * across + y * up) * (0.5 * angle_rad).sin();
                 let forth = (1.0 - aside.length_squared()).max(0.0).sqrt();
                 // (The directions of a disc are evenly spread where their shadows on a plane across it are.)
                 Self::Directional {
@@ -59,7 +58,7 @@ impl Light {
 
 /// Three numbers from 0 to 1, of any number of such evenly spread (Roberts 2018, "The unreasonable effectiveness of quasirandom
 /// sequences": steps by the powers of the inverse of the root of x⁴ = x + 1).
-pub(super) fn spread(index: usize) -> [f64; 3] {
+fn spread(index: usize) -> [f64; 3] {
     const ROOT: f64 = 1.220_744_084_605_759_6;
     let step = index as f64 + 1.0;
     [1, 2, 3].map(|power| (0.5 + step / ROOT.powi(power)).fract())
@@ -76,11 +75,13 @@ pub(super) fn in_square(index: usize, count: usize) -> [f64; 2] {
     [2.0 * from_middle / count, 2.0 * part - 1.0].map(|part| part * shrunk)
 }
 
-/// A place in the unit sphere, see [`Light::pieces`].
-pub(super) fn in_sphere([u, v, w]: [f64; 3]) -> DVec3 {
+/// One of any number of places in the unit sphere, see [`Light::pieces`]: each second one lies opposite to the one before.
+pub(super) fn in_sphere(index: usize) -> DVec3 {
+    let side = if index.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let [u, v, w] = spread(index / 2);
     let (sine, cosine) = (TAU * v).sin_cos();
     let radius = (1.0 - u).sqrt();
-    DVec3::new(radius * cosine, radius * sine, u.sqrt() * (TAU * w).sin())
+    side * DVec3::new(radius * cosine, radius * sine, u.sqrt() * (TAU * w).sin())
 }
 
 #[cfg(test)]

@@ -99,7 +99,8 @@ impl Probe {
         self.resampled([0, 1].map(|axis| self.size_px[axis].min(most_px[axis].max(1))))
     }
 
-    /// The same light in so many columns and rows, each pixel the mean over the solid angle that it is of. Of no pixels, none.
+    /// The same light in so many columns and rows, each pixel the mean over the solid angle that it is of; black where there
+    /// are no pixels.
     pub fn resampled(&self, size_px: [usize; 2]) -> Self {
         let [width, height] = size_px;
         let columns = overlaps(self.size_px[0], width, |part| part * TAU);

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::form_factor;
-use super::pieces::{in_sphere, in_square, spread};
+use super::pieces::{in_sphere, in_square};
 
 /// What shines at a [`Light::Point`]'s place.
 ///
@@ -134,8 +134,7 @@ impl Shape {
         match self {
             Self::Point | Self::Spot { .. } => (DVec3::ZERO, self),
             Self::Sphere { radius_m } => {
-                let side = if index.is_multiple_of(2) { 1.0 } else { -1.0 };
-                let aside_m = in_sphere(spread(index / 2)) * (radius_m * side);
+                let aside_m = in_sphere(index) * radius_m;
                 let radius_m = radius_m * smaller;
                 (aside_m, Self::Sphere { radius_m })
             }

@@ -120,11 +120,25 @@ fn is_utf16(bytes: &[u8]) -> bool {
 /// What to write for a number that begins or ends with its point, where a place in a text is in one; nothing elsewhere.
 fn number_hint(text: &str, at: usize) -> &'static str {
     let is_digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
-    let (before, after) = text.split_at(at);
+    // (Not every place that is told begins a character.)
+    let Some((before, after)) = text.split_at_checked(at) else {
+        return "";
+    };
     let begins = after.starts_with('.') && is_digit(after.chars().nth(1));
     let ends = before.ends_with('.') && is_digit(before.chars().rev().nth(1));
     match begins || ends {
         true => "; a number has digits before and after its point, as in 0.5",
         false => "",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_within_a_character_is_no_number() {
+        assert_eq!(number_hint("x = é", 5), "");
+        assert_ne!(number_hint("x = .5", 4), "");
     }
 }

@@ -309,7 +309,8 @@ impl Limited {
                 let projection = bundle.intrinsics.project(in_camera_m)?;
                 let missing_px = corner_px - projection.pixel;
                 let weight = huber_weight(missing_px.length(), self.limit_px());
-                let by_camera = by_camera(&bundle.intrinsics, in_camera_m, projection.pixel);
+                let by_camera = (bundle.camera_is_free)
+                    .then(|| by_camera(&bundle.intrinsics, in_camera_m, projection.pixel));
                 for (axis, gradient) in projection.gradients().into_iter().enumerate() {
                     let value = missing_px[axis];
                     let row_of_pose = by_step(turned_m, gradient);
@@ -320,7 +321,7 @@ impl Limited {
                     blocks[seen.marker].add_weighted(&row_of_marker, value, weight);
                     of_marker.add(&row_of_pose, &row_of_marker, value, weight);
                     squares_px += weight * value * value;
-                    if bundle.camera_is_free {
+                    if let Some(by_camera) = by_camera {
                         let [focal, x, y, k1, k2] = by_camera.map(|step_px| step_px[axis]);
                         let row_of_camera = [focal, x, y, k1, k2, 0.0, 0.0];
                         blocks[bundle.camera_block()].add_weighted(&row_of_camera, value, weight);
