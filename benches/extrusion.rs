@@ -252,6 +252,24 @@ struct Place {
     light: Vec4,
 }
 
+/// The corners of the table's two triangles.
+const TABLE_M: [(f32, f32); 6] = [
+    (-0.4, -0.4),
+    (0.4, -0.4),
+    (0.4, 0.4),
+    (-0.4, -0.4),
+    (0.4, 0.4),
+    (-0.4, 0.4),
+];
+
+/// What [`SHADER`]'s `made` reads.
+const POINT: [wgpu::VertexAttribute; 1] = wgpu::vertex_attr_array![0 => Float32x4];
+/// What its `side` reads.
+const EDGE: [wgpu::VertexAttribute; 4] =
+    wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x4, 3 => Float32x4];
+/// What its `cap` reads.
+const CORNER: [wgpu::VertexAttribute; 2] = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x4];
+
 /// The device, and a stencil that counts volumes over a table.
 struct Lab {
     device: wgpu::Device,
@@ -284,139 +302,19 @@ impl Lab {
                 required_limits: adapter.limits(),
                 ..Default::default()
             }))?;
-        let depth_stencil = device.create_texture(&wgpu::TextureDescriptor {
-            label: None,
-            size: wgpu::Extent3d {
-                width: SIZE_PX[0],
-                height: SIZE_PX[1],
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: Self::FORMAT,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: None,
-            source: wgpu::ShaderSource::Wgsl(SHADER.into()),
-        });
-        let bind_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: None,
-            entries: &[wgpu::BindGroupLayoutEntry {
-                binding: 0,
-                visibility: wgpu::ShaderStages::VERTEX,
-                ty: wgpu::BindingType::Buffer {
-                    ty: wgpu::BufferBindingType::Uniform,
-                    has_dynamic_offset: false,
-                    min_binding_size: None,
-                },
-                count: None,
-            }],
-        });
-        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: None,
-            bind_group_layouts: &[Some(&bind_layout)],
-            immediate_size: 0,
-        });
-        let place = || {
-            let buffer = device.create_buffer(&wgpu::BufferDescriptor {
-                label: None,
-                size: size_of::<Place>() as u64,
-                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            });
-            let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: None,
-                layout: &bind_layout,
-                entries: &[wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: buffer.as_entire_binding(),
-                }],
-            });
-            (buffer, group)
-        };
-        let pipeline =
-            |entry_point, attributes: &[wgpu::VertexAttribute], counting: Option<Counting>| {
-                let (up, down) = (
-                    wgpu::StencilOperation::IncrementWrap,
-                    wgpu::StencilOperation::DecrementWrap,
-                );
-                let face = |pass_op, depth_fail_op| {
-                    let keep = wgpu::StencilFaceState::IGNORE;
-                    match counting {
-                        None => keep,
-                        Some(Counting::DepthPass) => wgpu::StencilFaceState { pass_op, ..keep },
-                        Some(Counting::DepthFail) => wgpu::StencilFaceState {
-                            depth_fail_op,
-                            ..keep
-                        },
-                    }
-                };
-                let array_stride = attributes
-                    .iter()
-                    .map(|attribute| attribute.format.size())
-                    .sum();
-                device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                    label: Some(entry_point),
-                    layout: Some(&layout),
-                    vertex: wgpu::VertexState {
-                        module: &module,
-                        entry_point: Some(entry_point),
-                        compilation_options: Default::default(),
-                        buffers: &[Some(wgpu::VertexBufferLayout {
-                            array_stride,
-                            step_mode: wgpu::VertexStepMode::Vertex,
-                            attributes,
-                        })],
-                    },
-                    primitive: wgpu::PrimitiveState::default(),
-                    depth_stencil: Some(wgpu::DepthStencilState {
-                        format: Self::FORMAT,
-                        depth_write_enabled: Some(counting.is_none()),
-                        depth_compare: Some(wgpu::CompareFunction::Greater),
-                        stencil: wgpu::StencilState {
-                            front: face(up, down),
-                            back: face(down, up),
-                            read_mask: 0xff,
-                            write_mask: 0xff,
-                        },
-                        bias: wgpu::DepthBiasState::default(),
-                    }),
-                    multisample: wgpu::MultisampleState::default(),
-                    fragment: None,
-                    multiview_mask: None,
-                    cache: None,
-                })
-            };
-        let point = wgpu::vertex_attr_array![0 => Float32x4];
-        let edge = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x4, 3 => Float32x4];
-        let corner = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x4];
-        let counting = |counting| Pipelines {
-            made: pipeline("made", &point, Some(counting)),
-            side: pipeline("side", &edge, Some(counting)),
-            cap: pipeline("cap", &corner, Some(counting)),
-        };
-        let table = [
-            (-0.4, -0.4),
-            (0.4, -0.4),
-            (0.4, 0.4),
-            (-0.4, -0.4),
-            (0.4, 0.4),
-            (-0.4, 0.4),
-        ];
-        let table = table.map(|(x, y)| Vec4::new(x, y, 0.0, 1.0));
+        let bind_layout = place_layout(&device);
+        let parts = PipelineParts::new(&device, &bind_layout);
+        let table = TABLE_M.map(|(x, y)| Vec4::new(x, y, 0.0, 1.0));
         let info = adapter.get_info();
         Ok(Self {
             adapter: format!("{} ({:?}, {})", info.name, info.backend, info.driver_info),
             table: buffer(&device, wgpu::BufferUsages::VERTEX, &table),
-            table_place: place(),
-            caster_place: place(),
-            table_pipeline: pipeline("made", &point, None),
-            depth_pass: counting(Counting::DepthPass),
-            depth_fail: counting(Counting::DepthFail),
-            depth_stencil,
+            table_place: place(&device, &bind_layout),
+            caster_place: place(&device, &bind_layout),
+            table_pipeline: parts.pipeline("made", &POINT, None),
+            depth_pass: parts.pipelines(Counting::DepthPass),
+            depth_fail: parts.pipelines(Counting::DepthFail),
+            depth_stencil: depth_stencil(&device),
             device,
             queue,
         })
@@ -509,6 +407,159 @@ impl Lab {
             .chunks_exact(row_bytes as usize)
             .flat_map(|row| row[..width as usize].to_vec())
             .collect())
+    }
+}
+
+fn depth_stencil(device: &wgpu::Device) -> wgpu::Texture {
+    device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d {
+            width: SIZE_PX[0],
+            height: SIZE_PX[1],
+            depth_or_array_layers: 1,
+        },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: Lab::FORMAT,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    })
+}
+
+fn place_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: None,
+        entries: &[wgpu::BindGroupLayoutEntry {
+            binding: 0,
+            visibility: wgpu::ShaderStages::VERTEX,
+            ty: wgpu::BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Uniform,
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        }],
+    })
+}
+
+/// A buffer for a [`Place`], and what binds it.
+fn place(
+    device: &wgpu::Device,
+    bind_layout: &wgpu::BindGroupLayout,
+) -> (wgpu::Buffer, wgpu::BindGroup) {
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: size_of::<Place>() as u64,
+        usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: None,
+        layout: bind_layout,
+        entries: &[wgpu::BindGroupEntry {
+            binding: 0,
+            resource: buffer.as_entire_binding(),
+        }],
+    });
+    (buffer, group)
+}
+
+/// What all pipelines have in common.
+struct PipelineParts<'a> {
+    device: &'a wgpu::Device,
+    module: wgpu::ShaderModule,
+    layout: wgpu::PipelineLayout,
+}
+
+impl<'a> PipelineParts<'a> {
+    fn new(device: &'a wgpu::Device, bind_layout: &wgpu::BindGroupLayout) -> Self {
+        Self {
+            device,
+            module: device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: None,
+                source: wgpu::ShaderSource::Wgsl(SHADER.into()),
+            }),
+            layout: device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: None,
+                bind_group_layouts: &[Some(bind_layout)],
+                immediate_size: 0,
+            }),
+        }
+    }
+
+    fn pipelines(&self, counting: Counting) -> Pipelines {
+        Pipelines {
+            made: self.pipeline("made", &POINT, Some(counting)),
+            side: self.pipeline("side", &EDGE, Some(counting)),
+            cap: self.pipeline("cap", &CORNER, Some(counting)),
+        }
+    }
+
+    /// What counts in the stencil, or else writes depth.
+    fn pipeline(
+        &self,
+        entry_point: &str,
+        attributes: &[wgpu::VertexAttribute],
+        counting: Option<Counting>,
+    ) -> wgpu::RenderPipeline {
+        let (up, down) = (
+            wgpu::StencilOperation::IncrementWrap,
+            wgpu::StencilOperation::DecrementWrap,
+        );
+        let array_stride = attributes
+            .iter()
+            .map(|attribute| attribute.format.size())
+            .sum();
+        self.device
+            .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(entry_point),
+                layout: Some(&self.layout),
+                vertex: wgpu::VertexState {
+                    module: &self.module,
+                    entry_point: Some(entry_point),
+                    compilation_options: Default::default(),
+                    buffers: &[Some(wgpu::VertexBufferLayout {
+                        array_stride,
+                        step_mode: wgpu::VertexStepMode::Vertex,
+                        attributes,
+                    })],
+                },
+                primitive: wgpu::PrimitiveState::default(),
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: Lab::FORMAT,
+                    depth_write_enabled: Some(counting.is_none()),
+                    depth_compare: Some(wgpu::CompareFunction::Greater),
+                    stencil: wgpu::StencilState {
+                        front: stencil_face(counting, up, down),
+                        back: stencil_face(counting, down, up),
+                        read_mask: 0xff,
+                        write_mask: 0xff,
+                    },
+                    bias: wgpu::DepthBiasState::default(),
+                }),
+                multisample: wgpu::MultisampleState::default(),
+                fragment: None,
+                multiview_mask: None,
+                cache: None,
+            })
+    }
+}
+
+/// One of two operations, by where the counting is done; neither where nothing is counted.
+fn stencil_face(
+    counting: Option<Counting>,
+    pass_op: wgpu::StencilOperation,
+    depth_fail_op: wgpu::StencilOperation,
+) -> wgpu::StencilFaceState {
+    let keep = wgpu::StencilFaceState::IGNORE;
+    match counting {
+        None => keep,
+        Some(Counting::DepthPass) => wgpu::StencilFaceState { pass_op, ..keep },
+        Some(Counting::DepthFail) => wgpu::StencilFaceState {
+            depth_fail_op,
+            ..keep
+        },
     }
 }
 

@@ -191,6 +191,11 @@ struct Range {
 }
 
 impl Range {
+    const ZERO: Self = Self {
+        low: DVec3::ZERO,
+        high: DVec3::ZERO,
+    };
+
     fn holds(&self, found: DVec3) -> bool {
         found.cmpge(self.low - TOLERANCE).all() && found.cmple(self.high + TOLERANCE).all()
     }
@@ -200,6 +205,29 @@ impl Range {
             low: self.low.min(other.low),
             high: self.high.max(other.high),
         }
+    }
+}
+
+/// Gain of real surfaces: how much of the light that reaches them is left. What is shaded at one place has the least of
+/// both there, and the most of both.
+fn gain_range(reaching: Range, taken: Range, at_one_place: bool) -> Range {
+    let gain = |taken: DVec3, reaching: DVec3| {
+        let left = (reaching - taken).max(DVec3::ZERO) / reaching;
+        DVec3::select(taken.cmpgt(DVec3::ZERO), left, DVec3::ONE)
+    };
+    if !at_one_place {
+        return Range {
+            low: gain(taken.high, reaching.low),
+            high: gain(taken.low, reaching.high),
+        };
+    }
+    let ends = [
+        gain(taken.low, reaching.low),
+        gain(taken.high, reaching.high),
+    ];
+    Range {
+        low: ends[0].min(ends[1]),
+        high: ends[0].max(ends[1]),
     }
 }
 
@@ -328,11 +356,7 @@ impl<'a> Expected<'a> {
 
     /// Each sample's state shaded at any of some places, what is taken from a surface apart from what reaches it.
     fn shaded(&self, states: &[State], places: &dyn Fn(usize) -> Vec<DVec2>) -> Range {
-        let nothing = Range {
-            low: DVec3::ZERO,
-            high: DVec3::ZERO,
-        };
-        let (mut reaching, mut taken, mut added) = (nothing, nothing, nothing);
+        let (mut reaching, mut taken, mut added) = (Range::ZERO, Range::ZERO, Range::ZERO);
         let (mut modelled, mut open) = (0.0, 0.0);
         for (index, state) in states.iter().enumerate() {
             let Some(surface) = state.surface else {
@@ -344,43 +368,13 @@ impl<'a> Expected<'a> {
                 .iter()
                 .map(|place| self.on_plane(&surface, *place))
                 .collect();
-            let edge_on = points.len() > 1 && self.is_edge_on(&points);
-            let sum_of = |lights: u32| -> Range {
-                let reaches = |index: &usize| lights >> index & 1 == 1;
-                let at = |point: &DVec3| -> DVec3 {
-                    let given =
-                        |index: usize| irradiance(&self.lights[index], *point, surface.normal);
-                    (0..self.lights.len()).filter(reaches).map(given).sum()
-                };
-                let sums = points.iter().map(at);
-                let ranges = sums.map(|sum| Range {
-                    low: sum,
-                    high: sum,
-                });
-                ranges.reduce(Range::union).unwrap_or(nothing)
-            };
             if surface.role == VIRTUAL {
-                let albedo = self.albedos[surface.thing];
-                let least = if self.unknown > 0.0 { 0.0 } else { 1.0 };
-                let unlit = self.ambient * albedo / PI;
-                added.low += unlit * least;
-                added.high += unlit + self.unknown * albedo;
-                if edge_on {
-                    added.high += 1.0;
-                } else if self.faceted[surface.thing] {
-                    let lights = sum_of(state.arriving);
-                    added.low += lights.low * albedo / PI;
-                    added.high += lights.high * albedo / PI;
-                } else {
-                    let straight = self.lights.iter().map(|light| {
-                        points.iter().fold(DVec3::ZERO, |most, point| {
-                            most.max(straight_on(light, *point))
-                        })
-                    });
-                    added.high += straight.sum::<DVec3>() * albedo / PI;
-                }
+                let radiance = self.virtual_radiance(&surface, state.arriving, &points);
+                added.low += radiance.low;
+                added.high += radiance.high;
             } else {
-                let (reaches, takes) = (sum_of(state.arriving), sum_of(state.taken));
+                let reaches = self.light_sum(state.arriving, &points, surface.normal);
+                let takes = self.light_sum(state.taken, &points, surface.normal);
                 reaching.low += self.ambient + reaches.low;
                 reaching.high += self.ambient + reaches.high;
                 taken.low += takes.low;
@@ -388,30 +382,54 @@ impl<'a> Expected<'a> {
                 modelled += 1.0;
             }
         }
-        let gain = |taken: DVec3, reaching: DVec3| {
-            let left = (reaching - taken).max(DVec3::ZERO) / reaching;
-            DVec3::select(taken.cmpgt(DVec3::ZERO), left, DVec3::ONE)
-        };
-        let mut gains = Range {
-            low: gain(taken.high, reaching.low),
-            high: gain(taken.low, reaching.high),
-        };
-        if states.iter().all(|state| state.is_like(&states[0])) {
-            // All of it is shaded at one place.
-            gains = Range {
-                low: gain(taken.low, reaching.low),
-                high: gain(taken.high, reaching.high),
-            };
-            gains = Range {
-                low: gains.low.min(gains.high),
-                high: gains.low.max(gains.high),
-            };
-        }
+        let at_one_place = states.iter().all(|state| state.is_like(&states[0]));
+        let gains = gain_range(reaching, taken, at_one_place);
         let weight = 1.0 / states.len() as f64;
         Range {
             low: ((gains.low * modelled + open + added.low) * weight).min(DVec3::ONE),
             high: ((gains.high * modelled + open + added.high) * weight).min(DVec3::ONE),
         }
+    }
+
+    /// What some lights give a surface together, at any of some points of its plane.
+    fn light_sum(&self, lights: u32, points: &[DVec3], normal: DVec3) -> Range {
+        let reaches = |index: &usize| lights >> index & 1 == 1;
+        let at = |point: &DVec3| -> DVec3 {
+            let given = |index: usize| irradiance(&self.lights[index], *point, normal);
+            (0..self.lights.len()).filter(reaches).map(given).sum()
+        };
+        let sums = points.iter().map(at);
+        let ranges = sums.map(|sum| Range {
+            low: sum,
+            high: sum,
+        });
+        ranges.reduce(Range::union).unwrap_or(Range::ZERO)
+    }
+
+    /// What a virtual surface sends to the camera, at any of some points of its plane.
+    fn virtual_radiance(&self, surface: &SeenSurface, arriving: u32, points: &[DVec3]) -> Range {
+        let albedo = self.albedos[surface.thing];
+        let least = if self.unknown > 0.0 { 0.0 } else { 1.0 };
+        let unlit = self.ambient * albedo / PI;
+        let mut radiance = Range {
+            low: unlit * least,
+            high: unlit + self.unknown * albedo,
+        };
+        if points.len() > 1 && self.is_edge_on(points) {
+            radiance.high += 1.0;
+        } else if self.faceted[surface.thing] {
+            let lights = self.light_sum(arriving, points, surface.normal);
+            radiance.low += lights.low * albedo / PI;
+            radiance.high += lights.high * albedo / PI;
+        } else {
+            let straight = self.lights.iter().map(|light| {
+                points.iter().fold(DVec3::ZERO, |most, point| {
+                    most.max(straight_on(light, *point))
+                })
+            });
+            radiance.high += straight.sum::<DVec3>() * albedo / PI;
+        }
+        radiance
     }
 
     /// Whether the depth changes so much from a pixel to the next that those points are anywhere.
@@ -455,6 +473,15 @@ impl<'a> Expected<'a> {
             return false;
         };
         surface.role == VIRTUAL || state.taken != 0
+    }
+
+    fn is_any_touched(&self, states: &[State]) -> bool {
+        states.iter().any(|state| self.is_touched(state))
+    }
+
+    fn sample_states(&self, center: DVec2) -> Vec<State> {
+        let places = self.sample_places(center);
+        places.iter().map(|place| self.state(*place)).collect()
     }
 
     fn sample_places(&self, center: DVec2) -> Vec<DVec2> {
@@ -519,77 +546,93 @@ impl<'a> Expected<'a> {
         let states: Vec<State> = if uniform {
             vec![*state; self.samples]
         } else {
-            let places = self.sample_places(center);
-            places.iter().map(|place| self.state(*place)).collect()
+            self.sample_states(center)
         };
         if states.iter().any(|state| state.grazes) {
             return;
         }
         verdict.judged += 1;
-        verdict.changed += usize::from(states.iter().any(|state| self.is_touched(state)));
+        verdict.changed += usize::from(self.is_any_touched(&states));
         if !uniform {
             self.measure_edge(center, &states, found, index, verdict);
         }
-        let touched = states.iter().any(|state| self.is_touched(state));
-        let explained = |states: &[State]| self.range(center, states).holds(found);
-        if explained(&states) && (touched || is_white && stays) {
+        let explained = |states: &[State]| {
+            self.range(center, states).holds(found)
+                && (self.is_any_touched(states) || is_white && stays)
+        };
+        if explained(&states) {
             return;
         }
-        let states: Vec<State> = self
-            .sample_places(center)
-            .iter()
-            .map(|place| self.state(*place))
-            .collect();
-        let touched = states.iter().any(|state| self.is_touched(state));
-        if explained(&states) && (touched || is_white && stays) {
+        let states = self.sample_states(center);
+        if explained(&states) {
             return;
         }
+        self.look_into(index, center, &states, found, stays, verdict);
+    }
+
+    /// Finds what an unexplained pixel may be, or why it is wrong.
+    fn look_into(
+        &self,
+        index: usize,
+        center: DVec2,
+        states: &[State],
+        found: DVec3,
+        stays: bool,
+        verdict: &mut Verdict,
+    ) {
         if verdict.wrong >= ENOUGH {
             verdict.wrong += 1;
             return;
         }
-        if let Some(ring) = self.nearest_explanation(center, &states, found, touched) {
+        let touched = self.is_any_touched(states);
+        if let Some(ring) = self.nearest_explanation(center, states, found, touched) {
             verdict.snapped[ring] += 1;
             return;
         }
-        if self.is_snapped(index, center) && self.is_possible(center, &states, found) {
+        if self.is_snapped(index, center) && self.is_possible(center, states, found) {
             verdict.thin += 1;
             return;
         }
         verdict.wrong += 1;
-        let range = self.range(center, &states);
-        let of_state = |state: &State| {
-            let Some(surface) = state.surface else {
-                return "nothing".to_owned();
-            };
-            let kind = if surface.role == REAL {
-                "real"
-            } else {
-                "virtual"
-            };
-            format!(
-                "{kind} {} triangle {}{} at {:.5} normal {:.4} arriving {:b} taken {:b}",
-                surface.thing,
-                surface.triangle,
-                if self.reaches_behind(&surface) {
-                    " (reaching behind the camera)"
-                } else {
-                    ""
-                },
-                surface.point,
-                surface.normal,
-                state.arriving,
-                state.taken,
-            )
+        let range = self.range(center, states);
+        let seen: Vec<String> = states.iter().map(|state| self.described(state)).collect();
+        let away = if self.is_uniform(index) {
+            ", away from edges"
+        } else {
+            ""
         };
-        let seen: Vec<String> = states.iter().map(of_state).collect();
         verdict.first.push(format!(
-            "pixel {center}: found {found:.3} (stays: {stays}) for {:.3} to {:.3}; {}{}",
+            "pixel {center}: found {found:.3} (stays: {stays}) for {:.3} to {:.3}; {}{away}",
             range.low,
             range.high,
             seen.join(" | "),
-            if uniform { ", away from edges" } else { "" },
         ));
+    }
+
+    /// A state in words, for whoever looks for the mistake.
+    fn described(&self, state: &State) -> String {
+        let Some(surface) = state.surface else {
+            return "nothing".to_owned();
+        };
+        let kind = if surface.role == REAL {
+            "real"
+        } else {
+            "virtual"
+        };
+        format!(
+            "{kind} {} triangle {}{} at {:.5} normal {:.4} arriving {:b} taken {:b}",
+            surface.thing,
+            surface.triangle,
+            if self.reaches_behind(&surface) {
+                " (reaching behind the camera)"
+            } else {
+                ""
+            },
+            surface.point,
+            surface.normal,
+            state.arriving,
+            state.taken,
+        )
     }
 
     /// Pixels away from edges where the layers say something else than the picture: what is there, which lights reach it, and
@@ -710,9 +753,8 @@ impl<'a> Expected<'a> {
         let width = self.view.intrinsics.size_px[0] as usize;
         let center = DVec2::new((index % width) as f64, (index / width) as f64);
         let found = picture.linear(index);
-        let places = self.sample_places(center);
-        let states: Vec<State> = places.iter().map(|place| self.state(*place)).collect();
-        let touched = states.iter().any(|state| self.is_touched(state));
+        let states = self.sample_states(center);
+        let touched = self.is_any_touched(&states);
         let is_white = picture.pixel(index) == [255; 3];
         if self.range(center, &states).holds(found) && (touched || is_white)
             || states.iter().any(|state| state.grazes)

@@ -75,133 +75,148 @@ fn on_table(random: &mut Random) -> DVec3 {
     DVec3::new(step(random, -12, 12), step(random, -10, 10), 0.0)
 }
 
+/// Phantoms and virtual things, and what is special about them.
+type Things = (Vec<Thing>, Vec<Thing>, &'static str);
+
+fn faceted_at(soup: Soup, place: DVec3) -> Thing {
+    Thing::made(soup).at(place.to_array()).faceted()
+}
+
+fn above(random: &mut Random, place: DVec3) -> DVec3 {
+    place + DVec3::Z * step(random, 2, 14)
+}
+
 /// Things that lie in one another's planes, and what is special about them.
-fn things(random: &mut Random) -> (Vec<Thing>, Vec<Thing>, &'static str) {
-    let at = |soup: Soup, place: DVec3| Thing::made(soup).at(place.to_array()).faceted();
+fn things(random: &mut Random) -> Things {
     let place = on_table(random);
-    let above = |random: &mut Random, place: DVec3| place + DVec3::Z * step(random, 2, 14);
     match random.below(13) {
         0 => {
             // Where nothing else is higher, it lies in the top of the box around all.
             let place = above(random, place);
-            (vec![], vec![at(flat(random), place)], "flat card on top")
+            let card = faceted_at(flat(random), place);
+            (vec![], vec![card], "flat card on top")
         }
-        1 => {
-            let side = if random.chance(0.5) {
-                // In a side of the box around all.
-                let side = [0.4, -0.4][random.below(2)];
-                match random.below(2) {
-                    0 => DVec3::new(side, place.y, 0.0),
-                    _ => DVec3::new(place.x, side, 0.0),
-                }
-            } else {
-                place
-            };
-            let height = DVec3::Z * step(random, 0, 12);
-            let pose = upright(random, side + height);
-            let card = Thing::made(flat(random)).placed(pose).faceted();
-            (vec![], vec![card], "upright card")
-        }
-        2 => {
-            let radius = step(random, 3, 6) as f32;
-            let tube = step(random, 1, 2) as f32;
-            let ring = shapes::torus(radius, tube, 16, 8);
-            let height = step(random, 2, 6);
-            let top = match random.chance(0.5) {
-                true => height + f64::from(tube),
-                false => height + f64::from(tube) + 0.04,
-            };
-            let sheet = at(flat(random), DVec3::new(place.x, place.y, top));
-            let ring = at(ring, place + DVec3::Z * height);
-            (vec![sheet], vec![ring], "flat phantom over a torus")
-        }
+        1 => upright_card(random, place),
+        2 => flat_phantom_over_torus(random, place),
         3 => {
-            let sheet = at(flat(random), place);
+            let sheet = faceted_at(flat(random), place);
             (vec![], vec![sheet], "virtual sheet in the table")
         }
         4 => {
             let (soup, size) = block(random);
-            let sheet = at(flat(random), place + DVec3::Z * size.z);
-            (
-                vec![at(soup, place)],
-                vec![sheet],
-                "virtual sheet on a real block",
-            )
+            let sheet = faceted_at(flat(random), place + DVec3::Z * size.z);
+            let real = faceted_at(soup, place);
+            (vec![real], vec![sheet], "virtual sheet on a real block")
         }
         5 => {
             let (soup, size) = block(random);
             let sunk = [0.0, -size.z / 2.0, -size.z][random.below(3)];
-            let thing = at(soup, place + DVec3::Z * sunk);
+            let thing = faceted_at(soup, place + DVec3::Z * sunk);
             (vec![], vec![thing], "virtual block on or in the table")
         }
         6 => {
             let (real, size) = block(random);
             let (soup, _) = block(random);
-            let top = at(soup, place + DVec3::Z * size.z);
-            (
-                vec![at(real, place)],
-                vec![top],
-                "virtual block on a real one",
-            )
+            let top = faceted_at(soup, place + DVec3::Z * size.z);
+            let real = faceted_at(real, place);
+            (vec![real], vec![top], "virtual block on a real one")
         }
         7 => {
             let (soup, _) = block(random);
-            let copy = at(soup.clone(), place);
-            (
-                vec![at(soup, place)],
-                vec![copy],
-                "virtual copy of a phantom",
-            )
+            let copy = faceted_at(soup.clone(), place);
+            let real = faceted_at(soup, place);
+            (vec![real], vec![copy], "virtual copy of a phantom")
         }
-        8 => {
-            let soup = match random.below(3) {
-                0 => block(random).0,
-                1 => flat(random),
-                _ => shapes::torus(0.04, 0.02, 12, 7),
-            };
-            let place = above(random, place);
-            let twice = vec![at(soup.clone(), place), at(soup, place).of_albedo(0.2)];
-            (vec![], twice, "a virtual thing twice")
-        }
-        9 | 10 => {
-            let (outer, size) = block(random);
-            let inner = outer.clone().scaled(0.5);
-            let inner_place = place + DVec3::Z * size.z * [0.0, 0.25][random.below(2)];
-            let (outer, inner) = (at(outer, place), at(inner, inner_place));
-            match random.below(2) {
-                0 => (vec![outer], vec![inner], "virtual in real"),
-                _ => (vec![inner], vec![outer], "real in virtual"),
-            }
-        }
-        11 => {
-            let [half_x, half_y] = [0; 2].map(|_| step(random, 2, 6));
-            let card = shapes::rectangle(
-                [-half_x as f32, -half_y as f32],
-                [half_x as f32, half_y as f32],
-            );
-            let place = above(random, place);
-            let beside = place + DVec3::X * (2.0 * half_x);
-            let cards = vec![at(card.clone(), place), at(card.clone(), beside)];
-            match random.below(2) {
-                0 => (vec![], cards, "cards edge to edge"),
-                _ => (
-                    vec![at(card, beside)],
-                    cards[..1].to_vec(),
-                    "real and virtual card edge to edge",
-                ),
-            }
-        }
-        _ => {
-            // Sheets one above the other, as many as the stencil's bits are tried by.
-            let soup = flat(random);
-            let count = 2 + random.below(6);
-            let sheets = (0..count).map(|index| {
-                let height = DVec3::Z * (0.01 + 0.01 * index as f64);
-                at(soup.clone(), place + height)
-            });
-            (vec![], sheets.collect(), "a stack of sheets")
-        }
+        8 => thing_twice(random, place),
+        9 | 10 => one_in_another(random, place),
+        11 => cards_edge_to_edge(random, place),
+        _ => stack_of_sheets(random, place),
     }
+}
+
+fn upright_card(random: &mut Random, place: DVec3) -> Things {
+    let side = if random.chance(0.5) {
+        // In a side of the box around all.
+        let side = [0.4, -0.4][random.below(2)];
+        match random.below(2) {
+            0 => DVec3::new(side, place.y, 0.0),
+            _ => DVec3::new(place.x, side, 0.0),
+        }
+    } else {
+        place
+    };
+    let height = DVec3::Z * step(random, 0, 12);
+    let pose = upright(random, side + height);
+    let card = Thing::made(flat(random)).placed(pose).faceted();
+    (vec![], vec![card], "upright card")
+}
+
+fn flat_phantom_over_torus(random: &mut Random, place: DVec3) -> Things {
+    let radius = step(random, 3, 6) as f32;
+    let tube = step(random, 1, 2) as f32;
+    let ring = shapes::torus(radius, tube, 16, 8);
+    let height = step(random, 2, 6);
+    let top = match random.chance(0.5) {
+        true => height + f64::from(tube),
+        false => height + f64::from(tube) + 0.04,
+    };
+    let sheet = faceted_at(flat(random), DVec3::new(place.x, place.y, top));
+    let ring = faceted_at(ring, place + DVec3::Z * height);
+    (vec![sheet], vec![ring], "flat phantom over a torus")
+}
+
+fn thing_twice(random: &mut Random, place: DVec3) -> Things {
+    let soup = match random.below(3) {
+        0 => block(random).0,
+        1 => flat(random),
+        _ => shapes::torus(0.04, 0.02, 12, 7),
+    };
+    let place = above(random, place);
+    let one = faceted_at(soup.clone(), place);
+    let other = faceted_at(soup, place).of_albedo(0.2);
+    (vec![], vec![one, other], "a virtual thing twice")
+}
+
+fn one_in_another(random: &mut Random, place: DVec3) -> Things {
+    let (outer, size) = block(random);
+    let inner = outer.clone().scaled(0.5);
+    let inner_place = place + DVec3::Z * size.z * [0.0, 0.25][random.below(2)];
+    let outer = faceted_at(outer, place);
+    let inner = faceted_at(inner, inner_place);
+    match random.below(2) {
+        0 => (vec![outer], vec![inner], "virtual in real"),
+        _ => (vec![inner], vec![outer], "real in virtual"),
+    }
+}
+
+fn cards_edge_to_edge(random: &mut Random, place: DVec3) -> Things {
+    let [half_x, half_y] = [0; 2].map(|_| step(random, 2, 6));
+    let card = shapes::rectangle(
+        [-half_x as f32, -half_y as f32],
+        [half_x as f32, half_y as f32],
+    );
+    let place = above(random, place);
+    let first = faceted_at(card.clone(), place);
+    let beside = faceted_at(card, place + DVec3::X * (2.0 * half_x));
+    match random.below(2) {
+        0 => (vec![], vec![first, beside], "cards edge to edge"),
+        _ => (
+            vec![beside],
+            vec![first],
+            "real and virtual card edge to edge",
+        ),
+    }
+}
+
+/// Sheets one above the other, as many as the stencil's bits are tried by.
+fn stack_of_sheets(random: &mut Random, place: DVec3) -> Things {
+    let soup = flat(random);
+    let count = 2 + random.below(6);
+    let sheets = (0..count).map(|index| {
+        let height = DVec3::Z * (0.01 + 0.01 * index as f64);
+        faceted_at(soup.clone(), place + height)
+    });
+    (vec![], sheets.collect(), "a stack of sheets")
 }
 
 /// Of each of its triangles, on its anchor.
@@ -292,75 +307,26 @@ fn light(random: &mut Random, triangles: &[[DVec3; 3]]) -> (Light, &'static str)
 /// A scene in which things and lights lie in one another's planes and places.
 pub fn degenerate_case(random: &mut Random) -> Case {
     let (mut phantoms, mut virtuals, what) = things(random);
-    let table = match random.below(4) {
-        0 => Some(Thing::made(shapes::cuboid(
-            [-0.4, -0.4, -0.05],
-            [0.4, 0.4, 0.0],
-        ))),
-        1 => Some(Thing::made(shapes::rectangle([-0.4, -0.4], [0.4, 0.4])).without_shadow()),
-        _ => Some(Thing::made(shapes::rectangle([-0.4, -0.4], [0.4, 0.4]))),
-    };
-    phantoms.splice(0..0, table);
-    if random.chance(0.2) {
-        let (soup, _) = block(random);
-        let place = on_table(random).to_array();
-        phantoms.push(Thing::made(soup).at(place));
-    }
-    if random.chance(0.2) {
-        let soup = random.closed_mesh();
-        let place = on_table(random) + DVec3::Z * 0.06;
-        let thing = Thing::made(soup)
-            .scaled(DVec3::splat(0.04))
-            .at(place.to_array());
-        virtuals.push(thing.faceted());
-    }
-
+    phantoms.insert(0, table(random));
+    add_others(random, &mut phantoms, &mut virtuals);
     let all: Vec<[DVec3; 3]> = phantoms[1..]
         .iter()
         .chain(&virtuals)
         .flat_map(corners_of)
         .collect();
-    let count = match random.below(20) {
-        0 => 5 + random.below(12),
-        1..=5 => 2 + random.below(2),
-        _ => 1,
-    };
-    let mut names = vec![what];
-    let mut lights: Vec<Light> = Vec::new();
-    for _ in 0..count {
-        let (light, name) = light(random, &all);
-        lights.push(light);
-        names.push(name);
-    }
+    let (mut lights, of_lights) = lights(random, &all);
+    let mut names = [vec![what], of_lights].concat();
     names.dedup();
     let places = all.iter().flatten().copied().collect();
 
     // On the world's anchor the surroundings throw light back that rays do not know: little of it by dark things.
-    let world_from_card = match random.below(3) {
-        0 => None,
-        1 => Some(DAffine3::IDENTITY),
-        _ => {
-            let place = DVec3::new(step(random, -10, 10), step(random, -10, 10), 0.0);
-            Some(DAffine3::from_translation(place))
-        }
-    };
+    let world_from_card = world_from_card(random);
     let mut ambient = random.between(0.03, 0.2);
     match world_from_card {
         None => {
             names.push("all on the world's anchor");
             ambient *= 0.5;
-            for light in &mut lights {
-                match light {
-                    Light::Point { intensity, .. } => *intensity *= 3.0,
-                    Light::Directional { irradiance, .. } => *irradiance *= 3.0,
-                }
-            }
-            for thing in &mut phantoms {
-                thing.albedo = 0.0;
-            }
-            for thing in &mut virtuals {
-                thing.albedo *= 0.25;
-            }
+            reflect_less(&mut phantoms, &mut virtuals, &mut lights);
         }
         Some(card) => {
             for thing in &mut virtuals {
@@ -386,6 +352,69 @@ pub fn degenerate_case(random: &mut Random) -> Case {
             distortion: Distortion::NONE,
         },
         name: names.join(", "),
+    }
+}
+
+fn table(random: &mut Random) -> Thing {
+    match random.below(4) {
+        0 => Thing::made(shapes::cuboid([-0.4, -0.4, -0.05], [0.4, 0.4, 0.0])),
+        1 => Thing::made(shapes::rectangle([-0.4, -0.4], [0.4, 0.4])).without_shadow(),
+        _ => Thing::made(shapes::rectangle([-0.4, -0.4], [0.4, 0.4])),
+    }
+}
+
+/// Sometimes one more of each kind, anywhere.
+fn add_others(random: &mut Random, phantoms: &mut Vec<Thing>, virtuals: &mut Vec<Thing>) {
+    if random.chance(0.2) {
+        let (soup, _) = block(random);
+        let place = on_table(random).to_array();
+        phantoms.push(Thing::made(soup).at(place));
+    }
+    if random.chance(0.2) {
+        let soup = random.closed_mesh();
+        let place = on_table(random) + DVec3::Z * 0.06;
+        let thing = Thing::made(soup)
+            .scaled(DVec3::splat(0.04))
+            .at(place.to_array());
+        virtuals.push(thing.faceted());
+    }
+}
+
+/// Lights about some triangles, and what is special about each.
+fn lights(random: &mut Random, triangles: &[[DVec3; 3]]) -> (Vec<Light>, Vec<&'static str>) {
+    let count = match random.below(20) {
+        0 => 5 + random.below(12),
+        1..=5 => 2 + random.below(2),
+        _ => 1,
+    };
+    (0..count).map(|_| light(random, triangles)).unzip()
+}
+
+/// Where the virtual things' anchor is; `None` where they are on the world's.
+fn world_from_card(random: &mut Random) -> Option<DAffine3> {
+    match random.below(3) {
+        0 => None,
+        1 => Some(DAffine3::IDENTITY),
+        _ => {
+            let place = DVec3::new(step(random, -10, 10), step(random, -10, 10), 0.0);
+            Some(DAffine3::from_translation(place))
+        }
+    }
+}
+
+/// Less reflected light beside what the lights give: darker things under brighter lights.
+fn reflect_less(phantoms: &mut [Thing], virtuals: &mut [Thing], lights: &mut [Light]) {
+    for light in lights {
+        match light {
+            Light::Point { intensity, .. } => *intensity *= 3.0,
+            Light::Directional { irradiance, .. } => *irradiance *= 3.0,
+        }
+    }
+    for thing in phantoms {
+        thing.albedo = 0.0;
+    }
+    for thing in virtuals {
+        thing.albedo *= 0.25;
     }
 }
 

@@ -262,57 +262,70 @@ fn layers_are_the_contract_s() {
         }
     }
     assert_eq!(files(folder.path()), expected);
+    for frame in ["000000", "000003"] {
+        let roles = hold_pictures(&folder.path().join("DIR"), frame);
+        hold_depth(&folder.path().join("DIR"), frame, &roles);
+    }
+    hold_poses(folder.path());
+    hold_stats(folder.path());
+}
 
+/// Holds a frame's pictures against the contract; its roles.
+fn hold_pictures(folder: &Path, frame: &str) -> Vec<u8> {
     let picture = |name: &str| {
-        let picture = image::open(folder.path().join("DIR").join(name)).unwrap();
+        let picture = image::open(folder.join(name)).unwrap();
         assert_eq!((picture.width(), picture.height()), (640, 480), "{name}");
         picture
     };
     let color = |name: &str| picture(name).color();
-    for frame in ["000000", "000003"] {
-        assert_eq!(color(&format!("{frame}.png")), image::ColorType::Rgb8);
-        assert_eq!(color(&format!("{frame}_gain.png")), image::ColorType::Rgb16);
-        assert_eq!(color(&format!("{frame}_role.png")), image::ColorType::L8);
-        assert_eq!(
-            color(&format!("{frame}_shadow_0.png")),
-            image::ColorType::L8
-        );
-        let roles = picture(&format!("{frame}_role.png"))
-            .into_luma8()
-            .into_raw();
-        let values: BTreeSet<u8> = roles.iter().copied().collect();
-        assert!(values.is_subset(&BTreeSet::from([0, 100, 200])) && values.contains(&200));
-        let bits = picture(&format!("{frame}_shadow_0.png")).into_luma8();
-        let values: BTreeSet<u8> = bits.into_raw().into_iter().collect();
-        assert!(values.is_subset(&BTreeSet::from([0, 1, 2, 3])) && values.contains(&2));
-        let gain = picture(&format!("{frame}_gain.png"))
-            .into_rgb16()
-            .into_raw();
-        let unchanged = gain.iter().filter(|&&gain| gain == 32768).count();
-        assert!(2 * unchanged > gain.len(), "1 is without a change");
-        assert!(gain.iter().min().is_some_and(|&least| least < 20_000));
+    assert_eq!(color(&format!("{frame}.png")), image::ColorType::Rgb8);
+    assert_eq!(color(&format!("{frame}_gain.png")), image::ColorType::Rgb16);
+    assert_eq!(color(&format!("{frame}_role.png")), image::ColorType::L8);
+    assert_eq!(
+        color(&format!("{frame}_shadow_0.png")),
+        image::ColorType::L8
+    );
+    let roles = picture(&format!("{frame}_role.png"))
+        .into_luma8()
+        .into_raw();
+    let values: BTreeSet<u8> = roles.iter().copied().collect();
+    assert!(values.is_subset(&BTreeSet::from([0, 100, 200])) && values.contains(&200));
+    let bits = picture(&format!("{frame}_shadow_0.png")).into_luma8();
+    let values: BTreeSet<u8> = bits.into_raw().into_iter().collect();
+    assert!(values.is_subset(&BTreeSet::from([0, 1, 2, 3])) && values.contains(&2));
+    let gain = picture(&format!("{frame}_gain.png"))
+        .into_rgb16()
+        .into_raw();
+    let unchanged = gain.iter().filter(|&&gain| gain == 32768).count();
+    assert!(2 * unchanged > gain.len(), "1 is without a change");
+    assert!(gain.iter().min().is_some_and(|&least| least < 20_000));
+    roles
+}
 
-        let exr = folder.path().join(format!("DIR/{frame}_depth.exr"));
-        let depth = exr::prelude::read_first_flat_layer_from_file(&exr).unwrap();
-        assert_eq!(
-            (depth.layer_data.size.x(), depth.layer_data.size.y()),
-            (640, 480)
-        );
-        let [channel] = &depth.layer_data.channel_data.list[..] else {
-            panic!("one channel")
+/// Holds a frame's depth: nowhere but where there is something, and there as far as the scene is.
+fn hold_depth(folder: &Path, frame: &str, roles: &[u8]) {
+    let exr = folder.join(format!("{frame}_depth.exr"));
+    let depth = exr::prelude::read_first_flat_layer_from_file(&exr).unwrap();
+    assert_eq!(
+        (depth.layer_data.size.x(), depth.layer_data.size.y()),
+        (640, 480)
+    );
+    let [channel] = &depth.layer_data.channel_data.list[..] else {
+        panic!("one channel")
+    };
+    for (depth_m, role) in channel.sample_data.values_as_f32().zip(roles) {
+        // The camera is 0.7 m from the table.
+        let holds = if *role == 0 {
+            depth_m == 0.0
+        } else {
+            (0.3..2.0).contains(&depth_m)
         };
-        for (depth_m, role) in channel.sample_data.values_as_f32().zip(&roles) {
-            // The camera is 0.7 m from the table.
-            let holds = if *role == 0 {
-                depth_m == 0.0
-            } else {
-                (0.3..2.0).contains(&depth_m)
-            };
-            assert!(holds, "{depth_m} m where the role is {role}");
-        }
+        assert!(holds, "{depth_m} m where the role is {role}");
     }
+}
 
-    let poses = text(folder.path().join("poses.csv"));
+fn hold_poses(folder: &Path) {
+    let poses = text(folder.join("poses.csv"));
     let rows: Vec<Vec<&str>> = poses
         .lines()
         .skip(1)
@@ -338,9 +351,11 @@ fn layers_are_the_contract_s() {
         );
         assert!(row[11].parse::<f64>().is_ok(), "track_ms of {index}");
     }
+}
 
+fn hold_stats(folder: &Path) {
     let stats: serde_json::Value =
-        serde_json::from_slice(&read(folder.path().join("stats.json"))).unwrap();
+        serde_json::from_slice(&read(folder.join("stats.json"))).unwrap();
     assert_eq!(
         (&stats["frames"], &stats["drawn"], &stats["drops"]),
         (&4.into(), &2.into(), &0.into())

@@ -273,8 +273,20 @@ fn a_session_has_probe_room_and_dictionaries_with_it() {
 #[test]
 fn what_a_job_reads_is_never_written() {
     let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    lamp_in(folder.path());
+    all_that_is_read_in(folder.path());
+    for job in jobs_that_write_what_they_read() {
+        refused(folder.path(), &job, &["write elsewhere"]);
+        if job[0] != "live" {
+            let forced = [job.as_slice(), &["--force"]].concat();
+            refused(folder.path(), &forced, &["read; write elsewhere"]);
+        }
+    }
+}
+
+/// A scene with a file of each kind that jobs read, some of them by other names too.
+fn all_that_is_read_in(folder: &Path) {
+    let at = |name: &str| folder.join(name);
+    lamp_in(folder);
     fs::write(at("models/torus.mtl"), "newmtl a\nKd 1 1 1\n").unwrap();
     let torus = fs::read_to_string(at("models/torus.obj")).unwrap();
     fs::write(at("models/torus.obj"), format!("mtllib torus.mtl\n{torus}")).unwrap();
@@ -299,6 +311,9 @@ fn what_a_job_reads_is_never_written() {
     std::os::unix::fs::symlink("models/../scene.toml", at("soft.toml")).unwrap();
     fs::create_dir(at("links")).unwrap();
     fs::hard_link(at("scene.toml"), at("links/000003_role.png")).unwrap();
+}
+
+fn jobs_that_write_what_they_read() -> Vec<Vec<&'static str>> {
     let lone = ["--calibration", "calibration.toml", "--size-mm", "44"];
     let of_video = ["recording/video.mp4", lone[0], lone[1], lone[2], lone[3]];
     let board = ["board", "--size-mm", "44", "--from"];
@@ -311,7 +326,7 @@ fn what_a_job_reads_is_never_written() {
         "25",
         "--out",
     ];
-    let jobs: Vec<Vec<&str>> = vec![
+    vec![
         vec!["replay", "scene.toml", "--stats", "scene.toml"],
         vec!["replay", "scene.toml", "--stats", "models/../scene.toml"],
         vec!["replay", "scene.toml", "--stats", "none/../scene.toml"],
@@ -374,14 +389,7 @@ fn what_a_job_reads_is_never_written() {
             "probe.hdr",
         ],
         vec!["live", "scene.toml", "--out", "recording"],
-    ];
-    for job in jobs {
-        refused(folder.path(), &job, &["write elsewhere"]);
-        if job[0] != "live" {
-            let forced = [job.as_slice(), &["--force"]].concat();
-            refused(folder.path(), &forced, &["read; write elsewhere"]);
-        }
-    }
+    ]
 }
 
 #[test]

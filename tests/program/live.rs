@@ -383,40 +383,20 @@ fn what_is_edited_is_drawn_as_if_it_had_always_been_so() {
 fn what_is_added_is_read_beside_the_picture_and_drawn_copied_and_renamed() {
     let folder = tempfile::tempdir().unwrap();
     let path = lamp_in(folder.path());
-    // A cube in millimetres.
-    let cube = "v 0 0 0\nv 80 0 0\nv 80 80 0\nv 0 80 0\nv 0 0 80\nv 80 0 80\nv 80 80 80\nv 0 80 80\n\
-                f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
-    std::fs::write(folder.path().join("cube, large.obj"), cube).unwrap();
+    let cube = folder.path().join("cube, large.obj");
+    std::fs::write(&cube, CUBE_MM).unwrap();
     let before = std::fs::read_to_string(&path).unwrap();
     let mut session = open(&path, folder.path(), true);
     let mut state = WindowState::new();
     run_until(&mut session, &state, "the scene is drawn", |session| {
         session.picture().is_some() && session.is_settled()
     });
-    let wanted = |shape, is_real| {
-        SceneCommand::Add(WantedThing {
-            is_real,
-            shape,
-            on: None,
-        })
-    };
-    let model = WantedShape::Model(folder.path().join("cube, large.obj"));
-    session.edit_scene(wanted(model, false), &state);
+    session.edit_scene(model(cube), &state);
     // It is on its way: the file says nothing of it yet.
     assert_eq!(std::fs::read_to_string(&path).unwrap(), before);
-    let has = |name: &'static str| {
-        move |session: &LiveSession| {
-            let scene = session.scene().unwrap();
-            let mut things = scene.phantoms.iter().chain(&scene.virtuals);
-            things.any(|thing| thing.name == name)
-        }
-    };
-    run_until(
-        &mut session,
-        &state,
-        "the model is read",
-        has("cube_ large"),
-    );
+    run_until(&mut session, &state, "the model is read", |session| {
+        has(session, "cube_ large")
+    });
     let selected = Some(Selected::Thing("cube_ large".to_owned()));
     state.selected = session.take_selected();
     assert_eq!(state.selected, selected);
@@ -426,31 +406,9 @@ fn what_is_added_is_read_beside_the_picture_and_drawn_copied_and_renamed() {
         "{text}"
     );
 
-    session.edit_scene(SceneCommand::DuplicateSelected, &state);
-    let rename = SceneCommand::Rename {
-        thing: "cube_ large".to_owned(),
-        name: " die ".to_owned(),
-    };
-    session.edit_scene(rename, &state);
-    session.edit_scene(wanted(WantedShape::Ball, true), &state);
-    for name in ["cube_ large 2", "die", "ball"] {
-        assert!(has(name)(&session), "{name}");
-    }
-    assert!(!has("cube_ large")(&session));
-    // No two of them stand in one place.
+    copy_rename_and_add_a_ball(&mut session, &state);
     let written = Scene::load(&path).unwrap();
-    let places: Vec<f64> = (written.phantoms.iter().chain(&written.virtuals))
-        .filter(|thing| ["cube_ large 2", "die", "ball"].contains(&thing.name.as_str()))
-        .map(|thing| thing.anchor_from_object.translation.x)
-        .collect();
-    for (index, place) in places.iter().enumerate() {
-        assert!(
-            places[..index]
-                .iter()
-                .all(|other| (other - place).abs() > 0.05),
-            "{places:?}"
-        );
-    }
+    assert_apart(&written, &["cube_ large 2", "die", "ball"]);
     run_until(
         &mut session,
         &state,
@@ -465,8 +423,7 @@ fn what_is_added_is_read_beside_the_picture_and_drawn_copied_and_renamed() {
 
     // What cannot be read is told, and changes nothing.
     let text = std::fs::read_to_string(&path).unwrap();
-    let missing = WantedShape::Model(folder.path().join("none.obj"));
-    session.edit_scene(wanted(missing, false), &state);
+    session.edit_scene(model(folder.path().join("none.obj")), &state);
     let is_told = |session: &LiveSession| {
         let shown = session.notices.shown(session.now_secs());
         shown.iter().any(|(_, text)| text.contains("none.obj"))
@@ -477,6 +434,53 @@ fn what_is_added_is_read_beside_the_picture_and_drawn_copied_and_renamed() {
         session.edit_scene(SceneCommand::Undo, &state);
     }
     assert_eq!(std::fs::read_to_string(&path).unwrap(), before);
+}
+
+/// A cube in millimetres.
+const CUBE_MM: &str = "v 0 0 0\nv 80 0 0\nv 80 80 0\nv 0 80 0\nv 0 0 80\nv 80 0 80\nv 80 80 80\nv 0 80 80\n\
+     f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+
+/// Whether a session's scene has a thing of this name.
+fn has(session: &LiveSession, name: &str) -> bool {
+    let scene = session.scene().unwrap();
+    let mut things = scene.phantoms.iter().chain(&scene.virtuals);
+    things.any(|thing| thing.name == name)
+}
+
+/// The large cube, which is selected, is copied and then called something else; a real ball comes beside both.
+fn copy_rename_and_add_a_ball(session: &mut LiveSession, state: &WindowState) {
+    session.edit_scene(SceneCommand::DuplicateSelected, state);
+    let rename = SceneCommand::Rename {
+        thing: "cube_ large".to_owned(),
+        name: " die ".to_owned(),
+    };
+    session.edit_scene(rename, state);
+    let ball = SceneCommand::Add(WantedThing {
+        is_real: true,
+        shape: WantedShape::Ball,
+        on: None,
+    });
+    session.edit_scene(ball, state);
+    for name in ["cube_ large 2", "die", "ball"] {
+        assert!(has(session, name), "{name}");
+    }
+    assert!(!has(session, "cube_ large"));
+}
+
+/// No two of these things stand in one place.
+fn assert_apart(scene: &Scene, names: &[&str]) {
+    let places: Vec<f64> = (scene.phantoms.iter().chain(&scene.virtuals))
+        .filter(|thing| names.contains(&thing.name.as_str()))
+        .map(|thing| thing.anchor_from_object.translation.x)
+        .collect();
+    for (index, place) in places.iter().enumerate() {
+        assert!(
+            places[..index]
+                .iter()
+                .all(|other| (other - place).abs() > 0.05),
+            "{places:?}"
+        );
+    }
 }
 
 /// What is to be added by a file.

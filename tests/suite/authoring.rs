@@ -15,8 +15,8 @@ use gnomon::app::truth::{draw, key_frames};
 use gnomon::light::{Light, Shape};
 use gnomon::render::Renderer;
 use gnomon::scene::{
-    Difference, Placement, Quality, Scene, ShadowChange, ShadowSettings, ShaftSettings, Shortcuts,
-    Technique, VolumeCounting,
+    Difference, Object, Placement, Quality, Scene, ShadowChange, ShadowSettings, ShaftSettings,
+    Shortcuts, Technique, VolumeCounting,
 };
 
 /// What is promised for the time from a saved file to its scene.
@@ -173,7 +173,7 @@ mod edits {
     }
 
     #[test]
-    fn each_kind_of_edit_is_written_as_a_person_would() {
+    fn what_is_hidden_is_written_as_a_person_would() {
         let project = Project::new();
         let mut document = project.open();
         let mut changed_to = |edit: &Edit, old: &str, new: &str| {
@@ -191,6 +191,15 @@ mod edits {
         };
         let mean = "# the mean of its wood\n";
         changed_to(&hidden, mean, &format!("{mean}visible = false\n"));
+    }
+
+    #[test]
+    fn lights_are_written_as_a_person_would() {
+        let project = Project::new();
+        let mut document = project.open();
+        let mut changed_to = |edit: &Edit, old: &str, new: &str| {
+            assert_changed_to(&project, &mut document, edit, old, new);
+        };
         let ambient = Edit::Ambient(DVec3::new(0.1, 0.2, 0.130_02));
         changed_to(
             &ambient,
@@ -223,6 +232,15 @@ mod edits {
             "[[light]]\nkind = \"point\"\nposition_m = [-0.26, 0.24, 0.46]\nintensity = [1.15, 1.06, 0.9]\n\n",
             "",
         );
+    }
+
+    #[test]
+    fn settings_of_shadows_are_written_as_a_person_would() {
+        let project = Project::new();
+        let mut document = project.open();
+        let mut changed_to = |edit: &Edit, old: &str, new: &str| {
+            assert_changed_to(&project, &mut document, edit, old, new);
+        };
         let settings = ShadowSettings {
             samples: 1,
             counting: VolumeCounting::DepthFail,
@@ -240,6 +258,15 @@ mod edits {
                 "{end}\n[shadows]\nsamples = 1\ncounting = \"depth-fail\"\nframe_budget_ms = 16.0\n"
             ),
         );
+    }
+
+    #[test]
+    fn a_new_thing_is_written_as_a_person_would() {
+        let project = Project::new();
+        let mut document = project.open();
+        let mut changed_to = |edit: &Edit, old: &str, new: &str| {
+            assert_changed_to(&project, &mut document, edit, old, new);
+        };
         let block = NewThing {
             is_real: false,
             name: "block".to_owned(),
@@ -263,12 +290,17 @@ mod edits {
         );
     }
 
-    #[test]
-    fn things_come_as_phantoms_and_shapes_are_copied_renamed_and_painted() {
-        let project = Project::with(|text| {
+    /// The demo's scene, and a thing whose material is a table of its own.
+    fn project_with_a_cup() -> Project {
+        Project::with(|text| {
             let dotted = "\n# Mine.\n[[virtual]] # a cup\nname = \"cup\"\ncylinder_m = [0.04, 0.1] # 8 cm wide\n[virtual.material] # blue\nalbedo = [0.1, 0.1, 0.8]\n";
             text + dotted
-        });
+        })
+    }
+
+    #[test]
+    fn things_come_as_phantoms_and_are_copied_and_removed() {
+        let project = project_with_a_cup();
         let before = project.text();
         let mut document = project.open();
         let mut changed_to = |edit: &Edit, old: &str, new: &str| {
@@ -318,6 +350,20 @@ mod edits {
             ),
         );
         changed_to(
+            &Edit::RemoveThing("cup".to_owned()),
+            &before[before.find("\n# Mine.").unwrap()..],
+            "",
+        );
+    }
+
+    #[test]
+    fn things_are_renamed_and_painted() {
+        let project = project_with_a_cup();
+        let mut document = project.open();
+        let mut changed_to = |edit: &Edit, old: &str, new: &str| {
+            assert_changed_to(&project, &mut document, edit, old, new);
+        };
+        changed_to(
             &Edit::Rename {
                 thing: "cup".to_owned(),
                 name: "mug".to_owned(),
@@ -340,11 +386,6 @@ mod edits {
             &painted("torus", None),
             "{ albedo = [0.75, 0.16, 0.12] }",
             "{ albedo = [0.5, 0.25, 0.125] }",
-        );
-        changed_to(
-            &Edit::RemoveThing("cup".to_owned()),
-            &before[before.find("\n# Mine.").unwrap()..],
-            "",
         );
     }
 
@@ -463,9 +504,27 @@ mod edits {
 
     /// What is equal to 0.1 mm, 0.01° and four digits.
     fn assert_alike(a: &Scene, b: &Scene, what: &str) {
-        let near = |a: DVec3, b: DVec3| {
-            (a - b).abs().max_element() < 0.6e-4 + 0.6e-3 * a.abs().max_element()
-        };
+        assert_lights_alike(a, b, what);
+        assert!(near(a.ambient_radiance, b.ambient_radiance), "{what}");
+        assert_eq!(
+            format!("{:?}", a.shadows),
+            format!("{:?}", b.shadows),
+            "{what}"
+        );
+        assert_anchors_alike(a, b, what);
+        for (a, b) in [(&a.phantoms, &b.phantoms), (&a.virtuals, &b.virtuals)] {
+            assert_eq!(a.len(), b.len(), "{what}");
+            for (a, b) in a.iter().zip(b) {
+                assert_things_alike(a, b, what);
+            }
+        }
+    }
+
+    fn near(a: DVec3, b: DVec3) -> bool {
+        (a - b).abs().max_element() < 0.6e-4 + 0.6e-3 * a.abs().max_element()
+    }
+
+    fn assert_lights_alike(a: &Scene, b: &Scene, what: &str) {
         assert_eq!(a.lights.len(), b.lights.len(), "{what}");
         for (a, b) in a.lights.iter().zip(&b.lights) {
             let alike = match (&a.light, &b.light) {
@@ -497,12 +556,9 @@ mod edits {
             };
             assert!(alike, "{what}: {a:?} {b:?}");
         }
-        assert!(near(a.ambient_radiance, b.ambient_radiance), "{what}");
-        assert_eq!(
-            format!("{:?}", a.shadows),
-            format!("{:?}", b.shadows),
-            "{what}"
-        );
+    }
+
+    fn assert_anchors_alike(a: &Scene, b: &Scene, what: &str) {
         assert_eq!(a.anchors.len(), b.anchors.len());
         for (a, b) in a.anchors.iter().zip(&b.anchors) {
             assert_eq!(a.name, b.name);
@@ -514,56 +570,38 @@ mod edits {
                 );
             }
         }
-        for (a, b) in [(&a.phantoms, &b.phantoms), (&a.virtuals, &b.virtuals)] {
-            assert_eq!(a.len(), b.len(), "{what}");
-            for (a, b) in a.iter().zip(b) {
-                assert_eq!(
-                    (&a.name, a.visible, a.casts, a.anchor),
-                    (&b.name, b.visible, b.casts, b.anchor),
-                    "{what}"
-                );
-                for (a, b) in a.materials.iter().zip(&b.materials) {
-                    assert!(near(a.albedo, b.albedo), "{what}");
-                    let (a_metal, b_metal) = (a.metallic, b.metallic);
-                    let (a, b) = (a.roughness.unwrap_or(9.0), b.roughness.unwrap_or(9.0));
-                    assert!((a - b).abs() < 1e-3 * a, "{what}: {a} {b}");
-                    assert!((a_metal - b_metal).abs() < 1e-3, "{what}");
-                }
-                assert_eq!(
-                    (&a.mesh.positions, &a.mesh.triangles),
-                    (&b.mesh.positions, &b.mesh.triangles),
-                    "{what}"
-                );
-                let (m, n) = (a.anchor_from_object, b.anchor_from_object);
-                assert!(
-                    (m.translation - n.translation).abs().max_element() <= 0.51e-4,
-                    "{what}"
-                );
-                for axis in 0..3 {
-                    let off = (m.matrix3.col(axis) - n.matrix3.col(axis)).length();
-                    assert!(off < 8e-4 * m.matrix3.col(axis).length(), "{what}: {off}");
-                }
-            }
+    }
+
+    fn assert_things_alike(a: &Object, b: &Object, what: &str) {
+        assert_eq!(
+            (&a.name, a.visible, a.casts, a.anchor),
+            (&b.name, b.visible, b.casts, b.anchor),
+            "{what}"
+        );
+        for (a, b) in a.materials.iter().zip(&b.materials) {
+            assert!(near(a.albedo, b.albedo), "{what}");
+            let (a_metal, b_metal) = (a.metallic, b.metallic);
+            let (a, b) = (a.roughness.unwrap_or(9.0), b.roughness.unwrap_or(9.0));
+            assert!((a - b).abs() < 1e-3 * a, "{what}: {a} {b}");
+            assert!((a_metal - b_metal).abs() < 1e-3, "{what}");
+        }
+        assert_eq!(
+            (&a.mesh.positions, &a.mesh.triangles),
+            (&b.mesh.positions, &b.mesh.triangles),
+            "{what}"
+        );
+        let (m, n) = (a.anchor_from_object, b.anchor_from_object);
+        assert!(
+            (m.translation - n.translation).abs().max_element() <= 0.51e-4,
+            "{what}"
+        );
+        for axis in 0..3 {
+            let off = (m.matrix3.col(axis) - n.matrix3.col(axis)).length();
+            assert!(off < 8e-4 * m.matrix3.col(axis).length(), "{what}: {off}");
         }
     }
 
     fn random_edit(random: &mut Random, scene: &Scene, document: &SceneDocument) -> Edit {
-        let vector = |random: &mut Random, reach: f64| random.vector_wide() * reach;
-        let light = |random: &mut Random| {
-            if random.chance(0.5) {
-                Light::Point {
-                    position_m: vector(random, 1.0),
-                    intensity: vector(random, 3.0).abs(),
-                    shape: Shape::Point,
-                }
-            } else {
-                Light::Directional {
-                    direction: random.direction(),
-                    irradiance: DVec3::splat(random.between(0.0, 2.0)),
-                    angle_rad: 0.0,
-                }
-            }
-        };
         let things: Vec<&str> = scene
             .phantoms
             .iter()
@@ -574,9 +612,9 @@ mod edits {
         match random.below(10) {
             0 if !scene.lights.is_empty() => Edit::Light {
                 index: random.below(scene.lights.len()),
-                light: light(random),
+                light: random_light(random),
             },
-            1 if scene.lights.len() < 6 => Edit::AddLight(light(random)),
+            1 if scene.lights.len() < 6 => Edit::AddLight(random_light(random)),
             2 if !scene.lights.is_empty() => Edit::RemoveLight(random.below(scene.lights.len())),
             3 => Edit::Ambient(vector(random, 0.5).abs()),
             4 => Edit::Show {
@@ -585,39 +623,7 @@ mod edits {
             },
             5 => Edit::Shadows(ShadowChange {
                 from: scene.shadows,
-                to: ShadowSettings {
-                    compact_penumbra_px: (random.between(0.0, 40.0) * 100.0).round() / 100.0,
-                    environment: Default::default(),
-                    without: Shortcuts::NONE,
-                    light_samples: [16, 64, 100][random.below(3)],
-                    ambient_samples: [0, 32, 50][random.below(3)],
-                    reflection_samples: [0, 16, 20][random.below(3)],
-                    technique: if random.chance(0.5) {
-                        Technique::Auto
-                    } else {
-                        Technique::Volumes
-                    },
-                    samples: if random.chance(0.5) { 1 } else { 4 },
-                    counting: if random.chance(0.5) {
-                        VolumeCounting::Auto
-                    } else {
-                        VolumeCounting::DepthFail
-                    },
-                    max_silhouette_error_px: random.below(100) as f64 / 4.0,
-                    frame_budget_ms: random.chance(0.5).then_some(12.5),
-                    quality: match random.below(4) {
-                        grade @ 0..3 => Some(Quality::BY_NAME[grade].1),
-                        _ => None,
-                    },
-                    shafts: ShaftSettings {
-                        sources: random.chance(0.5).then(|| 1 + random.below(99) as u32),
-                        patches: 100 + random.below(900) as u32,
-                        map_px: 64 << random.below(3),
-                        difference: [Difference::Ratio, Difference::Subtract, Difference::Encoded]
-                            [random.below(3)],
-                        ..ShaftSettings::default()
-                    },
-                },
+                to: random_shadows(random),
             }),
             6 => Edit::AnchorSize {
                 anchor: "table".to_owned(),
@@ -627,19 +633,7 @@ mod edits {
                 let things: Vec<&str> =
                     things.iter().copied().filter(|it| *it != "table").collect();
                 let thing = things[random.below(things.len())].to_owned();
-                match random.chance(0.5) {
-                    true => Edit::Rename {
-                        name: format!("{thing} {}", random.below(1000)),
-                        thing,
-                    },
-                    false => Edit::Material {
-                        thing,
-                        albedo: (random.chance(0.7))
-                            .then(|| vector(random, 1.0).abs().min(DVec3::ONE)),
-                        roughness: random.chance(0.5).then(|| random.between(0.1, 1.0)),
-                        metallic: random.chance(0.3).then(|| random.between(0.0, 1.0)),
-                    },
-                }
+                random_name_or_material(random, thing)
             }
             8 if scene.virtuals.len() > 1 => Edit::RemoveThing(
                 scene.virtuals[random.below(scene.virtuals.len())]
@@ -648,19 +642,95 @@ mod edits {
             ),
             _ => {
                 let thing = thing(random);
-                let mut placement = document.placement(&thing).expect("a thing of the scene");
-                if thing == "table" {
-                    placement.position_m.z = random.between(-0.1, 0.1);
-                } else {
-                    match random.below(3) {
-                        0 => placement.position_m = vector(random, 0.5),
-                        1 => placement.rotation_deg = vector(random, 180.0),
-                        _ => placement.scale = vector(random, 2.0) + DVec3::splat(0.001),
-                    }
-                }
-                Edit::Place { thing, placement }
+                let placement = document.placement(&thing).expect("a thing of the scene");
+                random_place(random, thing, placement)
             }
         }
+    }
+
+    fn vector(random: &mut Random, reach: f64) -> DVec3 {
+        random.vector_wide() * reach
+    }
+
+    fn random_light(random: &mut Random) -> Light {
+        if random.chance(0.5) {
+            Light::Point {
+                position_m: vector(random, 1.0),
+                intensity: vector(random, 3.0).abs(),
+                shape: Shape::Point,
+            }
+        } else {
+            Light::Directional {
+                direction: random.direction(),
+                irradiance: DVec3::splat(random.between(0.0, 2.0)),
+                angle_rad: 0.0,
+            }
+        }
+    }
+
+    fn random_shadows(random: &mut Random) -> ShadowSettings {
+        ShadowSettings {
+            compact_penumbra_px: (random.between(0.0, 40.0) * 100.0).round() / 100.0,
+            environment: Default::default(),
+            without: Shortcuts::NONE,
+            light_samples: [16, 64, 100][random.below(3)],
+            ambient_samples: [0, 32, 50][random.below(3)],
+            reflection_samples: [0, 16, 20][random.below(3)],
+            technique: if random.chance(0.5) {
+                Technique::Auto
+            } else {
+                Technique::Volumes
+            },
+            samples: if random.chance(0.5) { 1 } else { 4 },
+            counting: if random.chance(0.5) {
+                VolumeCounting::Auto
+            } else {
+                VolumeCounting::DepthFail
+            },
+            max_silhouette_error_px: random.below(100) as f64 / 4.0,
+            frame_budget_ms: random.chance(0.5).then_some(12.5),
+            quality: match random.below(4) {
+                grade @ 0..3 => Some(Quality::BY_NAME[grade].1),
+                _ => None,
+            },
+            shafts: ShaftSettings {
+                sources: random.chance(0.5).then(|| 1 + random.below(99) as u32),
+                patches: 100 + random.below(900) as u32,
+                map_px: 64 << random.below(3),
+                difference: [Difference::Ratio, Difference::Subtract, Difference::Encoded]
+                    [random.below(3)],
+                ..ShaftSettings::default()
+            },
+        }
+    }
+
+    fn random_name_or_material(random: &mut Random, thing: String) -> Edit {
+        match random.chance(0.5) {
+            true => Edit::Rename {
+                name: format!("{thing} {}", random.below(1000)),
+                thing,
+            },
+            false => Edit::Material {
+                thing,
+                albedo: (random.chance(0.7)).then(|| vector(random, 1.0).abs().min(DVec3::ONE)),
+                roughness: random.chance(0.5).then(|| random.between(0.1, 1.0)),
+                metallic: random.chance(0.3).then(|| random.between(0.0, 1.0)),
+            },
+        }
+    }
+
+    /// A thing moved, turned or scaled; the table only up or down.
+    fn random_place(random: &mut Random, thing: String, mut placement: Placement) -> Edit {
+        if thing == "table" {
+            placement.position_m.z = random.between(-0.1, 0.1);
+        } else {
+            match random.below(3) {
+                0 => placement.position_m = vector(random, 0.5),
+                1 => placement.rotation_deg = vector(random, 180.0),
+                _ => placement.scale = vector(random, 2.0) + DVec3::splat(0.001),
+            }
+        }
+        Edit::Place { thing, placement }
     }
 
     #[test]

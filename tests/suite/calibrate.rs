@@ -568,21 +568,26 @@ fn mistakes_are_told_and_leave_nothing() {
             vec!["wall/camera.toml", "write elsewhere"],
         ),
     ] {
-        let output = gnomon(folder.path(), &format!("calibrate {arguments}"));
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert!(
-            !output.status.success() && !said.contains("panicked"),
-            "{arguments:?}: {said}"
-        );
-        assert!(output.stdout.is_empty());
-        for part in parts {
-            assert!(said.contains(part), "{arguments:?} lacks {part:?}: {said}");
-        }
-        assert!(
-            !path("out").exists() && !path("wall/camera.toml").exists(),
-            "{arguments:?}"
-        );
+        refused(folder.path(), &arguments, &parts);
     }
+}
+
+/// A run that must fail, say each of `parts`, and write nothing.
+fn refused(folder: &Path, arguments: &str, parts: &[&str]) {
+    let output = gnomon(folder, &format!("calibrate {arguments}"));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        !output.status.success() && !said.contains("panicked"),
+        "{arguments:?}: {said}"
+    );
+    assert!(output.stdout.is_empty());
+    for part in parts {
+        assert!(said.contains(part), "{arguments:?} lacks {part:?}: {said}");
+    }
+    assert!(
+        !folder.join("out").exists() && !folder.join("wall/camera.toml").exists(),
+        "{arguments:?}"
+    );
 }
 
 #[test]

@@ -304,7 +304,10 @@ fn hostile_files_are_errors_with_their_place() {
         assert!(message.contains("a.gltf"), "{name}: {message}");
         assert!(message.contains(expected), "{name}: {message}");
     }
-    // Indices out of range, and numbers that are none.
+}
+
+#[test]
+fn indices_out_of_range_and_numbers_that_are_none_are_errors_with_their_place() {
     let (json, mut data) = square();
     data[99] = 4;
     let message = read(&json, &[("a b.bin", &data)]).unwrap_err();
@@ -541,8 +544,12 @@ fn what_does_not_matter_refuses_no_model() {
             read(&json, &[("a b.bin", &data)]).unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!(thing.mesh, expected.mesh, "{name}");
     }
-    // Normals and texture coordinates that are no numbers are made anew or passed over.
-    let mut broken = data.clone();
+}
+
+/// Normals and texture coordinates that are no numbers are made anew or passed over.
+#[test]
+fn texture_coordinates_that_are_no_numbers_are_told_and_refuse_no_model() {
+    let (json, mut broken) = square();
     broken[12..16].copy_from_slice(&f32::NAN.to_le_bytes());
     let thing = read(&json, &[("a b.bin", &broken)]).unwrap();
     assert_eq!(thing.mesh.triangles.len(), 2);

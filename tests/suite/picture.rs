@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use crate::common::composite::{Differences, Expected, Verdict};
+use crate::common::composite::{Differences, Expected, State, Verdict};
 use crate::common::degenerate::{Case, corners_of, degenerate_camera, degenerate_case};
 use crate::common::random::{Random, random_camera, random_stage};
 use crate::common::{
@@ -715,8 +715,6 @@ fn hold_meshes(paths: &[PathBuf]) {
 /// the torus there.
 #[test]
 fn no_seam_where_a_virtual_shadow_meets_a_real_one() {
-    const SIDE: usize = 12;
-    const ALBEDO: f64 = 0.7;
     let intrinsics = Intrinsics {
         size_px: [320, 240],
         focal_px: DVec2::splat(700.0),
@@ -741,36 +739,25 @@ fn no_seam_where_a_virtual_shadow_meets_a_real_one() {
     );
     stage.virtuals[0].visible = false;
     stage.place();
-    let side = |expected: &Expected, index: usize| match expected.is_uniform(index) {
-        true => 1,
-        false => SIDE,
-    };
-    let bare = Expected::new(&stage, view);
-    let of_pixels: Vec<_> = pixels(intrinsics.size_px)
-        .map(|(index, center)| {
-            let area = bare.area(center, side(&bare, index));
-            let is_edge = area.iter().any(|state| state.arriving != area[0].arriving);
-            (bare.radiance(&area, ALBEDO), is_edge)
-        })
-        .collect();
+    // With whether the real shadow's edge passes there.
+    let real = recorded(&Expected::new(&stage, view), view, |area| {
+        area.iter().any(|state| state.arriving != area[0].arriving)
+    });
     let bytes = |index: usize| match index % 4 {
         3 => 255,
-        channel => level_of_linear(of_pixels[index / 4].0[channel]).round() as u8,
+        channel => level_of_linear(real[index / 4].0[channel]).round() as u8,
     };
     let video = frame_of(intrinsics.size_px, bytes);
     stage.virtuals[0].visible = true;
     stage.place();
-    let full = Expected::new(&stage, view);
-    let ideal: Vec<(DVec3, bool)> = pixels(intrinsics.size_px)
-        .map(|(index, center)| {
-            let area = full.area(center, side(&full, index));
-            let taken = area.iter().any(|state| state.taken != 0);
-            let whole = area
-                .iter()
-                .all(|state| state.surface.is_some_and(|s| s.role == REAL));
-            (full.radiance(&area, ALBEDO), taken && whole)
-        })
-        .collect();
+    // With whether the torus takes light there, and covers nothing.
+    let ideal = recorded(&Expected::new(&stage, view), view, |area| {
+        let taken = area.iter().any(|state| state.taken != 0);
+        let whole = area
+            .iter()
+            .all(|state| state.surface.is_some_and(|s| s.role == REAL));
+        taken && whole
+    });
     for samples in [1, 4] {
         let shadows = ShadowSettings {
             samples,
@@ -779,33 +766,58 @@ fn no_seam_where_a_virtual_shadow_meets_a_real_one() {
         let mut renderer = stage.renderer_of(shadows, intrinsics);
         renderer.upload(&video).expect("an uploaded frame");
         let picture = stage.picture(&mut renderer, view.camera_from_world);
-        let (mut seam, mut rest) = (Differences::default(), Differences::default());
-        let (mut brightest, mut sum) = (0.0_f64, 0.0);
-        for (index, (ideal, taken)) in ideal.iter().enumerate() {
-            if !taken {
-                continue;
-            }
-            let off = (picture.linear(index) - *ideal).x;
-            if of_pixels[index].1 {
-                seam.add(off);
-                sum += off;
-                brightest = brightest.max(off);
-            } else {
-                rest.add(off);
-            }
-        }
-        eprintln!(
-            "{samples} samples: {} pixels on the seam: mean {:+.4}, rms {:.4}, most {:.3}, brightest {brightest:+.3}; {} others: rms {:.4}, most {:.3}",
-            seam.count,
-            sum / seam.count as f64,
-            seam.rms(),
-            seam.most,
-            rest.count,
-            rest.rms(),
-            rest.most
-        );
-        assert!(seam.count > 30);
+        measure_seam(samples, &picture, &real, &ideal);
     }
+}
+
+/// The radiance of each pixel's area as an ideal camera records it, and what is told of that area's states.
+fn recorded(
+    expected: &Expected,
+    view: View,
+    told: impl Fn(&[State]) -> bool,
+) -> Vec<(DVec3, bool)> {
+    const SIDE: usize = 12;
+    const ALBEDO: f64 = 0.7;
+    pixels(view.intrinsics.size_px)
+        .map(|(index, center)| {
+            let side = match expected.is_uniform(index) {
+                true => 1,
+                false => SIDE,
+            };
+            let area = expected.area(center, side);
+            (expected.radiance(&area, ALBEDO), told(&area))
+        })
+        .collect()
+}
+
+/// Tells how far a picture is off the ideal one in the virtual shadow: on the real shadow's edge, and elsewhere.
+fn measure_seam(samples: u32, picture: &Picture, real: &[(DVec3, bool)], ideal: &[(DVec3, bool)]) {
+    let (mut seam, mut rest) = (Differences::default(), Differences::default());
+    let (mut brightest, mut sum) = (0.0_f64, 0.0);
+    for (index, (ideal, taken)) in ideal.iter().enumerate() {
+        if !taken {
+            continue;
+        }
+        let off = (picture.linear(index) - *ideal).x;
+        if real[index].1 {
+            seam.add(off);
+            sum += off;
+            brightest = brightest.max(off);
+        } else {
+            rest.add(off);
+        }
+    }
+    eprintln!(
+        "{samples} samples: {} pixels on the seam: mean {:+.4}, rms {:.4}, most {:.3}, brightest {brightest:+.3}; {} others: rms {:.4}, most {:.3}",
+        seam.count,
+        sum / seam.count as f64,
+        seam.rms(),
+        seam.most,
+        rest.count,
+        rest.rms(),
+        rest.most
+    );
+    assert!(seam.count > 30);
 }
 
 fn level_of_linear(linear: f64) -> f64 {

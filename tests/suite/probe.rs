@@ -193,27 +193,29 @@ fn near_lamp(direction: DVec3) -> f64 {
     f64::from(direction.angle_between(lamp()) < 2.0 * LAMP_HALF_ANGLE)
 }
 
+/// How the ball was photographed, for gnomon.
+const BALL_FLAGS: [&str; 10] = [
+    "--kind",
+    "ball",
+    "--ball-distance",
+    "9",
+    "--reflectance",
+    "0.65",
+    "--turn-deg",
+    "25",
+    "--tilt-deg",
+    "15",
+];
+
 #[test]
 fn a_photographed_ball_gives_its_surroundings_back() {
     let folder = tempfile::tempdir().unwrap();
     let pictures = photographs(folder.path());
     let file = |name: &str| folder.path().join(name);
-    let flags = [
-        "--kind",
-        "ball",
-        "--ball-distance",
-        "9",
-        "--reflectance",
-        "0.65",
-        "--turn-deg",
-        "25",
-        "--tilt-deg",
-        "15",
-    ];
     let (out, err) = run(gnomon()
         .args(&pictures)
         .args(["--exposures", &TIMES.join(",")])
-        .args(flags)
+        .args(BALL_FLAGS)
         .arg("--out")
         .arg(file("probe.exr"))
         .arg("--preview")
@@ -221,11 +223,45 @@ fn a_photographed_ball_gives_its_surroundings_back() {
         .arg("--save-response")
         .arg(file("response.csv")));
     eprintln!("{err}{out}");
-
     let crop = err
         .lines()
         .find_map(|line| line.strip_prefix("the ball: --crop "))
         .expect("the outline is told");
+    hold_outline(crop);
+    hold_response(&file("response.csv"));
+
+    let probe = read(&file("probe.exr"), ProbeKind::LatitudeLongitude)
+        .unwrap()
+        .probe;
+    let truth = truth();
+    // No better than the response that was estimated.
+    for (name, weight) in measures() {
+        let ratio = integral(&probe, weight) / integral(&truth, weight);
+        eprintln!("{name}: {ratio}");
+        assert!((ratio - 1.0).abs().max_element() < 0.05, "{name}: {ratio}");
+    }
+    hold_direction_of_lamp(&probe);
+    hold_told_lamp(&out);
+    assert!(err.contains("filled in"), "{err}");
+    let preview = image::open(file("probe.png")).unwrap();
+    assert_eq!(preview.width() as usize, probe.size_px()[0]);
+
+    // With the outline that was found and the camera's own response, in another order, the numbers are exact.
+    let again = probe_by_own_response(folder.path(), &pictures, crop);
+    for (name, weight) in measures() {
+        let ratio = integral(&again, weight) / integral(&truth, weight);
+        eprintln!("{name}, response known: {ratio}");
+        // The lamp is ten pixels wide, and the outline is found to a third of one.
+        let allowed = if name == "the lamp" { 0.02 } else { 0.01 };
+        assert!(
+            (ratio - 1.0).abs().max_element() < allowed,
+            "{name}: {ratio}"
+        );
+    }
+}
+
+/// Holds the outline that gnomon tells against the ball's.
+fn hold_outline(crop: &str) {
     let crop_numbers: Vec<f64> = crop
         .split(',')
         .map(|number| number.parse().unwrap())
@@ -239,8 +275,11 @@ fn a_photographed_ball_gives_its_surroundings_back() {
         off_px < 0.5 && (crop_numbers[2] - RADIUS_PX).abs() < 0.7,
         "{crop}"
     );
+}
 
-    let text = std::fs::read_to_string(file("response.csv")).unwrap();
+/// Holds the response that was estimated against the camera's.
+fn hold_response(file: &Path) {
+    let text = std::fs::read_to_string(file).unwrap();
     let response = Response::from_csv(&text).unwrap();
     let mut worst: f64 = 0.0;
     for level in 25..=235 {
@@ -250,19 +289,12 @@ fn a_photographed_ball_gives_its_surroundings_back() {
     }
     eprintln!("response: at worst {:.1} % off", 100.0 * worst);
     assert!(worst < 0.05, "{worst}");
+}
 
-    let probe = read(&file("probe.exr"), ProbeKind::LatitudeLongitude)
-        .unwrap()
-        .probe;
-    let truth = truth();
-    // No better than the response that was estimated.
-    for (name, weight) in measures() {
-        let ratio = integral(&probe, weight) / integral(&truth, weight);
-        eprintln!("{name}: {ratio}");
-        assert!((ratio - 1.0).abs().max_element() < 0.05, "{name}: {ratio}");
-    }
+/// Holds the mean direction of the light about the lamp against where it is.
+fn hold_direction_of_lamp(probe: &Probe) {
     let moment = |axis: DVec3| {
-        integral(&probe, |direction| {
+        integral(probe, |direction| {
             near_lamp(direction) * direction.dot(axis)
         })
         .y
@@ -271,7 +303,10 @@ fn a_photographed_ball_gives_its_surroundings_back() {
     let off_deg = found.angle_between(lamp()).to_degrees();
     eprintln!("the lamp: {off_deg:.2} degrees off");
     assert!(off_deg < 0.5, "{off_deg}");
+}
 
+/// Holds the first light that gnomon tells against the lamp: azimuth, elevation and width.
+fn hold_told_lamp(out: &str) {
     let first = out.lines().nth(1).expect("a light is told");
     let columns: Vec<f64> = first
         .split_whitespace()
@@ -285,12 +320,11 @@ fn a_photographed_ball_gives_its_surroundings_back() {
         (columns[2] / (2.0 * LAMP_HALF_ANGLE.to_degrees()) - 1.0).abs() < 0.15,
         "{first}"
     );
-    assert!(err.contains("filled in"), "{err}");
-    let preview = image::open(file("probe.png")).unwrap();
-    assert_eq!(preview.width() as usize, probe.size_px()[0]);
+}
 
-    // With the outline that was found and the camera's own response, in another order, the numbers are exact.
-    let list = file("times.txt");
+/// The probe of the pictures the other way round, their times in a list, by the camera's own curve.
+fn probe_by_own_response(folder: &Path, pictures: &[PathBuf], crop: &str) -> Probe {
+    let list = folder.join("times.txt");
     let lines = pictures.iter().zip(TIMES).map(|(path, time)| {
         let name = path.file_name().unwrap().to_string_lossy();
         format!("{name} {time}\n")
@@ -299,29 +333,19 @@ fn a_photographed_ball_gives_its_surroundings_back() {
     let own = Response::estimated(std::array::from_fn(|level| {
         [curve_inverse((level as f64).min(254.5)); 3]
     }));
-    std::fs::write(file("own.csv"), own.unwrap().csv()).unwrap();
+    let response = folder.join("own.csv");
+    std::fs::write(&response, own.unwrap().csv()).unwrap();
+    let probe = folder.join("again.hdr");
     run(gnomon()
         .args(pictures.iter().rev())
         .arg("--exposures")
         .arg(&list)
-        .args(flags)
+        .args(BALL_FLAGS)
         .args(["--crop", crop, "--response"])
-        .arg(file("own.csv"))
+        .arg(&response)
         .arg("--out")
-        .arg(file("again.hdr")));
-    let again = read(&file("again.hdr"), ProbeKind::LatitudeLongitude)
-        .unwrap()
-        .probe;
-    for (name, weight) in measures() {
-        let ratio = integral(&again, weight) / integral(&truth, weight);
-        eprintln!("{name}, response known: {ratio}");
-        // The lamp is ten pixels wide, and the outline is found to a third of one.
-        let allowed = if name == "the lamp" { 0.02 } else { 0.01 };
-        assert!(
-            (ratio - 1.0).abs().max_element() < allowed,
-            "{name}: {ratio}"
-        );
-    }
+        .arg(&probe));
+    read(&probe, ProbeKind::LatitudeLongitude).unwrap().probe
 }
 
 #[test]
@@ -428,30 +452,39 @@ fn a_panorama_and_an_angular_map_in_radiance_are_turned_into_the_world() {
     }
 }
 
+/// Writes a picture without anything in it.
+fn flat_picture(path: &Path, size_px: [u32; 2]) -> PathBuf {
+    let rgba = vec![90; (4 * size_px[0] * size_px[1]) as usize];
+    write_rgb_png(path, size_px, &rgba).unwrap();
+    path.to_owned()
+}
+
+/// A run that must fail, say each of `words`, and write no probe.
+fn refused(folder: &Path, pictures: &[PathBuf], flags: &[&str], words: &[&str]) {
+    let probe = folder.join("probe.hdr");
+    let output = gnomon()
+        .args(pictures)
+        .args(flags)
+        .arg("--out")
+        .arg(&probe)
+        .output()
+        .unwrap();
+    let err = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!output.status.success(), "{flags:?}");
+    for word in words {
+        assert!(err.contains(word), "{err:?} lacks {word:?}");
+    }
+    assert!(!probe.exists());
+}
+
 #[test]
 fn mistakes_are_told_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let pictures = photographs(folder.path());
     let file = |name: &str| folder.path().join(name);
-    let flat = |name: &str, size_px: [u32; 2]| {
-        let rgba = vec![90; (4 * size_px[0] * size_px[1]) as usize];
-        write_rgb_png(&file(name), size_px, &rgba).unwrap();
-        file(name)
-    };
+    let flat = |name: &str, size_px: [u32; 2]| flat_picture(&file(name), size_px);
     let refused = |pictures: &[PathBuf], flags: &[&str], words: &[&str]| {
-        let output = gnomon()
-            .args(pictures)
-            .args(flags)
-            .arg("--out")
-            .arg(file("probe.hdr"))
-            .output()
-            .unwrap();
-        let err = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(!output.status.success(), "{flags:?}");
-        for word in words {
-            assert!(err.contains(word), "{err:?} lacks {word:?}");
-        }
-        assert!(!file("probe.hdr").exists());
+        refused(folder.path(), pictures, flags, words);
     };
     let ball = ["--kind", "ball"];
     let with = |times: &'static str| [ball[0], ball[1], "--exposures", times];

@@ -424,54 +424,13 @@ fn photographs_of_tags_tell_the_focal_length() {
 #[test]
 #[cfg_attr(not(has_shared), ignore = "needs ../shared/real")]
 fn photographs_of_an_april_grid_agree_with_motion_capture() {
-    let folder = photographs("yac_mocap");
-    let bodies = captured_poses(&folder.join("body0/data.csv"));
-    let targets = captured_poses(&folder.join("target0/data.csv"));
-    // The target lies still; its jitter is the instrument's.
-    let first = DQuat::from_mat3(&targets[0].1.matrix3);
-    let mut turn_sum = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
-    let mut shift_sum_m = DVec3::ZERO;
-    for (_, target) in &targets {
-        let turn = DQuat::from_mat3(&target.matrix3);
-        turn_sum += turn * turn.dot(first).signum();
-        shift_sum_m += target.translation;
-    }
-    let world_from_target = DAffine3::from_rotation_translation(
-        turn_sum.normalize(),
-        shift_sum_m / targets.len() as f64,
-    );
-    let target_from_world = world_from_target.inverse();
-    let anchors = [anchor("grid", &april_grid())];
-    let settings = settings(DetectorKind::AprilTag);
-    let stills: Vec<CapturedStill> = pictures_in(&folder.join("cam0/data"))
-        .iter()
-        .map(|file| {
-            let name = file.file_stem().expect("a name").to_string_lossy();
-            let pose = &track_once(&settings, &anchors, GRID_CAMERA, &read_photograph(file))[0];
-            assert_eq!(pose.status, Status::Tracked, "{name}");
-            let time_ns = name.parse().expect("nanoseconds");
-            CapturedStill {
-                camera_from_grid: pose.camera_from_anchor.expect("a pose"),
-                target_from_body: target_from_world * pose_at(&bodies, time_ns),
-            }
-        })
-        .collect();
+    let stills = captured_stills(&photographs("yac_mocap"));
     assert_eq!(stills.len(), 30);
-    // From each way in which a camera may be mounted by right angles.
-    let quarter = |k: usize| 0.5 * PI * k as f64;
-    let starts = (0..24).map(|k| {
-        let up = match k / 4 {
-            side @ 0..4 => DQuat::from_rotation_x(quarter(side)),
-            4 => DQuat::from_rotation_y(quarter(1)),
-            _ => DQuat::from_rotation_y(quarter(3)),
-        };
-        let body_from_camera = DAffine3::from_quat(up * DQuat::from_rotation_z(quarter(k % 4)));
-        HandEye {
-            body_from_camera,
-            target_from_grid: stills[0].target_from_body
-                * body_from_camera
-                * stills[0].camera_from_grid,
-        }
+    let starts = right_angled_mountings().map(|body_from_camera| HandEye {
+        body_from_camera,
+        target_from_grid: stills[0].target_from_body
+            * body_from_camera
+            * stills[0].camera_from_grid,
     });
     let (_, hand_eye) = starts
         .map(|start| fit_hand_eye(&stills, start))
@@ -507,6 +466,54 @@ fn photographs_of_an_april_grid_agree_with_motion_capture() {
     );
     eprintln!("against motion capture: {off_mm:.2} mm, {off_deg:.3}°");
     assert!(off_mm <= 3.8 && off_deg <= 0.23, "{off_mm} mm, {off_deg}°");
+}
+
+/// The grid in each photograph as it is tracked, with the camera's body as it was captured.
+fn captured_stills(folder: &Path) -> Vec<CapturedStill> {
+    let bodies = captured_poses(&folder.join("body0/data.csv"));
+    let targets = captured_poses(&folder.join("target0/data.csv"));
+    // The target lies still; its jitter is the instrument's.
+    let target_from_world = mean_pose(&targets).inverse();
+    let anchors = [anchor("grid", &april_grid())];
+    let settings = settings(DetectorKind::AprilTag);
+    pictures_in(&folder.join("cam0/data"))
+        .iter()
+        .map(|file| {
+            let name = file.file_stem().expect("a name").to_string_lossy();
+            let pose = &track_once(&settings, &anchors, GRID_CAMERA, &read_photograph(file))[0];
+            assert_eq!(pose.status, Status::Tracked, "{name}");
+            let time_ns = name.parse().expect("nanoseconds");
+            CapturedStill {
+                camera_from_grid: pose.camera_from_anchor.expect("a pose"),
+                target_from_body: target_from_world * pose_at(&bodies, time_ns),
+            }
+        })
+        .collect()
+}
+
+fn mean_pose(poses: &[(i64, DAffine3)]) -> DAffine3 {
+    let first = DQuat::from_mat3(&poses[0].1.matrix3);
+    let mut turn_sum = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
+    let mut shift_sum_m = DVec3::ZERO;
+    for (_, pose) in poses {
+        let turn = DQuat::from_mat3(&pose.matrix3);
+        turn_sum += turn * turn.dot(first).signum();
+        shift_sum_m += pose.translation;
+    }
+    DAffine3::from_rotation_translation(turn_sum.normalize(), shift_sum_m / poses.len() as f64)
+}
+
+/// `body_from_camera` of each way in which a camera may be mounted by right angles.
+fn right_angled_mountings() -> impl Iterator<Item = DAffine3> {
+    let quarter = |k: usize| 0.5 * PI * k as f64;
+    (0..24).map(move |k| {
+        let up = match k / 4 {
+            side @ 0..4 => DQuat::from_rotation_x(quarter(side)),
+            4 => DQuat::from_rotation_y(quarter(1)),
+            _ => DQuat::from_rotation_y(quarter(3)),
+        };
+        DAffine3::from_quat(up * DQuat::from_rotation_z(quarter(k % 4)))
+    })
 }
 
 // ---------------------------------------------------------------------------------------------------------------------

@@ -1337,20 +1337,7 @@ fn assert_sound(pose: &AnchorPose, what: &str) {
 #[test]
 fn empty_pictures_and_extreme_cameras() {
     let mut random = Random::new(77);
-    let frames: Vec<Frame> = {
-        let [width, height] = MIDDLE.size_px;
-        let pixels = 4 * (width * height) as usize;
-        let flat = |level: u8| Frame {
-            index: 0,
-            time_secs: 0.0,
-            size_px: MIDDLE.size_px,
-            rgba: vec![level; pixels],
-        };
-        let mut frames = vec![flat(0), flat(255), flat(128)];
-        frames.extend((1..4).map(|seed| with_noise(&flat(128), 60.0, seed)));
-        frames.extend((0..3).map(|kind| texture(&mut random, kind)));
-        frames
-    };
+    let frames = frames_without_markers(&mut random);
     let mut seen = 0;
     for round in 0..40 {
         let id = random.below(10) as u32;
@@ -1364,30 +1351,12 @@ fn empty_pictures_and_extreme_cameras() {
         let anchors = [anchor("lone", &lone), anchor("board", &board)];
         let extreme = random.chance(0.5);
         let camera = if extreme {
-            Intrinsics {
-                size_px: MIDDLE.size_px,
-                focal_px: DVec2::new(
-                    10f64.powf(random.between(-2.0, 6.0)),
-                    10f64.powf(random.between(-2.0, 6.0)),
-                ),
-                center_px: DVec2::new(random.between(-1e4, 1e4), random.between(-500.0, 500.0)),
-                distortion: Distortion::Polynomial(std::array::from_fn(|_| {
-                    random.between(-3.0, 3.0)
-                })),
-            }
+            extreme_camera(&mut random)
         } else {
             MIDDLE
         };
         let mut tracker = tracker(&default_settings(), &anchors, camera);
-        let direction = random.direction();
-        let rest = DAffine3::from_rotation_translation(
-            glam::DQuat::from_axis_angle(direction, random.between(0.0, 6.3)),
-            DVec3::new(
-                random.between(-1.0, 1.0),
-                random.between(-1.0, 1.0),
-                random.between(-2.0, 10.0),
-            ) * size_m,
-        );
+        let rest = random_rest(&mut random, size_m);
         for k in 0..6 {
             let truth = held(&rest, k, round, 20.0, 0.1 * size_m);
             let frame = match k {
@@ -1416,4 +1385,46 @@ fn empty_pictures_and_extreme_cameras() {
     }
     eprintln!("tracked in {seen} frames");
     assert!(seen > 5, "{seen}");
+}
+
+/// Flat pictures, noise, and textures.
+fn frames_without_markers(random: &mut Random) -> Vec<Frame> {
+    let [width, height] = MIDDLE.size_px;
+    let pixels = 4 * (width * height) as usize;
+    let flat = |level: u8| Frame {
+        index: 0,
+        time_secs: 0.0,
+        size_px: MIDDLE.size_px,
+        rgba: vec![level; pixels],
+    };
+    let mut frames = vec![flat(0), flat(255), flat(128)];
+    frames.extend((1..4).map(|seed| with_noise(&flat(128), 60.0, seed)));
+    frames.extend((0..3).map(|kind| texture(random, kind)));
+    frames
+}
+
+/// A calibration that no camera has.
+fn extreme_camera(random: &mut Random) -> Intrinsics {
+    Intrinsics {
+        size_px: MIDDLE.size_px,
+        focal_px: DVec2::new(
+            10f64.powf(random.between(-2.0, 6.0)),
+            10f64.powf(random.between(-2.0, 6.0)),
+        ),
+        center_px: DVec2::new(random.between(-1e4, 1e4), random.between(-500.0, 500.0)),
+        distortion: Distortion::Polynomial(std::array::from_fn(|_| random.between(-3.0, 3.0))),
+    }
+}
+
+/// Before the camera or behind it, as far off as suits a marker's size.
+fn random_rest(random: &mut Random, size_m: f64) -> DAffine3 {
+    let direction = random.direction();
+    DAffine3::from_rotation_translation(
+        glam::DQuat::from_axis_angle(direction, random.between(0.0, 6.3)),
+        DVec3::new(
+            random.between(-1.0, 1.0),
+            random.between(-1.0, 1.0),
+            random.between(-2.0, 10.0),
+        ) * size_m,
+    )
 }

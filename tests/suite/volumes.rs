@@ -125,35 +125,16 @@ fn random_broken_meshes() {
 /// The light that a pixel loses at an edge against the part of its area that is in shadow.
 #[test]
 fn edges_are_as_smooth_as_four_samples_can_make_them() {
-    const STEPS: u32 = 16;
     let intrinsics = Intrinsics {
         size_px: [320, 240],
         focal_px: DVec2::splat(300.0),
         center_px: DVec2::new(161.3, 118.7),
         distortion: Distortion::NONE,
     };
-    let mut random = Random::new(17);
-    let lump = shapes::sphere(0.05, 8, 11).map(|place| place * random.between(0.7, 1.3) as f32);
-    let lump = shapes::Soup {
-        normals: None,
-        ..lump
-    };
-    let casters = [
-        Thing::made(shapes::torus(0.05, 0.02, 40, 20)).at([0.05, 0.0, 0.08]),
-        Thing::made(lump.without(|index| index % 6 == 0)).at([-0.08, 0.02, 0.07]),
-        Thing::made(shapes::cuboid([-0.03; 3], [0.03; 3])).at([0.02, 0.12, 0.05]),
-    ];
     // One irradiance everywhere: what is lost tells the part in shadow.
     let light = sun([0.3, 0.2, -1.0], [1.0; 3]);
     let ambient = DVec3::splat(0.1);
-    let ground = Thing::made(shapes::rectangle([-0.5, -0.5], [0.5, 0.5]));
-    let stage = Stage::new(
-        &[ground],
-        &casters,
-        Some(DAffine3::IDENTITY),
-        vec![light],
-        ambient,
-    );
+    let stage = casters_above_the_ground(light, ambient);
     let around = PI * ambient.x;
     let dark = around / (around + irradiance(&light, DVec3::ZERO, DVec3::Z).x);
     let mut renderer = stage.renderer(intrinsics);
@@ -165,39 +146,10 @@ fn edges_are_as_smooth_as_four_samples_can_make_them() {
             camera_from_world: look_at(turn.extend(0.5), DVec3::new(0.02, 0.02, 0.0)),
         };
         let picture = stage.picture(&mut renderer, view.camera_from_world);
-        let exact = stage.world.cast(&[light], &view, 0.0);
-        let hidden = |place: DVec2| {
-            let seen = stage.world.look(&view, place).filter(|s| s.role == REAL);
-            seen.map(|s| stage.world.bits(&s, &light, 0.0) & VIRTUAL_HIDES != 0)
-        };
-        for (index, center) in pixels(intrinsics.size_px) {
-            let same = |a: usize, b: usize| exact.bits[0][a] == exact.bits[0][b];
-            if exact.role(index) != REAL || is_uniform(intrinsics.size_px, index, same) {
-                continue;
-            }
-            let area: Option<Vec<bool>> = (0..STEPS * STEPS)
-                .map(|step| {
-                    let cell = DVec2::new(f64::from(step % STEPS), f64::from(step / STEPS));
-                    hidden(center + (cell + 0.5) / f64::from(STEPS) - 0.5)
-                })
-                .collect();
-            let samples: Option<Vec<bool>> = SAMPLES_PX
-                .iter()
-                .map(|&sample| hidden(center + DVec2::from_array(sample)))
-                .collect();
-            // A pixel with the caster itself in it has no area of table to average over.
-            let (Some(area), Some(samples)) = (area, samples) else {
-                continue;
-            };
-            let share = |hidden: &[bool]| {
-                hidden.iter().filter(|hidden| **hidden).count() as f64 / hidden.len() as f64
-            };
-            if share(&area) == 0.0 || share(&area) == 1.0 {
-                continue;
-            }
-            let found = (1.0 - picture.linear(index).x) / (1.0 - dark);
-            errors.push(found - share(&area));
-            pattern_errors.push(share(&samples) - share(&area));
+        for edge in shares_at_edges(&stage, &view, light) {
+            let found = (1.0 - picture.linear(edge.pixel).x) / (1.0 - dark);
+            errors.push(found - edge.of_area);
+            pattern_errors.push(edge.of_samples - edge.of_area);
         }
     }
     let count = errors.len() as f64;
@@ -213,6 +165,80 @@ fn edges_are_as_smooth_as_four_samples_can_make_them() {
     assert!(rms <= bound, "{rms} is more than {bound}");
     // Samples that lie about the pixel's centre err as often to both sides: three standard errors.
     assert!(mean.abs() <= 3.0 * bound / count.sqrt(), "{mean}");
+}
+
+/// A torus, a lump with holes and a cube, over a plane.
+fn casters_above_the_ground(light: Light, ambient: DVec3) -> Stage {
+    let mut random = Random::new(17);
+    let lump = shapes::sphere(0.05, 8, 11).map(|place| place * random.between(0.7, 1.3) as f32);
+    let lump = shapes::Soup {
+        normals: None,
+        ..lump
+    };
+    let casters = [
+        Thing::made(shapes::torus(0.05, 0.02, 40, 20)).at([0.05, 0.0, 0.08]),
+        Thing::made(lump.without(|index| index % 6 == 0)).at([-0.08, 0.02, 0.07]),
+        Thing::made(shapes::cuboid([-0.03; 3], [0.03; 3])).at([0.02, 0.12, 0.05]),
+    ];
+    let ground = Thing::made(shapes::rectangle([-0.5, -0.5], [0.5, 0.5]));
+    Stage::new(
+        &[ground],
+        &casters,
+        Some(DAffine3::IDENTITY),
+        vec![light],
+        ambient,
+    )
+}
+
+/// A pixel of the ground that an edge of a virtual shadow passes, and how much of it lies in the shadow.
+struct EdgePixel {
+    pixel: usize,
+    of_area: f64,
+    of_samples: f64,
+}
+
+fn shares_at_edges(stage: &Stage, view: &View, light: Light) -> Vec<EdgePixel> {
+    const STEPS: u32 = 16;
+    let size_px = view.intrinsics.size_px;
+    let exact = stage.world.cast(&[light], view, 0.0);
+    let hidden = |place: DVec2| {
+        let seen = stage.world.look(view, place).filter(|s| s.role == REAL);
+        seen.map(|s| stage.world.bits(&s, &light, 0.0) & VIRTUAL_HIDES != 0)
+    };
+    let share = |hidden: &[bool]| {
+        hidden.iter().filter(|hidden| **hidden).count() as f64 / hidden.len() as f64
+    };
+    let mut edges = Vec::new();
+    for (index, center) in pixels(size_px) {
+        let same = |a: usize, b: usize| exact.bits[0][a] == exact.bits[0][b];
+        if exact.role(index) != REAL || is_uniform(size_px, index, same) {
+            continue;
+        }
+        let area: Option<Vec<bool>> = (0..STEPS * STEPS)
+            .map(|step| {
+                let cell = DVec2::new(f64::from(step % STEPS), f64::from(step / STEPS));
+                hidden(center + (cell + 0.5) / f64::from(STEPS) - 0.5)
+            })
+            .collect();
+        let samples: Option<Vec<bool>> = SAMPLES_PX
+            .iter()
+            .map(|&sample| hidden(center + DVec2::from_array(sample)))
+            .collect();
+        // A pixel with the caster itself in it has no area of table to average over.
+        let (Some(area), Some(samples)) = (area, samples) else {
+            continue;
+        };
+        let (of_area, of_samples) = (share(&area), share(&samples));
+        if of_area == 0.0 || of_area == 1.0 {
+            continue;
+        }
+        edges.push(EdgePixel {
+            pixel: index,
+            of_area,
+            of_samples,
+        });
+    }
+    edges
 }
 
 /// A coarse sphere with a sphere's normals under one light: each pixel gives back albedo / π · E · max(N·L, 0) with its
@@ -281,33 +307,22 @@ fn hold_smooth_sphere(
     let others = World::new(stage.world.triangles[of_sphere..].to_vec());
     // Radiance of a place on the sphere.
     let radiance = |seen: &SeenSurface| -> f64 {
-        let corners = soup.triangles[seen.triangle].map(|index| index as usize);
-        let [a, b, c] = stage.world.triangles[seen.triangle].corners;
-        let across = (b - a).cross(c - a);
-        let share = |p: DVec3, q: DVec3| (p - seen.point).cross(q - seen.point).dot(across);
-        let shares = [share(b, c), share(c, a), share(a, b)];
-        let normal: DVec3 = shares
-            .iter()
-            .zip(corners)
-            .map(|(share, corner)| normals[corner].as_dvec3() * *share)
-            .sum();
+        let triangle = stage.world.triangles[seen.triangle].corners;
+        let corners = soup.triangles[seen.triangle];
+        let of_corners = corners.map(|corner| normals[corner as usize].as_dvec3());
+        let normal = interpolated_normal(seen.point, triangle, of_corners);
         if others.bits(seen, &light, 0.0) & VIRTUAL_HIDES != 0 {
             return 0.0;
         }
-        let arriving = irradiance(&light, seen.point, normal.normalize());
+        let arriving = irradiance(&light, seen.point, normal);
         albedo.x / PI * arriving.x
     };
     let (mut held, mut backs, mut shaded, mut wrong, mut worst) = (0, 0, 0, 0, 0.0_f64);
     for (index, center) in pixels(view.intrinsics.size_px) {
         // All that a pixel's samples may be is between the least and the most within it.
-        let within: Option<Vec<SeenSurface>> = (0..25)
-            .map(|step| {
-                let offset = DVec2::new(f64::from(step % 5) - 2.0, f64::from(step / 5) - 2.0);
-                let seen = stage.world.look(view, center + offset * 0.25);
-                seen.filter(|surface| surface.triangle < of_sphere)
-            })
-            .collect();
-        let Some(within) = within else { continue };
+        let Some(within) = seen_within(&stage.world, view, center, of_sphere) else {
+            continue;
+        };
         let (mut low, mut high) = (f64::MAX, 0.0_f64);
         for surface in &within {
             low = low.min(radiance(surface));
@@ -344,4 +359,33 @@ fn hold_smooth_sphere(
         "{name}: the plate shades {shaded} pixels"
     );
     assert_eq!(wrong, 0, "{name}: pixels wrong by up to {worst}");
+}
+
+/// A triangle's normal at a point of it, from those of its corners.
+fn interpolated_normal(point: DVec3, [a, b, c]: [DVec3; 3], of_corners: [DVec3; 3]) -> DVec3 {
+    let across = (b - a).cross(c - a);
+    let share = |p: DVec3, q: DVec3| (p - point).cross(q - point).dot(across);
+    let shares = [share(b, c), share(c, a), share(a, b)];
+    let normal: DVec3 = shares
+        .iter()
+        .zip(of_corners)
+        .map(|(share, corner)| corner * *share)
+        .sum();
+    normal.normalize()
+}
+
+/// What is seen at 5 x 5 places of a pixel; `None` unless all of it is among the first so many triangles.
+fn seen_within(
+    world: &World,
+    view: &View,
+    center: DVec2,
+    triangles: usize,
+) -> Option<Vec<SeenSurface>> {
+    (0..25)
+        .map(|step| {
+            let offset = DVec2::new(f64::from(step % 5) - 2.0, f64::from(step / 5) - 2.0);
+            let seen = world.look(view, center + offset * 0.25);
+            seen.filter(|surface| surface.triangle < triangles)
+        })
+        .collect()
 }

@@ -162,12 +162,8 @@ fn a_small_scene_has_the_defaults() {
     assert_eq!(object.anchor_from_object, glam::DAffine3::IDENTITY);
 }
 
-#[test]
-fn every_key_arrives() {
-    let project = project();
-    fs::create_dir(project.path().join("take")).unwrap();
-    fs::write(project.path().join("config/lens.toml"), "").unwrap();
-    let text = "[camera]
+/// A scene that says another value than the default for most of what it can say.
+const EVERY_KEY: &str = "[camera]
 source = \"take\"
 calibration = \"lens.toml\"
 [tracking]
@@ -214,7 +210,19 @@ samples = 1
 counting = \"depth-fail\"
 frame_budget_ms = 16
 ";
-    let scene = load_in(&project, text).unwrap();
+
+/// [`EVERY_KEY`] as it is read, and the project that it lies in.
+fn scene_of_every_key() -> (TempDir, Scene) {
+    let project = project();
+    fs::create_dir(project.path().join("take")).unwrap();
+    fs::write(project.path().join("config/lens.toml"), "").unwrap();
+    let scene = load_in(&project, EVERY_KEY).unwrap();
+    (project, scene)
+}
+
+#[test]
+fn every_key_of_camera_and_tracking_arrives() {
+    let (project, scene) = scene_of_every_key();
     assert!(Path::new(&scene.camera.source).is_absolute() && scene.camera.source.ends_with("take"));
     assert_eq!(
         scene.camera.calibration,
@@ -237,6 +245,11 @@ frame_budget_ms = 16
         ),
         (false, 0, 2)
     );
+}
+
+#[test]
+fn every_key_of_anchors_arrives() {
+    let (_project, scene) = scene_of_every_key();
     let names: Vec<&str> = scene
         .anchors
         .iter()
@@ -254,6 +267,11 @@ frame_budget_ms = 16
         .unwrap()
     );
     assert_eq!(scene.anchors[1].markers[0].id, 17);
+}
+
+#[test]
+fn every_key_of_things_and_the_table_arrives() {
+    let (_project, scene) = scene_of_every_key();
     let object = &scene.virtuals[0];
     assert_eq!((object.anchor, object.casts), (1, false));
     assert_eq!(
@@ -288,6 +306,11 @@ frame_budget_ms = 16
             .all(|normal| *normal == Vec3::Z)
     );
     assert_eq!(table.mesh_report.open_edges, 4);
+}
+
+#[test]
+fn every_key_of_lights_and_shadows_arrives() {
+    let (_project, scene) = scene_of_every_key();
     assert_eq!(
         scene.world_lights(),
         [Light::Directional {

@@ -106,26 +106,31 @@ fn each_shape_is_as_large_as_its_numbers_and_stands_on_its_origin() {
         ),
     ];
     for (keys, kind, [x0, y0, x1, y1], [z0, z1], volume_m3) in shapes {
+        let (low, high) = (DVec3::new(x0, y0, z0), DVec3::new(x1, y1, z1));
         for object in [virtual_of(keys), phantom_of(keys)] {
             assert_eq!(object.shape, kind);
-            let places = object.mesh.positions.iter().map(|place| place.as_dvec3());
-            let bounds = Bounds::around(places).unwrap();
-            let (low, high) = (DVec3::new(x0, y0, z0), DVec3::new(x1, y1, z1));
-            assert!(bounds.low.distance(low) < 1e-7, "{keys}: {}", bounds.low);
-            assert!(bounds.high.distance(high) < 1e-7, "{keys}: {}", bounds.high);
-            assert_eq!(object.mesh_report.closed, volume_m3 > 0.0, "{keys}");
-            let found = if volume_m3 > 0.0 {
-                object.mesh.signed_volume_m3()
-            } else {
-                0.0
-            };
-            // What is inscribed has that much less.
-            let least = volume_m3 * (1.0 - 1.2e-3);
-            let is_right = (least..=volume_m3 * (1.0 + 1e-6)).contains(&found);
-            assert!(is_right, "{keys}: {found} {volume_m3}");
+            hold_size(&object, keys, [low, high], volume_m3);
             assert!(object.notes.is_empty() && object.materials.len() == 1);
         }
     }
+}
+
+/// Holds a thing's bounds and volume; without a volume it is open.
+fn hold_size(object: &Object, keys: &str, [low, high]: [DVec3; 2], volume_m3: f64) {
+    let places = object.mesh.positions.iter().map(|place| place.as_dvec3());
+    let bounds = Bounds::around(places).unwrap();
+    assert!(bounds.low.distance(low) < 1e-7, "{keys}: {}", bounds.low);
+    assert!(bounds.high.distance(high) < 1e-7, "{keys}: {}", bounds.high);
+    assert_eq!(object.mesh_report.closed, volume_m3 > 0.0, "{keys}");
+    let found = if volume_m3 > 0.0 {
+        object.mesh.signed_volume_m3()
+    } else {
+        0.0
+    };
+    // What is inscribed has that much less.
+    let least = volume_m3 * (1.0 - 1.2e-3);
+    let is_right = (least..=volume_m3 * (1.0 + 1e-6)).contains(&found);
+    assert!(is_right, "{keys}: {found} {volume_m3}");
 }
 
 #[test]
