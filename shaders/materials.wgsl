@@ -129,18 +129,25 @@ fn is_there(map: MapOnGpu) -> bool {
     return (map.place & 1u) != 0u;
 }
 
-fn srgb_spot(s: Sampled, at: vec2f) -> vec4f {
+// One reading of a picture: of the stack that it lies in, as its sampler repeats.
+fn read_at(
+    stack_0: texture_2d_array<f32>,
+    stack_1: texture_2d_array<f32>,
+    stack_2: texture_2d_array<f32>,
+    s: Sampled,
+    at: vec2f,
+) -> vec4f {
     if is_repeated(s) {
         switch s.stack {
-            case 0u: { return textureSampleGrad(srgb_0, repeated, at, s.layer, s.spot_x, s.spot_y); }
-            case 1u: { return textureSampleGrad(srgb_1, repeated, at, s.layer, s.spot_x, s.spot_y); }
-            default: { return textureSampleGrad(srgb_2, repeated, at, s.layer, s.spot_x, s.spot_y); }
+            case 0u: { return textureSampleGrad(stack_0, repeated, at, s.layer, s.spot_x, s.spot_y); }
+            case 1u: { return textureSampleGrad(stack_1, repeated, at, s.layer, s.spot_x, s.spot_y); }
+            default: { return textureSampleGrad(stack_2, repeated, at, s.layer, s.spot_x, s.spot_y); }
         }
     }
     switch s.stack {
-        case 0u: { return textureSampleGrad(srgb_0, clamped, at, s.layer, s.spot_x, s.spot_y); }
-        case 1u: { return textureSampleGrad(srgb_1, clamped, at, s.layer, s.spot_x, s.spot_y); }
-        default: { return textureSampleGrad(srgb_2, clamped, at, s.layer, s.spot_x, s.spot_y); }
+        case 0u: { return textureSampleGrad(stack_0, clamped, at, s.layer, s.spot_x, s.spot_y); }
+        case 1u: { return textureSampleGrad(stack_1, clamped, at, s.layer, s.spot_x, s.spot_y); }
+        default: { return textureSampleGrad(stack_2, clamped, at, s.layer, s.spot_x, s.spot_y); }
     }
 }
 
@@ -152,24 +159,9 @@ fn srgb_of(map: MapOnGpu, at: TextureCoordinates) -> vec4f {
     let s = sampled(map, at);
     var sum = vec4f(0.0);
     for (var spot = 0u; spot < s.spots; spot++) {
-        sum += srgb_spot(s, spot_at(s, spot));
+        sum += read_at(srgb_0, srgb_1, srgb_2, s, spot_at(s, spot));
     }
     return sum / f32(s.spots);
-}
-
-fn linear_spot(s: Sampled, at: vec2f) -> vec4f {
-    if is_repeated(s) {
-        switch s.stack {
-            case 0u: { return textureSampleGrad(linear_0, repeated, at, s.layer, s.spot_x, s.spot_y); }
-            case 1u: { return textureSampleGrad(linear_1, repeated, at, s.layer, s.spot_x, s.spot_y); }
-            default: { return textureSampleGrad(linear_2, repeated, at, s.layer, s.spot_x, s.spot_y); }
-        }
-    }
-    switch s.stack {
-        case 0u: { return textureSampleGrad(linear_0, clamped, at, s.layer, s.spot_x, s.spot_y); }
-        case 1u: { return textureSampleGrad(linear_1, clamped, at, s.layer, s.spot_x, s.spot_y); }
-        default: { return textureSampleGrad(linear_2, clamped, at, s.layer, s.spot_x, s.spot_y); }
-    }
 }
 
 // Of a picture of numbers; 1 where there is none.
@@ -180,7 +172,7 @@ fn linear_of(map: MapOnGpu, at: TextureCoordinates) -> vec4f {
     let s = sampled(map, at);
     var sum = vec4f(0.0);
     for (var spot = 0u; spot < s.spots; spot++) {
-        sum += linear_spot(s, spot_at(s, spot));
+        sum += read_at(linear_0, linear_1, linear_2, s, spot_at(s, spot));
     }
     return sum / f32(s.spots);
 }

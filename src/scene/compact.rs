@@ -4,7 +4,8 @@ use std::borrow::Cow;
 
 use glam::DVec3;
 
-use super::{ProbeScene, Scene, SceneLight, ShadowTechnique};
+use super::shadows::OutlinedLights;
+use super::{ProbeScene, Scene, SceneLight};
 use crate::geometry::bounds::Bounds;
 use crate::geometry::ray_caster::RayCaster;
 use crate::light::brightest::{BrightRegion, bright_regions};
@@ -110,13 +111,10 @@ impl Scene {
 
     /// The lights that cast shadow volumes.
     pub fn outlined_lights(&self) -> Vec<SceneLight> {
-        match (self.chosen_technique().0, &self.probe) {
-            (ShadowTechnique::Both | ShadowTechnique::Environment, Some(probe)) => {
-                self.split_light(probe).compact
-            }
-            (ShadowTechnique::Shafts, _) => Vec::new(),
-            (ShadowTechnique::Volumes, _)
-            | (ShadowTechnique::Both | ShadowTechnique::Environment, None) => self.lights.clone(),
+        match (self.chosen_technique().0.outlined_lights(), &self.probe) {
+            (OutlinedLights::None, _) => Vec::new(),
+            (OutlinedLights::Compact, Some(probe)) => self.split_light(probe).compact,
+            (OutlinedLights::Lamps, _) | (OutlinedLights::Compact, None) => self.lights.clone(),
         }
     }
 

@@ -101,6 +101,17 @@ choices! {
     }
 }
 
+/// The lights whose shadows have outlines: those that cast shadow volumes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OutlinedLights {
+    /// None of them.
+    None,
+    /// The scene's own.
+    Lamps,
+    /// The scene's own, and what is compact in its probe.
+    Compact,
+}
+
 /// What makes a scene's shadows: a [`Technique`] that is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ShadowTechnique {
@@ -122,6 +133,15 @@ impl ShadowTechnique {
             Self::Shafts => Technique::Shafts.name(),
             Self::Both => "volumes and shafts",
             Self::Environment => Technique::Environment.name(),
+        }
+    }
+
+    /// The lights that cast shadow volumes with it.
+    pub fn outlined_lights(self) -> OutlinedLights {
+        match self {
+            Self::Volumes => OutlinedLights::Lamps,
+            Self::Shafts => OutlinedLights::None,
+            Self::Both | Self::Environment => OutlinedLights::Compact,
         }
     }
 

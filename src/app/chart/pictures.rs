@@ -146,25 +146,25 @@ fn qualities(scene: &Scene) -> Ways {
         scene.shadows = shadows;
         (name.to_owned(), scene)
     };
-    match scene.chosen_technique().0 {
-        ShadowTechnique::Environment => environment_ways(scene),
-        ShadowTechnique::Shafts | ShadowTechnique::Both => {
-            let ways = by_sources(scene).into_iter();
-            ways.map(|(name, scene)| (format!("{name} sources"), scene))
-                .collect()
-        }
-        ShadowTechnique::Volumes => {
-            let qualities = Quality::BY_NAME.into_iter();
-            let technique = scene.shadows.technique;
-            let shadows = |quality: Quality| ShadowSettings {
-                technique,
-                ..quality.shadows()
-            };
-            qualities
-                .map(|(name, quality)| with(name, shadows(quality)))
-                .collect()
-        }
+    let technique = scene.chosen_technique().0;
+    if technique == ShadowTechnique::Environment {
+        return environment_ways(scene);
     }
+    if technique.has_shafts() {
+        let ways = by_sources(scene).into_iter();
+        return ways
+            .map(|(name, scene)| (format!("{name} sources"), scene))
+            .collect();
+    }
+    let qualities = Quality::BY_NAME.into_iter();
+    let technique = scene.shadows.technique;
+    let shadows = |quality: Quality| ShadowSettings {
+        technique,
+        ..quality.shadows()
+    };
+    qualities
+        .map(|(name, quality)| with(name, shadows(quality)))
+        .collect()
 }
 
 /// Shafts beside compact light by ever more sources; none without a probe.

@@ -16,6 +16,7 @@ use crate::app::recording::session_recorder::{Recorded, SessionRecorder};
 use crate::app::recording::session_writer::SessionHead;
 use crate::app::stages::progress::Progress;
 use crate::app::stopwatch::Stopwatch;
+use crate::app::talk::counted;
 use crate::scene::CameraSettings;
 
 const PATIENCE: Duration = Duration::from_millis(50);
@@ -82,7 +83,8 @@ pub fn record(request: &RecordRequest, stop: &AtomicBool) -> Result<String> {
 
 fn summary(request: &RecordRequest, recorded: Recorded, broken_pictures: u64) -> String {
     let Recorded { frames, dropped } = recorded;
-    let mut text = format!("{frames} frames in {}", request.out.display());
+    let frames = counted(frames as usize, "frame");
+    let mut text = format!("{frames} in {}", request.out.display());
     if dropped > 0 {
         text +=
             &format!("; {dropped} more were dropped, because the encoder was too slow for them");

@@ -27,7 +27,7 @@ use crate::app::stages::stats::{Stats, detector_in_words, peak_memory_mib};
 use crate::app::stages::tally::Tally;
 use crate::app::stages::tracked::{Ended, Frames, Poser, TrackedFrame, each_tracked_frame};
 use crate::app::stopwatch::Stopwatch;
-use crate::app::talk;
+use crate::app::talk::{self, counted};
 use crate::capture::live::is_live;
 use crate::geometry::camera::Intrinsics;
 use crate::scene::{Anchor, CameraSettings, Family, TrackingSettings};
@@ -220,10 +220,10 @@ impl TrackRun<'_> {
         let place = self.request.input.calibration_named().place();
         let learnt = ended.camera.map(KnownCamera::Learnt);
         remarks.extend(learnt.and_then(|camera| camera.remark(&self.plan.camera.source, place)));
-        let frames = self.tally.frames;
+        let frames = counted(self.tally.frames as usize, "frame");
         let done = match self.plan.every_marker.is_some() {
-            true => format!("{frames} frames, {} markers found", listed.len()),
-            false => format!("{frames} frames"),
+            true => format!("{frames}, {} found", counted(listed.len(), "marker")),
+            false => frames,
         };
         Report::new(
             done,

@@ -10,6 +10,7 @@ use crate::app::files::output_error::OutputError;
 use crate::app::files::picture_files::{rgb_png, write_first};
 use crate::app::recording::session_recorder::SessionRecorder;
 use crate::app::recording::session_writer::SessionHead;
+use crate::app::talk::counted;
 
 /// The recordings that are under way, and where to.
 pub struct Recorders {
@@ -130,8 +131,8 @@ impl Recorders {
             dropped => format!("; {dropped} more were dropped, the encoder was too slow"),
         };
         Ok(format!(
-            "{} frames in {}{lost}",
-            recorded.frames,
+            "{} in {}{lost}",
+            counted(recorded.frames as usize, "frame"),
             path.display()
         ))
     }

@@ -3,10 +3,15 @@
 use glam::{DVec3, Vec3};
 
 use crate::light::Light;
-use crate::scene::{EnvironmentSettings, Scene, ShadowTechnique};
+use crate::scene::{EnvironmentSettings, Marker, Scene, ShadowTechnique};
 
 /// Nobody prints larger markers, metres.
 const LARGEST_MARKER_M: f64 = 2.0;
+
+/// Nobody has a lamp farther from the table that is too dim to be seen there, metres.
+const FARTHEST_LAMP_M: f64 = 20.0;
+/// Irradiance below which a lamp does nothing that a picture could show.
+const LEAST_IRRADIANCE: f64 = 1e-3;
 
 /// What there is to warn of.
 pub fn warnings(scene: &Scene) -> Vec<String> {
@@ -26,6 +31,14 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
             ));
         }
     }
+    let world = scene.anchors.first();
+    let is_flat = world.is_some_and(|world| world.markers.iter().all(Marker::is_in_plane));
+    for (number, light) in scene.lights.iter().enumerate() {
+        if light.anchor == 0 {
+            warnings.extend(too_far(number, light.light));
+            warnings.extend(is_flat.then(|| from_behind(number, light.light)).flatten());
+        }
+    }
     let shows = scene.virtuals.iter().any(|thing| thing.visible);
     if shows && is_dark(scene) {
         warnings.push(
@@ -43,6 +56,41 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
         ));
     }
     warnings
+}
+
+/// A lamp that is too far away for its strength.
+fn too_far(number: usize, light: Light) -> Option<String> {
+    let Light::Point {
+        position_m,
+        intensity,
+        ..
+    } = light
+    else {
+        return None;
+    };
+    let distance_m = position_m.length();
+    let irradiance = intensity.max_element() / distance_m.powi(2);
+    let [x, y, z] = (position_m / 1000.0).to_array();
+    (distance_m > FARTHEST_LAMP_M && irradiance < LEAST_IRRADIANCE).then(|| {
+        format!(
+            "light {number} is {distance_m:.0} m away and too dim to be seen from there: position_m is in metres; was [{x}, {y}, \
+             {z}] meant?"
+        )
+    })
+}
+
+/// A light from behind the markers of the world, which lie on a table or hang on a wall.
+fn from_behind(number: usize, light: Light) -> Option<String> {
+    let (key, z, is_behind) = match light {
+        Light::Point { position_m, .. } => ("position_m", position_m.z, position_m.z < 0.0),
+        Light::Directional { direction, .. } => ("direction", direction.z, direction.z > 0.0),
+    };
+    is_behind.then(|| {
+        format!(
+            "light {number} comes from behind the markers and lights nothing that lies beside them: its {key} has z = {z:.2}; z \
+             points out of their printed side, and a direction is the way that light goes"
+        )
+    })
 }
 
 /// Of the light from all around what the technique does not take.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::stats::StageLog;
 use super::tracked::TrackedFrame;
+use crate::app::talk::counted;
 use crate::scene::Anchor;
 use crate::tracking::{LossReason, Status};
 
@@ -74,7 +75,10 @@ impl Tally {
             .flat_map(|(anchor, hindered)| {
                 let name = &anchor.name;
                 hindered.iter().map(move |(reason, frames)| {
-                    format!("{name} has no pose in {frames} frames: {reason}")
+                    format!(
+                        "{name} has no pose in {}: {reason}",
+                        counted(*frames as usize, "frame")
+                    )
                 })
             })
     }

@@ -433,11 +433,11 @@ impl TechniquePasses for ShaftsAlone {
         }
     }
 
-    /// Gibson et al. 2003, section 7, in as few passes over the pixels as there are: one.
     fn mirrored(&self) -> Option<&MirroredProbe> {
         self.shafts.mirrored()
     }
 
+    /// Gibson et al. 2003, section 7, in as few passes over the pixels as there are: one.
     fn draw(&mut self, passes: &mut Passes<'_>, frame: &FrameContext<'_>) {
         self.shafts.draw_maps(frame.gpu, passes);
         let mut pass = passes.begin(

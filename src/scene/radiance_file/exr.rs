@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 
 use exr::block::UncompressedBlock;
+use exr::block::lines::LineRef;
 use exr::block::reader::ChunksReader;
 use exr::meta::attribute::{Chromaticities as Attribute, SampleType};
 use exr::meta::header::Header;
@@ -60,7 +61,12 @@ pub fn read(bytes: Vec<u8>, wanted: Option<&str>) -> Result<Pixels, String> {
                 .to_owned(),
         );
     }
-    let mut pixels = vec![Vec3::ZERO; size_px[0] * size_px[1]];
+    let mut canvas = Canvas {
+        size_px,
+        corner,
+        channels,
+        pixels: vec![Vec3::ZERO; size_px[0] * size_px[1]],
+    };
     let full = Vec2(0, 0);
     let mut chunks = reader
         .filter_chunks(false, |_, _, block| {
@@ -68,46 +74,15 @@ pub fn read(bytes: Vec<u8>, wanted: Option<&str>) -> Result<Pixels, String> {
         })
         .map_err(broken)?;
     while let Some(chunk) = chunks.next() {
-        let block =
-            UncompressedBlock::decompress_chunk(chunk.map_err(broken)?, chunks.meta_data(), false)
-                .map_err(broken)?;
+        let chunk = chunk.map_err(broken)?;
+        let block = UncompressedBlock::decompress_chunk(chunk, chunks.meta_data(), false)
+            .map_err(broken)?;
         for line in block.lines(&header.channels) {
-            let index = line.location.channel;
-            let mine: Vec<usize> = (0..3).filter(|&colour| channels[colour] == index).collect();
-            let row = corner.y() + line.location.position.y() as i32;
-            let Some(row) = usize::try_from(row).ok().filter(|row| *row < size_px[1]) else {
-                continue;
-            };
-            if mine.is_empty() {
-                continue;
-            }
-            let mut put = |at: usize, value: f32| {
-                let column = corner.x() + (line.location.position.x() + at) as i32;
-                if let Some(column) = usize::try_from(column).ok().filter(|at| *at < size_px[0]) {
-                    for &colour in &mine {
-                        pixels[row * size_px[0] + column][colour] = value;
-                    }
-                }
-            };
-            match header.channels.list[index].sample_type {
-                SampleType::F16 => {
-                    for (at, value) in line.read_samples::<f16>().enumerate() {
-                        put(at, value.map_err(broken)?.to_f32());
-                    }
-                }
-                SampleType::F32 => {
-                    for (at, value) in line.read_samples::<f32>().enumerate() {
-                        put(at, value.map_err(broken)?);
-                    }
-                }
-                SampleType::U32 => {
-                    for (at, value) in line.read_samples::<u32>().enumerate() {
-                        put(at, value.map_err(broken)? as f32);
-                    }
-                }
-            }
+            let kind = header.channels.list[line.location.channel].sample_type;
+            canvas.put_line(line, kind).map_err(broken)?;
         }
     }
+    let mut pixels = canvas.pixels;
     let is_colour = channels[0] != channels[1];
     if let (Some(primaries), true) = (header.shared_attributes.chromaticities, is_colour) {
         let matrix = srgb_from(primaries)
@@ -123,6 +98,60 @@ pub fn read(bytes: Vec<u8>, wanted: Option<&str>) -> Result<Pixels, String> {
         pixels,
         notes: missing(held).into_iter().collect(),
     })
+}
+
+/// The pixels of a display window, while those of the data window are read into it.
+struct Canvas {
+    size_px: [usize; 2],
+    /// Where the data window begins in the display window.
+    corner: Vec2<i32>,
+    /// As in [`Layer`].
+    channels: [usize; 3],
+    pixels: Vec<Vec3>,
+}
+
+impl Canvas {
+    /// Puts what a line has of one channel where it belongs; what lies beside the display window, nowhere.
+    fn put_line(&mut self, line: LineRef<'_>, kind: SampleType) -> exr::error::UnitResult {
+        let channel = line.location.channel;
+        let colours: Vec<usize> = (0..3)
+            .filter(|&colour| self.channels[colour] == channel)
+            .collect();
+        let row = self.corner.y() + line.location.position.y() as i32;
+        let row = usize::try_from(row)
+            .ok()
+            .filter(|row| *row < self.size_px[1]);
+        let (Some(row), false) = (row, colours.is_empty()) else {
+            return Ok(());
+        };
+        let first = self.corner.x() + line.location.position.x() as i32;
+        let mut put = |at: usize, value: f32| {
+            let column = usize::try_from(first + at as i32).ok();
+            if let Some(column) = column.filter(|at| *at < self.size_px[0]) {
+                for &colour in &colours {
+                    self.pixels[row * self.size_px[0] + column][colour] = value;
+                }
+            }
+        };
+        match kind {
+            SampleType::F16 => {
+                for (at, value) in line.read_samples::<f16>().enumerate() {
+                    put(at, value?.to_f32());
+                }
+            }
+            SampleType::F32 => {
+                for (at, value) in line.read_samples::<f32>().enumerate() {
+                    put(at, value?);
+                }
+            }
+            SampleType::U32 => {
+                for (at, value) in line.read_samples::<u32>().enumerate() {
+                    put(at, value? as f32);
+                }
+            }
+        }
+        Ok(())
+    }
 }
 
 /// How many of a picture's `count` columns or rows so many from a place on cover.

@@ -107,3 +107,41 @@ fn a_light_inside_a_closed_caster_is_warned_of() {
         assert_eq!(summary(&scene).contains(&line), expected);
     }
 }
+
+#[test]
+fn a_lamp_in_millimetres_and_light_from_behind_are_doubted() {
+    let project = project();
+    let card = "[[marker]]\nname = \"card\"\nid = 1\nsize_m = 0.04\n";
+    let point = |place: &str| format!("kind = \"point\"\nintensity = 0.4\nposition_m = {place}\n");
+    let sun = |way: &str| format!("kind = \"directional\"\nirradiance = 1\ndirection = {way}\n");
+    let behind = "comes from behind the markers";
+    for (light, says) in [
+        (point("[300, 200, 500]"), Some("was [0.3, 0.2, 0.5] meant?")),
+        (point("[0.3, 0.2, 0.5]"), None),
+        // A floodlight.
+        (point("[30, 20, 50]").replace("0.4", "4e4"), None),
+        (point("[0.3, 0.2, -0.5]"), Some(behind)),
+        (sun("[0.3, 0.2, 0.5]"), Some(behind)),
+        (sun("[0.3, 0.2, -0.5]"), None),
+        // Which side of a card the light is on, no file says.
+        (format!("{}on = \"card\"\n", sun("[0.3, 0.2, 0.5]")), None),
+    ] {
+        let scene = load_in(&project, &format!("{HEAD}{card}[[light]]\n{light}")).unwrap();
+        let found = warnings(&scene);
+        assert_eq!(
+            found.len(),
+            usize::from(says.is_some()),
+            "{light}: {found:?}"
+        );
+        assert!(
+            found.iter().all(|found| found.contains(says.unwrap())),
+            "{found:?}"
+        );
+    }
+    // Of a cube there is no behind.
+    let cube = "[camera]\nsource = \"webcam:0\"\n[[board]]\nname = \"cube\"\nmarkers = [\
+                { id = 0, size_m = 0.045, center_m = [0, 0, 0.03] }, \
+                { id = 1, size_m = 0.045, center_m = [0.03, 0, 0], rotation_deg = [0, 90, 0] }]\n";
+    let scene = load_in(&project, &format!("{cube}[[light]]\n{}", sun("[0, 0, 1]"))).unwrap();
+    assert_eq!(warnings(&scene), Vec::<String>::new());
+}

@@ -92,19 +92,7 @@ pub fn replay(request: &ReplayRequest, stop: &AtomicBool) -> Result<Report> {
         talk::say(remark);
     }
     let intrinsics = camera.intrinsics();
-    let mut given_frames = None;
-    let poser = match &request.poses_from {
-        Some(path) => {
-            let given = GivenPoses::read(path, &scene.anchors)?;
-            given_frames = Some(given.frames_in_words());
-            Poser::Given(given)
-        }
-        None => Poser::tracker(
-            Tracker::new(&scene.tracking, &scene.anchors, intrinsics)?,
-            MirrorWatch::new(&scene.tracking, scene.families()),
-            Sightings::of_anchors(&scene.anchors),
-        ),
-    };
+    let (poser, given_frames) = poser(request, &scene, intrinsics)?;
     let drawing = (request.out.is_some() || request.sheet.is_some())
         .then(|| ReplayDrawing::open(request, &scene, &source, intrinsics, stop))
         .transpose()?;
@@ -135,13 +123,7 @@ pub fn replay(request: &ReplayRequest, stop: &AtomicBool) -> Result<Report> {
         ),
         Err(error) => (Ended::default(), Some(error)),
     };
-    if let Some(path) = &request.poses {
-        write_text(path, run.poses.as_str())?;
-    }
-    if let Some(path) = &request.stats {
-        let stats = run.stats(size_px, ended.dropped, adapter, watch.elapsed_ms() * 1e-3);
-        write_text(path, &stats.text()?)?;
-    }
+    run.write_tables(size_px, ended.dropped, adapter, watch.elapsed_ms() * 1e-3)?;
     if let Some(failure) = failure {
         return Err(failure);
     }
@@ -160,6 +142,25 @@ pub fn replay(request: &ReplayRequest, stop: &AtomicBool) -> Result<Report> {
         None if !run.needs_poses() => report.missing(None),
         None => report,
     })
+}
+
+/// What tells where the anchors are, and in words which frames it was given poses for.
+fn poser(
+    request: &ReplayRequest,
+    scene: &Scene,
+    intrinsics: Intrinsics,
+) -> Result<(Poser, Option<String>)> {
+    let Some(path) = &request.poses_from else {
+        let tracked = Poser::tracker(
+            Tracker::new(&scene.tracking, &scene.anchors, intrinsics)?,
+            MirrorWatch::new(&scene.tracking, scene.families()),
+            Sightings::of_anchors(&scene.anchors),
+        );
+        return Ok((tracked, None));
+    };
+    let given = GivenPoses::read(path, &scene.anchors)?;
+    let frames = given.frames_in_words();
+    Ok((Poser::Given(given), Some(frames)))
 }
 
 impl ReplayRequest {
@@ -458,6 +459,24 @@ impl ReplayRun<'_> {
                 talk::counted(self.tally.frames as usize, "frame")
             )
         })
+    }
+
+    /// Writes the tables that were asked for, of the frames that were done.
+    fn write_tables(
+        &self,
+        size_px: [u32; 2],
+        drops: u32,
+        adapter: Option<String>,
+        total_secs: f64,
+    ) -> Result<()> {
+        if let Some(path) = &self.request.poses {
+            write_text(path, self.poses.as_str())?;
+        }
+        if let Some(path) = &self.request.stats {
+            let stats = self.stats(size_px, drops, adapter, total_secs);
+            write_text(path, &stats.text()?)?;
+        }
+        Ok(())
     }
 
     fn stats(
