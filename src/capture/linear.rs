@@ -6,18 +6,11 @@ use std::sync::LazyLock;
 use glam::{DVec2, DVec3};
 
 use super::Frame;
+use crate::light::srgb::linear_from_srgb;
 
-/// Linear light of each level (IEC 61966-2-1).
-static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| {
-    std::array::from_fn(|level| {
-        let encoded = level as f32 / 255.0;
-        if encoded <= 0.04045 {
-            encoded / 12.92
-        } else {
-            ((encoded + 0.055) / 1.055).powf(2.4)
-        }
-    })
-});
+/// Linear light of each level.
+static LINEAR: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|level| linear_from_srgb(level as f64 / 255.0) as f32));
 
 /// Linear light of an sRGB level, 0 to 1.
 pub fn linear(level: u8) -> f32 {

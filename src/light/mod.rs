@@ -21,6 +21,7 @@ pub mod radiance_picture;
 pub mod regions;
 pub mod response;
 mod shape;
+pub mod srgb;
 pub mod texture;
 
 use std::f64::consts::PI;

@@ -5,6 +5,7 @@ use std::ops::{Add, Mul};
 use glam::{DVec2, DVec4, Vec2};
 
 use super::material::{Encoding, Filter, Map, Wrap};
+use super::srgb::linear_from_srgb;
 
 /// A decoded picture: RGBA of eight bits, alpha not multiplied in, rows from the top.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -82,22 +83,6 @@ fn wrapped(place: f64, count: u32, wrap: Wrap) -> u32 {
         }
     };
     (inside as u32).min(count - 1)
-}
-
-/// Linear light of a display value in [0, 1] (IEC 61966-2-1).
-pub fn linear_from_srgb(encoded: f64) -> f64 {
-    match encoded <= 0.040_45 {
-        true => encoded / 12.92,
-        false => ((encoded + 0.055) / 1.055).powf(2.4),
-    }
-}
-
-/// The display value of linear light (IEC 61966-2-1); what is darker than black or brighter than white is these.
-pub fn srgb_from_linear(linear: f64) -> f64 {
-    match linear <= 0.003_130_8 {
-        true => 12.92 * linear.max(0.0),
-        false => (1.055 * linear.powf(1.0 / 2.4) - 0.055).min(1.0),
-    }
 }
 
 #[cfg(test)]

@@ -9,7 +9,8 @@ use glam::DVec4;
 use super::gpu::Gpu;
 use super::pipelines::{GroupLayout, filtered_array, sampler, storage};
 use crate::light::material::{Coverage, Encoding, Filter, Map, Material, Shading, Wrap};
-use crate::light::texture::{Texture, linear_from_srgb};
+use crate::light::srgb::{linear_from_srgb, srgb_from_linear};
+use crate::light::texture::Texture;
 use crate::scene::Object;
 
 /// Group 3 of every shader that includes materials.wgsl.
@@ -345,8 +346,7 @@ fn write(
     let byte = |value: f32| (value * 255.0 + 0.5) as u8;
     let encoded = |value: f32| match encoding {
         Encoding::Linear => byte(value),
-        Encoding::Srgb if value <= 0.003_130_8 => byte(12.92 * value),
-        Encoding::Srgb => byte(1.055 * value.powf(1.0 / 2.4) - 0.055),
+        Encoding::Srgb => byte(srgb_from_linear(f64::from(value)) as f32),
     };
     let bytes: Vec<u8> = level
         .texels

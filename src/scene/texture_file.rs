@@ -9,7 +9,8 @@ use image::{ColorType, DynamicImage, ImageBuffer, ImageFormat, ImageReader, Rgba
 use super::in_its_place::in_place_of;
 use super::plain_file::{self, MOST_PICTURE};
 use super::tiff_header;
-use crate::light::texture::{Texture, srgb_from_linear};
+use crate::light::srgb::srgb_from_linear;
+use crate::light::texture::Texture;
 
 /// What is read.
 const ALLOWED: &str = "PNG, JPEG, WebP, TGA, BMP, TIFF, GIF, DDS (DXT1, DXT3, DXT5), PNM, HDR";

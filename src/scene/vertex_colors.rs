@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::light::texture::linear_from_srgb;
+use crate::light::srgb::linear_from_srgb;
 
 /// What is said of colours that turn out to be of bytes.
 pub const ABOVE_ONE: &str = "vertex colours above 1 are taken for 0 to 255";

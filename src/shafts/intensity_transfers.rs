@@ -3,6 +3,8 @@
 
 use glam::Vec3;
 
+use crate::light::srgb::srgb_from_linear;
+
 /// The sets of sources that are taken to be hidden together (section 7.1: two of half are best where a third to a half of
 /// them is).
 pub const SETS: usize = 2;
@@ -36,11 +38,8 @@ pub fn set_of(place: usize) -> usize {
 
 /// How a camera encodes linear light as sRGB, 0 to 1.
 pub fn encoded(linear: Vec3) -> Vec3 {
-    let channel = |linear: f32| match linear.clamp(0.0, 1.0) {
-        dark if dark <= 0.003_130_8 => 12.92 * dark,
-        bright => 1.055 * bright.powf(1.0 / 2.4) - 0.055,
-    };
-    Vec3::from_array(linear.to_array().map(channel))
+    let channels = linear.to_array();
+    Vec3::from_array(channels.map(|linear| srgb_from_linear(f64::from(linear)) as f32))
 }
 
 #[cfg(test)]

@@ -95,7 +95,10 @@ fn hold_soft(name: &str, change_real: f64, residual_virtual: f64) {
     let folder = project_file("recordings").join(name);
     for e in &errors_of(&folder, &scene_of(name), name) {
         assert!(e.role_pct <= 0.5, "{name}: roles: {e:?}");
-        assert!(e.change_real <= change_real, "{name}: shadow: {e:?}");
+        assert!(
+            e.change_real <= change_real && e.factor_by_light <= 0.02,
+            "{name}: shadow: {e:?}"
+        );
         assert!(
             e.residual_virtual <= residual_virtual,
             "{name}: shading: {e:?}"

@@ -11,7 +11,7 @@ use gnomon::app::truth::{Truth, compare, draw, key_frames};
 use gnomon::capture::{Frame, load_calibration};
 use gnomon::geometry::camera::Intrinsics;
 use gnomon::light::probe::Probe;
-use gnomon::light::texture::srgb_from_linear;
+use gnomon::light::srgb::srgb_from_linear;
 use gnomon::render::{Renderer, Shown, VIRTUAL};
 use gnomon::scene::{Difference, Scene, Technique};
 use image::{Rgb, RgbImage};

@@ -7,7 +7,7 @@ use gnomon::capture::Frame;
 use gnomon::geometry::camera::{Distortion, Intrinsics};
 use gnomon::geometry::cuboid::cuboid;
 use gnomon::light::layer_albedo;
-use gnomon::light::texture::srgb_from_linear;
+use gnomon::light::srgb::srgb_from_linear;
 use gnomon::light::{Light, Material};
 use gnomon::render::{REAL, Renderer, Shown, VIRTUAL};
 use gnomon::scene::{Object, Scene};

@@ -195,17 +195,6 @@ fn refuse(path: &Path, message: String) -> OutputError {
     }
 }
 
-/// The sRGB level of a part of display white, or of white paper's light.
-pub(crate) fn srgb_level(linear: f32) -> u8 {
-    let linear = linear.clamp(0.0, 1.0);
-    let encoded = if linear <= 0.003_130_8 {
-        12.92 * linear
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
-    };
-    (255.0 * encoded).round() as u8
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

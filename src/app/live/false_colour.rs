@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::app::files::picture_files::srgb_level;
+use crate::light::srgb::srgb_level;
 use crate::render::Layers;
 
 /// Role of a phantom's surface in [`Layers::role`].

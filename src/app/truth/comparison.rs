@@ -8,6 +8,7 @@ use glam::DAffine3;
 use super::picture::LinearPicture;
 use super::poses::TruePoses;
 use crate::capture::{Frame, FrameSource};
+use crate::light::srgb::linear_from_srgb;
 use crate::render::{Layers, REAL, Renderer, Shown, VIRTUAL, VIRTUAL_HIDES};
 use crate::scene::Anchor;
 
@@ -38,6 +39,9 @@ pub struct Errors {
     pub residual_virtual: f64,
     /// Root mean square error of the gain where the truth darkens.
     pub factor: f64,
+    /// The same of a gain that is box-filtered as the truth is, which is a quotient of filtered pictures: by the light that it
+    /// takes from. (Filtered alone, even the true gain is off where a shadow's edge lies beside an edge of a print.)
+    pub factor_by_light: f64,
     /// Root mean square error of what the virtual things change along the outlines of things, unfiltered, in levels of
     /// 255: jagged outlines show here.
     pub outline_levels: f64,
@@ -218,6 +222,18 @@ pub fn compare(frame: u32, truth: &Truth, drawn: &Drawn) -> Result<Errors> {
         .map(|factor| factor.iter().sum::<f64>() / 3.0 < DARKENED)
         .collect();
     let factor_error = gain_picture.blurred().minus(&truth.factor);
+    let light = truth.without.map(|level| linear_from_srgb(level / 255.0));
+    let left = gain_picture.with_each(&light, |gain, light| gain * light);
+    let by_light = left
+        .blurred()
+        .with_each(&light.blurred(), |left, light| left / light.max(1e-4));
+    let factor_error_by_light = by_light.minus(&truth.factor);
+    let in_shadow = both(&inner_real, &darkened);
+
+    let of_shadow = |error: &LinearPicture| {
+        let rms = error.rms(&in_shadow);
+        rms.with_context(|| format!("frame {frame}: the truth darkens nothing"))
+    };
 
     // A sample of a virtual thing may touch a pixel whose centre it misses.
     let beside_virtual = |i: usize| around(i, 1, width, count).any(|near| role[near] == VIRTUAL);
@@ -239,9 +255,8 @@ pub fn compare(frame: u32, truth: &Truth, drawn: &Drawn) -> Result<Errors> {
         change_real: ratio(&change_error, &on_real)?,
         residual_real: ratio(&error, &on_real)?,
         residual_virtual: ratio(&error, &on_virtual)?,
-        factor: factor_error
-            .rms(&both(&inner_real, &darkened))
-            .with_context(|| format!("frame {frame}: the truth darkens nothing"))?,
+        factor: of_shadow(&factor_error)?,
+        factor_by_light: of_shadow(&factor_error_by_light)?,
         outline_levels: outline_levels
             .with_context(|| format!("frame {frame}: the truth shows no virtual thing"))?,
         untouched_pct: 100.0 * untouched.len() as f64 / count as f64,

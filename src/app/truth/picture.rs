@@ -58,7 +58,16 @@ impl LinearPicture {
         self.with_each(other, |a, b| a + b)
     }
 
-    fn with_each(&self, other: &Self, of: impl Fn(f64, f64) -> f64) -> Self {
+    /// Each number of it turned into another.
+    pub fn map(&self, of: impl Fn(f64) -> f64) -> Self {
+        Self {
+            width: self.width,
+            pixels: self.pixels.iter().map(|pixel| pixel.map(&of)).collect(),
+        }
+    }
+
+    /// What comes of each number and that of another picture of one size.
+    pub fn with_each(&self, other: &Self, of: impl Fn(f64, f64) -> f64) -> Self {
         let pixels = self.pixels.iter().zip(&other.pixels);
         Self {
             width: self.width,

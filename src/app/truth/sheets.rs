@@ -7,6 +7,7 @@ use glam::{DAffine3, DQuat, DVec2, DVec3};
 
 use crate::capture::Frame;
 use crate::geometry::camera::Intrinsics;
+use crate::light::srgb::srgb_from_linear;
 use crate::scene::{Codes, Face, Family, Marker};
 
 /// Linear light of paper, of ink, and of what lies around.
@@ -302,11 +303,7 @@ impl Light {
     /// As a camera encodes it: 8 bits of sRGB.
     pub fn frame(&self, time_secs: f64) -> Frame {
         let rgba = self.values.iter().flat_map(|&linear| {
-            let encoded = match linear <= 0.003_130_8 {
-                true => 12.92 * linear,
-                false => 1.055 * linear.powf(1.0 / 2.4) - 0.055,
-            };
-            let grey = (255.0 * encoded.clamp(0.0, 1.0)).round() as u8;
+            let grey = (255.0 * srgb_from_linear(linear)).round() as u8;
             [grey, grey, grey, 255]
         });
         Frame {

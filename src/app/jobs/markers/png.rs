@@ -6,7 +6,7 @@ use opencv::core::{Mat, Point, Scalar};
 use opencv::imgproc;
 
 use super::page::{Page, Rect, Text};
-use crate::app::files::picture_files::srgb_level;
+use crate::light::srgb::srgb_level;
 
 const MM_PER_INCH: f64 = 25.4;
 const FONT: i32 = imgproc::FONT_HERSHEY_SIMPLEX;

@@ -4,9 +4,9 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
 
-use crate::app::files::picture_files::srgb_level;
 use crate::light::brightest::BrightLight;
 use crate::light::probe::Probe;
+use crate::light::srgb::srgb_level;
 
 /// Display value of the probe's log-mean luminance, linear.
 const KEY: f32 = 0.18;
