@@ -89,7 +89,7 @@ fn beyond(harmonics: &[DVec3; TRANSFERS], probe: &Probe, exposure: f64) -> Probe
 }
 
 /// A probe's radiance times `exposure`, in cells about as large as the part of the sky that a ray stands for.
-pub fn coarse_radiance(probe: &Probe, exposure: f64) -> Probe {
+fn coarse_radiance(probe: &Probe, exposure: f64) -> Probe {
     probe.coarser(COARSE_PX).exposed(exposure as f32)
 }
 

@@ -28,6 +28,11 @@ const DIRECTIONS_OF_AN_END: usize = 64;
 const RAYS_OF_AN_END: usize = 2;
 /// ... and the next ray those that are so many on: no divisor of the others.
 const DIRECTIONS_APART: usize = 37;
+/// As finely as so many rays over an end's hemisphere would, those of neighbouring ends together tell what lies around it.
+const SPOT_OF_AN_END: usize = 16;
+/// Steps from one ray to the next through the power of all sources that its end asks for, and that the surface asks for which
+/// that end sees: parts that no small number of steps makes whole (Roberts 2018: the plastic number's).
+const STEPS_THROUGH_POWER: [f64; 2] = [0.754_877_666, 0.569_840_291];
 /// Points inside of a solid have the light of those outside for so many edges.
 const EDGES_INWARDS: usize = 2;
 /// Changes below the first of these parts of all light at a point are none, so that what nothing touches stays as it is; from
@@ -183,7 +188,9 @@ impl PlacedScene<'_> {
                 None => behind,
             };
         }
+        // (What few rays find hidden of the sky may be more than there is.)
         let weight = PI / rays.max(1) as f32;
+        let [without, with] = [without, with].map(|light| light.max(Vec3::ZERO));
         let [of_sky, left_of_sky] = self.of_sources(start, normal, how.sky);
         let is_inside = |counts: fn(&PlacedThing<'_>) -> bool| {
             let mut things = self.things.iter().filter(|placed| counts(placed));
@@ -193,7 +200,7 @@ impl PlacedScene<'_> {
         Sample {
             without: without * weight + of_sky,
             with: with * weight + left_of_sky,
-            direct: self.direct(start, normal, how, 0, |_| Vec3::ONE)[0],
+            direct: self.direct(start, normal, how, (0, 0.0), |_| Vec3::ONE)[0],
             is_inside_real,
             is_inside: is_inside_real || is_inside(is_virtual_caster),
         }
@@ -231,7 +238,8 @@ impl PlacedScene<'_> {
     /// Radiance that a surface reflects of the lights and of what is around it: without virtual things, and with them.
     fn reflected_by(&self, seen: &SeenSurface, how: &Gathering<'_>, number: usize) -> [Vec3; 2] {
         let start = seen.place + seen.normal * OFFSET_M;
-        let direct = self.direct_reflected(start, seen, how, number);
+        let rays = how.sky.rays(how.rays);
+        let direct = self.direct_reflected(start, seen, how, (number, rays));
         let around = self.around(start, seen.normal, how, number);
         [0, 1].map(|with| (direct[with] + seen.albedo * around[with]) * FRAC_1_PI)
     }
@@ -248,74 +256,111 @@ impl PlacedScene<'_> {
                 return [Vec3::ZERO; 2];
             }
             let start = seen.place + seen.normal * OFFSET_M;
-            let direct = self.direct_reflected(start, seen, how, number);
-            let of_sky = self.left_of_sky(start, seen.normal, how, number);
+            let direct = self.direct_reflected(start, seen, how, (number, SPOT_OF_AN_END));
+            let of_sky = self.left_of_sky(start, seen.normal, how.sky, number);
             [0, 1].map(|with| direct[with] + seen.albedo * of_sky[with])
         };
         let axes = normal.any_orthonormal_pair();
         // Neighbouring rays look elsewhere.
         let first = number * DIRECTIONS_APART;
         // What rays meet is there in place of the sky behind it: few rays tell that better than the sky where they meet nothing.
+        let behind = PI * how.sky.radiance;
         let mut changes = [Vec3::ZERO; 2];
         for ray in 0..RAYS_OF_AN_END {
             let turn = first + ray * DIRECTIONS_OF_AN_END / RAYS_OF_AN_END;
             let which = [turn % DIRECTIONS_OF_AN_END, DIRECTIONS_OF_AN_END];
             let direction = over_hemisphere(normal, axes, which);
-            let behind = PI * how.sky.radiance_from(direction);
             let change = |seen: &SeenSurface| of_surface(seen).map(|given| given - behind);
             let [real, before] = self.met(start, direction);
             let [without, of_real] = real.as_ref().map_or([Vec3::ZERO; 2], change);
             changes[0] += without;
             changes[1] += before.as_ref().map_or(of_real, |seen| change(seen)[1]);
         }
-        changes.map(|change| (of_sky + change / RAYS_OF_AN_END as f32).max(Vec3::ZERO))
+        let part = (number as f64 * STEPS_THROUGH_POWER[0]).fract();
+        let hidden = self.hidden_of_sources(start, normal, how.sky, (part, RAYS_OF_AN_END));
+        [0, 1].map(|with| of_sky + changes[with] / RAYS_OF_AN_END as f32 - hidden[with])
+    }
+
+    /// Irradiance of a place that is hidden of the sky's single directions, as `count` of them tell that are evenly spread over their
+    /// power from a part of it on: without virtual things, and with them. (By power, for rays in all directions alike miss a sun or
+    /// meet nothing else.)
+    fn hidden_of_sources(
+        &self,
+        start: Vec3,
+        normal: Vec3,
+        sky: &Sky,
+        (part, count): (f64, usize),
+    ) -> [Vec3; 2] {
+        let mut hidden = [Vec3::ZERO; 2];
+        for turn in 0..count {
+            let Some((source, stands_for)) = sky.source_at((part + turn as f64) / count as f64)
+            else {
+                continue;
+            };
+            let toward = source.toward.as_vec3();
+            let cosine = toward.dot(normal);
+            let is_hidden = |counts: fn(&PlacedThing<'_>) -> bool| {
+                self.is_behind(counts, start, toward, f32::INFINITY)
+            };
+            if cosine <= 0.0 {
+                continue;
+            }
+            let given = source.irradiance.as_vec3() * (cosine * stands_for / count as f32);
+            if is_hidden(is_real) {
+                hidden[0] += given;
+                hidden[1] += given;
+            } else if is_hidden(is_virtual_caster) {
+                hidden[1] += given;
+            }
+        }
+        hidden
     }
 
     /// Irradiance of a place of the sky and, where something hides it, of the sky's light that this reflects, as a single ray tells
     /// it: without virtual things, and with them.
-    fn left_of_sky(
-        &self,
-        start: Vec3,
-        normal: Vec3,
-        how: &Gathering<'_>,
-        turn: usize,
-    ) -> [Vec3; 2] {
+    fn left_of_sky(&self, start: Vec3, normal: Vec3, sky: &Sky, turn: usize) -> [Vec3; 2] {
         let which = [
             turn * DIRECTIONS_APART % DIRECTIONS_OF_AN_END,
             DIRECTIONS_OF_AN_END,
         ];
         let direction = over_hemisphere(normal, normal.any_orthonormal_pair(), which);
-        let behind = PI * how.sky.radiance_from(direction);
+        let behind = PI * sky.radiance;
         let [real, before] = self.met(start, direction);
-        let of_sky = how.sky.irradiance(normal);
-        [real, before.or(real)].map(|met| match met {
-            Some(seen) => of_sky + seen.albedo * how.sky.irradiance(seen.normal) - behind,
-            None => of_sky,
+        let part = (turn as f64 * STEPS_THROUGH_POWER[1]).fract();
+        let [without, with] = self.hidden_of_sources(start, normal, sky, (part, 1));
+        let of_sky = sky.irradiance(normal);
+        [(real, without), (before.or(real), with)].map(|(met, hidden)| match met {
+            Some(seen) => of_sky - hidden + seen.albedo * sky.irradiance(seen.normal) - behind,
+            None => of_sky - hidden,
         })
     }
 
-    /// What a surface reflects of the lights themselves along the ray that met it, π times its radiance.
+    /// What a surface reflects of the lights themselves along the ray that met it, one of so many over a hemisphere, π times its
+    /// radiance.
     fn direct_reflected(
         &self,
         start: Vec3,
         seen: &SeenSurface,
         how: &Gathering<'_>,
-        turn: usize,
+        (turn, rays): (usize, usize),
     ) -> [Vec3; 2] {
         let surface = self.surface(seen);
-        self.direct(start, seen.normal, how, turn, |toward| {
+        let reach_m = seen.distance / (rays.max(1) as f32).sqrt();
+        self.direct(start, seen.normal, how, (turn, reach_m), |toward| {
             surface.reflected(seen.normal, toward, seen.toward_viewer)
         })
     }
 
     /// Irradiance of a place of the lights themselves, without virtual things and with them, as that of their places whose turn
-    /// it is sees it; times what `part` is for a unit direction to a light.
+    /// it is sees it; times what `part` is for a unit direction to a light. The place stands for all within `reach_m` of it: a lamp
+    /// that is nearer lights them less than it does the place, on the average as much as from the edge, for few of many rays meet
+    /// the spot below a lamp and none of them tells how small it is.
     fn direct(
         &self,
         start: Vec3,
         normal: Vec3,
         how: &Gathering<'_>,
-        turn: usize,
+        (turn, reach_m): (usize, f32),
         part: impl Fn(Vec3) -> Vec3,
     ) -> [Vec3; 2] {
         let mut arriving = [Vec3::ZERO; 2];
@@ -330,7 +375,12 @@ impl PlacedScene<'_> {
             if given == Vec3::ZERO || is_hidden(true) {
                 continue;
             }
-            let given = given * part(way.normalize_or_zero());
+            // (The mean over a disc below a lamp: its flux from there is 2 π of its intensity where the disc is wide.)
+            let mean = match reach.is_finite() {
+                true => (2.0 * way.length_squared() / reach_m.powi(2)).min(1.0),
+                false => 1.0,
+            };
+            let given = given * part(way.normalize_or_zero()) * mean;
             arriving[0] += given;
             if !is_hidden(false) {
                 arriving[1] += given;

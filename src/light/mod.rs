@@ -16,7 +16,6 @@ pub mod prefiltered;
 pub mod probe;
 pub mod probe_maps;
 pub mod probe_power;
-pub mod radiance9;
 pub mod radiance_picture;
 pub mod regions;
 pub mod response;

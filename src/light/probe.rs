@@ -35,14 +35,6 @@ impl Probe {
         }
     }
 
-    /// The same radiance from everywhere.
-    pub fn of_one_radiance(radiance: Vec3) -> Self {
-        Self {
-            size_px: [1, 1],
-            radiance: vec![radiance],
-        }
-    }
-
     /// Columns and rows.
     pub fn size_px(&self) -> [usize; 2] {
         self.size_px
@@ -91,6 +83,17 @@ impl Probe {
         match is_finer {
             true => Cow::Owned(self.coarser(most_px)),
             false => Cow::Borrowed(self),
+        }
+    }
+
+    /// It where it has as many columns and rows as this or none, or else the same light in pixels that are parts of its own.
+    pub fn at_least(&self, least_px: [usize; 2]) -> Cow<'_, Self> {
+        let times = (0..2).map(|axis| least_px[axis].div_ceil(self.size_px[axis].max(1)));
+        match times.max().unwrap_or(1) {
+            times if times > 1 && !self.radiance.is_empty() => {
+                Cow::Owned(self.resampled(self.size_px.map(|side| side * times)))
+            }
+            _ => Cow::Borrowed(self),
         }
     }
 

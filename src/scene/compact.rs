@@ -13,6 +13,8 @@ use crate::light::compact::{TakenLight, take, width_rad};
 use crate::light::probe::Probe;
 use crate::light::{Light, REC_709, Shape, irradiance};
 
+/// Probes have pixels of less than 3 degrees at least: what is asked of one direction in each would else be asked of too few.
+const LEAST_PX: [usize; 2] = [128, 64];
 /// Lights of a probe that are looked at, the strongest first.
 const MOST_FOUND: usize = 8;
 /// Things fill so many pixels of the picture, for what the camera could see of their shadows.
@@ -72,7 +74,7 @@ impl Scene {
     pub fn split_light<'a>(&self, scene: &'a ProbeScene) -> SplitLight<'a> {
         let mut split = SplitLight {
             compact: Vec::new(),
-            rest: Cow::Borrowed(&scene.probe),
+            rest: scene.probe.at_least(LEAST_PX),
             found: Vec::new(),
         };
         if !self.chosen_technique().0.has_compact_and_broad() {
@@ -80,12 +82,13 @@ impl Scene {
         }
         split.compact.extend(&self.lights);
         let mut walls = None;
-        for region in bright_regions(&scene.probe, MOST_FOUND) {
+        for region in bright_regions(&split.rest, MOST_FOUND) {
             let width_rad = width_rad(&region);
             let penumbra_px = self.penumbra_px(width_rad);
             let same = self.same_light(scene, &region);
             let kind = match same {
                 Some(same) => same,
+                None if self.is_below_table(scene, region.light.direction) => ProbeLightKind::Broad,
                 None if penumbra_px < self.shadows.compact_penumbra_px => ProbeLightKind::Compact,
                 None => ProbeLightKind::Broad,
             };
@@ -118,12 +121,24 @@ impl Scene {
         }
     }
 
+    /// Whether light from a direction of a probe comes from below the table, which stands in its way but casts no volumes. (Where
+    /// a probe that turns with a marker has its below is not known.)
+    fn is_below_table(&self, scene: &ProbeScene, toward: DVec3) -> bool {
+        let mut phantoms = self.phantoms.iter();
+        let has_table =
+            phantoms.any(|thing| thing.anchor == 0 && thing.visible && thing.is_table());
+        scene.anchor == 0 && has_table && toward.z < 0.0
+    }
+
     /// Width of the edges of shadows from a light of some width (radians), as a camera sees them that is near enough for all
-    /// things to fill half of a small picture.
+    /// things to fill half of a small picture: at most as far below what casts them as the lowest thing that is seen. (A thing that
+    /// moves counts as if it stood in the world: its marker lies on the table.)
     fn penumbra_px(&self, width_rad: f64) -> f64 {
         let things = self.phantoms.iter().chain(&self.virtuals);
-        let bounds = things
-            .filter(|thing| thing.casts && thing.visible && thing.anchor == 0)
+        let seen = things.filter(|thing| thing.visible);
+        let bounds = seen
+            .clone()
+            .filter(|thing| thing.casts)
             .filter_map(|thing| thing.bounds_in_anchor());
         let Some(around) = bounds.reduce(|a, b| Bounds {
             low: a.low.min(b.low),
@@ -131,7 +146,9 @@ impl Scene {
         }) else {
             return 0.0;
         };
-        let size = around.high - around.low;
+        let all = seen.filter_map(|thing| thing.bounds_in_anchor());
+        let lowest_m = all.map(|bounds| bounds.low.z).fold(around.low.z, f64::min);
+        let size = (around.high - around.low).with_z(around.high.z - lowest_m);
         2.0 * (width_rad / 2.0).min(1.5).tan() * size.z / size.length().max(1e-9) * SEEN_PX
     }
 

@@ -287,6 +287,11 @@ pub struct Object {
 }
 
 impl Object {
+    /// Whether it is the top of the table, which is there but casts no shadow.
+    pub fn is_table(&self) -> bool {
+        self.name == objects::TABLE_SECTION.name && !self.casts
+    }
+
     /// What it stands or moves on: index into [`Scene::anchors`].
     pub fn stands_on(&self) -> usize {
         self.motion

@@ -24,6 +24,8 @@ use crate::geometry::winding::winding_number;
 /// Without a room the light comes from a box that reaches so far to each side of the probe: on a table it comes from the same
 /// direction everywhere, to a tenth of a degree.
 const FAR_M: f32 = 300.0;
+/// What stands nearer to such a probe was not there when it was taken, or is nothing of what it saw.
+pub const BEYOND_M: f32 = FAR_M / 2.0;
 
 keys! {
     /// Keys of `[probe]`.

@@ -2,6 +2,7 @@
 
 use glam::{DVec3, DVec4, UVec2, Vec3};
 
+use super::probe::BEYOND_M;
 use super::{Object, ProbeScene, Scene, SplitLight};
 use crate::geometry::bounds::Bounds;
 use crate::geometry::mesh::{CornerLook, Mesh};
@@ -224,6 +225,7 @@ impl Scene {
                 probe: rest,
                 position_m: probe.position_m,
                 exposure: probe.exposure as f32,
+                beyond_m: if probe.is_far { BEYOND_M } else { 0.0 },
             },
             // (The room is worked out once: a light that moves along with an anchor is thrown back by nothing.)
             compact: compact

@@ -52,9 +52,9 @@ pub fn carried_light(
     let [_, height] = probe.size_px();
     let most = MOST_CARRIED * whole_power(probe);
     let block = block_px(probe);
-    let origin = placed.position_m.as_vec3();
     let met = |parcel: Parcel| {
-        let hit = caster.first_hit(origin, parcel.direction, f32::INFINITY)?;
+        let start = placed.start(parcel.direction);
+        let hit = caster.first_hit(start, parcel.direction, f32::INFINITY)?;
         let patch = &patches.patches[hit.triangle];
         (patches.normal(patch).dot(parcel.direction) < 0.0).then_some((hit.triangle, parcel))
     };

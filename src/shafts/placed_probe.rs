@@ -16,6 +16,8 @@ pub struct PlacedProbe<'a> {
     pub position_m: DVec3,
     /// Display white over the probe's unit of radiance.
     pub exposure: f32,
+    /// What it saw is farther away than this, metres: what stands nearer now hides nothing of it. 0 in a room.
+    pub beyond_m: f32,
 }
 
 impl PlacedProbe<'_> {
@@ -24,9 +26,15 @@ impl PlacedProbe<'_> {
         self.probe.radiance(place.as_dvec3() - self.position_m) * self.exposure
     }
 
-    /// Whether nothing of a room lies between.
+    /// Whether it saw a place: nothing of a room lies between.
     pub(super) fn sees(&self, caster: &RayCaster, place: Vec3) -> bool {
-        let origin = self.position_m.as_vec3();
-        !caster.is_hidden(origin, place - origin, 1.0 - 1e-4)
+        let start = self.start(place - self.position_m.as_vec3());
+        let way = place - self.position_m.as_vec3();
+        way.length() > self.beyond_m && !caster.is_hidden(start, place - start, 1.0 - 1e-4)
+    }
+
+    /// Where light from a direction was on its way before anything that is near could hide it.
+    pub(super) fn start(&self, direction: Vec3) -> Vec3 {
+        self.position_m.as_vec3() + direction.normalize_or_zero() * self.beyond_m
     }
 }

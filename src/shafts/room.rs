@@ -62,10 +62,16 @@ impl Room<'_> {
             probe,
             position_m,
             exposure,
+            beyond_m,
         } = &self.probe;
         hash_numbers(
             &mut hasher,
-            [source_power, least_part, f64::from(*exposure)],
+            [
+                source_power,
+                least_part,
+                f64::from(*exposure),
+                f64::from(*beyond_m),
+            ],
         );
         hash_numbers(&mut hasher, position_m.to_array());
         probe.size_px().hash(&mut hasher);

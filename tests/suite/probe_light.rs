@@ -98,6 +98,7 @@ fn from_afar(probe: &Probe) -> RoomTransport {
             probe: Cow::Borrowed(probe),
             position_m: DVec3::new(0.0, 0.0, 0.05),
             exposure: 1.0,
+            beyond_m: 0.0,
         },
     };
     room.transport()

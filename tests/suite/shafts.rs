@@ -76,6 +76,7 @@ fn a_room_of_one_brightness_lights_every_place_with_pi_times_it() {
             probe: Cow::Borrowed(&probe),
             position_m: DVec3::ZERO,
             exposure: 2.0,
+            beyond_m: 0.0,
         },
     };
     let prepared = room.transport();

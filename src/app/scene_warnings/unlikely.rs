@@ -2,8 +2,9 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::light::Light;
-use crate::scene::{EnvironmentSettings, Marker, Scene, ShadowTechnique};
+use crate::geometry::bounds::Bounds;
+use crate::light::{Light, irradiance};
+use crate::scene::{EnvironmentSettings, Marker, Object, Scene, ShadowTechnique};
 
 /// Nobody prints larger markers, metres.
 const LARGEST_MARKER_M: f64 = 2.0;
@@ -36,7 +37,8 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
     for (number, light) in scene.lights.iter().enumerate() {
         if light.anchor == 0 {
             warnings.extend(too_far(number, light.light));
-            warnings.extend(is_flat.then(|| from_behind(number, light.light)).flatten());
+            let behind = is_flat.then(|| from_behind(number, light.light)).flatten();
+            warnings.extend(behind.or_else(|| past_everything(scene, number, light.light)));
         }
     }
     let shows = scene.virtuals.iter().any(|thing| thing.visible);
@@ -91,6 +93,51 @@ fn from_behind(number: usize, light: Light) -> Option<String> {
              points out of their printed side, and a direction is the way that light goes"
         )
     })
+}
+
+/// A lamp in whose light lies nothing of the world, neither things nor markers.
+fn past_everything(scene: &Scene, number: usize, light: Light) -> Option<String> {
+    let Light::Point {
+        position_m,
+        intensity,
+        ..
+    } = light
+    else {
+        return None;
+    };
+    let things = scene.phantoms.iter().chain(&scene.virtuals);
+    let things = things.filter(|thing| thing.visible && thing.anchor == 0);
+    let markers = scene
+        .anchors
+        .iter()
+        .take(1)
+        .flat_map(|world| &world.markers);
+    let places = things
+        .filter_map(Object::bounds_in_anchor)
+        .flat_map(|bounds| places_in(&bounds))
+        .chain(markers.flat_map(Marker::corners_m));
+    let is_lit = |place: DVec3| {
+        let toward = (position_m - place).normalize_or_zero();
+        irradiance(&light, place, toward) != DVec3::ZERO
+    };
+    (intensity != DVec3::ZERO && !places.into_iter().any(is_lit)).then(|| {
+        format!(
+            "light {number} shines past everything: no thing and no marker lies in its light; its direction is the way that light \
+             goes"
+        )
+    })
+}
+
+/// Places all over a box.
+fn places_in(bounds: &Bounds) -> Vec<DVec3> {
+    const SIDE: usize = 5;
+    let part = |index: usize| index as f64 / (SIDE - 1) as f64;
+    let (low, size) = (bounds.low, bounds.high - bounds.low);
+    (0..SIDE * SIDE * SIDE)
+        .map(|k| {
+            low + size * DVec3::new(part(k % SIDE), part(k / SIDE % SIDE), part(k / SIDE / SIDE))
+        })
+        .collect()
 }
 
 /// Of the light from all around what the technique does not take.

@@ -114,7 +114,13 @@ fn a_lamp_in_millimetres_and_light_from_behind_are_doubted() {
     let card = "[[marker]]\nname = \"card\"\nid = 1\nsize_m = 0.04\n";
     let point = |place: &str| format!("kind = \"point\"\nintensity = 0.4\nposition_m = {place}\n");
     let sun = |way: &str| format!("kind = \"directional\"\nirradiance = 1\ndirection = {way}\n");
+    let aimed = |kind: &str, own: &str, way: &str| {
+        format!(
+            "kind = \"{kind}\"\nintensity = 0.4\nposition_m = [0, 0, 0.5]\ndirection = {way}\n{own}\n"
+        )
+    };
     let behind = "comes from behind the markers";
+    let past = "shines past everything";
     for (light, says) in [
         (point("[300, 200, 500]"), Some("was [0.3, 0.2, 0.5] meant?")),
         (point("[0.3, 0.2, 0.5]"), None),
@@ -123,6 +129,13 @@ fn a_lamp_in_millimetres_and_light_from_behind_are_doubted() {
         (point("[0.3, 0.2, -0.5]"), Some(behind)),
         (sun("[0.3, 0.2, 0.5]"), Some(behind)),
         (sun("[0.3, 0.2, -0.5]"), None),
+        (aimed("spot", "outer_deg = 20", "[0, 0, 1]"), Some(past)),
+        (aimed("spot", "outer_deg = 20", "[0, 0, -1]"), None),
+        (
+            aimed("rect", "size_m = [0.3, 0.3]", "[0, 0, 1]"),
+            Some(past),
+        ),
+        (aimed("rect", "size_m = [0.3, 0.3]", "[0.3, 0, -1]"), None),
         // Which side of a card the light is on, no file says.
         (format!("{}on = \"card\"\n", sun("[0.3, 0.2, 0.5]")), None),
     ] {
