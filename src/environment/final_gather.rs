@@ -30,6 +30,8 @@ const RAYS_OF_AN_END: usize = 2;
 const DIRECTIONS_APART: usize = 37;
 /// As finely as so many rays over an end's hemisphere would, those of neighbouring ends together tell what lies around it.
 const SPOT_OF_AN_END: usize = 16;
+/// Of the sky an end asks for so many sources: a sun that has a fifth of all power is then met nearly as often as it should be.
+const SOURCES_OF_AN_END: usize = 4;
 /// Steps from one ray to the next through the power of all sources that its end asks for, and that the surface asks for which
 /// that end sees: parts that no small number of steps makes whole (Roberts 2018: the plastic number's).
 const STEPS_THROUGH_POWER: [f64; 2] = [0.754_877_666, 0.569_840_291];
@@ -277,7 +279,7 @@ impl PlacedScene<'_> {
             changes[1] += before.as_ref().map_or(of_real, |seen| change(seen)[1]);
         }
         let part = (number as f64 * STEPS_THROUGH_POWER[0]).fract();
-        let hidden = self.hidden_of_sources(start, normal, how.sky, (part, RAYS_OF_AN_END));
+        let hidden = self.hidden_of_sources(start, normal, how.sky, (part, SOURCES_OF_AN_END));
         [0, 1].map(|with| of_sky + changes[with] / RAYS_OF_AN_END as f32 - hidden[with])
     }
 

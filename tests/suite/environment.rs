@@ -504,3 +504,56 @@ fn things_that_move_past_each_other_change_the_light_smoothly() {
         "{largest}, of the light {of_the_light}"
     );
 }
+
+/// A sky, and a sun as broad as a fist that comes low over what lies at -x.
+fn sky_with_sun(radiance: f32) -> Probe {
+    const SIZE_PX: [usize; 2] = [160, 80];
+    let grid = Probe::new(SIZE_PX, vec![Vec3::ZERO; SIZE_PX[0] * SIZE_PX[1]]).expect("pixels");
+    let sun = DVec3::new(
+        -(40.0_f64.to_radians().cos()),
+        0.0,
+        40.0_f64.to_radians().sin(),
+    );
+    let pixel = |index: usize| {
+        let (column, row) = (index % SIZE_PX[0], index / SIZE_PX[0]);
+        let direction = grid.direction(column as f64 + 0.5, row as f64 + 0.5);
+        let is_sun = direction.angle_between(sun) < 5.0_f64.to_radians();
+        Vec3::splat(if is_sun { radiance } else { 0.4 })
+    };
+    let pixels = (0..SIZE_PX[0] * SIZE_PX[1]).map(pixel);
+    Probe::new(SIZE_PX, pixels.collect()).expect("pixels")
+}
+
+/// Rays from the table end on a bright box that stands in a wall's shadow; none of the wall's sun goes on from there.
+#[test]
+fn a_broad_sun_that_a_real_wall_hides_is_thrown_on_by_nothing_behind_it() {
+    let wall = black_box(
+        "wall",
+        [-0.06, -0.09, 0.0],
+        [-0.04, 0.09, 0.15],
+        DAffine3::IDENTITY,
+    );
+    let soup = cuboid([0.025, -0.03, 0.0], [0.06, 0.03, 0.03]);
+    let mesh = flat_mesh(soup.positions, soup.triangles);
+    let bright = object("box", mesh, DVec3::splat(0.8), DAffine3::IDENTITY);
+    let gain_under = |radiance: f32| {
+        let mut scene = under_sky(0, vec![wall.clone()], vec![bright.clone()]);
+        scene.probe = Some(probe_scene(sky_with_sun(radiance)));
+        let (gain, role, _) = gains(&scene, camera());
+        (gain, role)
+    };
+    let (with_sun, role) = gain_under(60.0);
+    let (without, _) = gain_under(0.4);
+    let mut judged = 0;
+    for index in 0..role.len() {
+        let place = on_table(index, &camera());
+        // Amid the shadow, off the wall's foot.
+        let is_between = (-0.025..0.02).contains(&place.x) && place.y.abs() < 0.04;
+        if role[index] == REAL && is_between && with_sun[index][1] != 1.0 {
+            let off = with_sun[index][1] - without[index][1];
+            assert!(off.abs() < 0.06, "{place}: {off}");
+            judged += 1;
+        }
+    }
+    assert!(judged > 40, "{judged}");
+}

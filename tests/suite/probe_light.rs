@@ -3,11 +3,11 @@
 
 use std::borrow::Cow;
 
-use glam::{DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 use gnomon::geometry::bounds::Bounds;
 use gnomon::light::probe::Probe;
 use gnomon::light::{Light, irradiance};
-use gnomon::scene::{ProbeLightKind, Scene, SceneLight, Technique};
+use gnomon::scene::{Object, ProbeLightKind, Scene, SceneLight, Technique};
 use gnomon::shafts::patches::RoomTriangle;
 use gnomon::shafts::placed_probe::PlacedProbe;
 use gnomon::shafts::room::{Room, RoomOptions};
@@ -81,11 +81,17 @@ fn exact(probe: &Probe, normal: Vec3) -> f64 {
 
 /// The light where nothing stands around.
 fn from_afar(probe: &Probe) -> RoomTransport {
+    from_afar_past(probe, Vec::new())
+}
+
+/// The same where something was put in the probe's place after it was taken.
+fn from_afar_past(probe: &Probe, things: Vec<RoomTriangle>) -> RoomTransport {
     let (low, high) = (Vec3::splat(-300.0), Vec3::splat(300.0));
     let room = Room {
         triangles: super::shafts::inside_of(low, high, None)
             .into_iter()
             .chain(small_square())
+            .chain(things)
             .collect(),
         standing: 0,
         compact: Vec::new(),
@@ -98,7 +104,7 @@ fn from_afar(probe: &Probe) -> RoomTransport {
             probe: Cow::Borrowed(probe),
             position_m: DVec3::new(0.0, 0.0, 0.05),
             exposure: 1.0,
-            beyond_m: 0.0,
+            beyond_m: 150.0,
         },
     };
     room.transport()
@@ -289,4 +295,89 @@ fn a_lamp_that_the_scene_and_the_probe_know_shines_once() {
     let probe = scene.probe.as_ref().expect("a probe");
     let split = scene.split_light(probe);
     assert!(split.compact.is_empty() && *split.rest == probe.probe);
+}
+
+/// Phantoms stand where the probe is taken to have been: without a room what it saw was farther away than they are.
+#[test]
+fn what_stands_about_the_probe_hides_nothing_of_what_it_saw() {
+    let probe = sun(30.0, 40.0, 2.0);
+    let toward = Vec3::new(0.663, 0.383, 0.643);
+    let (across, up) = toward.any_orthonormal_pair();
+    let corner =
+        |x: f32, y: f32| Vec3::new(0.0, 0.0, 0.05) + toward * 0.03 + (across * x + up * y) * 0.02;
+    let card = [
+        [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0)],
+        [corner(-1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
+    ];
+    // From both sides.
+    let turned = card.map(|[a, b, c]| [a, c, b]);
+    let things = card.into_iter().chain(turned).map(|corners| RoomTriangle {
+        corners,
+        albedo: Some(Vec3::ZERO),
+        piece: 7,
+    });
+    let (with, without) = (from_afar_past(&probe, things.collect()), from_afar(&probe));
+    // Off to the side, where the card hides next to nothing of the sky and nothing of the sun.
+    let aside = Vec3::new(-0.08, 0.08, 0.05);
+    let [with, without] = [&with, &without].map(|room| room.volume.irradiance(aside, Vec3::Z).y);
+    assert!((with / without - 1.0).abs() < 0.03, "{with} {without}");
+}
+
+#[test]
+fn a_light_is_compact_by_how_far_things_are_above_what_they_shade() {
+    let card = |height_m: f64| {
+        let card = crate::common::shapes::rectangle([-0.1, -0.1], [0.1, 0.1]);
+        let card = crate::common::flat_mesh(card.positions, card.triangles);
+        let place = DAffine3::from_translation(DVec3::Z * height_m);
+        crate::common::object("card", card, DVec3::splat(0.5), place)
+    };
+    let kind_of = |scene: &Scene| {
+        let split = scene.split_light(scene.probe.as_ref().expect("a probe"));
+        split.found[0].kind
+    };
+    let mut scene = scene_under(sun(-131.0, 40.0, 20.0));
+    scene.phantoms.retain(|thing| !thing.casts);
+    // What moves with a marker counts like what stands.
+    for anchor in [0, 1] {
+        for (height_m, kind) in [
+            (0.001, ProbeLightKind::Compact),
+            (0.12, ProbeLightKind::Broad),
+        ] {
+            let card = card(height_m);
+            scene.virtuals = vec![Object { anchor, ..card }];
+            assert_eq!(kind_of(&scene), kind, "{anchor} {height_m}");
+        }
+    }
+    // From below a table nothing comes with outlines.
+    let mut scene = scene_under(sun(-131.0, -20.0, 1.0));
+    assert_eq!(kind_of(&scene), ProbeLightKind::Broad);
+    scene.phantoms.retain(|thing| thing.name != "table");
+    assert_eq!(kind_of(&scene), ProbeLightKind::Compact);
+}
+
+#[test]
+fn large_pixels_are_cut_and_their_light_stays() {
+    let mut pixels = vec![Vec3::splat(0.2); 8 * 4];
+    pixels[8 + 3] = Vec3::splat(40.0);
+    let small = Probe::new([8, 4], pixels).expect("pixels");
+    let cut = small.at_least([128, 64]);
+    assert_eq!(cut.size_px(), [128, 64]);
+    let mut scene = scene_under(small.clone());
+    scene.shadows.compact_penumbra_px = 0.0;
+    let rest = scene
+        .split_light(scene.probe.as_ref().expect("a probe"))
+        .rest;
+    assert_eq!(*rest, *cut);
+    // The sum over each pixel's own sphere is kept to the last digits.
+    let power = |probe: &Probe| {
+        let [width, _] = probe.size_px();
+        let pixels = probe.pixels().iter().enumerate();
+        let light =
+            pixels.map(|(k, pixel)| f64::from(pixel.y) * probe.pixel_solid_angle(k / width));
+        light.sum::<f64>()
+    };
+    assert!((power(&cut) / power(&small) - 1.0).abs() < 1e-6);
+    assert_eq!(cut.radiance(small.direction(3.5, 1.5)), Vec3::splat(40.0));
+    // What is fine enough is not copied.
+    assert!(matches!(cut.at_least([100, 64]), Cow::Borrowed(_)));
 }
