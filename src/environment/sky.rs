@@ -17,7 +17,7 @@ const RAYS_FOR_ONE: usize = 4;
 pub struct Sky {
     /// From everywhere.
     pub radiance: Vec3,
-    /// Of regions of like power, each from one direction: a bright part of the sky gets many of them.
+    /// Of regions of like power, each from one direction, the brightest first: a bright part of the sky gets many of them.
     pub sources: Vec<Region>,
     /// The sources' powers up to each of them and with it.
     powers: Vec<f64>,
@@ -69,6 +69,9 @@ impl Sky {
         for source in &mut sources {
             source.irradiance *= exposure;
         }
+        // Those of a sun lie together: few places that are evenly spread over the power are then in it as often as they should be.
+        let radiance = |source: &Region| source.irradiance.dot(REC_709) / source.solid_angle_sr;
+        sources.sort_by(|a, b| radiance(b).total_cmp(&radiance(a)));
         let mut power = 0.0;
         let powers = sources.iter().map(|source| {
             power += source.irradiance.dot(REC_709);

@@ -544,16 +544,21 @@ fn a_broad_sun_that_a_real_wall_hides_is_thrown_on_by_nothing_behind_it() {
     };
     let (with_sun, role) = gain_under(60.0);
     let (without, _) = gain_under(0.4);
-    let mut judged = 0;
+    let mut off = Vec::new();
     for index in 0..role.len() {
         let place = on_table(index, &camera());
         // Amid the shadow, off the wall's foot.
         let is_between = (-0.025..0.02).contains(&place.x) && place.y.abs() < 0.04;
         if role[index] == REAL && is_between && with_sun[index][1] != 1.0 {
-            let off = with_sun[index][1] - without[index][1];
-            assert!(off.abs() < 0.06, "{place}: {off}");
-            judged += 1;
+            off.push(f64::from(with_sun[index][1] - without[index][1]));
         }
     }
-    assert!(judged > 40, "{judged}");
+    let mean = off.iter().sum::<f64>() / off.len() as f64;
+    let largest = off.iter().fold(0.0, |most, off| f64::max(most, off.abs()));
+    // (What few rays tell of the sky differs a little where there is a sun in it.)
+    assert!(
+        off.len() > 40 && mean.abs() < 0.02 && largest < 0.1,
+        "{} places: {mean:.4} on the average, {largest:.4} at most",
+        off.len()
+    );
 }
