@@ -398,7 +398,7 @@ fn what_is_added_is_read_beside_the_picture_and_drawn_copied_and_renamed() {
         has(session, "cube_ large")
     });
     let selected = Some(Selected::Thing("cube_ large".to_owned()));
-    state.selected = session.take_selected();
+    state.apply(&session.take_selection().expect("what came is selected"));
     assert_eq!(state.selected, selected);
     let text = std::fs::read_to_string(&path).unwrap();
     assert!(
@@ -469,15 +469,14 @@ fn copy_rename_and_add_a_ball(session: &mut LiveSession, state: &WindowState) {
 
 /// No two of these things stand in one place.
 fn assert_apart(scene: &Scene, names: &[&str]) {
-    let places: Vec<f64> = (scene.phantoms.iter().chain(&scene.virtuals))
+    let places: Vec<DVec3> = (scene.phantoms.iter().chain(&scene.virtuals))
         .filter(|thing| names.contains(&thing.name.as_str()))
-        .map(|thing| thing.anchor_from_object.translation.x)
+        .map(|thing| thing.anchor_from_object.translation.with_z(0.0))
         .collect();
     for (index, place) in places.iter().enumerate() {
+        let others = &places[..index];
         assert!(
-            places[..index]
-                .iter()
-                .all(|other| (other - place).abs() > 0.05),
+            others.iter().all(|other| other.distance(*place) > 0.05),
             "{places:?}"
         );
     }

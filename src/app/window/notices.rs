@@ -24,7 +24,7 @@ pub enum CameraState {
     Opening,
     /// Its name and format.
     Open(String),
-    /// It cannot be opened, and why.
+    /// It cannot be opened, and why; a camera is looked for until it is there.
     Failed(String),
     /// It was open and is gone, and why; it is looked for.
     Lost(String),
