@@ -19,6 +19,7 @@ mod overlays;
 pub mod panel;
 pub mod pipeline;
 mod recorders;
+mod seen_instead;
 mod selected_outline;
 mod selection;
 pub mod session;
