@@ -122,13 +122,11 @@ pub fn free_place(scene: &Scene, anchor: usize, wanted: DVec3) -> DVec3 {
     const STEP_M: f64 = 0.06;
     const MOST_STEPS: i32 = 12;
     // (About half of what comes.)
-    const MARGIN_M: f64 = 0.03;
-    let boxes = || {
-        let there = things(scene).filter(|thing| thing.stands_on() == anchor && thing.casts);
-        there.filter_map(Object::bounds_in_anchor)
-    };
+    const MARGIN_M: f64 = 0.04;
+    let there = things(scene).filter(|thing| thing.stands_on() == anchor && thing.casts);
+    let boxes: Vec<_> = there.filter_map(Object::bounds_in_anchor).collect();
     let is_free = |place: &DVec3| {
-        boxes().all(|bounds| {
+        boxes.iter().all(|bounds| {
             let low = bounds.low.truncate() - MARGIN_M;
             let high = bounds.high.truncate() + MARGIN_M;
             let place = place.truncate();

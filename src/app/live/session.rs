@@ -29,7 +29,7 @@ use crate::app::recording::session_writer::SessionHead;
 use crate::app::stopwatch::Stopwatch;
 use crate::app::window::Wake;
 use crate::app::window::notices::{CameraState, Notices, Weight};
-use crate::capture::live::Now;
+use crate::capture::live::{Now, is_live};
 use crate::geometry::camera::Intrinsics;
 use crate::render::{Gpu, Renderer};
 use crate::scene::{CameraSettings, Scene};
@@ -160,6 +160,7 @@ impl LiveSession {
         ) {
             self.recorders.add_poses(&tracked);
             self.notices.tracking.clone_from(&tracked.trouble);
+            self.notices.never_found.clone_from(&tracked.never_found);
             self.tell_of_camera(&tracked);
             self.picture = PictureState::Following(Box::new(DrawnPicture {
                 tracked,
@@ -443,6 +444,11 @@ impl LiveSession {
         if let Some(said) = said.transpose() {
             self.say(said);
         }
+    }
+
+    /// Whether a camera that could not be opened is looked for.
+    pub fn looks_for_camera(&self) -> bool {
+        is_live(&self.camera.source) && matches!(self.notices.camera, CameraState::Failed(_))
     }
 
     /// Whether pictures still come, or may come again.

@@ -123,7 +123,7 @@ impl LiveWindow {
             match command {
                 LiveCommand::Scene(command) => self.session.edit_scene(command, &self.state),
                 LiveCommand::Recording(command) => self.session.record(command),
-                LiveCommand::Window(WindowCommand::Escape) if self.is_left_first() => {
+                LiveCommand::Window(WindowCommand::Escape) if self.leaves_search() => {
                     let cancel = SceneCommand::Clicks(Clicks::Cancel);
                     self.session.edit_scene(cancel, &self.state);
                 }
@@ -131,9 +131,9 @@ impl LiveWindow {
                 LiveCommand::Quit => ctx.send_viewport_cmd(ViewportCommand::Close),
                 LiveCommand::Close(answer) => self.answer(ctx, answer),
             }
-            if let Some(command) = self.session.take_selection() {
-                self.state.apply(&command);
-            }
+        }
+        if let Some(command) = self.session.take_selection() {
+            self.state.apply(&command);
         }
         if self.state.full_screen != self.full_screen {
             self.full_screen = self.state.full_screen;
@@ -142,7 +142,7 @@ impl LiveWindow {
     }
 
     /// Whether a light is being found, with nothing over it: that is what Esc leaves.
-    fn is_left_first(&self) -> bool {
+    fn leaves_search(&self) -> bool {
         !self.state.keys && self.session.clicks().is_some()
     }
 
@@ -152,23 +152,23 @@ impl LiveWindow {
     }
 
     fn answer(&mut self, ctx: &Context, answer: ClosingAnswer) {
-        let closes = answer != ClosingAnswer::Stay;
-        self.closing = match answer {
-            ClosingAnswer::Stay => Closing::NotAsked,
-            ClosingAnswer::Discard => Closing::Discards,
-            ClosingAnswer::Save(path) => {
-                self.session
-                    .edit_scene(SceneCommand::Save(path), &self.state);
-                match self.session.is_unsaved() {
-                    // A notice tells why.
-                    true => return,
-                    false => Closing::NotAsked,
-                }
+        match answer {
+            ClosingAnswer::Stay => {
+                self.closing = Closing::NotAsked;
+                return;
             }
-        };
-        if closes {
-            ctx.send_viewport_cmd(ViewportCommand::Close);
+            ClosingAnswer::Discard => self.closing = Closing::Discards,
+            ClosingAnswer::Save(path) => {
+                let save = SceneCommand::Save(path);
+                self.session.edit_scene(save, &self.state);
+                if self.session.is_unsaved() {
+                    // A notice tells why.
+                    return;
+                }
+                self.closing = Closing::NotAsked;
+            }
         }
+        ctx.send_viewport_cmd(ViewportCommand::Close);
     }
 
     fn side_panel(&mut self, ui: &mut Ui) -> Commands {
@@ -324,10 +324,14 @@ impl LiveWindow {
     fn say_in_the_middle(&self, ui: &Ui, area: Rect) {
         let text = match &self.session.notices.camera {
             // A notice tells why.
-            CameraState::Failed(_) => "There is no picture.".to_owned(),
-            CameraState::Ended => "The recording has no pictures.".to_owned(),
-            _ => "Waiting for the first picture …".to_owned(),
-        };
+            CameraState::Failed(_) if self.session.looks_for_camera() => {
+                "The camera is looked for: it is taken up as soon as it is there."
+            }
+            CameraState::Failed(_) => "There is no picture.",
+            CameraState::Ended => "The recording has no pictures.",
+            _ => "Waiting for the first picture …",
+        }
+        .to_owned();
         let painter = ui.painter();
         let wrap = (area.width() - 40.0).max(40.0);
         let galley = painter.layout(text, FontId::proportional(18.0), Color32::LIGHT_GRAY, wrap);

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::Places;
 use super::editing::{Editing, number, vector};
-use super::names::selectable;
+use super::names::{selectable, shortened};
 use crate::app::authoring::{AnimationName, Edit, ThingPlace};
 use crate::app::live::command::{Commands, SceneCommand, Selected, WindowCommand};
 use crate::app::live::window_state::WindowState;
@@ -14,6 +14,9 @@ use crate::scene::{Object, Placement, Scene};
 
 /// Metres, degrees and factors per point that a field is dragged.
 const SPEEDS: [f64; 3] = [0.0005, 0.5, 0.005];
+
+/// Letters of an animation's name in the choice of one.
+const IN_CHOICE: usize = 24;
 
 /// The name that is being written.
 #[derive(Debug, Default)]
@@ -115,7 +118,7 @@ fn animation(ui: &mut Ui, thing: &Object, commands: &mut Commands) {
     let playing = thing.animation.as_ref().map(|animation| animation.number);
     let mut chosen = playing;
     ComboBox::from_label("plays")
-        .selected_text(told(playing))
+        .selected_text(shortened(&told(playing), IN_CHOICE))
         .show_ui(ui, |ui| {
             let numbers = (0..thing.clips.len()).map(Some);
             for number in std::iter::once(None).chain(numbers) {

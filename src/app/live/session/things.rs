@@ -151,7 +151,10 @@ impl LiveSession {
             (EditError::Scene(error), NewForm::Mesh { file, .. })
                 if Some(error.file.as_path()) == path =>
             {
-                format!("{file}: {}", error.message)
+                // `virtual.mesh = "…": ` would be said of the scene's file.
+                let reason = error.message.split_once("\": ");
+                let reason = reason.map_or(error.message.as_str(), |(_, reason)| reason);
+                format!("{file}: {reason}")
             }
             _ => error.to_string(),
         }
