@@ -17,7 +17,7 @@ use gnomon::app::live::TrackingPlan;
 use gnomon::app::live::adding::{WantedShape, WantedThing};
 use gnomon::app::live::beginning::Opening;
 use gnomon::app::live::command::{
-    Clicks, Commands, LiveCommand, RecordingCommand, SceneCommand, Selected,
+    Clicks, Commands, LiveCommand, RecordingCommand, SceneCommand, Selected, WindowCommand,
 };
 use gnomon::app::live::meters::Sample;
 use gnomon::app::live::panel::Panel;
@@ -398,7 +398,7 @@ fn what_is_added_is_read_beside_the_picture_and_drawn_copied_and_renamed() {
         has(session, "cube_ large")
     });
     let selected = Some(Selected::Thing("cube_ large".to_owned()));
-    state.selected = session.take_selected();
+    state.apply(&session.take_selection().expect("what came is selected"));
     assert_eq!(state.selected, selected);
     let text = std::fs::read_to_string(&path).unwrap();
     assert!(
@@ -436,6 +436,91 @@ fn what_is_added_is_read_beside_the_picture_and_drawn_copied_and_renamed() {
     assert_eq!(std::fs::read_to_string(&path).unwrap(), before);
 }
 
+#[test]
+fn what_is_refused_leaves_the_selection_and_what_is_removed_leaves_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = lamp_in(folder.path());
+    let mut session = open(&path, folder.path(), true);
+    let thing = |name: &str| Some(Selected::Thing(name.to_owned()));
+    let mut state = WindowState::new();
+    state.selected = thing("torus");
+    let rename = |name: &str| SceneCommand::Rename {
+        thing: "torus".to_owned(),
+        name: name.to_owned(),
+    };
+    let text = std::fs::read_to_string(&path).unwrap();
+    // Another thing has that name.
+    let phantom = session.scene().unwrap().phantoms[1].name.clone();
+    session.edit_scene(rename(&phantom), &state);
+    assert_eq!(session.take_selection(), None);
+    state.selected = thing("table");
+    session.edit_scene(SceneCommand::RemoveSelected, &state);
+    assert_eq!(session.take_selection(), None);
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+    // While the file has a mistake, nothing is done, which is said.
+    std::fs::write(&path, format!("{text}[nonsense]\n")).unwrap();
+    state.selected = thing("torus");
+    session.edit_scene(SceneCommand::RemoveSelected, &state);
+    assert_eq!(session.take_selection(), None);
+    let told = session.notices.shown(session.now_secs());
+    let is_told = |text: &str| text.starts_with("not done: remove \"torus\"");
+    assert!(told.iter().any(|(_, text)| is_told(text)), "{told:?}");
+    std::fs::write(&path, text).unwrap();
+    session.edit_scene(SceneCommand::RemoveSelected, &state);
+    let none = WindowCommand::Select(None);
+    assert_eq!(session.take_selection(), Some(none));
+    state.selected = Some(Selected::Light(1));
+    let added = SceneCommand::Commit(Edit::AddLight(Light::Point {
+        position_m: DVec3::Z,
+        intensity: DVec3::ONE,
+        shape: Shape::Point,
+    }));
+    let lights = session.scene().unwrap().lights.len();
+    session.edit_scene(added, &state);
+    let last = WindowCommand::Select(Some(Selected::Light(lights)));
+    assert_eq!(session.take_selection(), Some(last));
+    state.selected = Some(Selected::Light(lights));
+    session.edit_scene(SceneCommand::Commit(Edit::RemoveLight(0)), &state);
+    let moved_up = WindowCommand::Select(Some(Selected::Light(lights - 1)));
+    assert_eq!(session.take_selection(), Some(moved_up));
+}
+
+#[test]
+fn a_picture_that_was_drawn_after_the_last_was_handed_over_is_not_yet_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = lamp_in(folder.path());
+    let mut session = open(&path, folder.path(), true);
+    let state = WindowState::new();
+    let began = Instant::now();
+    while !session.step(&state).unwrap() {
+        assert!(began.elapsed() < SOON, "no picture");
+        thread::sleep(Duration::from_millis(2));
+    }
+    session.was_shown(0.0).unwrap();
+    assert_eq!(session.meters.samples().count(), 0);
+    session.was_shown(session.now_secs()).unwrap();
+    let sample = session.meters.samples().next().expect("a picture is shown");
+    assert!(sample.draw_ms >= 0.0 && sample.latency_ms >= 0.0);
+}
+
+#[test]
+fn an_anchor_that_is_never_seen_is_told_with_what_is_seen_instead() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = lamp_in(folder.path());
+    let card = "\n[[marker]]\nname = \"card\"\nfamily = \"tag36h11\"\nid = 78\nsize_m = 0.04\n";
+    let text = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(&path, text + card).unwrap();
+    let mut session = open(&path, folder.path(), true);
+    let state = WindowState::new();
+    let told = "\"card\" was never found: tag36h11 ";
+    run_until(&mut session, &state, "it is told", |session| {
+        let shown = session.notices.shown(session.now_secs());
+        shown
+            .iter()
+            .any(|(_, text)| text.starts_with(told) && text.contains("wants tag36h11 78"))
+    });
+}
+
 /// A cube in millimetres.
 const CUBE_MM: &str = "v 0 0 0\nv 80 0 0\nv 80 80 0\nv 0 80 0\nv 0 0 80\nv 80 0 80\nv 80 80 80\nv 0 80 80\n\
      f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
@@ -469,15 +554,14 @@ fn copy_rename_and_add_a_ball(session: &mut LiveSession, state: &WindowState) {
 
 /// No two of these things stand in one place.
 fn assert_apart(scene: &Scene, names: &[&str]) {
-    let places: Vec<f64> = (scene.phantoms.iter().chain(&scene.virtuals))
+    let places: Vec<DVec3> = (scene.phantoms.iter().chain(&scene.virtuals))
         .filter(|thing| names.contains(&thing.name.as_str()))
-        .map(|thing| thing.anchor_from_object.translation.x)
+        .map(|thing| thing.anchor_from_object.translation.with_z(0.0))
         .collect();
     for (index, place) in places.iter().enumerate() {
+        let others = &places[..index];
         assert!(
-            places[..index]
-                .iter()
-                .all(|other| (other - place).abs() > 0.05),
+            others.iter().all(|other| other.distance(*place) > 0.05),
             "{places:?}"
         );
     }
@@ -816,6 +900,8 @@ fn first_use_puts_something_on_a_marker_and_saves_a_scene() {
     };
     run_until(&mut session, &state, "the marker is tracked", is_there);
     assert!(session.is_unsaved());
+    // Whoever ends the program by force finds it again.
+    let kept = session.keep_unsaved().expect("a scene that is kept");
     let scene = session.scene().unwrap().clone();
     assert!(shown(&session) == drawn_afresh(&session, &scene));
     let (renderer, ..) = session.renderer().unwrap();
@@ -828,9 +914,20 @@ fn first_use_puts_something_on_a_marker_and_saves_a_scene() {
         .count();
     assert!(red > 200, "a red torus is seen: {red} pixels");
 
+    let taken = folder.path().join("taken.toml");
+    std::fs::write(&taken, "mine").unwrap();
+    session.edit_scene(SceneCommand::Save(taken), &state);
+    assert!(session.is_unsaved());
+    let told = session.notices.shown(session.now_secs());
+    let is_told = |text: &str| text.contains("taken.toml: a file of that name is there already");
+    assert!(told.iter().any(|(_, text)| is_told(text)), "{told:?}");
+
     let saved = folder.path().join("mine.toml");
     session.edit_scene(SceneCommand::Save(saved.clone()), &state);
     assert!(!session.is_unsaved());
+    assert_eq!(session.title(), "mine.toml");
+    assert!(Scene::load(&kept).is_ok(), "{}", kept.display());
+    std::fs::remove_dir_all(kept.parent().unwrap()).unwrap();
     assert_eq!(Scene::load(&saved).unwrap().anchors[0].markers[0].id, 4);
     assert!(folder.path().join("torus.obj").is_file());
 }

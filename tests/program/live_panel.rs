@@ -6,13 +6,14 @@ use std::sync::mpsc::channel;
 use eframe::egui::accesskit::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use gnomon::app::authoring::Edit;
+use gnomon::app::authoring::{Edit, ThingPlace};
 use gnomon::app::live::adding::{WantedShape, WantedThing};
 use gnomon::app::live::command::{
-    Clicks, Commands, LiveCommand, Overlay, RecordingCommand, SceneCommand, Selected, WindowCommand,
+    Clicks, ClosingAnswer, Commands, LiveCommand, Overlay, RecordingCommand, SceneCommand,
+    Selected, WindowCommand,
 };
 use gnomon::app::live::meters::Meters;
-use gnomon::app::live::panel::{Facts, Panel};
+use gnomon::app::live::panel::{DialogEnd, Facts, Panel};
 use gnomon::app::live::views::ViewMode;
 use gnomon::app::live::window_state::WindowState;
 use gnomon::light::Light;
@@ -48,7 +49,12 @@ fn desk(scene: Option<Scene>, selected: Option<Selected>) -> Harness<'static, De
                     scene: desk.scene.as_ref(),
                     path: None,
                     unsaved: false,
-                    placement: &|thing| (thing != "table").then(Placement::default),
+                    place: &|thing| {
+                        Some(match thing {
+                            "table" => ThingPlace::TableTop { height_m: -0.0005 },
+                            _ => ThingPlace::Free(Placement::default()),
+                        })
+                    },
                     history: [Some("place \"torus\""), None],
                     picture: None,
                     meters: &meters,
@@ -116,8 +122,7 @@ fn buttons_ask_for_what_they_say() {
     );
     assert_eq!(
         clicked(&mut harness, "table"),
-        [],
-        "that one cannot be moved"
+        select(Selected::Thing("table".to_owned()))
     );
     assert_eq!(
         clicked(&mut harness, "light 0 (point)"),
@@ -264,13 +269,14 @@ fn what_the_system_s_dialog_gives_is_asked_for_once() {
     harness.state_mut().panel.await_dialog(chosen);
     harness.run();
     assert_eq!(harness.state().commands, []);
-    giver.send(Some("/models/a chair's.glb".into())).unwrap();
+    let file = "/models/a chair's.glb".into();
+    giver.send(DialogEnd::Chosen(file)).unwrap();
     harness.run();
     harness.run();
     assert_eq!(harness.state().commands, [added("/models/a chair's.glb")]);
     // One that is closed without a file, and one that has come to grief.
     harness.state_mut().commands.clear();
-    for answer in [Some(None), None] {
+    for answer in [Some(DialogEnd::Cancelled), None] {
         let (giver, chosen) = channel();
         harness.state_mut().panel.await_dialog(chosen);
         if let Some(answer) = answer {
@@ -280,6 +286,94 @@ fn what_the_system_s_dialog_gives_is_asked_for_once() {
         harness.run();
     }
     assert_eq!(harness.state().commands, []);
+}
+
+#[test]
+fn where_there_is_no_dialog_it_is_said_and_a_name_stays_until_it_is_there() {
+    let mut harness = desk(Some(lamp()), None);
+    _ = clicked(&mut harness, "Add …");
+    let (giver, ended) = channel();
+    harness.state_mut().panel.await_dialog(ended);
+    giver.send(DialogEnd::NoDialog).unwrap();
+    harness.run();
+    harness.run();
+    harness.get_by_label_contains("There is no file dialog here");
+    let fields = harness.query_all_by_role(Role::TextInput);
+    let field = fields.last().expect("the field for a file's name");
+    field.focus();
+    field.type_text("chair.obj");
+    harness.run();
+    harness.key_press(eframe::egui::Key::Enter);
+    harness.run();
+    let asked = std::mem::take(&mut harness.state_mut().commands);
+    assert_eq!(asked, [added("chair.obj")]);
+    assert!(harness.query_by_value("chair.obj").is_some());
+    let scene = harness.state_mut().scene.as_mut().expect("a scene");
+    let chair = scene.virtuals[0].clone();
+    scene.virtuals.push(chair);
+    harness.run();
+    assert!(harness.query_by_value("chair.obj").is_none());
+}
+
+#[test]
+fn the_table_s_top_has_what_can_be_done_with_it() {
+    let table = Selected::Thing("table".to_owned());
+    let mut harness = desk(Some(lamp()), Some(table));
+    harness.run();
+    for there in ["height", "albedo"] {
+        assert!(harness.query_all_by_label(there).count() > 0, "{there}");
+    }
+    for absent in ["duplicate", "scale", "turned", "metallic"] {
+        assert_eq!(harness.query_all_by_label(absent).count(), 0, "{absent}");
+    }
+}
+
+#[test]
+fn long_names_leave_the_picture_its_place() {
+    let mut scene = lamp();
+    let name = "a name of very many letters ".repeat(4);
+    scene.virtuals[0].name.clone_from(&name);
+    let mut harness = desk(Some(scene), None);
+    harness.state_mut().reading = vec![("an endless wheel of a wagon", LoadStage::Unpacking)];
+    harness.run_steps(3);
+    harness.get_by_label_contains("unpacks triangles and pictures");
+    // (Its box to tick has the same label.)
+    for shown in harness.query_all_by_label_contains("a name of very") {
+        assert!(shown.rect().right() < 330.0, "{:?}", shown.rect());
+    }
+}
+
+/// What is asked before the window closes on a scene that is not saved.
+fn closing_desk() -> Harness<'static, (Panel, Vec<LiveCommand>)> {
+    Harness::builder().with_size([600.0, 400.0]).build_ui_state(
+        |ui, (panel, commands): &mut (Panel, Vec<LiveCommand>)| {
+            commands.extend(panel.ask_before_closing(ui.ctx()));
+        },
+        (Panel::default(), Vec::new()),
+    )
+}
+
+#[test]
+fn a_scene_that_is_not_saved_is_asked_for_before_the_window_closes() {
+    for (label, answer) in [
+        ("Save", ClosingAnswer::Save("scene.toml".into())),
+        ("Discard it and close", ClosingAnswer::Discard),
+        ("Stay", ClosingAnswer::Stay),
+    ] {
+        let mut harness = closing_desk();
+        harness.run();
+        assert!(harness.query_by_label("This scene is not saved").is_some());
+        assert_eq!(harness.state().1, []);
+        harness.get_by_role_and_label(Role::Button, label).click();
+        harness.run();
+        assert_eq!(harness.state().1, [LiveCommand::Close(answer)], "{label}");
+    }
+    let mut harness = closing_desk();
+    harness.run();
+    harness.key_press(eframe::egui::Key::Escape);
+    harness.run();
+    let stays = LiveCommand::Close(ClosingAnswer::Stay);
+    assert_eq!(harness.state().1, [stays]);
 }
 
 #[test]

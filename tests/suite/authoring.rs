@@ -8,7 +8,7 @@ use std::time::Duration;
 use crate::common::random::Random;
 use glam::DVec3;
 use gnomon::app::authoring::{
-    Edit, EditError, NewForm, NewThing, SceneDocument, SceneNews, SceneWatch,
+    Edit, EditError, NewForm, NewThing, SceneDocument, SceneNews, SceneWatch, ThingPlace,
 };
 use gnomon::app::stopwatch::Stopwatch;
 use gnomon::app::truth::{draw, key_frames};
@@ -88,7 +88,7 @@ fn torus_at(position_m: DVec3, old: Placement) -> Edit {
 }
 
 fn moved_torus(document: &SceneDocument, x_m: f64) -> Edit {
-    let old = document.placement("torus").expect("the torus");
+    let old = document.place("torus").expect("the torus").placement();
     torus_at(DVec3::new(x_m, old.position_m.y, old.position_m.z), old)
 }
 
@@ -100,7 +100,7 @@ mod edits {
         let project = Project::new();
         let before = project.text();
         let mut document = project.open();
-        let old = document.placement("torus").expect("the torus");
+        let old = document.place("torus").expect("the torus").placement();
         assert_eq!(old.rotation_deg, DVec3::new(70.0, 0.0, 35.0));
         document
             .commit(&torus_at(DVec3::new(0.031_26, 0.0, 0.036), old))
@@ -437,6 +437,37 @@ mod edits {
     }
 
     #[test]
+    fn the_table_s_top_is_lifted_and_painted_and_nothing_else() {
+        let project = Project::new();
+        let mut document = project.open();
+        let place = document.place("table").expect("the table's top");
+        assert_eq!(place, ThingPlace::TableTop { height_m: -0.0005 });
+        assert!(place.placement().position_m.x.is_sign_positive());
+        let painted = |albedo, roughness| Edit::Material {
+            thing: "table".to_owned(),
+            albedo,
+            roughness,
+            metallic: None,
+        };
+        let grey = Some(DVec3::splat(0.25));
+        let [from, to] = ["[0.5, 0.335, 0.2]", "[0.25, 0.25, 0.25]"];
+        assert_changed_to(&project, &mut document, &painted(grey, None), from, to);
+        let before = project.text();
+        for edit in [
+            painted(None, Some(0.5)),
+            Edit::RemoveThing("table".to_owned()),
+            Edit::Rename {
+                thing: "table".to_owned(),
+                name: "desk".to_owned(),
+            },
+        ] {
+            let message = document.commit(&edit).unwrap_err().to_string();
+            assert!(message.contains("its height, its albedo"), "{message}");
+            assert_eq!(project.text(), before);
+        }
+    }
+
+    #[test]
     fn what_does_not_fit_changes_nothing() {
         let project = Project::new();
         let before = project.text();
@@ -642,7 +673,10 @@ mod edits {
             ),
             _ => {
                 let thing = thing(random);
-                let placement = document.placement(&thing).expect("a thing of the scene");
+                let placement = document
+                    .place(&thing)
+                    .expect("a thing of the scene")
+                    .placement();
                 random_place(random, thing, placement)
             }
         }
@@ -886,7 +920,9 @@ mod history {
         // A broken file is left to the one who is at it.
         fs::write(project.file(), "[camera").unwrap();
         let error = document.commit(&edit).unwrap_err();
-        assert!(error.to_string().contains("scene.toml:1:"), "{error}");
+        let told = error.to_string();
+        assert!(told.contains("scene.toml:1:"), "{told}");
+        assert!(told.starts_with("not done: place \"torus\""), "{told}");
         assert_eq!(project.text(), "[camera");
         assert!(document.undo().is_err());
         assert_eq!(document.text(), both);

@@ -6,10 +6,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::edit::Edit;
 use super::history::{EditStep, History};
 use super::watch::{KnownText, OutsideChange, SceneWatch};
-use super::written::{Unfit, placement_of, touched_by, with_edit};
+use super::written::{ThingPlace, Unfit, place_of, touched_by, with_edit};
 use crate::app::files::output_error::OutputError;
 use crate::app::files::picture_files::write_text;
-use crate::scene::{Loading, ModelCache, Placement, Scene, SceneError};
+use crate::scene::{Loading, ModelCache, Scene, SceneError};
 
 /// What an outside change is called in the history.
 const OUTSIDE: &str = "change of the file from outside";
@@ -44,6 +44,14 @@ pub enum EditError {
         path: PathBuf,
         /// What was to be done.
         label: String,
+    },
+    /// Somebody has made a mistake in the file meanwhile.
+    #[error("not done: {label}; the file has a mistake: {mistake}")]
+    MistakenFile {
+        /// What was to be done.
+        label: String,
+        /// The mistake.
+        mistake: SceneError,
     },
     /// The file could not be written.
     #[error(transparent)]
@@ -116,8 +124,8 @@ impl SceneDocument {
     }
 
     /// Where a thing stands, in the numbers of the file; `None` where the scene has no such thing.
-    pub fn placement(&self, thing: &str) -> Option<Placement> {
-        placement_of(&self.text, thing)
+    pub fn place(&self, thing: &str) -> Option<ThingPlace> {
+        place_of(&self.text, thing)
     }
 
     /// Shows an edit without making it: for as long as a drag lasts. False where that cannot be, as for a new thing.
@@ -141,7 +149,7 @@ impl SceneDocument {
     pub fn commit(&mut self, edit: &Edit) -> Result<(), EditError> {
         self.shown = None;
         let before = touched_by(&self.text, edit);
-        let changed = self.follow_file()?;
+        let changed = self.follow_file(|| edit.label())?;
         if changed && touched_by(&self.text, edit) != before {
             return Err(self.changed_outside(edit.label()));
         }
@@ -240,20 +248,23 @@ impl SceneDocument {
 
     fn step_to(&mut self, text: String, label: String) -> Result<(), EditError> {
         self.shown = None;
-        if self.follow_file()? {
+        if self.follow_file(|| label.clone())? {
             return Err(self.changed_outside(label));
         }
         self.put(text)
     }
 
-    /// Takes what the file has become if someone changed it; tells whether.
-    fn follow_file(&mut self) -> Result<bool, EditError> {
+    /// Takes what the file has become if someone changed it, before what `label` says is done; tells whether.
+    fn follow_file(&mut self, label: impl Fn() -> String) -> Result<bool, EditError> {
         let text = Scene::read_text(&self.path)?;
         if text == self.text {
             return Ok(false);
         }
         let reading = Scene::read_with(&self.path, &text, &self.models);
-        let scene = reading.scene?;
+        let scene = reading.scene.map_err(|mistake| EditError::MistakenFile {
+            label: label(),
+            mistake,
+        })?;
         *self.known.lock().unwrap_or_else(PoisonError::into_inner) = text.clone();
         self.accept(OutsideChange {
             text,

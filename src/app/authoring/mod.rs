@@ -15,4 +15,4 @@ pub use light_from_picture::{
     FoundLight, LightNotFound, PickedVertex, PicturedThings, ShadowClick,
 };
 pub use watch::{OutsideChange, SceneNews, SceneWatch};
-pub use written::Unfit;
+pub use written::{ThingPlace, Unfit};

@@ -25,7 +25,9 @@ pub enum Unfit {
     #[error("the scene has no {0}")]
     Missing(String),
     /// The scene's `[table]`.
-    #[error("the table's top moves up and down alone; it lies flat, with its rect_m in the world")]
+    #[error(
+        "of the table's top its height, its albedo and whether it is shown are edited here; all else is in the file's [table]"
+    )]
     TableTop,
     /// Sizes of a board whose markers another file has.
     #[error("the board's markers are in the file of its bundle; change their sizes there")]
@@ -97,13 +99,12 @@ pub fn with_edit(text: &str, scene: &Scene, edit: &Edit) -> Result<String, Unfit
             roughness,
             metallic,
         } => {
-            let (siblings, index) = listed(&document, thing)?;
             let parts = [
                 roughness.map(|it| new_key(&MATERIAL.roughness, &Some(it))),
                 metallic.map(|it| new_key(&MATERIAL.metallic, &Some(it))),
             ];
             let parts = parts.into_iter().flatten().collect();
-            set_material(&mut spliced, siblings[index], *albedo, parts);
+            paint(&mut spliced, thing_of(&document, thing)?, *albedo, parts)?;
         }
         Edit::Animate { thing, animation } => {
             let (siblings, index) = listed(&document, thing)?;
@@ -146,7 +147,9 @@ pub fn touched_by(text: &str, edit: &Edit) -> Option<String> {
         Edit::Show { thing: name, .. } => thing(name, &[THING.visible.name]),
         Edit::RemoveThing(name) => thing(name, &VIRTUAL_SECTION.names()),
         Edit::Rename { thing: name, .. } => thing(name, &[THING_NAME.name.name]),
-        Edit::Material { thing: name, .. } => thing(name, &[THING.material.name]),
+        Edit::Material { thing: name, .. } => {
+            thing(name, &[THING.material.name, TABLE.albedo.name])
+        }
         Edit::Animate { thing: name, .. } => thing(name, &[ANIMATION.animation.name]),
         Edit::Shadows(change) => {
             let keys: Vec<&str> = change.keys().iter().map(|change| change.key).collect();
@@ -189,8 +192,33 @@ fn set_vector<M: Absent<DVec3>>(
     spliced.set_numbers(body, key.name, &wanted.to_array(), digits, default);
 }
 
+/// The place of a thing, in the numbers of the scene's file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ThingPlace {
+    /// Of a phantom or a virtual thing, which stands and turns as it likes.
+    Free(Placement),
+    /// Of the table's top, which moves up and down alone.
+    TableTop {
+        /// Its z in the world, metres.
+        height_m: f64,
+    },
+}
+
+impl ThingPlace {
+    /// The same as any thing would have it.
+    pub fn placement(self) -> Placement {
+        match self {
+            Self::Free(placement) => placement,
+            Self::TableTop { height_m } => Placement {
+                position_m: DVec3::new(0.0, 0.0, height_m),
+                ..Placement::default()
+            },
+        }
+    }
+}
+
 /// Where a thing stands, as a text says it; `None` where the text has no such thing.
-pub fn placement_of(text: &str, name: &str) -> Option<Placement> {
+pub fn place_of(text: &str, name: &str) -> Option<ThingPlace> {
     let document = parsed(text)?;
     let vector = |body: Body, key: &str, default: DVec3| match body.value(key) {
         Some(Value::Array(array)) => {
@@ -202,18 +230,16 @@ pub fn placement_of(text: &str, name: &str) -> Option<Placement> {
     };
     let default = Placement::default();
     Some(match thing_of(&document, name).ok()? {
-        WrittenThing::Object(body) => Placement {
+        WrittenThing::Object(body) => ThingPlace::Free(Placement {
             position_m: vector(body, PLACEMENT.position_m.name, default.position_m),
             rotation_deg: vector(body, PLACEMENT.rotation_deg.name, default.rotation_deg),
             scale: vector(body, PLACEMENT.scale.name, default.scale),
-        },
+        }),
         WrittenThing::TableTop(body) => {
             let key = &TABLE.height_m;
-            let height_m = body.value(key.name).and_then(number_of);
-            Placement {
-                position_m: DVec3::Z * height_m.unwrap_or(*key.default()),
-                ..default
-            }
+            let written = body.value(key.name).and_then(number_of);
+            let height_m = written.unwrap_or(*key.default());
+            ThingPlace::TableTop { height_m }
         }
     })
 }
@@ -243,14 +269,17 @@ fn thing_of<'a>(document: &'a Document<&str>, name: &str) -> Result<WrittenThing
 
 /// The tables among which a thing's is, and its number there.
 fn listed<'a>(document: &'a Document<&str>, name: &str) -> Result<(Vec<Body<'a>>, usize), Unfit> {
-    [&PHANTOM_SECTION, &VIRTUAL_SECTION]
+    let among = [&PHANTOM_SECTION, &VIRTUAL_SECTION]
         .into_iter()
         .find_map(|section| {
             let siblings = tables(document, section);
             let index = siblings.iter().position(|body| body.has_name(name))?;
             Some((siblings, index))
-        })
-        .ok_or_else(|| no_thing(name))
+        });
+    match (among, thing_of(document, name)?) {
+        (Some(among), WrittenThing::Object(_)) => Ok(among),
+        _ => Err(Unfit::TableTop),
+    }
 }
 
 fn set_animation(spliced: &mut Spliced, thing: Body, animation: Option<&AnimationName>) {
@@ -288,6 +317,27 @@ fn set_visible(spliced: &mut Spliced, thing: WrittenThing, visible: bool) {
     if written.unwrap_or(*key.default()) != visible {
         spliced.set(body, key.name, visible.to_string());
     }
+}
+
+/// Of the table's top the albedo alone is edited.
+fn paint(
+    spliced: &mut Spliced,
+    thing: WrittenThing,
+    albedo: Option<DVec3>,
+    parts: Vec<NewKey>,
+) -> Result<(), Unfit> {
+    match thing {
+        WrittenThing::Object(body) => set_material(spliced, body, albedo, parts),
+        WrittenThing::TableTop(_) if !parts.is_empty() => return Err(Unfit::TableTop),
+        WrittenThing::TableTop(body) => {
+            if let Some(albedo) = albedo {
+                let (key, digits) = (&TABLE.albedo, TABLE.albedo.takes.numbers.digits);
+                // (What it is without one hangs on whether it has a picture.)
+                spliced.set_numbers(body, key.name, &albedo.to_array(), digits, None);
+            }
+        }
+    }
+    Ok(())
 }
 
 fn set_material(spliced: &mut Spliced, thing: Body, albedo: Option<DVec3>, parts: Vec<NewKey>) {

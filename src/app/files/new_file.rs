@@ -64,7 +64,7 @@ impl NewFile {
     /// As [`NewFile::create`], and something of that name.
     pub fn create_first(path: &Path) -> Result<Self, OutputError> {
         match fs::symlink_metadata(path) {
-            Ok(_) => Err(io_error(path, io::ErrorKind::AlreadyExists.into())),
+            Ok(_) => Err(io_error(path, is_there())),
             Err(_) => Self::begin(path, true),
         }
     }
@@ -168,7 +168,10 @@ impl NewFile {
                     true => self.temporary.persist_noclobber(&place),
                     false => self.temporary.persist(&place),
                 }
-                .map_err(|failed| failed.error)?;
+                .map_err(|failed| match failed.error.kind() {
+                    io::ErrorKind::AlreadyExists => is_there(),
+                    _ => failed.error,
+                })?;
                 return Ok(place.parent().map(Path::to_owned));
             }
             WriteTarget::Through(place) => {
@@ -224,6 +227,11 @@ fn copy_from_start(from: &mut File, to: &mut impl io::Write) -> io::Result<()> {
             count => to.write_all(&buffer[..count])?,
         }
     }
+}
+
+fn is_there() -> io::Error {
+    let kind = io::ErrorKind::AlreadyExists;
+    io::Error::new(kind, "a file of that name is there already, and stays")
 }
 
 fn io_error(path: &Path, error: io::Error) -> OutputError {

@@ -9,17 +9,19 @@ use std::time::Duration;
 
 use super::mailbox::Mailbox;
 use crate::capture::Frame;
-use crate::capture::live::{LiveError, LiveEvent, LiveOptions, LiveSource, Now, Opened};
+use crate::capture::live::{LiveError, LiveEvent, LiveOptions, LiveSource, Now, Opened, is_live};
 
 /// How soon the thread sees that it is to stop.
 const PATIENCE: Duration = Duration::from_millis(50);
+/// A camera that is not there is looked for again after so long, seconds.
+const AGAIN_SECS: f64 = 2.0;
 
 /// An event of a live source, besides its frames.
 #[derive(Debug)]
 pub enum CaptureEvent {
     /// It is open; frames will follow.
     Opened(Opened),
-    /// It cannot be opened; nothing will come.
+    /// It cannot be opened. Of a recording nothing will come; a camera or a stream is looked for until it is there.
     Failed(LiveError),
     /// It gives no frames any more, and is looked for.
     Lost(LiveError),
@@ -78,10 +80,22 @@ impl LiveCapture {
         });
         let thread = {
             let (frames, shared) = (Arc::clone(&frames), Arc::clone(&shared));
-            let source = LiveSource::open(source, options, Arc::clone(&now));
+            let (source, options) = (source.to_owned(), options.clone());
             thread::spawn(move || {
-                capture(source, &now, &frames, &to_owner, &shared);
-                frames.close();
+                let stage = CaptureStage {
+                    now,
+                    frames,
+                    to_owner,
+                    shared,
+                };
+                loop {
+                    let opened = LiveSource::open(&source, &options, Arc::clone(&stage.now));
+                    let ends = stage.capture(opened) == Ending::ForGood || !is_live(&source);
+                    if ends || !stage.waits_to_try_again() {
+                        break;
+                    }
+                }
+                stage.frames.close();
             })
         };
         Self {
@@ -142,52 +156,79 @@ impl Drop for LiveCapture {
     }
 }
 
-/// Until the source ends or the owner stops it.
-fn capture(
-    mut source: LiveSource,
-    now: &Now,
-    frames: &Mailbox<Arrived>,
-    to_owner: &Sender<CaptureEvent>,
-    shared: &CaptureShared,
-) {
-    while !shared.stop.load(Ordering::Relaxed) {
-        let event = match source.next(PATIENCE) {
-            Ok(event) => event,
-            Err(error) => {
-                _ = to_owner.send(CaptureEvent::Failed(error));
+/// The end of what a source gives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Ending {
+    /// Nothing more will come, or nobody wants it.
+    ForGood,
+    /// It could not be opened.
+    NotOpened,
+}
+
+/// What the capture thread works with.
+struct CaptureStage {
+    now: Now,
+    frames: Arc<Mailbox<Arrived>>,
+    to_owner: Sender<CaptureEvent>,
+    shared: Arc<CaptureShared>,
+}
+
+impl CaptureStage {
+    /// Until the source ends or the owner stops it.
+    fn capture(&self, mut source: LiveSource) -> Ending {
+        let shared = &self.shared;
+        while !shared.stop.load(Ordering::Relaxed) {
+            let event = match source.next(PATIENCE) {
+                Ok(event) => event,
+                Err(error) => {
+                    _ = self.to_owner.send(CaptureEvent::Failed(error));
+                    return Ending::NotOpened;
+                }
+            };
+            let broken_pictures = source.broken_pictures();
+            shared
+                .broken_pictures
+                .store(broken_pictures, Ordering::Relaxed);
+            let (event, is_last) = match event {
+                None => continue,
+                Some(LiveEvent::Frame(frame)) => {
+                    let arrived = Arrived {
+                        frame: Arc::new(frame),
+                        at_secs: (self.now)(),
+                    };
+                    shared.take(arrived, &self.frames);
+                    continue;
+                }
+                Some(LiveEvent::Opened(opened)) => {
+                    shared.tap(Tapped::Opened(&opened));
+                    (CaptureEvent::Opened(opened), false)
+                }
+                Some(LiveEvent::Lost(error)) => (CaptureEvent::Lost(error), false),
+                Some(LiveEvent::Back(opened)) => {
+                    shared.tap(Tapped::Opened(&opened));
+                    (CaptureEvent::Back(opened), false)
+                }
+                Some(LiveEvent::Ended) => (CaptureEvent::Ended, true),
+            };
+            // The owner may have gone, and then sets `stop`.
+            _ = self.to_owner.send(event);
+            if is_last {
                 break;
             }
-        };
-        let broken_pictures = source.broken_pictures();
-        shared
-            .broken_pictures
-            .store(broken_pictures, Ordering::Relaxed);
-        let (event, is_last) = match event {
-            None => continue,
-            Some(LiveEvent::Frame(frame)) => {
-                let arrived = Arrived {
-                    frame: Arc::new(frame),
-                    at_secs: now(),
-                };
-                shared.take(arrived, frames);
-                continue;
-            }
-            Some(LiveEvent::Opened(opened)) => {
-                shared.tap(Tapped::Opened(&opened));
-                (CaptureEvent::Opened(opened), false)
-            }
-            Some(LiveEvent::Lost(error)) => (CaptureEvent::Lost(error), false),
-            Some(LiveEvent::Back(opened)) => {
-                shared.tap(Tapped::Opened(&opened));
-                (CaptureEvent::Back(opened), false)
-            }
-            Some(LiveEvent::Ended) => (CaptureEvent::Ended, true),
-        };
-        // The owner may have gone, and then sets `stop`.
-        _ = to_owner.send(event);
-        if is_last {
-            break;
         }
+        Ending::ForGood
+    }
+
+    /// Waits until a source that could not be opened is tried again; false where it is wanted no more.
+    fn waits_to_try_again(&self) -> bool {
+        let until_secs = (self.now)() + AGAIN_SECS;
+        while (self.now)() < until_secs {
+            if self.shared.stop.load(Ordering::Relaxed) {
+                return false;
+            }
+            thread::sleep(PATIENCE);
+        }
+        true
     }
 }
 
@@ -286,6 +327,18 @@ mod tests {
         let address = format!("http://{}/video", listener.local_addr().unwrap());
         let capture = play(&address, false);
         let _connection = listener.accept().unwrap();
+        let watch = Stopwatch::start();
+        drop(capture);
+        assert!(watch.elapsed_ms() < 1500.0, "{} ms", watch.elapsed_ms());
+    }
+
+    #[test]
+    fn a_camera_that_is_not_there_is_looked_for_again_and_a_stop_ends_that() {
+        let capture = play("webcam:no such camera", false);
+        for _ in 0..2 {
+            let event = capture.wait_for_event(SOON);
+            assert!(matches!(event, Some(CaptureEvent::Failed(_))), "{event:?}");
+        }
         let watch = Stopwatch::start();
         drop(capture);
         assert!(watch.elapsed_ms() < 1500.0, "{} ms", watch.elapsed_ms());

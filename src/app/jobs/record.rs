@@ -105,7 +105,7 @@ fn watch(
     let progress = Progress::new(None);
     let frames = capture.frames();
     let mut first_secs = None;
-    while !stop.load(Ordering::Relaxed) && !recorder.has_failed() {
+    while !stop.load(Ordering::Relaxed) && !recorder.has_ended() {
         if let Some(event) = capture.next_event() {
             say(&event);
             match event {

@@ -58,7 +58,7 @@ impl WantedShape {
     fn form(&self, folder: &Path) -> NewForm {
         match self {
             Self::Model(path) => NewForm::Mesh {
-                file: file_from(folder, path),
+                file: file_from(folder, &named_file(folder, path)),
                 fit_m: None,
             },
             Self::Box => NewForm::Box(DVec3::new(0.08, 0.06, 0.04)),
@@ -117,25 +117,39 @@ pub fn allowed_name(text: &str) -> String {
     }
 }
 
-/// A place on an anchor where nothing that casts shadows is, at `wanted` or to its right, metres.
+/// A place on an anchor where nothing that casts shadows is, as near to `wanted` as there is one, metres.
 pub fn free_place(scene: &Scene, anchor: usize, wanted: DVec3) -> DVec3 {
     const STEP_M: f64 = 0.06;
+    const MOST_STEPS: i32 = 12;
     // (About half of what comes.)
-    const MARGIN_M: f64 = 0.03;
-    let boxes = || {
-        let there = things(scene).filter(|thing| thing.stands_on() == anchor && thing.casts);
-        there.filter_map(Object::bounds_in_anchor)
-    };
+    const MARGIN_M: f64 = 0.04;
+    let there = things(scene).filter(|thing| thing.stands_on() == anchor && thing.casts);
+    let boxes: Vec<_> = there.filter_map(Object::bounds_in_anchor).collect();
     let is_free = |place: &DVec3| {
-        boxes().all(|bounds| {
+        boxes.iter().all(|bounds| {
             let low = bounds.low.truncate() - MARGIN_M;
             let high = bounds.high.truncate() + MARGIN_M;
             let place = place.truncate();
             place.cmplt(low).any() || place.cmpgt(high).any()
         })
     };
-    let mut places = (0..32).map(|step| wanted + DVec3::X * (STEP_M * f64::from(step)));
-    places.find(is_free).unwrap_or(wanted)
+    let side = -MOST_STEPS..=MOST_STEPS;
+    let steps = side.clone().flat_map(|y| side.clone().map(move |x| (x, y)));
+    let mut steps: Vec<(i32, i32)> = steps.collect();
+    // (Of places as near to it the one on the right, then the one behind.)
+    steps.sort_by_key(|&(x, y)| (x * x + y * y, -x, -y));
+    let place =
+        |&(x, y): &(i32, i32)| wanted + STEP_M * DVec3::new(f64::from(x), f64::from(y), 0.0);
+    steps.iter().map(place).find(is_free).unwrap_or(wanted)
+}
+
+/// A file that somebody has named: from the current folder or, where it is not there, from the scene's.
+pub fn named_file(folder: &Path, file: &Path) -> PathBuf {
+    let in_folder = folder.join(file);
+    match !file.exists() && in_folder.exists() {
+        true => in_folder,
+        false => file.to_owned(),
+    }
 }
 
 /// How a scene in a folder names a file: from there if it lies there.
@@ -158,6 +172,11 @@ pub fn no_model(file: &Path) -> Option<String> {
     }
     if file.is_dir() {
         return Some(format!("{shown} is a folder; add the model's file in it"));
+    }
+    if !file.exists() {
+        return Some(format!(
+            "{shown}: no such file, neither here nor in the scene's folder"
+        ));
     }
     let extension = file.extension().and_then(|extension| extension.to_str());
     match extension.unwrap_or_default().to_lowercase().as_str() {
@@ -211,7 +230,7 @@ mod tests {
         let taken = |name: &str| name == "box 3";
         let other = wanted.in_scene(&scene, Path::new("/somewhere"), taken);
         assert_eq!(other.name, "box 4");
-        assert!(new.placement.position_m.distance(DVec3::X * 0.18) < 1e-9);
+        assert!(new.placement.position_m.distance(DVec3::Y * 0.12) < 1e-9);
         assert_eq!(allowed_name(" a,\"b\"; "), "a__b__");
         assert_eq!(allowed_name(" "), "thing");
         assert_eq!(
@@ -222,6 +241,37 @@ mod tests {
             file_from(Path::new("/a/b"), Path::new("/a/x.obj")),
             "/a/x.obj"
         );
+    }
+
+    #[test]
+    fn things_that_are_added_stay_near_and_none_stands_in_another() {
+        let mut things = String::new();
+        let mut places: Vec<DVec3> = Vec::new();
+        for number in 0..9 {
+            let place = free_place(&scene(&things), 0, DVec3::ZERO);
+            assert!(
+                places.iter().all(|it| it.distance(place) > 0.08),
+                "{places:?}"
+            );
+            assert!(place.length() < 0.2, "{place}");
+            let DVec3 { x, y, .. } = place;
+            things += &format!(
+                "[[virtual]]\nname = \"{number}\"\nsphere_m = 0.03\nposition_m = [{x}, {y}, 0]\n"
+            );
+            places.push(place);
+        }
+    }
+
+    #[test]
+    fn a_file_is_looked_for_here_and_beside_the_scene() {
+        let folder = tempfile::tempdir().unwrap();
+        let wheel = folder.path().join("wheel.obj");
+        std::fs::write(&wheel, "").unwrap();
+        assert_eq!(named_file(folder.path(), Path::new("wheel.obj")), wheel);
+        let here = Path::new("Cargo.toml");
+        assert_eq!(named_file(folder.path(), here), here);
+        let told = no_model(&named_file(folder.path(), Path::new("none.obj")));
+        assert!(told.unwrap().starts_with("none.obj: no such file"));
     }
 
     #[test]

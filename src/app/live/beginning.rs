@@ -63,13 +63,17 @@ impl Opening {
 
     /// What it is, for a title.
     pub fn title(&self) -> String {
-        let path = self.document.as_ref().map(SceneDocument::path);
-        let name = path.and_then(Path::file_name);
-        name.map_or_else(
-            || self.camera.source.clone(),
-            |name| name.to_string_lossy().into_owned(),
-        )
+        title_of(self.document.as_ref(), &self.camera)
     }
+}
+
+/// A scene's file or, where there is none, what is filmed with.
+pub(super) fn title_of(document: Option<&SceneDocument>, camera: &CameraSettings) -> String {
+    let name = document.and_then(|document| document.path().file_name());
+    name.map_or_else(
+        || camera.source.clone(),
+        |name| name.to_string_lossy().into_owned(),
+    )
 }
 
 /// What is looked for in a scene's frames.

@@ -19,8 +19,21 @@ pub enum LiveCommand {
     Recording(RecordingCommand),
     /// Of the window.
     Window(WindowCommand),
-    /// End the program.
+    /// End the program; a scene that nobody has saved is asked for first.
     Quit,
+    /// What becomes of that scene.
+    Close(ClosingAnswer),
+}
+
+/// An answer to what becomes of a scene that nobody has saved when the window is closed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ClosingAnswer {
+    /// It is saved in this file.
+    Save(PathBuf),
+    /// It is gone.
+    Discard,
+    /// The window stays open.
+    Stay,
 }
 
 /// A command to the scene and its file.
@@ -96,7 +109,7 @@ pub enum WindowCommand {
     ToggleKeys,
     /// Fill the screen, or a window again.
     ToggleFullScreen,
-    /// Out of whatever one is in: the list of keys, a selection, the full screen.
+    /// Out of whatever one is in: the list of keys, the search for a light, a selection, the full screen.
     Escape,
 }
 

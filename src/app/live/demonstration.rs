@@ -42,6 +42,12 @@ impl Demonstration {
         Ok(Self { folder })
     }
 
+    /// Leaves its folder where it is, also when the program ends: its file.
+    pub fn keep(&mut self) -> PathBuf {
+        self.folder.disable_cleanup(true);
+        self.path()
+    }
+
     /// Its file.
     pub fn path(&self) -> PathBuf {
         self.folder.path().join(SCENE_NAME)

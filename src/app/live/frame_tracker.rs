@@ -54,6 +54,8 @@ pub struct TrackedPicture {
     pub track_ms: f64,
     /// Why the frame could not be tracked.
     pub trouble: Option<String>,
+    /// Which anchors no picture has shown so far, and what is seen instead.
+    pub never_found: Option<String>,
 }
 
 impl TrackedPicture {
@@ -161,6 +163,7 @@ impl FrameTracker {
             wait_ms: (now_secs - at_secs).max(0.0) * 1e3,
             track_ms,
             trouble,
+            never_found: None,
         }
     }
 

@@ -2,10 +2,9 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::app::authoring::Edit;
+use crate::app::authoring::{Edit, ThingPlace};
 use crate::geometry::light_placing::PosedCamera;
 use crate::light::Light;
-use crate::scene::Placement;
 
 /// Length of an arrow in the picture, pixels.
 const ARROW_PX: f64 = 70.0;
@@ -39,7 +38,7 @@ pub enum GizmoTarget {
         /// Its name.
         name: String,
         /// Where it stands.
-        placement: Placement,
+        place: ThingPlace,
     },
     /// A light.
     Light {
@@ -91,6 +90,10 @@ impl<'a> Gizmo<'a> {
     /// The handles that there are, each as a line in the picture.
     pub fn handles(&self) -> Vec<(Handle, Vec<DVec2>)> {
         let all: &[Handle] = match self.target {
+            GizmoTarget::Thing {
+                place: ThingPlace::TableTop { .. },
+                ..
+            } => &[Handle::Axis(2)],
             GizmoTarget::Thing { .. } => &[
                 Handle::Axis(0),
                 Handle::Axis(1),
@@ -183,7 +186,7 @@ impl<'a> Gizmo<'a> {
 impl GizmoTarget {
     fn origin_m(&self) -> DVec3 {
         match self {
-            Self::Thing { placement, .. } => placement.position_m,
+            Self::Thing { place, .. } => place.placement().position_m,
             Self::Light { light, .. } => light_place_m(light),
         }
     }
@@ -202,8 +205,8 @@ impl Drag {
     pub fn edit(&self, sight: &PosedCamera, pointer_px: DVec2) -> Option<Edit> {
         let here = place(self.handle, &self.target, sight, pointer_px)?;
         Some(match &self.target {
-            GizmoTarget::Thing { name, placement } => {
-                let mut placement = *placement;
+            GizmoTarget::Thing { name, place } => {
+                let mut placement = place.placement();
                 match self.handle {
                     Handle::Axis(_) | Handle::Plane => placement.position_m += here - self.start,
                     Handle::Turn => {
@@ -301,6 +304,7 @@ mod tests {
     use super::*;
     use crate::geometry::camera::{Distortion, Intrinsics};
     use crate::light::Shape;
+    use crate::scene::Placement;
     use glam::{DAffine3, DMat3};
 
     /// A camera 0.8 m away that looks down on the origin from the front.
@@ -326,11 +330,11 @@ mod tests {
     fn thing() -> GizmoTarget {
         GizmoTarget::Thing {
             name: "torus".to_owned(),
-            placement: Placement {
+            place: ThingPlace::Free(Placement {
                 position_m: DVec3::new(0.02, 0.03, 0.04),
                 rotation_deg: DVec3::new(70.0, 0.0, 170.0),
                 scale: DVec3::splat(2.0),
-            },
+            }),
         }
     }
 
@@ -474,6 +478,27 @@ mod tests {
             gizmo
                 .grab(gizmo.origin_px() + DVec2::new(300.0, 0.0))
                 .is_none()
+        );
+    }
+
+    #[test]
+    fn the_table_s_top_is_moved_up_and_down_alone() {
+        let target = GizmoTarget::Thing {
+            name: "table".to_owned(),
+            place: ThingPlace::TableTop { height_m: 0.02 },
+        };
+        let sight = sight();
+        let gizmo = Gizmo::new(&target, &sight).unwrap();
+        let handles: Vec<Handle> = gizmo.handles().iter().map(|(handle, _)| *handle).collect();
+        assert_eq!(handles, [Handle::Axis(2)]);
+        let Edit::Place { placement, .. } = dragged(&target, Handle::Axis(2), DVec3::Z * 0.01)
+        else {
+            panic!("no place");
+        };
+        let DVec3 { x, y, z } = placement.position_m;
+        assert!(
+            x == 0.0 && y == 0.0 && (z - 0.03).abs() < 1e-4,
+            "{placement:?}"
         );
     }
 }

@@ -118,7 +118,7 @@ pub fn bindings() -> Vec<Binding> {
         plain(
             Key::Escape,
             "Esc",
-            "select nothing; leave the full screen",
+            "find no light; select nothing; leave the full screen",
             WindowCommand::Escape.into(),
         ),
     ];

@@ -19,6 +19,7 @@ mod overlays;
 pub mod panel;
 pub mod pipeline;
 mod recorders;
+mod seen_instead;
 mod selected_outline;
 mod selection;
 pub mod session;
@@ -80,7 +81,7 @@ pub fn live(request: &LiveRequest, stop: &Arc<AtomicBool>) -> Result<()> {
     let failure: Failure = Arc::default();
     let now: Now = Arc::new(Stopwatch::clock());
     let pass_end = PassEnd::default();
-    let title = format!("{} – gnomon", opening.title());
+    let title = window_title(&opening.title());
     let shared = WindowShared {
         stop: Arc::clone(stop),
         failure: Arc::clone(&failure),
@@ -104,4 +105,9 @@ pub fn live(request: &LiveRequest, stop: &Arc<AtomicBool>) -> Result<()> {
         .unwrap_or_else(PoisonError::into_inner)
         .take();
     failed.map_or(Ok(()), Err)
+}
+
+/// A window's title, by what it shows.
+fn window_title(what: &str) -> String {
+    format!("{what} – gnomon")
 }

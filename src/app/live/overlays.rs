@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Shape, Stroke, Vec2};
+use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Vec2};
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::command::Overlay;
@@ -72,7 +72,7 @@ impl Overlays<'_> {
             let Some(place) = self.place_of_distorted(middle) else {
                 continue;
             };
-            self.label(place, &seen.id.to_string(), SEEN);
+            self.label_on_ground(place, &seen.id.to_string(), SEEN);
         }
     }
 
@@ -118,7 +118,7 @@ impl Overlays<'_> {
                 }
                 (_, [point]) => {
                     let size = Vec2::splat(9.0);
-                    let square = eframe::egui::Rect::from_center_size(*point, size);
+                    let square = Rect::from_center_size(*point, size);
                     match handle {
                         Handle::Sphere => _ = self.painter.circle_filled(*point, 6.0, colour),
                         _ => _ = self.painter.rect_filled(square, 1.0, colour),
@@ -241,6 +241,17 @@ impl Overlays<'_> {
         if let Some(points) = points {
             self.painter.add(Shape::closed_line(points, stroke));
         }
+    }
+
+    /// A label that is read on a marker's pattern, too.
+    fn label_on_ground(&self, place: Pos2, text: &str, colour: Color32) {
+        let font = FontId::proportional(14.0);
+        let galley = self.painter.layout_no_wrap(text.to_owned(), font, colour);
+        let ground = Rect::from_center_size(place, galley.size() + Vec2::new(8.0, 2.0));
+        let dark = Color32::from_black_alpha(200);
+        self.painter.rect_filled(ground, 3.0, dark);
+        let corner = place - galley.size() / 2.0;
+        self.painter.galley(corner, galley, colour);
     }
 
     fn label(&self, place: Pos2, text: &str, colour: Color32) {

@@ -7,6 +7,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 
 use super::frame_tracker::{FrameTracker, TrackedPicture, TrackingPlan};
+use super::seen_instead::SeenInstead;
 use crate::app::input::live_capture::{Arrived, CaptureEvent, LiveCapture, Tap};
 use crate::app::input::mailbox::Mailbox;
 use crate::app::stages::known_camera::KeptCamera;
@@ -46,6 +47,7 @@ impl Pipeline {
         let thread = {
             let (captured, tracked) = (Arc::clone(&captured), Arc::clone(&tracked));
             let stage = TrackingStage {
+                seen_instead: SeenInstead::of(&plan),
                 tracker: FrameTracker::new(input.calibration, KeptCamera::of(&input.source), plan),
                 new_plans,
                 wants_rejected: Arc::clone(&wants_rejected),
@@ -122,6 +124,7 @@ impl Drop for Pipeline {
 
 struct TrackingStage {
     tracker: FrameTracker,
+    seen_instead: Option<SeenInstead>,
     new_plans: Receiver<TrackingPlan>,
     wants_rejected: Arc<AtomicBool>,
     now: Now,
@@ -132,10 +135,15 @@ impl TrackingStage {
     fn run(mut self, captured: &Mailbox<Arrived>, tracked: &Mailbox<TrackedPicture>) {
         while let Some(arrived) = captured.take() {
             if let Some(plan) = self.new_plans.try_iter().last() {
+                if !(self.seen_instead.as_ref()).is_some_and(|watch| watch.is_for(&plan)) {
+                    self.seen_instead = SeenInstead::of(&plan);
+                }
                 self.tracker.set_plan(plan);
             }
             let wants_rejected = self.wants_rejected.load(Ordering::Relaxed);
-            let picture = self.tracker.look(arrived, (self.now)(), wants_rejected);
+            let mut picture = self.tracker.look(arrived, (self.now)(), wants_rejected);
+            let watch = self.seen_instead.as_mut();
+            picture.never_found = watch.and_then(|watch| watch.note(&picture));
             if !tracked.put(picture) {
                 return;
             }

@@ -16,6 +16,8 @@ use crate::app::talk::counted;
 pub struct Recorders {
     folder: PathBuf,
     session: Option<(PathBuf, SessionRecorder)>,
+    /// Sessions that have ended, while what waits for the encoder is written.
+    ending: Vec<(PathBuf, SessionRecorder)>,
     video: Option<CompositeVideo>,
 }
 
@@ -25,6 +27,7 @@ impl Recorders {
         Self {
             folder,
             session: None,
+            ending: Vec::new(),
             video: None,
         }
     }
@@ -34,12 +37,19 @@ impl Recorders {
         self.session.is_some()
     }
 
+    /// Frames that have yet to be written of sessions that have ended; `None` where there is no such session.
+    pub fn frames_being_written(&self) -> Option<usize> {
+        let waiting = self.ending.iter().map(|(_, session)| session.waiting());
+        (!self.ending.is_empty()).then(|| waiting.sum())
+    }
+
     /// Whether a video of the composite is.
     pub fn records_video(&self) -> bool {
         self.video.is_some()
     }
 
-    /// Begins to record the camera as a session, or ends it. What was done, in words.
+    /// Begins to record the camera as a session, or ends it: what is left is then written beside everything else. What was
+    /// done, in words, where there is anything to say yet.
     ///
     /// # Errors
     /// What kept it from being written; what was until then is whole.
@@ -47,9 +57,10 @@ impl Recorders {
         &mut self,
         pipeline: &Pipeline,
         head: SessionHead,
-    ) -> Result<String, OutputError> {
+    ) -> Result<Option<String>, OutputError> {
         if self.session.is_some() {
-            return self.end_session(pipeline);
+            self.end_session(pipeline);
+            return Ok(None);
         }
         let (path, recorder) = first_free(&self.folder, "session", "", |path| {
             // Made here, so that it is nobody else's.
@@ -59,7 +70,7 @@ impl Recorders {
         pipeline.set_tap(Some(recorder.tap()));
         let said = format!("recording {}", path.display());
         self.session = Some((path, recorder));
-        Ok(said)
+        Ok(Some(said))
     }
 
     /// Begins to record the composite, or ends it. What was done, in words.
@@ -104,10 +115,14 @@ impl Recorders {
         }
     }
 
-    /// Ends what has failed by itself: what it said.
-    pub fn take_failure(&mut self, pipeline: &Pipeline) -> Option<Result<String, OutputError>> {
-        if self.session.as_ref().is_some_and(|(_, s)| s.has_failed()) {
-            return Some(self.end_session(pipeline));
+    /// What there is to say of what has been written to its end, or has failed by itself.
+    pub fn take_ended(&mut self, pipeline: &Pipeline) -> Option<Result<String, OutputError>> {
+        if self.session.as_ref().is_some_and(|(_, s)| s.has_ended()) {
+            self.end_session(pipeline);
+        }
+        let ended = self.ending.iter().position(|(_, s)| s.has_ended());
+        if let Some(index) = ended {
+            return Some(written(self.ending.remove(index)));
         }
         let has_failed = self.video.as_ref().is_some_and(CompositeVideo::has_failed);
         has_failed.then(|| self.end_video())
@@ -115,32 +130,41 @@ impl Recorders {
 
     /// Ends all recording: what there is to say of each.
     pub fn finish(&mut self, pipeline: &Pipeline) -> Vec<Result<String, OutputError>> {
-        let session = self.session.is_some().then(|| self.end_session(pipeline));
-        let video = self.video.is_some().then(|| self.end_video());
-        session.into_iter().chain(video).collect()
+        self.end_session(pipeline);
+        let sessions = self.ending.drain(..).map(written);
+        let mut said: Vec<_> = sessions.collect();
+        said.extend(self.video.is_some().then(|| self.end_video()));
+        said
     }
 
-    fn end_session(&mut self, pipeline: &Pipeline) -> Result<String, OutputError> {
-        pipeline.set_tap(None);
-        let Some((path, recorder)) = self.session.take() else {
-            return Ok(String::new());
-        };
-        let recorded = recorder.finish()?;
-        let lost = match recorded.dropped {
-            0 => String::new(),
-            dropped => format!("; {dropped} more were dropped, the encoder was too slow"),
-        };
-        Ok(format!(
-            "{} in {}{lost}",
-            counted(recorded.frames as usize, "frame"),
-            path.display()
-        ))
+    fn end_session(&mut self, pipeline: &Pipeline) {
+        if let Some((path, recorder)) = self.session.take() {
+            pipeline.set_tap(None);
+            recorder.end();
+            self.ending.push((path, recorder));
+        }
     }
 
     fn end_video(&mut self) -> Result<String, OutputError> {
         let video = self.video.take();
         video.map_or(Ok(String::new()), CompositeVideo::finish)
     }
+}
+
+/// Waits until a session is whole: what there is to say of it.
+fn written((path, recorder): (PathBuf, SessionRecorder)) -> Result<String, OutputError> {
+    let recorded = recorder.finish()?;
+    let lost = match recorded.dropped {
+        0 => String::new(),
+        dropped => format!("; {dropped} more were dropped, the encoder was too slow"),
+    };
+    Ok(match recorded.frames {
+        0 => format!("no frame came, so there is no session{lost}"),
+        frames => {
+            let frames = counted(frames as usize, "frame");
+            format!("{frames} in {}{lost}", path.display())
+        }
+    })
 }
 
 /// Makes something under the first name with a number that nothing has yet, `stem-001.png`, whoever else takes names there.

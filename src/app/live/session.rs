@@ -5,22 +5,22 @@ mod edits;
 mod states;
 mod things;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context as _, Result};
 
-use super::beginning::{Opening, plan_of};
+use super::beginning::{Opening, plan_of, title_of};
 use super::canvas::SceneCanvas;
-use super::command::{Overlay, RecordingCommand, Selected};
+use super::command::{Overlay, RecordingCommand, WindowCommand};
 use super::frame_tracker::TrackedPicture;
 use super::meters::{Meters, Sample};
 use super::pipeline::{Pipeline, PipelineInput};
 use super::recorders::Recorders;
 use super::shadow_clicks::ShadowClicks;
 use super::window_state::WindowState;
-use crate::app::authoring::{Edit, SceneDocument};
+use crate::app::authoring::{Edit, SceneDocument, ThingPlace};
 use crate::app::files::job_files::Replacing;
 use crate::app::files::output_error::OutputError;
 use crate::app::input::live_capture::CaptureEvent;
@@ -29,10 +29,10 @@ use crate::app::recording::session_writer::SessionHead;
 use crate::app::stopwatch::Stopwatch;
 use crate::app::window::Wake;
 use crate::app::window::notices::{CameraState, Notices, Weight};
-use crate::capture::live::Now;
+use crate::capture::live::{Now, is_live};
 use crate::geometry::camera::Intrinsics;
 use crate::render::{Gpu, Renderer};
-use crate::scene::{CameraSettings, Placement, Scene};
+use crate::scene::{CameraSettings, Scene};
 use states::{DrawnPicture, Origin, Pending, PictureState, SceneState};
 
 /// For composites of sources that do not say their rate.
@@ -60,8 +60,8 @@ pub struct LiveSession {
     pub meters: Meters,
     /// Renderers that drew, one after the other: a new one has another picture.
     renderers: u64,
-    /// What has just come into the scene.
-    newly_selected: Option<Selected>,
+    /// What is to be selected, after what came into the scene or went.
+    selection: Option<WindowCommand>,
 }
 
 impl LiveSession {
@@ -100,7 +100,7 @@ impl LiveSession {
             scene: SceneState::of(document, &wake),
             picture: PictureState::Awaited,
             renderers: 0,
-            newly_selected: None,
+            selection: None,
             calibration: input.calibration,
             pipeline,
             camera,
@@ -143,7 +143,7 @@ impl LiveSession {
         }
         self.take_scene_news();
         self.take_read();
-        if let Some(said) = self.recorders.take_failure(&self.pipeline) {
+        if let Some(said) = self.recorders.take_ended(&self.pipeline) {
             self.say(said);
         }
         self.pipeline.want_rejected(state.shows(Overlay::Rejected));
@@ -160,6 +160,7 @@ impl LiveSession {
         ) {
             self.recorders.add_poses(&tracked);
             self.notices.tracking.clone_from(&tracked.trouble);
+            self.notices.never_found.clone_from(&tracked.never_found);
             self.tell_of_camera(&tracked);
             self.picture = PictureState::Following(Box::new(DrawnPicture {
                 tracked,
@@ -215,13 +216,14 @@ impl LiveSession {
     }
 
     /// The frame that was drawn last is on the screen: handed over at `handed_over_secs`, or when the GPU is done with
-    /// it, whichever is later.
+    /// it, whichever is later. What was handed over before it was drawn was another one: it has yet to be shown.
     ///
     /// # Errors
     /// The GPU failed.
     pub fn was_shown(&mut self, handed_over_secs: f64) -> Result<()> {
         let picture = self.picture.drawn_mut();
-        let pending = picture.and_then(|picture| picture.pending.take());
+        let is_handed_over = |pending: &mut Pending| pending.begun_secs <= handed_over_secs;
+        let pending = picture.and_then(|picture| picture.pending.take_if(is_handed_over));
         let (Some(pending), Some((renderer, _))) = (pending, self.canvas.renderer()) else {
             return Ok(());
         };
@@ -297,15 +299,29 @@ impl LiveSession {
     }
 
     /// Where a thing stands in the numbers of the scene, with what is being dragged where it is.
-    pub fn placement(&self, thing: &str) -> Option<Placement> {
+    pub fn place(&self, thing: &str) -> Option<ThingPlace> {
         let scene = self.scene.open()?;
-        match &scene.previewed {
-            Some(Edit::Place {
-                thing: previewed,
-                placement,
-            }) if previewed == thing => Some(*placement),
-            _ => scene.document.placement(thing),
-        }
+        let written = scene.document.place(thing)?;
+        Some(match (&scene.previewed, written) {
+            (
+                Some(Edit::Place {
+                    thing: it,
+                    placement,
+                }),
+                ThingPlace::Free(_),
+            ) if it == thing => ThingPlace::Free(*placement),
+            (
+                Some(Edit::Place {
+                    thing: it,
+                    placement,
+                }),
+                ThingPlace::TableTop { .. },
+            ) if it == thing => {
+                let height_m = placement.position_m.z;
+                ThingPlace::TableTop { height_m }
+            }
+            _ => written,
+        })
     }
 
     /// The scene with its file; `None` on first use.
@@ -317,6 +333,22 @@ impl LiveSession {
     pub fn is_unsaved(&self) -> bool {
         let scene = self.scene.open();
         scene.is_some_and(|scene| matches!(scene.origin, Origin::Unsaved { .. }))
+    }
+
+    /// What is shown, for a title.
+    pub fn title(&self) -> String {
+        match self.is_unsaved() {
+            true => format!("{} (not saved)", self.camera.source),
+            false => title_of(self.document(), &self.camera),
+        }
+    }
+
+    /// Keeps a scene that nobody has saved, whatever becomes of the program: where its file is.
+    pub fn keep_unsaved(&mut self) -> Option<PathBuf> {
+        match &mut self.scene.open_mut()?.origin {
+            Origin::Saved => None,
+            Origin::Unsaved { folder } => Some(folder.keep()),
+        }
     }
 
     /// Frames that came, and how many of them were not shown: see [`Pipeline::dropped`].
@@ -335,6 +367,11 @@ impl LiveSession {
             self.recorders.records_session(),
             self.recorders.records_video(),
         ]
+    }
+
+    /// Frames of a session that has ended which have yet to be written; `None` where all are.
+    pub fn frames_being_written(&self) -> Option<usize> {
+        self.recorders.frames_being_written()
     }
 
     /// Does what is asked of the recorders. What goes wrong is told as a notice.
@@ -387,6 +424,13 @@ impl LiveSession {
     }
 
     fn toggle_session(&mut self) {
+        let nothing_comes = matches!(
+            self.notices.camera,
+            CameraState::Failed(_) | CameraState::Ended
+        );
+        if nothing_comes && !self.recorders.records_session() {
+            return self.tell(Weight::Trouble, "No pictures come that could be recorded.");
+        }
         let head = SessionHead {
             fps: self.fps,
             calibration: self.calibration,
@@ -397,7 +441,14 @@ impl LiveSession {
             replacing: Replacing::OlderResults,
         };
         let said = self.recorders.toggle_session(&self.pipeline, head);
-        self.say(said);
+        if let Some(said) = said.transpose() {
+            self.say(said);
+        }
+    }
+
+    /// Whether a camera that could not be opened is looked for.
+    pub fn looks_for_camera(&self) -> bool {
+        is_live(&self.camera.source) && matches!(self.notices.camera, CameraState::Failed(_))
     }
 
     /// Whether pictures still come, or may come again.

@@ -7,12 +7,12 @@ use std::time::Duration;
 use anyhow::Result;
 use eframe::egui::{
     Align2, Area, CentralPanel, Color32, Context, FontId, Frame, Grid, Id, PointerButton, Pos2,
-    ProgressBar, Rect, Response, RichText, Sense, Ui, Vec2, ViewportCommand,
+    ProgressBar, Rect, Response, RichText, ScrollArea, Sense, Ui, Vec2, ViewportCommand,
 };
 use glam::DAffine3;
 
 use super::command::{
-    Clicks, Commands, LiveCommand, Overlay, SceneCommand, Selected, WindowCommand,
+    Clicks, ClosingAnswer, Commands, LiveCommand, Overlay, SceneCommand, Selected, WindowCommand,
 };
 use super::gizmo::{Drag, Gizmo, GizmoTarget};
 use super::keys::bindings;
@@ -23,6 +23,7 @@ use super::selection::selected_at;
 use super::session::LiveSession;
 use super::shadow_lines::ShadowLines;
 use super::window_state::WindowState;
+use super::window_title;
 use crate::app::talk;
 use crate::app::window::ContextWaker;
 use crate::app::window::event_loop::PassEnd;
@@ -39,12 +40,26 @@ const PULSE: Duration = Duration::from_millis(200);
 /// What takes no longer is not told.
 const LONG_AWAITED_MS: f64 = 1000.0;
 const PANEL_WIDTH: f32 = 330.0;
+/// Whatever it shows, the picture has the rest.
+const MOST_PANEL_WIDTH: f32 = 480.0;
+/// What the list of keys has around it.
+const KEYS_MARGIN: f32 = 90.0;
 const PROGRESS_WIDTH: f32 = 330.0;
 const TROUBLE: Color32 = Color32::from_rgb(255, 190, 90);
 const RECORDING: Color32 = Color32::from_rgb(235, 60, 50);
 
 /// The error that ended the window before a person did.
 pub type Failure = Arc<Mutex<Option<anyhow::Error>>>;
+
+/// The end of the window, as far as it was asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Closing {
+    NotAsked,
+    /// A person is asked what becomes of the scene that nobody has saved.
+    Asked,
+    /// That scene is to be gone.
+    Discards,
+}
 
 /// All that the window and whoever opened it share.
 pub struct WindowShared {
@@ -70,6 +85,9 @@ pub struct LiveWindow {
     adapter: String,
     shared: WindowShared,
     full_screen: bool,
+    /// As it was set last.
+    title: String,
+    closing: Closing,
 }
 
 impl LiveWindow {
@@ -95,31 +113,62 @@ impl LiveWindow {
             outline: SelectedOutline::default(),
             drag: None,
             full_screen: false,
+            title: String::new(),
+            closing: Closing::NotAsked,
         })
     }
 
     fn run(&mut self, ctx: &Context, commands: Commands) {
         for command in commands {
             match command {
-                LiveCommand::Scene(command) => {
-                    let removes = command == SceneCommand::RemoveSelected;
-                    self.session.edit_scene(command, &self.state);
-                    if removes {
-                        self.state.selected = None;
-                    }
-                }
+                LiveCommand::Scene(command) => self.session.edit_scene(command, &self.state),
                 LiveCommand::Recording(command) => self.session.record(command),
+                LiveCommand::Window(WindowCommand::Escape) if self.leaves_search() => {
+                    let cancel = SceneCommand::Clicks(Clicks::Cancel);
+                    self.session.edit_scene(cancel, &self.state);
+                }
                 LiveCommand::Window(command) => self.state.apply(&command),
                 LiveCommand::Quit => ctx.send_viewport_cmd(ViewportCommand::Close),
+                LiveCommand::Close(answer) => self.answer(ctx, answer),
             }
         }
-        if let Some(selected) = self.session.take_selected() {
-            self.state.selected = Some(selected);
+        if let Some(command) = self.session.take_selection() {
+            self.state.apply(&command);
         }
         if self.state.full_screen != self.full_screen {
             self.full_screen = self.state.full_screen;
             ctx.send_viewport_cmd(ViewportCommand::Fullscreen(self.full_screen));
         }
+    }
+
+    /// Whether a light is being found, with nothing over it: that is what Esc leaves.
+    fn leaves_search(&self) -> bool {
+        !self.state.keys && self.session.clicks().is_some()
+    }
+
+    /// Whether a person is asked before the window closes: not where somebody else ends the program.
+    fn asks_before_closing(&self) -> bool {
+        self.closing != Closing::Discards && self.session.is_unsaved() && !self.shared.ends()
+    }
+
+    fn answer(&mut self, ctx: &Context, answer: ClosingAnswer) {
+        match answer {
+            ClosingAnswer::Stay => {
+                self.closing = Closing::NotAsked;
+                return;
+            }
+            ClosingAnswer::Discard => self.closing = Closing::Discards,
+            ClosingAnswer::Save(path) => {
+                let save = SceneCommand::Save(path);
+                self.session.edit_scene(save, &self.state);
+                if self.session.is_unsaved() {
+                    // A notice tells why.
+                    return;
+                }
+                self.closing = Closing::NotAsked;
+            }
+        }
+        ctx.send_viewport_cmd(ViewportCommand::Close);
     }
 
     fn side_panel(&mut self, ui: &mut Ui) -> Commands {
@@ -132,12 +181,12 @@ impl LiveWindow {
             CameraState::Lost(_) => "The camera is gone".to_owned(),
             CameraState::Ended => "The recording has ended".to_owned(),
         };
-        let placement = |thing: &str| session.placement(thing);
+        let place = |thing: &str| session.place(thing);
         let facts = Facts {
             scene: session.scene(),
             path: document.map(|document| document.path()),
             unsaved: session.is_unsaved(),
-            placement: &placement,
+            place: &place,
             history: [
                 document.and_then(|document| document.next_undo()),
                 document.and_then(|document| document.next_redo()),
@@ -157,6 +206,7 @@ impl LiveWindow {
         let panel = &mut self.panel;
         eframe::egui::Panel::right("panel")
             .default_size(PANEL_WIDTH)
+            .max_size(MOST_PANEL_WIDTH)
             .show(ui, |ui| panel.show(ui, &facts, state))
             .inner
     }
@@ -172,7 +222,7 @@ impl LiveWindow {
         let fit = PictureFit::within(area, size_px);
         let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
         ui.painter().image(texture, fit.rect, whole, Color32::WHITE);
-        let response = ui.interact(area, Id::unique("picture"), Sense::click_and_drag());
+        let response = ui.interact(fit.rect, Id::unique("picture"), Sense::click_and_drag());
         let command = self.point(&response, &fit);
         let Some(picture) = self.session.picture() else {
             return command;
@@ -232,7 +282,7 @@ impl LiveWindow {
         if response.clicked_by(left)
             && let (Some(scene), Some(picture)) = (self.session.scene(), self.session.picture())
         {
-            let can_move = |thing: &str| self.session.placement(thing).is_some();
+            let can_move = |thing: &str| self.session.place(thing).is_some();
             let with_lights = self.state.shows(Overlay::Lights);
             let selected = selected_at(scene, picture, pixel, with_lights, can_move);
             return Some(WindowCommand::Select(selected).into());
@@ -253,9 +303,9 @@ impl LiveWindow {
                 let moved_m = thing.motion.as_ref().map(|motion| motion.at(time_s).0);
                 let frame = camera_from_node[thing.stands_on()]?
                     * DAffine3::from_translation(moved_m.unwrap_or_default());
-                let placement = self.session.placement(name)?;
+                let place = self.session.place(name)?;
                 let name = name.clone();
-                (GizmoTarget::Thing { name, placement }, frame)
+                (GizmoTarget::Thing { name, place }, frame)
             }
             Selected::Light(index) => {
                 let SceneLight { anchor, light } = *scene.lights.get(*index)?;
@@ -273,10 +323,15 @@ impl LiveWindow {
 
     fn say_in_the_middle(&self, ui: &Ui, area: Rect) {
         let text = match &self.session.notices.camera {
-            CameraState::Failed(reason) => reason.clone(),
-            CameraState::Ended => "The recording has no pictures.".to_owned(),
-            _ => "Waiting for the first picture …".to_owned(),
-        };
+            // A notice tells why.
+            CameraState::Failed(_) if self.session.looks_for_camera() => {
+                "The camera is looked for: it is taken up as soon as it is there."
+            }
+            CameraState::Failed(_) => "There is no picture.",
+            CameraState::Ended => "The recording has no pictures.",
+            _ => "Waiting for the first picture …",
+        }
+        .to_owned();
         let painter = ui.painter();
         let wrap = (area.width() - 40.0).max(40.0);
         let galley = painter.layout(text, FontId::proportional(18.0), Color32::LIGHT_GRAY, wrap);
@@ -284,13 +339,40 @@ impl LiveWindow {
         painter.galley(place, galley, Color32::LIGHT_GRAY);
     }
 
+    /// What is told over the picture, each in its colour.
+    fn told(&self) -> Vec<(Color32, String)> {
+        let session = &self.session;
+        let mut told = Vec::new();
+        if session.clicks().is_some() {
+            let text = "finding the light: the picture stands still; Esc leaves it";
+            told.push((TROUBLE, text.to_owned()));
+        } else if self.state.holds {
+            told.push((TROUBLE, "held: the picture stands still".to_owned()));
+        }
+        let awaits_long = session.awaited_ms().is_some_and(|ms| ms >= LONG_AWAITED_MS);
+        if awaits_long && session.preparing().is_none() {
+            told.push((Color32::WHITE, "preparing the scene …".to_owned()));
+        }
+        for (recording, what) in session.records().into_iter().zip(["camera", "composite"]) {
+            if recording {
+                told.push((RECORDING, format!("recording the {what}")));
+            }
+        }
+        if let Some(frames) = session.frames_being_written() {
+            let frames = talk::counted(frames, "frame");
+            told.push((Color32::WHITE, format!("writing {frames} …")));
+        }
+        let shown = session.notices.shown(session.now_secs());
+        told.extend(shown.into_iter().map(|(weight, text)| match weight {
+            Weight::Done => (Color32::WHITE, text),
+            Weight::Trouble => (TROUBLE, text),
+        }));
+        told
+    }
+
     fn notices(&self, ctx: &Context, area: Rect) {
-        let shown = self.session.notices.shown(self.session.now_secs());
-        let [session, video] = self.session.records();
-        let preparing = self.session.preparing();
-        let awaits_long = (self.session.awaited_ms()).is_some_and(|ms| ms >= LONG_AWAITED_MS);
-        let is_calm = !session && !video && !self.state.holds;
-        if shown.is_empty() && is_calm && preparing.is_none() && !awaits_long {
+        let (told, preparing) = (self.told(), self.session.preparing());
+        if told.is_empty() && preparing.is_none() {
             return;
         }
         let place = area.left_top() + Vec2::splat(10.0);
@@ -299,12 +381,6 @@ impl LiveWindow {
             .interactable(false)
             .show(ctx, |ui| {
                 ui.set_max_width((area.width() - 20.0).clamp(60.0, 620.0));
-                if self.state.holds {
-                    boxed(
-                        ui,
-                        RichText::new("held: the picture stands still").color(TROUBLE),
-                    );
-                }
                 if let Some(part) = preparing {
                     let text = "working out what things hide from themselves";
                     ui.add(
@@ -313,29 +389,8 @@ impl LiveWindow {
                             .text(text),
                     );
                 }
-                if awaits_long && preparing.is_none() {
-                    boxed(
-                        ui,
-                        RichText::new("preparing the scene …").color(Color32::WHITE),
-                    );
-                }
-                for (recording, what) in [(session, "the camera"), (video, "the composite")] {
-                    if recording {
-                        boxed(
-                            ui,
-                            RichText::new(format!("recording {what}")).color(RECORDING),
-                        );
-                    }
-                }
-                for (weight, text) in shown {
-                    let text = RichText::new(text);
-                    boxed(
-                        ui,
-                        match weight {
-                            Weight::Done => text.color(Color32::WHITE),
-                            Weight::Trouble => text.color(TROUBLE),
-                        },
-                    );
+                for (colour, text) in told {
+                    boxed(ui, RichText::new(text).color(colour));
                 }
             });
     }
@@ -373,17 +428,22 @@ impl LiveWindow {
             .resizable(false)
             .anchor(Align2::CENTER_CENTER, Vec2::ZERO)
             .show(ctx, |ui| {
-                Grid::new("keys")
-                    .num_columns(2)
-                    .striped(true)
-                    .show(ui, |ui| {
-                        for binding in bindings() {
-                            ui.strong(binding.name);
-                            ui.label(binding.does);
-                            ui.end_row();
-                        }
-                    });
-                ui.weak("Click a thing in the picture to select it, drag its handles to move it.");
+                let most = (ctx.content_rect().height() - KEYS_MARGIN).max(KEYS_MARGIN / 2.0);
+                ScrollArea::vertical().max_height(most).show(ui, |ui| {
+                    Grid::new("keys")
+                        .num_columns(2)
+                        .striped(true)
+                        .show(ui, |ui| {
+                            for binding in bindings() {
+                                ui.strong(binding.name);
+                                ui.label(binding.does);
+                                ui.end_row();
+                            }
+                        });
+                    ui.weak(
+                        "Click a thing in the picture to select it, drag its handles to move it.",
+                    );
+                });
             });
         self.state.keys = open;
     }
@@ -416,6 +476,7 @@ impl Content for LiveWindow {
         self.screen = Screen::new(creation)?;
         gpu.description().clone_into(&mut self.adapter);
         self.full_screen = false;
+        self.title.clear();
         self.drag = None;
         self.shared.waker.set(&creation.egui_ctx);
         self.session.renew(Arc::clone(gpu));
@@ -426,6 +487,11 @@ impl Content for LiveWindow {
         ctx.request_repaint_after(PULSE);
         if self.shared.stop.load(Ordering::Relaxed) {
             ctx.send_viewport_cmd(ViewportCommand::Close);
+        }
+        if ctx.input(|input| input.viewport().close_requested()) && self.asks_before_closing() {
+            ctx.send_viewport_cmd(ViewportCommand::CancelClose);
+            ctx.send_viewport_cmd(ViewportCommand::Minimized(false));
+            self.closing = Closing::Asked;
         }
         let shown = self.session.was_shown(self.shared.pass_end.secs());
         if let Err(error) = shown.and_then(|()| self.session.step(&self.state)) {
@@ -441,7 +507,10 @@ impl Content for LiveWindow {
 
     fn ui(&mut self, ui: &mut Ui) {
         let ctx = ui.ctx().clone();
-        let mut commands = pressed(&ctx);
+        let mut commands = match self.closing {
+            Closing::Asked => self.panel.ask_before_closing(&ctx),
+            Closing::NotAsked | Closing::Discards => pressed(&ctx),
+        };
         if self.state.panel {
             commands.append(self.side_panel(ui));
         }
@@ -460,6 +529,11 @@ impl Content for LiveWindow {
             self.list_of_keys(&ctx);
         }
         self.run(&ctx, commands);
+        let title = window_title(&self.session.title());
+        if title != self.title {
+            self.title.clone_from(&title);
+            ctx.send_viewport_cmd(ViewportCommand::Title(title));
+        }
     }
 
     fn close(&mut self) {
@@ -469,6 +543,12 @@ impl Content for LiveWindow {
                 Err(error) => self.shared.fail(error.into()),
             }
         }
+        if self.closing != Closing::Discards
+            && let Some(path) = self.session.keep_unsaved()
+        {
+            let path = path.display();
+            talk::say(format_args!("the scene was not saved; it is kept: {path}"));
+        }
         if let CameraState::Failed(reason) = &self.session.notices.camera {
             self.shared.fail(anyhow::anyhow!("{reason}"));
         }
@@ -476,6 +556,12 @@ impl Content for LiveWindow {
 }
 
 impl WindowShared {
+    /// Whether somebody else than the person at the window ends it.
+    fn ends(&self) -> bool {
+        let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
+        failure.is_some() || self.stop.load(Ordering::Relaxed)
+    }
+
     /// The first thing that goes wrong is the one that is told.
     fn fail(&self, error: anyhow::Error) {
         let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);

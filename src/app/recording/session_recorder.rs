@@ -46,6 +46,7 @@ enum Item {
 #[derive(Default)]
 struct Waiting {
     bytes: AtomicUsize,
+    frames: AtomicUsize,
     dropped: AtomicU64,
 }
 
@@ -87,6 +88,7 @@ impl SessionRecorder {
                 return;
             }
             waiting.bytes.fetch_add(bytes, Ordering::Relaxed);
+            waiting.frames.fetch_add(1, Ordering::Relaxed);
             // A writer that has failed says so itself.
             _ = to_writer.send(Item::Frame(Arc::clone(frame)));
         })
@@ -107,9 +109,20 @@ impl SessionRecorder {
         });
     }
 
-    /// Whether it has ended by itself: [`SessionRecorder::finish`] tells why.
-    pub fn has_failed(&self) -> bool {
+    /// Frames that wait for the encoder.
+    pub fn waiting(&self) -> usize {
+        self.waiting.frames.load(Ordering::Relaxed)
+    }
+
+    /// Whether nothing is written any more, by itself or after [`SessionRecorder::end`]: [`SessionRecorder::finish`] tells how
+    /// it ended.
+    pub fn has_ended(&self) -> bool {
         self.thread.is_finished()
+    }
+
+    /// Writes what waits and ends the session, beside whoever asks.
+    pub fn end(&self) {
+        _ = self.to_writer.send(Item::Finish);
     }
 
     /// Writes what waits, and ends the session.
@@ -117,7 +130,7 @@ impl SessionRecorder {
     /// # Errors
     /// What kept a frame from being written; the frames before are whole.
     pub fn finish(self) -> Result<Recorded, OutputError> {
-        _ = self.to_writer.send(Item::Finish);
+        self.end();
         let written = self.thread.join();
         Ok(Recorded {
             frames: written.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?,
@@ -137,6 +150,7 @@ fn write(
             Item::Frame(frame) => {
                 writer.push(&frame)?;
                 waiting.bytes.fetch_sub(frame.rgba.len(), Ordering::Relaxed);
+                waiting.frames.fetch_sub(1, Ordering::Relaxed);
             }
             Item::Poses {
                 index,

@@ -24,7 +24,7 @@ pub enum CameraState {
     Opening,
     /// Its name and format.
     Open(String),
-    /// It cannot be opened, and why.
+    /// It cannot be opened, and why; a camera is looked for until it is there.
     Failed(String),
     /// It was open and is gone, and why; it is looked for.
     Lost(String),
@@ -41,6 +41,8 @@ pub struct Notices {
     pub scene: Option<String>,
     /// Why frames are not tracked.
     pub tracking: Option<String>,
+    /// Which anchors were never found, and what is seen instead.
+    pub never_found: Option<String>,
     passing: Vec<(f64, Weight, String)>,
 }
 
@@ -51,6 +53,7 @@ impl Notices {
             camera: CameraState::Opening,
             scene: None,
             tracking: None,
+            never_found: None,
             passing: Vec::new(),
         }
     }
@@ -93,6 +96,7 @@ impl Notices {
             self.tracking
                 .as_ref()
                 .map(|reason| format!("Not tracked: {reason}")),
+            self.never_found.clone(),
         ];
         let passing = self.passing.iter();
         let passing = passing.filter(|(told_secs, ..)| now_secs - told_secs < STAYS_SECS);

@@ -2,15 +2,18 @@
 
 use std::path::PathBuf;
 
-use eframe::egui::{ComboBox, Ui};
+use eframe::egui::{Button, ComboBox, Context, Id, Key, Modal, TextEdit, Ui};
 
 use super::Facts;
 use super::editing::field;
-use crate::app::live::command::{Commands, SceneCommand};
+use crate::app::live::command::{ClosingAnswer, Commands, LiveCommand, SceneCommand};
 use crate::scene::format::MARKER;
 
 /// Millimetres per point that a size is dragged.
 const SPEED_MM: f64 = 0.5;
+
+/// Width of the field for a file's name, points.
+const NAME_WIDTH: f32 = 190.0;
 
 /// What was answered so far.
 #[derive(Debug)]
@@ -35,7 +38,13 @@ impl FirstUse {
     pub fn show(&mut self, ui: &mut Ui, facts: &Facts<'_>, commands: &mut Commands) {
         match facts.scene {
             None => self.ask_size(ui, facts, commands),
-            Some(_) if facts.unsaved => self.offer_saving(ui, commands),
+            Some(_) if facts.unsaved => {
+                ui.heading("This scene is not saved");
+                if let Some(path) = self.ask_name(ui) {
+                    commands.push(SceneCommand::Save(path));
+                }
+                ui.separator();
+            }
             Some(_) => {}
         }
     }
@@ -75,22 +84,45 @@ impl FirstUse {
         ui.separator();
     }
 
-    fn offer_saving(&mut self, ui: &mut Ui, commands: &mut Commands) {
-        ui.heading("This scene is not saved");
-        ui.horizontal(|ui| {
-            let label = ui.label("as");
-            ui.text_edit_singleline(&mut self.save_as)
-                .labelled_by(label.id);
-            let named = !self.save_as.trim().is_empty();
-            let button = eframe::egui::Button::new("Save");
-            if ui.add_enabled(named, button).clicked() {
-                let mut path = PathBuf::from(self.save_as.trim());
-                if path.extension().is_none() {
-                    path.set_extension("toml");
+    /// Asks what becomes of the scene before the window closes.
+    pub fn ask_before_closing(&mut self, ctx: &Context, commands: &mut Commands) {
+        let asked = Modal::new(Id::unique("closing")).show(ctx, |ui| {
+            ui.heading("This scene is not saved");
+            let path = self.ask_name(ui);
+            let mut answer = path.map(ClosingAnswer::Save);
+            ui.horizontal(|ui| {
+                if ui.button("Discard it and close").clicked() {
+                    answer = Some(ClosingAnswer::Discard);
                 }
-                commands.push(SceneCommand::Save(path));
-            }
+                if ui.button("Stay").clicked() {
+                    answer = Some(ClosingAnswer::Stay);
+                }
+            });
+            answer
         });
-        ui.separator();
+        let stays = asked.should_close().then_some(ClosingAnswer::Stay);
+        if let Some(answer) = asked.inner.or(stays) {
+            commands.push(LiveCommand::Close(answer));
+        }
+    }
+
+    /// The file that the scene is to be saved as, once it is said.
+    fn ask_name(&mut self, ui: &mut Ui) -> Option<PathBuf> {
+        let asked = ui.horizontal(|ui| {
+            let label = ui.label("as");
+            let field = TextEdit::singleline(&mut self.save_as).desired_width(NAME_WIDTH);
+            let field = ui.add(field).labelled_by(label.id);
+            let entered = field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+            let is_named = !self.save_as.trim().is_empty();
+            let button = ui.add_enabled(is_named, Button::new("Save"));
+            is_named && (entered || button.clicked())
+        });
+        asked.inner.then(|| {
+            let mut path = PathBuf::from(self.save_as.trim());
+            if path.extension().is_none() {
+                path.set_extension("toml");
+            }
+            path
+        })
     }
 }

@@ -4,6 +4,7 @@ use eframe::egui::{ComboBox, Ui};
 use glam::DVec3;
 
 use super::editing::{Editing, number, power, vector};
+use super::names::selectable;
 use crate::app::authoring::Edit;
 use crate::app::live::command::{Commands, SceneCommand, Selected, WindowCommand};
 use crate::app::live::window_state::WindowState;
@@ -41,7 +42,7 @@ pub fn show(
         ui.push_id(("light", index), |ui| {
             ui.horizontal(|ui| {
                 let name = format!("light {index} ({kind}{on})");
-                if ui.selectable_label(is_selected, name).clicked() {
+                if selectable(ui, is_selected, &name).clicked() {
                     commands.push(WindowCommand::Select((!is_selected).then_some(selected)));
                 }
                 if ui.small_button("remove").clicked() {
@@ -90,9 +91,6 @@ pub fn show(
     }
     if ui.button("Add a light").clicked() {
         commands.push(SceneCommand::Commit(Edit::AddLight(NEW_LIGHT)));
-        commands.push(WindowCommand::Select(Some(Selected::Light(
-            scene.lights.len(),
-        ))));
     }
 }
 

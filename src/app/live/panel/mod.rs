@@ -5,15 +5,16 @@ mod editing;
 mod first_use;
 mod light_from_picture;
 mod lights;
+mod names;
 mod shadows;
 mod things;
 mod times;
 mod tracking;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::mpsc::Receiver;
 
-use eframe::egui::{CollapsingHeader, ScrollArea, Ui};
+use eframe::egui::{CollapsingHeader, Context, ScrollArea, Ui};
 
 use super::adding::WantedShape;
 use super::command::{Commands, Overlay, RecordingCommand, SceneCommand, WindowCommand};
@@ -21,14 +22,20 @@ use super::frame_tracker::TrackedPicture;
 use super::meters::Meters;
 use super::views::ViewMode;
 use super::window_state::WindowState;
-use crate::scene::{LoadStage, Placement, Scene, Shortcut, Shortcuts};
+use crate::app::authoring::ThingPlace;
+use crate::scene::{LoadStage, Scene, Shortcut, Shortcuts};
 use adding::Adding;
+pub use adding::DialogEnd;
 use editing::Editing;
 use first_use::FirstUse;
+use names::{shortened, with_whole};
 use things::Renaming;
 
+/// Letters that a button of its own row shows at most.
+const IN_BUTTON: usize = 40;
+
 /// Where a thing stands, in the numbers of the scene's file; `None` where it has none there.
-pub type Placements<'a> = dyn Fn(&str) -> Option<Placement> + 'a;
+pub type Places<'a> = dyn Fn(&str) -> Option<ThingPlace> + 'a;
 
 /// What the panel shows.
 pub struct Facts<'a> {
@@ -39,7 +46,7 @@ pub struct Facts<'a> {
     /// Whether it has yet to be saved.
     pub unsaved: bool,
     /// Where a thing stands, in the numbers of the scene's file.
-    pub placement: &'a Placements<'a>,
+    pub place: &'a Places<'a>,
     /// What would be taken back, and what made again.
     pub history: [Option<&'a str>; 2],
     /// The frame that is shown.
@@ -89,8 +96,15 @@ impl Panel {
     }
 
     /// The system's dialog is open from now on; what is chosen in it comes here.
-    pub fn await_dialog(&mut self, chosen: Receiver<Option<PathBuf>>) {
-        self.adding.dialog = Some(chosen);
+    pub fn await_dialog(&mut self, ended: Receiver<DialogEnd>) {
+        self.adding.await_dialog(ended);
+    }
+
+    /// Asks, before the window closes, what becomes of a scene that nobody has saved.
+    pub fn ask_before_closing(&mut self, ctx: &Context) -> Commands {
+        let mut commands = Commands::default();
+        self.first_use.ask_before_closing(ctx, &mut commands);
+        commands
     }
 
     /// Shows it: what is asked for.
@@ -110,7 +124,7 @@ impl Panel {
                         self.adding.show(ui, scene, &mut commands);
                         adding::being_read(ui, &facts.reading, &mut commands);
                         let fields = (&mut *editing, &mut self.things);
-                        things::show(ui, (scene, facts.placement), look, fields, &mut commands);
+                        things::show(ui, (scene, facts.place), look, fields, &mut commands);
                     });
                     section(ui, "Lights", true, |ui| {
                         lights::show(ui, scene, look, editing, &mut commands);
@@ -206,8 +220,10 @@ fn history(ui: &mut Ui, facts: &Facts<'_>, commands: &mut Commands) {
                 Some(step) => format!("{verb}: {step}"),
                 None => verb.to_owned(),
             };
-            let button = eframe::egui::Button::new(text);
-            if ui.add_enabled(step.is_some(), button).clicked() {
+            let shown = shortened(&text, IN_BUTTON);
+            let button = eframe::egui::Button::new(shown.as_ref());
+            let button = ui.add_enabled(step.is_some(), button);
+            if with_whole(button, &text, &shown).clicked() {
                 commands.push(command);
             }
         }

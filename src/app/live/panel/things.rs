@@ -3,16 +3,20 @@
 use eframe::egui::{ComboBox, TextEdit, Ui};
 use glam::DVec3;
 
-use super::Placements;
+use super::Places;
 use super::editing::{Editing, number, vector};
-use crate::app::authoring::{AnimationName, Edit};
+use super::names::{selectable, shortened};
+use crate::app::authoring::{AnimationName, Edit, ThingPlace};
 use crate::app::live::command::{Commands, SceneCommand, Selected, WindowCommand};
 use crate::app::live::window_state::WindowState;
-use crate::scene::format::{MATERIAL, PLACEMENT};
+use crate::scene::format::{MATERIAL, PLACEMENT, TABLE};
 use crate::scene::{Object, Placement, Scene};
 
 /// Metres, degrees and factors per point that a field is dragged.
 const SPEEDS: [f64; 3] = [0.0005, 0.5, 0.005];
+
+/// Letters of an animation's name in the choice of one.
+const IN_CHOICE: usize = 24;
 
 /// The name that is being written.
 #[derive(Debug, Default)]
@@ -24,7 +28,7 @@ pub struct Renaming {
 /// Shows them.
 pub fn show(
     ui: &mut Ui,
-    (scene, placement): (&Scene, &Placements<'_>),
+    (scene, place): (&Scene, &Places<'_>),
     look: &WindowState,
     (editing, renaming): (&mut Editing, &mut Renaming),
     commands: &mut Commands,
@@ -35,15 +39,22 @@ pub fn show(
         }
         ui.weak(kind);
         for thing in things {
-            let placed = placement(&thing.name);
+            let placed = place(&thing.name);
             ui.push_id(&thing.name, |ui| {
                 row(ui, thing, placed.is_some(), look, commands);
                 let selected = Selected::Thing(thing.name.clone());
-                if let (Some(placement), true) = (placed, look.selected == Some(selected)) {
-                    actions(ui, thing, renaming, commands);
-                    fields(ui, scene, thing, placement, editing, commands);
-                    material(ui, thing, editing, commands);
-                    animation(ui, thing, commands);
+                let is_selected = look.selected == Some(selected);
+                match placed.filter(|_| is_selected) {
+                    Some(ThingPlace::Free(placement)) => {
+                        actions(ui, thing, renaming, commands);
+                        fields(ui, scene, thing, placement, editing, commands);
+                        material(ui, thing, editing, commands);
+                        animation(ui, thing, commands);
+                    }
+                    Some(place @ ThingPlace::TableTop { .. }) => {
+                        table_top(ui, thing, place.placement(), editing, commands);
+                    }
+                    None => {}
                 }
             });
         }
@@ -56,10 +67,9 @@ fn row(ui: &mut Ui, thing: &Object, can_move: bool, look: &WindowState, commands
     let is_selected = look.selected.as_ref() == Some(&selected);
     ui.horizontal(|ui| {
         let mut visible = thing.visible;
-        // The table has no key for it.
         let checkbox = eframe::egui::Checkbox::without_text(&mut visible);
         let checkbox = ui.add_enabled(can_move, checkbox);
-        let name = ui.selectable_label(is_selected, &thing.name);
+        let name = selectable(ui, is_selected, &thing.name);
         if name.clicked() && can_move {
             commands.push(WindowCommand::Select((!is_selected).then_some(selected)));
         }
@@ -108,7 +118,7 @@ fn animation(ui: &mut Ui, thing: &Object, commands: &mut Commands) {
     let playing = thing.animation.as_ref().map(|animation| animation.number);
     let mut chosen = playing;
     ComboBox::from_label("plays")
-        .selected_text(told(playing))
+        .selected_text(shortened(&told(playing), IN_CHOICE))
         .show_ui(ui, |ui| {
             let numbers = (0..thing.clips.len()).map(Some);
             for number in std::iter::once(None).chain(numbers) {
@@ -131,14 +141,35 @@ fn first_of_name(thing: &Object, name: &str) -> Option<usize> {
     thing.clips.iter().position(|clip| clip.name == name)
 }
 
-/// What it is made of: of several materials the first, in place of all.
-fn material(ui: &mut Ui, thing: &Object, editing: &mut Editing, commands: &mut Commands) {
-    let Some(first) = thing.materials.first() else {
-        return;
-    };
-    let mut albedo = first.albedo.as_vec3().to_array();
-    let mut roughness = first.layer_roughness().unwrap_or(1.0);
-    let colour_changed = ui
+/// The table's top: its height and what it reflects.
+fn table_top(
+    ui: &mut Ui,
+    thing: &Object,
+    mut placement: Placement,
+    editing: &mut Editing,
+    commands: &mut Commands,
+) {
+    let [speed, ..] = SPEEDS;
+    let height_m = &mut placement.position_m.z;
+    if number(ui, "height", height_m, speed, &TABLE.height_m.takes).changed() {
+        let thing = thing.name.clone();
+        editing.changed(ui, Edit::Place { thing, placement }, commands);
+    }
+    if let Some(albedo) = albedo(ui, thing) {
+        let edit = Edit::Material {
+            thing: thing.name.clone(),
+            albedo: Some(albedo),
+            roughness: None,
+            metallic: None,
+        };
+        editing.changed(ui, edit, commands);
+    }
+}
+
+/// What it reflects; another colour, where somebody has chosen one.
+fn albedo(ui: &mut Ui, thing: &Object) -> Option<DVec3> {
+    let mut albedo = thing.materials.first()?.albedo.as_vec3().to_array();
+    let changed = ui
         .horizontal(|ui| {
             let colour = ui.color_edit_button_rgb(&mut albedo);
             let name = match thing.materials.len() {
@@ -149,16 +180,26 @@ fn material(ui: &mut Ui, thing: &Object, editing: &mut Editing, commands: &mut C
             colour.labelled_by(label.id).changed()
         })
         .inner;
+    changed.then(|| DVec3::from_array(albedo.map(f64::from)))
+}
+
+/// What it is made of: of several materials the first, in place of all.
+fn material(ui: &mut Ui, thing: &Object, editing: &mut Editing, commands: &mut Commands) {
+    let Some(first) = thing.materials.first() else {
+        return;
+    };
+    let mut roughness = first.layer_roughness().unwrap_or(1.0);
+    let albedo = albedo(ui, thing);
     let takes = &MATERIAL.roughness.takes;
     let roughness_changed =
         number(ui, "roughness (1: matt)", &mut roughness, 0.01, takes).changed();
     let mut metallic = first.metallic;
     let takes = &MATERIAL.metallic.takes;
     let metallic_changed = number(ui, "metallic", &mut metallic, 0.01, takes).changed();
-    if colour_changed || roughness_changed || metallic_changed {
+    if albedo.is_some() || roughness_changed || metallic_changed {
         let edit = Edit::Material {
             thing: thing.name.clone(),
-            albedo: colour_changed.then(|| DVec3::from_array(albedo.map(f64::from))),
+            albedo,
             roughness: roughness_changed.then_some(roughness),
             metallic: metallic_changed.then_some(metallic),
         };

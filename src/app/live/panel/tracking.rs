@@ -4,6 +4,7 @@ use eframe::egui::{Color32, Grid, Response, Ui};
 
 use super::Facts;
 use super::editing::{Editing, field};
+use super::names::label;
 use crate::app::authoring::Edit;
 use crate::app::live::command::Commands;
 use crate::scene::Scene;
@@ -12,6 +13,9 @@ use crate::tracking::{AnchorPose, Status};
 
 /// Above this the calibration or the markers' sizes are wrong, pixels.
 const MOST_REPROJECTION_PX: f64 = 1.0;
+
+/// Letters of an anchor's name that its column shows at most.
+const IN_COLUMN: usize = 12;
 
 /// Millimetres per point that a size is dragged.
 const SPEED_MM: f64 = 0.02;
@@ -36,7 +40,7 @@ pub fn show(ui: &mut Ui, facts: &Facts<'_>, editing: &mut Editing, commands: &mu
             }
             ui.end_row();
             for (anchor, pose) in picture.anchors.iter().zip(&picture.poses) {
-                let name = ui.label(&anchor.name);
+                let name = label(ui, &anchor.name, IN_COLUMN);
                 let (word, colour) = status(pose);
                 let told = ui.colored_label(colour, word);
                 if let Some(why) = pose.loss_reason {

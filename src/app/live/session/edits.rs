@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::super::beginning::{plan_of, same_camera};
-use super::super::command::{Clicks, SceneCommand, Selected};
+use super::super::command::{Clicks, SceneCommand, Selected, WindowCommand};
 use super::super::demonstration::{self, Demonstration};
 use super::super::shadow_clicks::{self, ShadowClicks};
 use super::super::window_state::WindowState;
@@ -18,7 +18,16 @@ impl LiveSession {
     pub fn edit_scene(&mut self, command: SceneCommand, state: &WindowState) {
         match command {
             SceneCommand::Preview(edit) => self.preview(&edit),
-            SceneCommand::Commit(edit) => self.commit(&edit),
+            SceneCommand::Commit(Edit::RemoveLight(index)) => {
+                self.remove(&Selected::Light(index), state.selected.as_ref());
+            }
+            SceneCommand::Commit(edit @ Edit::AddLight(_)) => {
+                if self.commit(&edit) {
+                    let last = self.scene().map_or(0, |scene| scene.lights.len() - 1);
+                    self.selection = Some(WindowCommand::Select(Some(Selected::Light(last))));
+                }
+            }
+            SceneCommand::Commit(edit) => _ = self.commit(&edit),
             SceneCommand::EndPreview => {
                 if let Some(scene) = self.scene.open_mut() {
                     scene.previewed = None;
@@ -26,8 +35,8 @@ impl LiveSession {
                     self.scene_changed(true);
                 }
             }
-            SceneCommand::Undo => self.edit(SceneDocument::undo),
-            SceneCommand::Redo => self.edit(SceneDocument::redo),
+            SceneCommand::Undo => _ = self.edit(SceneDocument::undo),
+            SceneCommand::Redo => _ = self.edit(SceneDocument::redo),
             SceneCommand::Clicks(clicks) => self.take_clicks(clicks, state),
             SceneCommand::Demonstrate { id, size_m } => self.demonstrate(id, size_m),
             SceneCommand::Save(path) => self.save(&path),
@@ -42,11 +51,11 @@ impl LiveSession {
                     }
                 }
             }
-            SceneCommand::RemoveSelected => match &state.selected {
-                Some(Selected::Thing(name)) => self.commit(&Edit::RemoveThing(name.clone())),
-                Some(Selected::Light(index)) => self.commit(&Edit::RemoveLight(*index)),
-                None => {}
-            },
+            SceneCommand::RemoveSelected => {
+                if let Some(selected) = &state.selected {
+                    self.remove(selected, Some(selected));
+                }
+            }
             SceneCommand::Add(wanted) => self.add(&wanted),
             SceneCommand::GiveUpReading(name) => self.give_up_reading(&name),
             SceneCommand::DuplicateSelected => {
@@ -67,22 +76,26 @@ impl LiveSession {
         }
     }
 
-    pub(super) fn commit(&mut self, edit: &Edit) {
-        self.edit(|document| document.commit(edit));
+    /// Makes an edit; tells whether it could be made.
+    pub(super) fn commit(&mut self, edit: &Edit) -> bool {
+        self.edit(|document| document.commit(edit))
     }
 
     pub(super) fn edit(
         &mut self,
         change: impl FnOnce(&mut SceneDocument) -> Result<(), EditError>,
-    ) {
+    ) -> bool {
         let Some(scene) = self.scene.open_mut() else {
-            return;
+            return false;
         };
         scene.previewed = None;
-        if let Err(error) = change(&mut scene.document) {
+        let changed = change(&mut scene.document);
+        let is_done = changed.is_ok();
+        if let Err(error) = changed {
             self.tell(Weight::Trouble, error.to_string());
         }
         self.scene_changed(true);
+        is_done
     }
 
     /// The scene is another: what depends on it follows.

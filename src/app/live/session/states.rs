@@ -37,10 +37,7 @@ pub(super) enum Origin {
     /// Where a person keeps it.
     Saved,
     /// In a folder that is gone with the program, until somebody saves it.
-    Unsaved {
-        #[expect(dead_code, reason = "it keeps the folder")]
-        folder: Demonstration,
-    },
+    Unsaved { folder: Demonstration },
 }
 
 /// The picture, as far as there is one.

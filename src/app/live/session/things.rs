@@ -6,10 +6,12 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use glam::DVec3;
 
-use super::super::adding::{self, WantedShape, WantedThing, allowed_name, free_name, free_place};
-use super::super::command::Selected;
+use super::super::adding::{
+    self, WantedShape, WantedThing, allowed_name, free_name, free_place, named_file,
+};
+use super::super::command::{Selected, WindowCommand};
 use super::LiveSession;
-use crate::app::authoring::{Edit, EditError, NewForm, NewThing};
+use crate::app::authoring::{Edit, EditError, NewForm, NewThing, SceneDocument};
 use crate::app::window::notices::Weight;
 use crate::scene::{LoadStage, Loading, Scene};
 
@@ -35,7 +37,7 @@ impl LiveSession {
         let is_read = |name: &str| scene.reading.iter().any(|other| other.thing.name == name);
         let thing = wanted.in_scene(document.scene(), folder, is_read);
         match &wanted.shape {
-            WantedShape::Model(file) => match adding::no_model(file) {
+            WantedShape::Model(file) => match adding::no_model(&named_file(folder, file)) {
                 None => self.read(thing),
                 Some(reason) => self.tell(Weight::Trouble, reason),
             },
@@ -134,8 +136,27 @@ impl LiveSession {
                     self.place_again(&mut thing);
                     self.add_thing(thing);
                 }
-                Err(error) => self.tell(Weight::Trouble, error.to_string()),
+                Err(error) => {
+                    let text = self.why_unread(&thing, &error);
+                    self.tell(Weight::Trouble, text);
+                }
             }
+        }
+    }
+
+    /// Why a model cannot be added, without the line that it would have had in the scene's file.
+    fn why_unread(&self, thing: &NewThing, error: &EditError) -> String {
+        let path = self.document().map(SceneDocument::path);
+        match (error, &thing.form) {
+            (EditError::Scene(error), NewForm::Mesh { file, .. })
+                if Some(error.file.as_path()) == path =>
+            {
+                // `virtual.mesh = "…": ` would be said of the scene's file.
+                let reason = error.message.split_once("\": ");
+                let reason = reason.map_or(error.message.as_str(), |(_, reason)| reason);
+                format!("{file}: {reason}")
+            }
+            _ => error.to_string(),
         }
     }
 
@@ -159,7 +180,7 @@ impl LiveSession {
 
     /// Copies a thing.
     pub(super) fn duplicate(&mut self, thing: &str) {
-        let (Some(scene), Some(placement)) = (self.scene(), self.placement(thing)) else {
+        let (Some(scene), Some(place)) = (self.scene(), self.place(thing)) else {
             return;
         };
         let mut things = scene.phantoms.iter().chain(&scene.virtuals);
@@ -173,7 +194,7 @@ impl LiveSession {
         let edit = Edit::Duplicate {
             thing: thing.to_owned(),
             name: name.clone(),
-            position_m: free_place(scene, anchor, placement.position_m + COPY_BESIDE),
+            position_m: free_place(scene, anchor, place.placement().position_m + COPY_BESIDE),
         };
         self.commit_named(&edit, name);
     }
@@ -195,19 +216,31 @@ impl LiveSession {
 
     /// Makes an edit by which a thing gets a name, and selects it.
     fn commit_named(&mut self, edit: &Edit, name: String) {
-        self.commit(edit);
-        let scene = self.scene();
-        let has = |scene: &Scene| {
-            let mut things = scene.phantoms.iter().chain(&scene.virtuals);
-            things.any(|thing| thing.name == name)
-        };
-        if scene.is_some_and(has) {
-            self.newly_selected = Some(Selected::Thing(name));
+        if self.commit(edit) {
+            self.selection = Some(WindowCommand::Select(Some(Selected::Thing(name))));
         }
     }
 
+    /// Takes a thing or a light away, of which `selected` may be one.
+    pub(super) fn remove(&mut self, removed: &Selected, selected: Option<&Selected>) {
+        let is_done = self.commit(&match removed {
+            Selected::Thing(name) => Edit::RemoveThing(name.clone()),
+            Selected::Light(index) => Edit::RemoveLight(*index),
+        });
+        let selects = match (removed, selected) {
+            _ if !is_done => return,
+            (removed, Some(selected)) if removed == selected => None,
+            // The lights behind it move up.
+            (Selected::Light(removed), Some(Selected::Light(index))) if removed < index => {
+                Some(Selected::Light(index - 1))
+            }
+            _ => return,
+        };
+        self.selection = Some(WindowCommand::Select(selects));
+    }
+
     /// What is to be selected from now on, once.
-    pub fn take_selected(&mut self) -> Option<Selected> {
-        self.newly_selected.take()
+    pub fn take_selection(&mut self) -> Option<WindowCommand> {
+        self.selection.take()
     }
 }
