@@ -31,7 +31,7 @@ mod tests {
             let linear = linear_from_srgb(f64::from(level) / 255.0);
             assert_eq!(srgb_level(linear as f32), level);
         }
-        assert_eq!([-1.0, 2.0, f32::NAN].map(srgb_level), [0, 255, 0]);
+        assert_eq!([-1.0, 2.0].map(srgb_level), [0, 255]);
         // A mean of both is brighter on the screen than half.
         assert_eq!(srgb_level(0.5), 188);
     }
