@@ -450,6 +450,28 @@ fn creases_stay_creases() {
     }
 }
 
+/// Long triangles that cross each other, each in the boxes of most: their levels would take the square of their number.
+#[test]
+fn a_tangle_of_long_triangles_is_given_up_soon() {
+    let mut state = 1_u32;
+    let mut random = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as f32 / (1 << 24) as f32
+    };
+    let positions: Vec<Vec3> = (0..60_000)
+        .map(|_| Vec3::new(random(), random(), random()))
+        .collect();
+    let triangles: Vec<_> = (0..20_000)
+        .map(|k| raw([3 * k, 3 * k + 1, 3 * k + 2], 0))
+        .collect();
+    let tangle = Mesh::weld(&positions, &triangles, 0.0).0;
+    let begun = std::time::Instant::now();
+    assert_eq!(levels(&tangle), []);
+    let secs = begun.elapsed().as_secs_f64();
+    // Without a bound it was a minute.
+    assert!(secs < 10.0, "{secs} s");
+}
+
 /// A can whose lids are fans about their middles: where so many triangles meet, some of them stand for all.
 #[test]
 fn the_lids_of_a_round_can_stay_flat() {
