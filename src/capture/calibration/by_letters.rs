@@ -4,17 +4,14 @@
 use serde_json::{Map, Value};
 
 use super::entries::{Entry, entries, entry};
+use super::kinds::refuse_skew;
 use super::lens::{LETTERS, lens_by};
-use super::values::{
-    LensModel, UncheckedCalibration, bad_side, model_of, normalised, number, side_px,
-};
+use super::opensfm;
+use super::sizes::size_beside;
+use super::values::{CORNER_PX, LensModel, UncheckedCalibration, model_of, normalised, number};
 
 const FOCAL: [[&str; 3]; 2] = [["fx", "flx", "focalx"], ["fy", "fly", "focaly"]];
 const CENTER: [[&str; 3]; 2] = [["cx", "ppx", "principalx"], ["cy", "ppy", "principaly"]];
-const SIDES: [[&str; 4]; 2] = [
-    ["width", "imagewidth", "w", "cols"],
-    ["height", "imageheight", "h", "rows"],
-];
 /// Tables in one another that are looked into.
 const MOST_LEVELS: u32 = 3;
 
@@ -26,8 +23,15 @@ pub(super) fn camera(tree: &Map<String, Value>) -> Option<Result<UncheckedCalibr
         let message = "it has several fx; keep the camera that is meant alone";
         return Some(Err(message.to_owned()));
     }
+    // OpenSfM's are in other units.
+    let focal = letters.iter().find(|entry| is_focal(entry))?;
+    let is_opensfm =
+        |entry: &Entry<'_>| entry.table == focal.table && entry.key == "projection_type";
+    if focal.key == "focal_x" && opensfm::is_focal(focal.value) && letters.iter().any(is_opensfm) {
+        return None;
+    }
     // Tables of a camera each are looked at one by one.
-    (has_all(&letters) && count(&letters) == 1).then(|| of_letters(&letters))
+    (has_all(&letters) && count(&letters) == 1).then(|| of_letters(&letters, focal))
 }
 
 fn is_focal(entry: &Entry<'_>) -> bool {
@@ -39,16 +43,17 @@ fn has_all(letters: &[Entry<'_>]) -> bool {
     all.into_iter().all(|names| entry(letters, names).is_some())
 }
 
-fn of_letters(letters: &[Entry<'_>]) -> Result<UncheckedCalibration, String> {
+fn of_letters(letters: &[Entry<'_>], focal: &Entry<'_>) -> Result<UncheckedCalibration, String> {
+    // Of a camera for depth and one for colour the numbers beside the focal length are meant.
     let needed = |names: &[&str]| {
-        let value = entry(letters, names).and_then(|entry| number(entry.value));
+        let is_named = |entry: &&Entry<'_>| names.contains(&entry.name.as_str());
+        let mut beside = letters.iter().filter(|entry| entry.table == focal.table);
+        let found = beside.find(is_named).or_else(|| entry(letters, names));
+        let value = found.and_then(|entry| number(entry.value));
         value.ok_or_else(|| format!("{} must be a finite number", names[0]))
     };
-    let side = |names: &[&str]| {
-        let side = entry(letters, names).map(|entry| side_px(entry.value).ok_or(names[0]));
-        side.transpose().map_err(bad_side)
-    };
-    let model = lens_model(letters)?;
+    refuse_skew(letters)?;
+    let model = lens_model(letters, focal)?;
     let lens = lens_by(letters, model.unwrap_or(LensModel::ByNumber))?;
     // RealSense's own formula goes from the picture to the ray; without coefficients it is none.
     if model.is_none()
@@ -63,33 +68,43 @@ fn of_letters(letters: &[Entry<'_>]) -> Result<UncheckedCalibration, String> {
                 .to_owned(),
         );
     }
+    // NeRF's count from the picture's corner, as COLMAP does whose numbers they are (docs.nerf.studio, "Data conventions").
+    let first_px = match focal.name.as_str() {
+        "flx" => CORNER_PX,
+        _ => 0.0,
+    };
+    let center_px = [needed(&CENTER[0])?, needed(&CENTER[1])?];
     Ok(UncheckedCalibration {
-        size_px: side(&SIDES[0])?
-            .zip(side(&SIDES[1])?)
-            .map(|(width, height)| [width, height]),
+        size_px: size_beside(letters, focal.table)?,
         focal_px: [needed(&FOCAL[0])?, needed(&FOCAL[1])?],
-        center_px: [needed(&CENTER[0])?, needed(&CENTER[1])?],
+        center_px: center_px.map(|center| center - first_px),
         lens,
     })
 }
 
 /// The lens's model; `None`: RealSense's inverse one.
-fn lens_model(letters: &[Entry<'_>]) -> Result<Option<LensModel>, String> {
-    let is_of_lens = |entry: &&Entry<'_>| is_focal(entry) || LETTERS.contains(&entry.name.as_str());
+fn lens_model(letters: &[Entry<'_>], focal: &Entry<'_>) -> Result<Option<LensModel>, String> {
+    let is_of_camera = |entry: &&Entry<'_>| {
+        is_focal(entry) || entry.is_in_lens || LETTERS.contains(&entry.name.as_str())
+    };
     // What other tables name a model is not the lens's: a device's, say.
     let tables: Vec<usize> = letters
         .iter()
-        .filter(is_of_lens)
+        .filter(is_of_camera)
         .map(|entry| entry.table)
         .collect();
-    let named = letters.iter().filter_map(|entry| {
-        let is_type = matches!(entry.name.as_str(), "modeltype" | "cameratype" | "type");
-        match is_type && entry.value.is_string() {
-            true => (entry.table == 0).then_some(("camera_model", entry.value)),
-            false => (entry.table == 0 || tables.contains(&entry.table))
-                .then_some((entry.key, entry.value)),
-        }
-    });
+    let named = letters
+        .iter()
+        .filter(|entry| entry.table == 0 || entry.name == "xi" || tables.contains(&entry.table))
+        .map(|entry| {
+            let is_type = matches!(entry.name.as_str(), "cameratype" | "type")
+                && (entry.table == 0 || entry.table == focal.table);
+            let name = match is_type && entry.value.is_string() {
+                true => "cameramodel",
+                false => entry.name.as_str(),
+            };
+            (entry.key, name, entry.value)
+        });
     let is_inverse = letters.iter().any(|entry| {
         matches!(entry.name.as_str(), "model" | "distortionmodel")
             && entry

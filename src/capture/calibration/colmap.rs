@@ -1,10 +1,7 @@
 //! COLMAP's `cameras.txt`: a camera a line, `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`.
 
-use super::values::{Lens, UncheckedCalibration};
+use super::values::{CORNER_PX, Lens, UncheckedCalibration};
 use crate::geometry::camera::{Distortion, MOST_SIDE_PX};
-
-/// COLMAP counts from the picture's corner: its first pixel's centre is at .5.
-const CENTER_PX: f64 = 0.5;
 
 /// All cameras of a file, each with its name.
 pub(super) fn cameras(text: &str) -> Result<Vec<(String, UncheckedCalibration)>, String> {
@@ -87,7 +84,8 @@ fn camera(line: &str) -> Result<(String, UncheckedCalibration), String> {
     let calibration = UncheckedCalibration {
         size_px: Some([side(width)?, side(height)?]),
         focal_px: f,
-        center_px: c.map(|center| center - CENTER_PX),
+        // COLMAP counts from the picture's corner.
+        center_px: c.map(|center| center - CORNER_PX),
         lens: Lens {
             distortion,
             is_said: true,

@@ -2,52 +2,57 @@
 
 use serde_json::{Map, Value};
 
+use super::lens::{is_of_lens, name_in_lens};
 use super::values::normalised;
 
 /// A key and its value.
 pub(super) struct Entry<'a> {
     /// As the file has it.
     pub key: &'a str,
-    /// The last part of the key (`Camera.fx`), as keys are compared.
+    /// The last part of the key (`Camera.fx`), as keys are compared; what it means where its table is a lens's.
     pub name: String,
     pub value: &'a Value,
     /// Which table it stands in; the outermost is 0.
     pub table: usize,
+    /// Whether that table is a lens's.
+    pub is_in_lens: bool,
 }
 
 /// All entries of a tree and of the tables in it down to `levels`, but for those of matrices.
 pub(super) fn entries(tree: &Map<String, Value>, levels: u32) -> Vec<Entry<'_>> {
-    gathered(tree, levels, &|_| true)
+    gathered(tree, levels, |_| true)
 }
 
-/// The entries of a tree, and those of its tables whose names (as keys are compared) are wanted.
-pub(super) fn entries_with(
-    tree: &Map<String, Value>,
-    wanted: impl Fn(&str) -> bool,
-) -> Vec<Entry<'_>> {
-    gathered(tree, 1, &wanted)
+/// The entries of a tree, and those of the tables in it that are a lens's.
+pub(super) fn entries_with_lens(tree: &Map<String, Value>) -> Vec<Entry<'_>> {
+    gathered(tree, 2, is_of_lens)
 }
 
 fn gathered<'a>(
     tree: &'a Map<String, Value>,
     levels: u32,
-    wanted: &dyn Fn(&str) -> bool,
+    wanted: impl Fn(&str) -> bool,
 ) -> Vec<Entry<'a>> {
     let mut found = Vec::new();
-    let mut tables = vec![(tree, levels)];
+    let mut tables = vec![(tree, levels, String::new())];
     let mut table = 0;
-    while let Some(&(tree, levels)) = tables.get(table) {
+    while let Some((tree, levels, table_name)) = tables.get(table).cloned() {
+        let is_in_lens = is_of_lens(&table_name);
         for (key, value) in tree {
             let name = normalised(key.rsplit('.').next().unwrap_or_default());
             match value {
                 Value::Object(inner) if levels > 0 && !is_matrix(value) && wanted(&name) => {
-                    tables.push((inner, levels - 1));
+                    tables.push((inner, levels - 1, name));
                 }
                 _ => found.push(Entry {
                     key,
-                    name,
+                    name: match is_in_lens {
+                        true => name_in_lens(&table_name, tree, name),
+                        false => name,
+                    },
                     value,
                     table,
+                    is_in_lens,
                 }),
             }
         }

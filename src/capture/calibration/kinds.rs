@@ -6,12 +6,14 @@ use std::collections::HashMap;
 use serde_json::{Map, Value};
 
 use super::by_letters;
-use super::entries::{entries, entries_with, is_matrix};
-use super::lens::{LETTERS, is_of_lens, lens_of, matrix_numbers};
+use super::entries::{Entry, entries, entries_with_lens, is_matrix};
+use super::lens::{LETTERS, is_coefficients, lens_of, matrix_numbers, refuse_signs};
+use super::opensfm;
+use super::sizes::{size, size_of, size_of_one};
 use super::values::{
-    Lens, UncheckedCalibration, bad_side, by_number, flat_numbers, is_model_key, normalised,
-    side_px,
+    Lens, UncheckedCalibration, by_number, flat_numbers, model_by_key, normalised, number,
 };
+use crate::geometry::camera::Distortion;
 
 type Named = Vec<(String, UncheckedCalibration)>;
 
@@ -29,9 +31,15 @@ const MATRIX_KEYS: [&str; 8] = [
     "k",
     "mtx",
 ];
-const WIDTH_KEYS: [&str; 2] = ["imagewidth", "width"];
-const HEIGHT_KEYS: [&str; 2] = ["imageheight", "height"];
-const SIZE_KEYS: [&str; 3] = ["resolution", "imagesize", "imgsize"];
+/// Keys as MATLAB writes them; who has two of them follows its conventions.
+const MATLAB_KEYS: [&str; 6] = [
+    "IntrinsicMatrix",
+    "ImageSize",
+    "RadialDistortion",
+    "TangentialDistortion",
+    "FocalLength",
+    "PrincipalPoint",
+];
 /// Tables and lists in one another in which cameras are looked for.
 const MOST_LEVELS: u32 = 4;
 
@@ -40,10 +48,17 @@ pub(super) fn cameras(tree: &Map<String, Value>) -> Result<Named, String> {
     let is_own = tree.keys().any(|key| OWN_KEYS[..3].contains(&key.as_str()));
     if !is_own {
         let found = known_cameras(tree, MOST_LEVELS)?;
-        return match found.is_empty() {
-            true => Err(no_camera(tree)),
-            false => Ok(found),
-        };
+        if found.is_empty() {
+            return Err(no_camera(tree));
+        }
+        if found.iter().all(|(_, camera)| !camera.lens.is_said) {
+            let mut models = found.iter().map(|(_, camera)| camera.lens.distortion);
+            refuse_signs(
+                tree,
+                models.any(|lens| matches!(lens, Distortion::Fisheye(_))),
+            )?;
+        }
+        return Ok(found);
     }
     Ok(vec![("the camera".to_owned(), of_own(tree)?)])
 }
@@ -79,27 +94,31 @@ fn known_cameras(tree: &Map<String, Value>, levels: u32) -> Result<Named, String
     if let Some(list) = tree.get("Calibration").and_then(|it| it.get("cameras")) {
         return of_calib_io(list);
     }
-    let is_kalibr = |entry: &Value| entry.get("intrinsics").is_some();
-    if tree.values().any(is_kalibr) {
-        let cameras = tree.iter().filter(|(_, entry)| is_kalibr(entry));
-        return cameras
-            .map(|(name, entry)| {
-                let camera = entry.as_object();
-                let camera = camera.map(|camera| of_kalibr(&with_model_of(tree, camera)));
-                let camera = camera.unwrap_or_else(|| Err("must be a table".to_owned()));
-                Ok((
-                    name.clone(),
-                    camera.map_err(|why| format!("{name}: {why}"))?,
-                ))
-            })
-            .collect();
+    let is_opensfm = |entry: &Value| entry.as_object().is_some_and(opensfm::is_camera);
+    if tree.values().any(is_opensfm) {
+        return of_tables(tree, is_opensfm, opensfm::camera);
     }
-    let has_four = |list: &Value| list.as_array().is_some_and(|list| list.len() == 4);
+    if opensfm::is_camera(tree) {
+        return one(opensfm::camera(tree)?);
+    }
+    let is_kalibr = |entry: &Value| entry.get("intrinsics").is_some_and(is_row);
+    if tree.values().any(is_kalibr) {
+        return of_tables(tree, is_kalibr, |camera| {
+            of_kalibr(&with_lens_of(tree, camera))
+        });
+    }
+    if let Some(renamed) = of_mrcal(tree) {
+        return one(of_kalibr(&renamed)?);
+    }
     // A sensor of EuRoC's is a camera of Kalibr's without a name.
-    if tree.get("intrinsics").is_some_and(has_four) {
+    if tree.get("intrinsics").is_some_and(is_row) {
         return one(of_kalibr(tree)?);
     }
-    if find(tree, &MATRIX_KEYS).is_some_and(|(_, matrix)| matrix.is_array() || is_matrix(matrix)) {
+    if let Some(renamed) = of_anipose(tree) {
+        return one(of_opencv(&renamed)?);
+    }
+    let is_numbers = |matrix: &Value| is_matrix(matrix) || is_list_of(matrix, |it| !it.is_object());
+    if find(tree, &MATRIX_KEYS).is_some_and(|(_, matrix)| is_numbers(matrix)) {
         return one(of_opencv(tree)?);
     }
     if let Some(camera) = by_letters::camera(tree) {
@@ -108,16 +127,52 @@ fn known_cameras(tree: &Map<String, Value>, levels: u32) -> Result<Named, String
     of_inner_tables(tree, levels)
 }
 
+/// The cameras of the tables of one kind within a tree.
+fn of_tables(
+    tree: &Map<String, Value>,
+    is_one: impl Fn(&Value) -> bool,
+    read: impl Fn(&Map<String, Value>) -> Result<UncheckedCalibration, String>,
+) -> Result<Named, String> {
+    let tables = tree.iter().filter(|(_, entry)| is_one(entry));
+    let cameras = tables.map(|(name, entry)| {
+        let camera = entry.as_object().ok_or("must be a table".to_owned());
+        let camera = camera.and_then(&read);
+        Ok((
+            name.clone(),
+            camera.map_err(|why| format!("{name}: {why}"))?,
+        ))
+    });
+    cameras.collect()
+}
+
+/// Whether a value is a list of single numbers that are no matrix of 3 x 3.
+fn is_row(value: &Value) -> bool {
+    const MATRIX: usize = 9;
+    is_list_of(data_of(value), |it| !it.is_object() && !it.is_array())
+        && data_of(value)
+            .as_array()
+            .is_some_and(|list| list.len() != MATRIX)
+}
+
+fn is_list_of(value: &Value, is_wanted: impl Fn(&Value) -> bool) -> bool {
+    value
+        .as_array()
+        .is_some_and(|list| list.iter().all(is_wanted))
+}
+
 /// The cameras of tables and of lists of tables within a tree; where they have no size of their own it is the tree's.
 fn of_inner_tables(tree: &Map<String, Value>, levels: u32) -> Result<Named, String> {
     let mut found = Vec::new();
     if levels == 0 {
         return Ok(found);
     }
-    let size_px = size_of(tree)?;
-    let mut look = |name: String, inner: &Map<String, Value>| {
-        let cameras = known_cameras(&with_model_of(tree, inner), levels - 1)
+    let mut look = |name: String, number: usize, inner: &Map<String, Value>| {
+        let cameras = known_cameras(&with_lens_of(tree, inner), levels - 1)
             .map_err(|why| format!("{name}: {why}"))?;
+        let size_px = match cameras.iter().all(|(_, camera)| camera.size_px.is_some()) {
+            true => None,
+            false => size_of_one(tree, number)?,
+        };
         found.extend(cameras.into_iter().map(|(_, camera)| {
             let size_px = camera.size_px.or(size_px);
             (name.clone(), UncheckedCalibration { size_px, ..camera })
@@ -126,13 +181,14 @@ fn of_inner_tables(tree: &Map<String, Value>, levels: u32) -> Result<Named, Stri
     };
     for (key, value) in tree {
         match value {
-            Value::Object(inner) => look(key.clone(), inner)?,
+            Value::Object(inner) => look(key.clone(), 0, inner)?,
             Value::Array(list) => {
-                let tables = list.iter().enumerate();
-                let tables =
-                    tables.filter_map(|(number, entry)| Some((number, entry.as_object()?)));
-                for (number, inner) in tables {
-                    look(format!("{key}[{number}]"), inner)?;
+                for (number, entry) in list.iter().enumerate() {
+                    // (DepthAI has pairs of a number and a table.)
+                    let table = entry.as_object();
+                    if let Some(inner) = table.or_else(|| entry.get(1)?.as_object()) {
+                        look(format!("{key}[{number}]"), number, inner)?;
+                    }
                 }
             }
             _ => {}
@@ -141,19 +197,36 @@ fn of_inner_tables(tree: &Map<String, Value>, levels: u32) -> Result<Named, Stri
     Ok(found)
 }
 
-/// A table within a tree, with the keys beside it that decide the lens's model where it has none of its own.
-fn with_model_of<'a>(
+/// A table within a tree, with what stands beside it of the lens: the keys that decide its model where it has none of its own,
+/// and the coefficients likewise.
+fn with_lens_of<'a>(
     tree: &Map<String, Value>,
     inner: &'a Map<String, Value>,
 ) -> Cow<'a, Map<String, Value>> {
-    let is_model = |key: &str| is_model_key(&normalised(key));
-    let outer = tree
+    let names_model = |key: &str, name: &str, value: &Value| {
+        !value.is_object() && !matches!(model_by_key(key, name, value), Ok(None))
+    };
+    let own = entries_with_lens(inner);
+    let has_model = own
         .iter()
-        .filter(|(key, value)| is_model(key) && !value.is_object());
+        .any(|entry| names_model(entry.key, &entry.name, entry.value));
+    let has_lens = own
+        .iter()
+        .any(|entry| is_coefficients(&entry.name, entry.value));
+    let is_camera = |value: &Value| {
+        let table = value.as_object();
+        table.is_some_and(|table| table.contains_key("fx") || find(table, &MATRIX_KEYS).is_some())
+    };
+    let outer = tree.iter().filter(|(key, value)| {
+        let name = normalised(key);
+        let is_model = || name == "mirrorparameters" || names_model(key, &name, value);
+        let is_missing = !has_model && is_model() || !has_lens && is_coefficients(&name, value);
+        is_missing && !is_camera(value) && !inner.contains_key(*key)
+    });
     let mut outer = outer
         .map(|(key, value)| (key.clone(), value.clone()))
         .peekable();
-    if outer.peek().is_none() || inner.keys().any(|key| is_model(key)) {
+    if outer.peek().is_none() {
         return Cow::Borrowed(inner);
     }
     let mut all = inner.clone();
@@ -202,7 +275,9 @@ fn of_session(camera: &Map<String, Value>) -> Result<UncheckedCalibration, Strin
 
 /// What the calibration tools of OpenCV, ROS 1, ROS 2 and PhotonVision write.
 fn of_opencv(tree: &Map<String, Value>) -> Result<UncheckedCalibration, String> {
-    let lens = lens_of(&entries_with(tree, is_of_lens))?;
+    let entries = entries_with_lens(tree);
+    let lens = lens_of(&entries)?;
+    refuse_skew(&entries)?;
     refuse_cut_pictures(tree)?;
     let (key, matrix) = find(tree, &MATRIX_KEYS).ok_or("the camera matrix is missing")?;
     let [fx, skew, mut cx, s1, fy, mut cy, mut s2, mut s3, one] = matrix_numbers(key, matrix)?
@@ -215,20 +290,57 @@ fn of_opencv(tree: &Map<String, Value>) -> Result<UncheckedCalibration, String> 
     if [skew, s1, s2, s3] != [0.0; 4] || one != 1.0 {
         return Err(format!("{key} must be [fx 0 cx; 0 fy cy; 0 0 1]"));
     }
+    // MATLAB counts pixels from 1, and its sizes are [rows, columns] (mathworks.com, cameraIntrinsicsToOpenCV, cameraIntrinsics).
+    let has = |key: &&&str| tree.contains_key(**key);
+    let is_matlab = MATLAB_KEYS.iter().filter(has).count() > 1;
+    let first_px = if is_matlab { 1.0 } else { 0.0 };
+    let size_px = match tree.get("ImageSize").filter(|_| is_matlab) {
+        Some(rows_and_columns) => {
+            let [rows, columns] = size(rows_and_columns)?;
+            Some([columns, rows])
+        }
+        None => size_of(tree)?,
+    };
     Ok(UncheckedCalibration {
-        size_px: size_of(tree)?,
+        size_px,
         focal_px: [fx, fy],
-        center_px: [cx, cy],
+        center_px: [cx, cy].map(|center| center - first_px),
         lens,
     })
 }
 
+/// A camera of anipose's, which calls its matrix and its size no more than that, under OpenCV's names.
+fn of_anipose(tree: &Map<String, Value>) -> Option<Map<String, Value>> {
+    let (matrix, size) = (tree.get("matrix")?, tree.get("size")?);
+    tree.get("distortions")?;
+    let mut renamed = tree.clone();
+    renamed.insert("camera_matrix".to_owned(), matrix.clone());
+    renamed.insert("image_size".to_owned(), size.clone());
+    Some(renamed)
+}
+
+/// A camera of mrcal's, whose coefficients follow on the focal lengths and the centre, under Kalibr's names.
+fn of_mrcal(tree: &Map<String, Value>) -> Option<Map<String, Value>> {
+    let all = tree.get("intrinsics")?.as_array()?;
+    let model = tree.get("lensmodel")?.as_str()?;
+    let (camera, lens) = all.split_at_checked(4)?;
+    if !model.starts_with("LENSMODEL_") {
+        return None;
+    }
+    let mut renamed = tree.clone();
+    renamed.insert("intrinsics".to_owned(), camera.into());
+    renamed.insert("distortion_coefficients".to_owned(), lens.into());
+    Some(renamed)
+}
+
 /// A camera of Kalibr's camchain: `camera_model`, `intrinsics`, `distortion_model`, `distortion_coeffs`, `resolution`.
 fn of_kalibr(camera: &Map<String, Value>) -> Result<UncheckedCalibration, String> {
-    let lens = lens_of(&entries_with(camera, is_of_lens))?;
+    let entries = entries_with_lens(camera);
+    let lens = lens_of(&entries)?;
+    refuse_skew(&entries)?;
     let [fx, fy, cx, cy] = camera
         .get("intrinsics")
-        .and_then(numbers::<4>)
+        .and_then(|list| numbers::<4>(data_of(list)))
         .ok_or("intrinsics must be four finite numbers fx, fy, cx, cy")?;
     Ok(UncheckedCalibration {
         size_px: size_of(camera)?,
@@ -325,13 +437,23 @@ fn of_calib_io_camera(entry: &Value, kind: &str) -> Result<UncheckedCalibration,
     })
 }
 
+/// Pixels of a camera here have two sides at right angles.
+pub(super) fn refuse_skew(entries: &[Entry<'_>]) -> Result<(), String> {
+    let mut skews = entries.iter().filter(|entry| entry.name == "skew");
+    match skews.find(|entry| number(entry.value).is_some_and(|skew| skew != 0.0)) {
+        Some(skew) => Err(format!(
+            "{} must be 0, not {}: pixels that lean are not supported",
+            skew.key, skew.value
+        )),
+        None => Ok(()),
+    }
+}
+
 /// ROS's matrix is that of the whole picture, which these keys cut or shrink.
 fn refuse_cut_pictures(tree: &Map<String, Value>) -> Result<(), String> {
-    for key in ["binning_x", "binning_y"] {
-        if tree
-            .get(key)
-            .and_then(Value::as_f64)
-            .is_some_and(|by| by > 1.0)
+    for name in ["binningx", "binningy"] {
+        if let Some((key, by)) = find(tree, &[name])
+            && by.as_f64().is_some_and(|by| by > 1.0)
         {
             return Err(format!(
                 "{key} says that the pictures are smaller than what was calibrated; that is not supported"
@@ -352,21 +474,6 @@ fn refuse_cut_pictures(tree: &Map<String, Value>) -> Result<(), String> {
     Ok(())
 }
 
-fn size_of(tree: &Map<String, Value>) -> Result<Option<[u32; 2]>, String> {
-    let side = |keys: &[&str]| {
-        let found = find(tree, keys);
-        found
-            .map(|(key, value)| side_px(value).ok_or_else(|| bad_side(key)))
-            .transpose()
-    };
-    if let (Some(width), Some(height)) = (side(&WIDTH_KEYS)?, side(&HEIGHT_KEYS)?) {
-        return Ok(Some([width, height]));
-    }
-    find(tree, &SIZE_KEYS)
-        .map(|(_, value)| size(value))
-        .transpose()
-}
-
 fn find<'a>(tree: &'a Map<String, Value>, keys: &[&str]) -> Option<(&'a str, &'a Value)> {
     keys.iter().find_map(|wanted| {
         let found = tree.iter().find(|(key, _)| normalised(key) == *wanted);
@@ -377,17 +484,6 @@ fn find<'a>(tree: &'a Map<String, Value>, keys: &[&str]) -> Option<(&'a str, &'a
 /// A matrix is written as `{rows, cols, data}`, or as its numbers alone.
 fn data_of(matrix: &Value) -> &Value {
     matrix.get("data").unwrap_or(matrix)
-}
-
-/// `[width, height]` or `{width, height}`.
-fn size(value: &Value) -> Result<[u32; 2], String> {
-    let sides = match data_of(value) {
-        Value::Array(sides) if sides.len() == 2 => Some((&sides[0], &sides[1])),
-        Value::Object(sides) => sides.get("width").zip(sides.get("height")),
-        _ => None,
-    };
-    let sides = sides.and_then(|(width, height)| Some([side_px(width)?, side_px(height)?]));
-    sides.ok_or_else(|| bad_side("the picture size [width, height]"))
 }
 
 fn numbers<const N: usize>(value: &Value) -> Option<[f64; N]> {

@@ -1,8 +1,8 @@
 //! Calibration files: gnomon's own TOML or JSON, a session's JSON, OpenCV's FileStorage (YAML, XML, JSON), ROS's
 //! `CameraInfo` and `ost.txt`, Kalibr's camchain and EuRoC's sensors, PhotonVision's and calib.io's JSON, whatever names
-//! `fx`, `fy`, `cx`, `cy` (RealSense, ORB-SLAM, VINS, NeRF), NumPy's arrays (`numpy.rs`), COLMAP's `cameras.txt`. All but the
-//! last become the same tree of values first (`tree.rs`), so there is one place that knows the keys (`kinds.rs`; `lens.rs` for the
-//! lens's; `by_letters.rs` for the letters).
+//! `fx`, `fy`, `cx`, `cy` (RealSense, ORB-SLAM, VINS, NeRF), OpenSfM's cameras (`opensfm.rs`), NumPy's arrays (`numpy.rs`), COLMAP's
+//! `cameras.txt`. All but the last become the same tree of values first (`tree.rs`), so there is one place that knows the keys
+//! (`kinds.rs`; `lens.rs` for the lens's; `sizes.rs` for the picture's size; `by_letters.rs` for the letters).
 
 mod by_letters;
 mod colmap;
@@ -10,7 +10,9 @@ mod entries;
 mod kinds;
 mod lens;
 mod numpy;
+mod opensfm;
 mod ost;
+mod sizes;
 mod tree;
 mod values;
 
@@ -255,6 +257,12 @@ impl UncheckedCalibration {
                 focal_px[0], focal_px[1]
             ));
         }
+        if let Some(looks) = other_units(focal_px, center_px, size_px) {
+            return refuse(format!(
+                "the focal lengths {} and {} and the principal point ({}, {}) must be in pixels of a picture of {} x {}; {looks}",
+                focal_px[0], focal_px[1], center_px[0], center_px[1], size_px[0], size_px[1]
+            ));
+        }
         // A cropped picture may have its centre outside, but not far.
         for (center, side) in center_px.iter().zip(size_px.map(f64::from)) {
             if *center < -0.5 * side || *center > 1.5 * side {
@@ -270,6 +278,33 @@ impl UncheckedCalibration {
             center_px: DVec2::from_array(center_px),
             distortion,
         })
+    }
+}
+
+/// What lengths look like that are in no pixels; `None`: they may be.
+fn other_units(focal_px: [f64; 2], center_px: [f64; 2], size_px: [u32; 2]) -> Option<&'static str> {
+    // The widest fisheyes, 220° across a tenth of the picture's longer side, have less than half of it.
+    const LEAST_FOCAL: f64 = 0.1;
+    const MOST_SHARE: f64 = 1.0;
+    /// Longer than a lens of 10° across in shares of a side.
+    const MOST_FOCAL_SHARE: f64 = 6.0;
+    let longer_px = f64::from(size_px[0].max(size_px[1]));
+    let is_short = focal_px
+        .iter()
+        .any(|&focal| focal < LEAST_FOCAL * longer_px);
+    let is_share = center_px.iter().all(|center| center.abs() <= MOST_SHARE);
+    let are_shares = is_share && focal_px.iter().all(|&focal| focal < MOST_FOCAL_SHARE);
+    match (is_short, is_share) {
+        (true, _) if are_shares => Some(
+            "they look normalised: multiply x by the width and y by the height, or both by what they are shares of",
+        ),
+        (true, _) => Some(
+            "they look like millimetres: divide them by the side of a pixel, as the sensor's width by the picture's",
+        ),
+        (false, true) => {
+            Some("the principal point looks normalised, or relative to the picture's middle")
+        }
+        (false, false) => None,
     }
 }
 
@@ -402,3 +437,7 @@ fn only_camera(
 mod numpy_tests;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_lens;
+#[cfg(test)]
+mod tests_units;

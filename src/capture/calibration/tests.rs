@@ -4,18 +4,18 @@ use super::*;
 
 const OWN: &str = "size_px = [640, 480]\nfocal_px = [615, 613.0]\ncenter_px = [321.4, 238.2]\ndistortion = [0.08, -0.19, 0.0008, -0.0005, 0.05]\n";
 
-fn load(name: &str, text: &str) -> Result<Intrinsics, CalibrationError> {
+pub(super) fn load(name: &str, text: &str) -> Result<Intrinsics, CalibrationError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     std::fs::write(&path, text).unwrap();
     load_calibration(&path)
 }
 
-fn message(name: &str, text: &str) -> String {
+pub(super) fn message(name: &str, text: &str) -> String {
     load(name, text).unwrap_err().to_string()
 }
 
-fn lamp() -> Intrinsics {
+pub(super) fn lamp() -> Intrinsics {
     Intrinsics {
         size_px: [640, 480],
         focal_px: DVec2::new(615.0, 613.0),
@@ -458,8 +458,6 @@ fn other_programs_write_the_same_camera() {
         cx: 321.4\n   cy: 238.2\n";
     let realsense = r#"{"width": 640, "height": 480, "fx": 615, "fy": 613, "ppx": 321.4, "ppy": 238.2,
         "model": "Brown Conrady", "coeffs": [0.08, -0.19, 0.0008, -0.0005, 0]}"#;
-    let nerf = r#"{"camera_model": "OPENCV", "fl_x": 615, "fl_y": 613, "cx": 321.4, "cy": 238.2, "w": 640, "h": 480,
-        "k1": 0.08, "k2": -0.19, "p1": 0.0008, "p2": -0.0005, "frames": [{"file_path": "a.png"}]}"#;
     let quoted = "image_width: \"640\"\nimage_height: '480'\ncamera_matrix: &k [['615', 0, 321.4], [0, 613, 238.2], [0, 0, 1]]\n\
         dist_coeff: [[0.08, -0.19, 0.0008, -0.0005]]\nagain: *k\n";
     let nested = r#"{"image_width": 640, "image_height": 480, "calibration": {"left": {"mtx":
@@ -479,7 +477,6 @@ fn other_programs_write_the_same_camera() {
         ("orb.yaml", orb_slam),
         ("vins.yaml", vins),
         ("realsense.json", realsense),
-        ("transforms.json", nerf),
         ("quoted.yaml", quoted),
         ("nested.json", nested),
         ("open3d.json", columns),

@@ -20,6 +20,9 @@ pub(super) struct Lens {
     pub is_said: bool,
 }
 
+/// Where those who count from the picture's corner have the first pixel's centre.
+pub(super) const CORNER_PX: f64 = 0.5;
+
 /// Which formula a file's coefficients belong to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum LensModel {
@@ -31,17 +34,43 @@ pub(super) enum LensModel {
     Fisheye,
 }
 
-const MODEL_KEYS: [&str; 8] = [
+/// Keys whose value is the name of a model, and nothing else.
+const MODEL_KEYS: [&str; 13] = [
     "distortionmodel",
     "distortiontype",
+    "distmodel",
     "cameramodel",
+    "cammodel",
+    "calibrationmodel",
+    "calibmodel",
     "lensmodel",
     "lenstype",
     "projectionmodel",
     "projectiontype",
+    "modeltype",
     "model",
 ];
-const FISHEYE_KEYS: [&str; 3] = ["fisheyemodel", "fisheye", "isfisheye"];
+/// What other keys end in whose value may name a model: `type: fisheye`, but also `type: usb`.
+const MODEL_ENDINGS: [&str; 4] = ["model", "type", "projection", "lens"];
+const FISHEYE_KEYS: [&str; 4] = ["fisheyemodel", "fisheye", "isfisheye", "usefisheye"];
+/// Models that nobody here computes, by what their names have in them. (OmniVision makes sensors.)
+const FOREIGN_PARTS: [&str; 14] = [
+    "fisheye",
+    "kannala",
+    "equidist",
+    "omnidir",
+    "eucm",
+    "doublesphere",
+    "unified",
+    "ftheta",
+    "stereographic",
+    "equisolid",
+    "equirect",
+    "spherical",
+    "panoram",
+    "scaramuzza",
+];
+const FOREIGN_NAMES: [&str; 6] = ["omni", "ds", "mei", "ucm", "fov", "ocam"];
 /// Numbers that OpenCV's coefficients come in.
 const COUNTS: [usize; 5] = [4, 5, 8, 12, 14];
 
@@ -59,33 +88,14 @@ pub(super) fn names_a_lens(model: &Value) -> bool {
     )
 }
 
-/// The lens model by all keys that decide it. What is not known is refused, never passed over.
+/// The lens model by all entries (key, name as keys are compared, value) that decide it. What is not known is refused, never
+/// passed over.
 pub(super) fn model_of<'a>(
-    entries: impl IntoIterator<Item = (&'a str, &'a Value)>,
+    entries: impl IntoIterator<Item = (&'a str, &'a str, &'a Value)>,
 ) -> Result<LensModel, String> {
     let mut found = LensModel::ByNumber;
-    for (key, value) in entries {
-        let name = normalised(key.rsplit('.').next().unwrap_or_default());
-        let model = if FISHEYE_KEYS.contains(&name.as_str()) {
-            match value {
-                Value::Null => LensModel::ByNumber,
-                value if value.as_bool() == Some(true) || value.as_f64() == Some(1.0) => {
-                    LensModel::Fisheye
-                }
-                value if value.as_bool() == Some(false) || value.as_f64() == Some(0.0) => {
-                    LensModel::ByNumber
-                }
-                other => return Err(format!("{key} must be 0 or 1, not {other}")),
-            }
-        } else if MODEL_KEYS.contains(&name.as_str()) {
-            model_by_name(key, value)?
-        } else if name == "xi" && value.as_f64() != Some(0.0) {
-            return Err(format!(
-                "{key} belongs to the omnidirectional model, which is not supported"
-            ));
-        } else {
-            continue;
-        };
+    for (key, name, value) in entries {
+        let model = model_by_key(key, name, value)?.unwrap_or(LensModel::ByNumber);
         match (found, model) {
             (_, LensModel::ByNumber) => {}
             (LensModel::ByNumber, _) => found = model,
@@ -100,27 +110,95 @@ pub(super) fn model_of<'a>(
     Ok(found)
 }
 
-fn model_by_name(key: &str, value: &Value) -> Result<LensModel, String> {
-    let name = match value {
-        Value::Null => "",
-        Value::String(name) => name,
-        other => return Err(format!("{key} must be a name, not {other}")),
+/// What one entry says of the lens's model; `None`: nothing.
+pub(super) fn model_by_key(
+    key: &str,
+    name: &str,
+    value: &Value,
+) -> Result<Option<LensModel>, String> {
+    let omnidirectional = || {
+        Err(format!(
+            "{key} belongs to the omnidirectional model, which is not supported"
+        ))
     };
-    let word = normalised(name);
+    match value {
+        Value::Null => Ok(None),
+        _ if name == "mirrorparameters" => omnidirectional(),
+        _ if name == "xi" => match value.as_f64() {
+            Some(0.0) => Ok(None),
+            _ => omnidirectional(),
+        },
+        _ if name.contains("fisheye") => match value.as_bool().or_else(|| truth(value)) {
+            Some(true) => Ok(Some(LensModel::Fisheye)),
+            Some(false) => Ok(Some(LensModel::ByNumber)),
+            None if FISHEYE_KEYS.contains(&name) => {
+                Err(format!("{key} must be 0 or 1, not {value}"))
+            }
+            None => Ok(None),
+        },
+        _ if MODEL_KEYS.contains(&name) => model_by_name(key, value).map(Some),
+        // DepthAI's CameraModel.
+        Value::Number(number) if name == "cameratype" => match number.as_f64() {
+            Some(0.0) => Ok(Some(LensModel::ByNumber)),
+            Some(1.0) => Ok(Some(LensModel::Fisheye)),
+            _ => Err(format!(
+                "{key} must be 0 (perspective) or 1 (fisheye), not {number}"
+            )),
+        },
+        Value::String(word) if MODEL_ENDINGS.iter().any(|ending| name.ends_with(ending)) => {
+            model_by_word(key, word)
+        }
+        _ => Ok(None),
+    }
+}
+
+fn truth(value: &Value) -> Option<bool> {
+    match value.as_f64()? {
+        0.0 => Some(false),
+        1.0 => Some(true),
+        _ => None,
+    }
+}
+
+/// The model that a word names which may be about something else.
+fn model_by_word(key: &str, word: &str) -> Result<Option<LensModel>, String> {
+    let name = normalised(word);
+    let is_foreign = FOREIGN_NAMES.contains(&name.as_str())
+        || FOREIGN_PARTS.iter().any(|part| name.contains(part));
+    match known_model(&name) {
+        None if is_foreign => Err(unsupported_model(key, word)),
+        _ if matches!(name.as_str(), "" | "none") => Ok(None),
+        known => Ok(known),
+    }
+}
+
+fn model_by_name(key: &str, value: &Value) -> Result<LensModel, String> {
+    let Value::String(name) = value else {
+        return Err(format!("{key} must be a name, not {value}"));
+    };
+    known_model(&normalised(name)).ok_or_else(|| unsupported_model(key, name))
+}
+
+fn unsupported_model(key: &str, name: &str) -> String {
+    format!(
+        "{key}: the model '{name}' is not supported; plumb_bob (radtan), rational_polynomial and equidistant \
+         (fisheye) are"
+    )
+}
+
+/// The model of a name, as keys are compared.
+fn known_model(name: &str) -> Option<LensModel> {
     // (PhotonVision and mrcal write LENSMODEL_OPENCV8.)
-    match word.strip_prefix("lensmodel").unwrap_or(&word) {
+    match name.strip_prefix("lensmodel").unwrap_or(name) {
         "" | "pinhole" | "perspective" | "rationalpolynomial" | "rational" | "thinprism"
         | "tilted" | "opencv" | "opencv4" | "opencv5" | "opencv8" | "opencv12" | "fullopencv"
-        | "simplepinhole" => Ok(LensModel::ByNumber),
+        | "simplepinhole" | "pinholeradtan8" => Some(LensModel::ByNumber),
         "plumbbob" | "radtan" | "radialtangential" | "brownconrady" | "brown" | "none" => {
-            Ok(LensModel::Brown)
+            Some(LensModel::Brown)
         }
         "equidistant" | "equi" | "fisheye" | "kannalabrandt" | "kannalabrandt4"
-        | "kannalabrandt8" | "opencvfisheye" => Ok(LensModel::Fisheye),
-        _ => Err(format!(
-            "{key}: the model '{name}' is not supported; plumb_bob (radtan), rational_polynomial and equidistant \
-             (fisheye) are"
-        )),
+        | "kannalabrandt8" | "kb4" | "opencvfisheye" => Some(LensModel::Fisheye),
+        _ => None,
     }
 }
 
@@ -129,11 +207,6 @@ pub(super) fn normalised(key: &str) -> String {
         .chars()
         .filter(|letter| !matches!(letter, '_' | '-' | ' '));
     kept.flat_map(char::to_lowercase).collect()
-}
-
-pub(super) fn side_px(value: &Value) -> Option<u32> {
-    let side = number(value)?;
-    (side.fract() == 0.0 && (1.0..=f64::from(MOST_SIDE_PX)).contains(&side)).then_some(side as u32)
 }
 
 pub(super) fn bad_side(what: &str) -> String {
