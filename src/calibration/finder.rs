@@ -1,7 +1,7 @@
 //! Finds a target's inner corners in a picture.
 //!
-//! Chessboards are OpenCV's to find. ChArUco boards are found by their markers and the corners between them refined as
-//! saddle points, which holds for every release of OpenCV alike: their own ChArUco code moved twice and changed the
+//! Chessboards are OpenCV's to find. ChArUco boards are found by their markers and the corners between them fitted
+//! (`corner_fit.rs`), which holds for every release of OpenCV alike: their own ChArUco code moved twice and changed the
 //! layout of its boards with 4.6.
 
 use std::collections::BTreeMap;
@@ -13,6 +13,8 @@ use opencv::core::{
 use opencv::prelude::*;
 use opencv::{boxed_ref::BoxedRef, calib3d, imgproc};
 
+use super::corner_fit::{ExpectedCorner, LEAST_CLEAR_PX};
+use super::shown_instead::{ShownInstead, mirrored, other_board_in};
 use super::{CalibrateError, Target, TargetCorner, TargetMarkers};
 use crate::geometry::homography::{best_homography, mapped};
 use crate::scene::TrackingSettings;
@@ -25,6 +27,28 @@ pub struct TargetFinder {
     detector: Option<Detector>,
     /// Pictures that show a board of as many rows as this one has columns, and the other way round.
     swapped: u32,
+    small: SmallSquares,
+    instead: ShownInstead,
+    has_found: bool,
+}
+
+/// Pictures in which most of a ChArUco board's corners have markers too near for the corner to be told.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SmallSquares {
+    /// How many there are.
+    pub pictures: u32,
+    /// The largest squares in them, pixels.
+    pub square_px: f64,
+    /// What they would have to have for their corners to be told, pixels.
+    pub needed_px: f64,
+}
+
+/// What a picture shows of a ChArUco board.
+#[derive(Default)]
+struct BoardView {
+    corners: Vec<TargetCorner>,
+    /// The squares at corners that markers are too near to: their sides and what these would have to be, pixels.
+    small_px: Vec<[f64; 2]>,
 }
 
 /// A marker's corners, as printed, in the target's frame and in the picture.
@@ -60,6 +84,9 @@ impl TargetFinder {
             target,
             detector: target.markers.as_ref().map(detector).transpose()?,
             swapped: 0,
+            small: SmallSquares::default(),
+            instead: ShownInstead::default(),
+            has_found: false,
         })
     }
 
@@ -71,6 +98,16 @@ impl TargetFinder {
     /// How many of the pictures so far show a ChArUco board whose columns and rows are given the wrong way round.
     pub fn swapped(&self) -> u32 {
         self.swapped
+    }
+
+    /// The pictures so far whose squares are too small.
+    pub fn small_squares(&self) -> SmallSquares {
+        self.small
+    }
+
+    /// What the pictures so far show in place of the target.
+    pub fn shown_instead(&self) -> &ShownInstead {
+        &self.instead
     }
 
     /// The corners that an 8-bit grey picture (rows from the top, no padding) shows: all of a chessboard's, or those of a
@@ -93,30 +130,78 @@ impl TargetFinder {
             .into());
         }
         let picture = Mat::new_rows_cols_with_data(height as i32, width as i32, grey)?;
-        let soft = softened(&picture)?;
-        let corners = match (&mut self.detector, &self.target.markers) {
-            (Some(detector), Some(markers)) => {
-                let seen = seen_markers(detector, grey, size_px, markers)?;
-                if is_swapped(&self.target, markers, &seen)? {
-                    self.swapped += 1;
-                    return Ok(Vec::new());
-                }
-                charuco_corners(&self.target, markers, &seen, &soft)?
-            }
-            _ => chessboard_corners(&self.target, &picture, &soft)?,
+        let corners = match self.target.markers {
+            Some(markers) => self.board_corners(&markers, grey, size_px)?,
+            None => self.whole_chessboard(&picture)?,
         };
-        Ok(if corners.len() < FEWEST_CORNERS {
-            Vec::new()
-        } else {
-            corners
-        })
+        if corners.len() < FEWEST_CORNERS {
+            return Ok(Vec::new());
+        }
+        self.has_found = true;
+        Ok(corners)
+    }
+
+    fn board_corners(
+        &mut self,
+        markers: &TargetMarkers,
+        grey: &[u8],
+        size_px: [u32; 2],
+    ) -> Result<Vec<TargetCorner>, CalibrateError> {
+        let Some(detector) = &mut self.detector else {
+            return Ok(Vec::new());
+        };
+        let seen = seen_markers(detector, grey, size_px, markers)?;
+        if is_swapped(&self.target, markers, &seen)? {
+            self.swapped += 1;
+            return Ok(Vec::new());
+        }
+        let view = charuco_corners(&self.target, markers, &seen, grey, size_px)?;
+        self.small.note(&view);
+        if seen.len() < FEWEST_MARKERS && self.instead.is_worth_a_look() {
+            let seen = seen_markers(detector, &mirrored(grey, size_px), size_px, markers)?;
+            let placed = placed_markers(&self.target, markers, &seen)?;
+            let is_board = placed.is_some_and(|(_, placed)| placed.len() >= FEWEST_MARKERS);
+            self.instead.mirrored += u32::from(is_board);
+        }
+        Ok(view.corners)
+    }
+
+    fn whole_chessboard(
+        &mut self,
+        picture: &BoxedRef<'_, Mat>,
+    ) -> Result<Vec<TargetCorner>, CalibrateError> {
+        // To look for a board that is not there takes long: where another one was seen again and again it is looked for first.
+        let suspected = self.instead.suspected().filter(|_| !self.has_found);
+        if suspected.is_some() && other_board_in(picture, &self.target)? == suspected {
+            self.instead.note_board(suspected);
+            return Ok(Vec::new());
+        }
+        let corners = chessboard_corners(&self.target, picture)?;
+        let is_open = corners.is_empty() && !self.has_found && suspected.is_none();
+        if is_open && self.instead.is_worth_a_look() {
+            self.instead
+                .note_board(other_board_in(picture, &self.target)?);
+        }
+        Ok(corners)
+    }
+}
+
+impl SmallSquares {
+    fn note(&mut self, view: &BoardView) {
+        if view.small_px.len() <= view.corners.len() {
+            return;
+        }
+        self.pictures += 1;
+        let largest = view.small_px.iter().max_by(|a, b| a[0].total_cmp(&b[0]));
+        if let Some(&[square_px, needed_px]) = largest.filter(|px| px[0] > self.square_px) {
+            (self.square_px, self.needed_px) = (square_px, needed_px);
+        }
     }
 }
 
 fn chessboard_corners(
     target: &Target,
     picture: &BoxedRef<'_, Mat>,
-    soft: &Mat,
 ) -> opencv::Result<Vec<TargetCorner>> {
     let [across, down] = target.corners().map(|corners| corners as i32);
     // Neither the exhaustive search nor the upsampled one is worth several times the time.
@@ -126,6 +211,7 @@ fn chessboard_corners(
     if !calib3d::find_chessboard_corners_sb(picture, size, &mut found, flags)? {
         return Ok(Vec::new());
     }
+    let soft = softened(picture)?;
     let pixels: Vec<DVec2> = found.iter().map(vector).collect();
     let across = across as usize;
     let mut corners = Vec::new();
@@ -143,7 +229,7 @@ fn chessboard_corners(
             .filter_map(|other| Some(pixels.get(other)?.distance(pixels[k])))
             .fold(f64::INFINITY, f64::min);
         // The finder's own places scatter by a tenth of a pixel, nearly twice as much as saddle points do.
-        let refined = saddle_point(soft, pixels[k], REACH * spacing_px)?;
+        let refined = saddle_point(&soft, pixels[k], REACH * spacing_px)?;
         corners.push(TargetCorner {
             target_m,
             pixel: refined.unwrap_or(pixels[k]),
@@ -175,14 +261,13 @@ fn charuco_corners(
     target: &Target,
     markers: &TargetMarkers,
     seen: &BTreeMap<u32, [DVec2; 4]>,
-    soft: &Mat,
-) -> opencv::Result<Vec<TargetCorner>> {
+    grey: &[u8],
+    size_px: [u32; 2],
+) -> opencv::Result<BoardView> {
+    let mut view = BoardView::default();
     let Some((_, placed)) = placed_markers(target, markers, seen)? else {
-        return Ok(Vec::new());
+        return Ok(view);
     };
-    // From a corner of the board to the next marker's, along an axis: what is refined must not reach so far.
-    let clear_m = (target.square_m - markers.size_m) / 2.0;
-    let mut corners = Vec::new();
     for target_m in target.corners_m() {
         let mut near: Vec<&MarkerPairs> = placed.iter().collect();
         near.sort_by(|a, b| distance_m(a, target_m).total_cmp(&distance_m(b, target_m)));
@@ -198,22 +283,22 @@ fn charuco_corners(
         let Some(picture_from_target) = best_homography(&pairs) else {
             continue;
         };
-        let at = |point_m: DVec2| mapped(&picture_from_target, point_m);
-        let guess_px = at(target_m);
-        let clear_px = [DVec2::X, DVec2::Y]
-            .map(|axis| (at(target_m + axis * clear_m) - guess_px).length())
-            .into_iter()
-            .fold(f64::INFINITY, f64::min);
-        // In the middle of what is one colour each.
-        let quarters_px = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
-            .map(|way| at(target_m + DVec2::from(way) * (0.6 * clear_m)));
-        if let Some(pixel) = saddle_point(soft, guess_px, clear_px)?
-            && alternates(soft, quarters_px)?
-        {
-            corners.push(TargetCorner { target_m, pixel });
+        let at = |way: DVec2| mapped(&picture_from_target, target_m + way * target.square_m);
+        let corner = ExpectedCorner {
+            pixel: at(DVec2::ZERO),
+            along_px: [DVec2::X, DVec2::Y].map(|way| (at(way) - at(-way)) / 2.0),
+            clear: 0.5 - markers.size_m / target.square_m / 2.0,
+        };
+        let clear_px = corner.clear_px();
+        if clear_px < LEAST_CLEAR_PX {
+            let square_px = corner.along_px[0].length().min(corner.along_px[1].length());
+            view.small_px
+                .push([square_px, square_px * LEAST_CLEAR_PX / clear_px]);
+        } else if let Some(pixel) = corner.found(grey, size_px) {
+            view.corners.push(TargetCorner { target_m, pixel });
         }
     }
-    Ok(corners)
+    Ok(view)
 }
 
 /// Whether the markers that are seen make up a board with as many rows as this one has columns, and not this one.
@@ -334,20 +419,6 @@ fn saddle_point(soft: &Mat, guess_px: DVec2, clear_px: f64) -> opencv::Result<Op
     // Where it runs away OpenCV gives the guess back.
     let moved_px = found_px.distance(guess_px);
     Ok((moved_px > 0.0 && moved_px < reach_px).then_some(found_px))
-}
-
-/// Whether four places around a corner are dark and bright by turns; not so at the board's rim.
-fn alternates(soft: &Mat, quarters_px: [DVec2; 4]) -> opencv::Result<bool> {
-    let mut levels = [0_u8; 4];
-    for (level, place) in levels.iter_mut().zip(quarters_px) {
-        let [column, row] = place.round().to_array().map(|at| at as i32);
-        if !(0..soft.cols()).contains(&column) || !(0..soft.rows()).contains(&row) {
-            return Ok(false);
-        }
-        *level = *soft.at_2d::<u8>(row, column)?;
-    }
-    let [a, b, c, d] = levels;
-    Ok(a.max(c) < b.min(d) || b.max(d) < a.min(c))
 }
 
 fn vector(point: Point2f) -> DVec2 {

@@ -3,11 +3,14 @@
 //! [`Views`] is shown one grey picture after the other, from files or from a webcam, and says after each what the set
 //! still lacks; [`solve`] makes a calibration of it. No type of OpenCV's leaves.
 
+mod corner_fit;
 mod coverage;
 mod coverage_picture;
 mod cross_validation;
 mod deviations;
 mod finder;
+mod focal_change;
+mod shown_instead;
 mod solve;
 mod taker;
 mod target;
@@ -19,7 +22,9 @@ use crate::tracking::TrackingError;
 
 pub use coverage::Coverage;
 pub use coverage_picture::{CoveragePicture, coverage_picture};
-pub use finder::TargetFinder;
+pub use finder::{SmallSquares, TargetFinder};
+pub use focal_change::FocalChange;
+pub use shown_instead::ShownInstead;
 pub use solve::{Calibration, FittedView, LensTerms, solve};
 pub use taker::{Moment, Taker};
 pub use target::{Target, TargetError, TargetMarkers};
@@ -61,6 +66,45 @@ pub enum CalibrateError {
         seen: u32,
         /// Its columns and rows.
         squares: [u32; 2],
+    },
+    /// Another chessboard is there.
+    #[error(
+        "none of {looked} pictures shows what was looked for ({target}); {seen} show a chessboard of {} x {} inner corners \
+         (--chessboard {0}x{1})",
+        corners[0], corners[1]
+    )]
+    OtherBoard {
+        /// Number of pictures.
+        looked: u32,
+        /// How many show the other board.
+        seen: u32,
+        /// Its inner corners.
+        corners: [u32; 2],
+        /// What was looked for.
+        target: Target,
+    },
+    /// The board's markers are mirrored.
+    #[error(
+        "{seen} of {looked} pictures show the target only when they are turned left for right: set --mirror (leave it out \
+         where it is set)"
+    )]
+    Mirrored {
+        /// Number of pictures.
+        looked: u32,
+        /// How many show it so.
+        seen: u32,
+    },
+    /// The markers stand too near to the board's corners, in pixels.
+    #[error(
+        "{} of {looked} pictures show the target too small: its squares are {:.0} px wide there, and {:.0} are needed for the \
+         corners between its markers to be told; hold it nearer, or take larger pictures",
+        small.pictures, small.square_px.floor(), small.needed_px.ceil()
+    )]
+    TooSmall {
+        /// Number of pictures.
+        looked: u32,
+        /// Those that are too small.
+        small: SmallSquares,
     },
     /// The target is in none of them.
     #[error(
@@ -110,6 +154,9 @@ pub enum CalibrateError {
         /// The larger standard deviation of the focal lengths, as a part of them; `None` where nothing was found.
         focal_deviation: Option<f64>,
     },
+    /// The views are not of one camera.
+    #[error("{0}: calibrate with pictures of one setting alone")]
+    Changed(FocalChange),
     /// The lens would send two rays to one pixel.
     #[error(
         "the lens that fits these views turns back on itself within the picture; move the target into the picture's \

@@ -9,7 +9,8 @@ use opencv::core::{
 use opencv::prelude::*;
 
 use super::cross_validation::{is_no_worse, left_out_errors};
-use super::deviations::{Parameters, deviations, polynomial_of};
+use super::deviations::{Parameters, deviations, polynomial_of, reduced_views};
+use super::focal_change::{FocalChange, focal_change};
 use super::views::{FEWEST_VIEWS, Placing, TILTED_RAD, TargetView, Views, coverage_of, lacks_of};
 use super::{CalibrateError, Coverage, Lack, TargetCorner};
 use crate::geometry::camera::{Distortion, Intrinsics};
@@ -35,6 +36,8 @@ pub struct Calibration {
     pub views: Vec<FittedView>,
     /// Views that did not fit: number of the picture and root mean square distance, pixels.
     pub dropped: Vec<(u32, f64)>,
+    /// What two kinds of views want, where one focal length does not explain them.
+    pub focal_change: Option<FocalChange>,
     /// Where the corners lie.
     pub coverage: Coverage,
     /// What the views lack; nothing when they are good.
@@ -163,11 +166,14 @@ pub fn solve(views: &Views) -> Result<Calibration, CalibrateError> {
     let (fit, lens, deviations) = simplest(&chosen, size_px)?;
     let focal_deviation_px = DVec2::new(deviations[0], deviations[1]);
     let focal_deviation = (focal_deviation_px / fit.intrinsics.focal_px).max_element();
+    let focal_change = fit.focal_change(&chosen, lens);
     // Also where it is not finite.
     if focal_deviation.is_nan() || focal_deviation > MOST_FOCAL_DEVIATION {
-        return Err(CalibrateError::Degenerate {
-            focal_deviation: Some(focal_deviation).filter(|deviation| deviation.is_finite()),
-        });
+        let focal_deviation = Some(focal_deviation).filter(|deviation| deviation.is_finite());
+        let why = focal_change
+            .map(CalibrateError::Changed)
+            .or(views.too_small());
+        return Err(why.unwrap_or(CalibrateError::Degenerate { focal_deviation }));
     }
     let fitted: Vec<FittedView> = chosen
         .iter()
@@ -184,6 +190,7 @@ pub fn solve(views: &Views) -> Result<Calibration, CalibrateError> {
         center_deviation_px: DVec2::new(deviations[2], deviations[3]),
         distortion_deviations: std::array::from_fn(|k| deviations[4 + k]),
         rms_px: fit.rms_px,
+        focal_change,
         views: fitted,
         dropped,
         coverage,
@@ -402,6 +409,12 @@ impl CameraFit {
     /// How far each view would be off for a camera that is known from the others.
     fn left_out_errors(&self, views: &[&TargetView], lens: LensTerms) -> Option<Vec<f64>> {
         left_out_errors(&self.intrinsics, self.posed(views), lens.free())
+    }
+
+    /// What the views want, where they are not all of one focal length.
+    fn focal_change(&self, views: &[&TargetView], lens: LensTerms) -> Option<FocalChange> {
+        let reduced = reduced_views(&self.intrinsics, self.posed(views), lens.free())?;
+        focal_change(&self.intrinsics, &reduced, self.rms_px)
     }
 
     /// The view that fits worst, if it is a bad one.

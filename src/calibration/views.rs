@@ -287,6 +287,43 @@ impl Views {
         lacks_of(self.kept.len(), &coverage, tilted.count())
     }
 
+    /// How many pictures show a ChArUco board left for right; they are left out.
+    pub fn mirrored(&self) -> u32 {
+        self.finder.shown_instead().mirrored
+    }
+
+    /// Why most pictures tell little, where their squares are too small for it.
+    pub(super) fn too_small(&self) -> Option<CalibrateError> {
+        let small = self.finder.small_squares();
+        (2 * small.pictures > self.looked).then_some(CalibrateError::TooSmall {
+            looked: self.looked,
+            small,
+        })
+    }
+
+    /// Why no picture shows the target.
+    fn why_none(&self) -> CalibrateError {
+        let (looked, target) = (self.looked, *self.target());
+        if let Some(too_small) = self.too_small() {
+            return too_small;
+        }
+        if self.mirrored() > 0 {
+            return CalibrateError::Mirrored {
+                looked,
+                seen: self.mirrored(),
+            };
+        }
+        match self.finder.shown_instead().other_board() {
+            Some((corners, seen)) => CalibrateError::OtherBoard {
+                looked,
+                seen,
+                corners,
+                target,
+            },
+            None => CalibrateError::NoTarget { looked, target },
+        }
+    }
+
     /// The views that a calibration is made of: all, or those that cover most and differ most.
     pub(super) fn chosen(&self) -> Result<Vec<&TargetView>, CalibrateError> {
         if self.finder.swapped() > self.found {
@@ -297,12 +334,12 @@ impl Views {
             });
         }
         let Some(size_px) = self.size_px.filter(|_| self.found > 0) else {
-            return Err(CalibrateError::NoTarget {
-                looked: self.looked,
-                target: *self.target(),
-            });
+            return Err(self.why_none());
         };
         if self.found < FEWEST_VIEWS as u32 {
+            if let Some(too_small) = self.too_small() {
+                return Err(too_small);
+            }
             return Err(CalibrateError::TooFewViews {
                 looked: self.looked,
                 found: self.found,

@@ -125,6 +125,7 @@ fn a_chessboard_tells_a_straight_lens() {
         "{:?}",
         found.lacks
     );
+    assert_eq!(found.focal_change, None);
     // Where the target was, up to the chessboard's half turn; none of these is needed to have one.
     for (view, pose) in found.views.iter().zip(&poses) {
         let tilt = pose.matrix3.z_axis.z.abs().acos();
@@ -156,6 +157,121 @@ fn a_charuco_board_tells_a_bent_lens_by_parts_of_it() {
     let found = solve(&views).expect("a calibration");
     assert_camera(&found, &BENT_CAMERA, 0.3);
     assert!(found.rms_px < 0.1, "{}", found.rms_px);
+}
+
+/// Tilted to all sides, so far away that squares of 25 mm are some 25 to 35 pixels wide.
+fn far_poses(print: &Print) -> Vec<DAffine3> {
+    let mut poses = Vec::new();
+    for (k, distance_m) in (0_i32..).zip([0.44, 0.48, 0.52, 0.56, 0.6, 0.64]) {
+        let turn_deg = f64::from(50 * k);
+        let aside = 0.1 * f64::from(k - 3);
+        for tilt_deg in [[28.0_f64, 8.0], [-10.0, -30.0]] {
+            let place = [aside * tilt_deg[0].signum(), -aside];
+            poses.push(pose(print, place, distance_m, tilt_deg, turn_deg));
+        }
+    }
+    poses
+}
+
+#[test]
+fn small_squares_tell_their_corners_though_markers_stand_beside_them() {
+    let print = Print::charuco();
+    let photographer = Photographer::bent();
+    let poses = far_poses(print);
+    let mut finder = TargetFinder::new(charuco()).expect("a finder");
+    let (mut squares, mut count) = (0.0, 0);
+    for camera_from_target in &poses {
+        let grey = photographer.photograph(print, camera_from_target, 1.0);
+        let corners = finder.find(&grey, BENT_CAMERA.size_px).expect("corners");
+        assert_eq!(corners.len(), 40);
+        count += corners.len();
+        for corner in corners {
+            let place = camera_from_target.transform_point3(corner.target_m.extend(0.0));
+            let expected_px = BENT_CAMERA.pixel_of(place).expect("a pixel");
+            squares += corner.pixel.distance_squared(expected_px);
+        }
+    }
+    let off_px = (squares / count as f64).sqrt();
+    eprintln!("{count} corners of small squares: {off_px:.4} px rms off");
+    // OpenCV's own corners are off by 0.1 px there.
+    assert!(off_px < 0.04, "{off_px}");
+    let views = shown(photographer, print, charuco(), &poses);
+    let found = solve(&views).expect("a calibration");
+    let off = (found.intrinsics.focal_px / BENT_CAMERA.focal_px - 1.0).abs();
+    eprintln!("focal lengths off by {off:.5}, rms {:.3} px", found.rms_px);
+    assert!(off.max_element() < 3e-3, "{:?}", found.intrinsics);
+}
+
+#[test]
+fn squares_that_are_too_small_are_told() {
+    let print = Print::of("--charuco 9x6 --square-mm 25 --marker-mm 22 --dictionary DICT_4X4_50");
+    let target = charuco_of([9, 6], 0.025, 0.022, "DICT_4X4_50");
+    let views = shown(Photographer::straight(), &print, target, &far_poses(&print));
+    let error = solve(&views).expect_err("too small").to_string();
+    assert!(error.contains("hold it nearer"), "{error}");
+}
+
+#[test]
+fn views_of_two_focal_lengths_are_told() {
+    let print = Print::chessboard();
+    for times in [1.15, 1.3] {
+        let longer = Photographer::new(Intrinsics {
+            focal_px: times * CAMERA.focal_px,
+            ..CAMERA
+        });
+        let mut views = Views::new(chessboard()).expect("a finder");
+        for (number, pose) in (0..).zip(good_poses(print)) {
+            let photographer = match number % 2 {
+                0 => Photographer::straight(),
+                _ => &longer,
+            };
+            let grey = photographer.photograph(print, &pose, 1.0);
+            views.look(number, &grey, CAMERA.size_px).expect("a look");
+        }
+        // Refused or warned of, it is told.
+        let change = match solve(&views) {
+            Ok(found) => found.focal_change,
+            Err(CalibrateError::Changed(change)) => Some(change),
+            Err(error) => panic!("{error}"),
+        };
+        let change = change.expect("two focal lengths");
+        eprintln!("{times}: {change}");
+        let [shorter_px, longer_px] = change.focal_px;
+        assert!(
+            longer_px / shorter_px > 1.0 + (times - 1.0) / 2.0,
+            "{change}"
+        );
+    }
+}
+
+#[test]
+fn a_board_left_for_right_and_another_board_are_told() {
+    let [width, height] = CAMERA.size_px;
+    let photograph = |print: &Print| {
+        let poses = good_poses(print);
+        let seen = move |pose| Photographer::straight().photograph(print, pose, 1.0);
+        poses.iter().take(5).map(seen).collect::<Vec<_>>()
+    };
+    let mut views = Views::new(charuco()).expect("a finder");
+    for mut grey in photograph(Print::charuco()) {
+        grey.chunks_exact_mut(width as usize)
+            .for_each(<[u8]>::reverse);
+        views.look(0, &grey, [width, height]).expect("a look");
+    }
+    let error = solve(&views).expect_err("mirrored");
+    assert!(
+        matches!(error, CalibrateError::Mirrored { looked: 5, seen: 5 }),
+        "{error}"
+    );
+    for counts in [[7, 5], [6, 4], [9, 6]] {
+        let target = Target::chessboard(counts, 0.025).expect("a target");
+        let mut views = Views::new(target).expect("a finder");
+        for grey in photograph(Print::chessboard()) {
+            views.look(0, &grey, [width, height]).expect("a look");
+        }
+        let error = solve(&views).expect_err("another board").to_string();
+        assert!(error.contains("--chessboard 8x5"), "{error}");
+    }
 }
 
 #[test]

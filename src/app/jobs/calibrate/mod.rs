@@ -67,8 +67,10 @@ pub struct Done {
 
 /// Frames of a recording that are looked at: neighbours in a video show the same.
 const MOST_FRAMES: u32 = 400;
-/// Corners that are farther off on the whole are not those of the target, pixels.
-const MOST_RMS_PX: f64 = 1.0;
+/// Corners that are farther off on the whole are not those of the target, pixels: small pictures are sharper…
+const MOST_RMS_PX: [f64; 2] = [0.5, 1.0];
+/// …than those that are as many times as large across their diagonal, pixels.
+const SHARP_PX: f64 = 1600.0;
 
 /// Calibrates. `stop` ends it with nothing written.
 ///
@@ -101,7 +103,7 @@ pub fn calibrate(request: &CalibrateRequest, stop: &Arc<AtomicBool>) -> Result<D
     write_text(out, &text)?;
     Ok(Done {
         summary,
-        warnings: warnings(&calibration),
+        warnings: warnings(&calibration, pictures.views.mirrored()),
         notices: pictures.notices,
     })
 }
@@ -371,9 +373,18 @@ impl TargetPictures {
     }
 }
 
-fn warnings(calibration: &Calibration) -> Vec<String> {
+fn warnings(calibration: &Calibration, mirrored: u32) -> Vec<String> {
     let mut warnings: Vec<String> = calibration.lacks.iter().map(Lack::to_string).collect();
-    if calibration.rms_px > MOST_RMS_PX {
+    if mirrored > 0 {
+        warnings.push(format!(
+            "{mirrored} pictures show the target only when they are turned left for right, and were left out"
+        ));
+    }
+    let [width, height] = calibration.intrinsics.size_px.map(f64::from);
+    let most_px = (width.hypot(height) / SHARP_PX).clamp(MOST_RMS_PX[0], MOST_RMS_PX[1]);
+    if let Some(change) = calibration.focal_change {
+        warnings.push(format!("{change}: the calibration holds for none of them"));
+    } else if calibration.rms_px > most_px {
         warnings.push(format!(
             "corners are off by {:.1} px: is the target flat, sharp, and as it was described?",
             calibration.rms_px
