@@ -170,6 +170,22 @@ pub enum Notice {
         /// Width and height of the first frame.
         expected_px: [u32; 2],
     },
+    /// A picture of a kind that is not read.
+    OtherKind {
+        /// The picture.
+        path: PathBuf,
+        /// Index of the frame.
+        frame: u32,
+        /// What it is, and what to do with it.
+        what: &'static str,
+    },
+    /// A file of several pictures, of which the first is taken.
+    FirstOfSeveral {
+        /// The file.
+        path: PathBuf,
+        /// How many it holds.
+        pictures: u32,
+    },
     /// A picture of more pixels than are read of a file of its size.
     TooLarge {
         /// The picture.
@@ -208,6 +224,13 @@ pub enum Notice {
         /// How many frames the header says.
         announced: u32,
     },
+    /// A video whose file is cut off, and that does not say how many frames it had.
+    CutOff {
+        /// The video.
+        path: PathBuf,
+        /// Good frames in it.
+        good: u32,
+    },
 }
 
 impl Notice {
@@ -215,8 +238,11 @@ impl Notice {
     pub fn lost_frames(&self) -> u32 {
         match self {
             Self::Broken { count, .. } => *count,
-            Self::OtherSize { .. } | Self::TooLarge { .. } => 1,
-            Self::Corrupt { .. } | Self::Faulty { .. } => 0,
+            Self::OtherSize { .. } | Self::TooLarge { .. } | Self::OtherKind { .. } => 1,
+            Self::Corrupt { .. }
+            | Self::Faulty { .. }
+            | Self::CutOff { .. }
+            | Self::FirstOfSeveral { .. } => 0,
             Self::EndedEarly {
                 ended_at,
                 announced,
@@ -226,14 +252,18 @@ impl Notice {
     }
 }
 
-/// All of them in words, one after the other; pictures of another size that follow each other are told as one.
+/// All of them in words, one after the other; pictures of another size or kind that follow each other are told as one, and
+/// so are files of as many pictures.
 pub fn notices_told(notices: &[Notice]) -> String {
-    let size_of = |notice: &Notice| match notice {
-        Notice::OtherSize { size_px, .. } => Some(*size_px),
-        _ => None,
+    let alike = |one: &Notice, next: &Notice| match (one, next) {
+        (Notice::OtherSize { size_px: a, .. }, Notice::OtherSize { size_px: b, .. }) => a == b,
+        (Notice::OtherKind { what: a, .. }, Notice::OtherKind { what: b, .. }) => a == b,
+        (
+            Notice::FirstOfSeveral { pictures: a, .. },
+            Notice::FirstOfSeveral { pictures: b, .. },
+        ) => a == b,
+        _ => false,
     };
-    let alike =
-        |one: &Notice, next: &Notice| size_of(one).is_some() && size_of(one) == size_of(next);
     let told = notices.chunk_by(alike).map(|run| match run.len() {
         1 => run[0].to_string(),
         count => format!("{} (and {} more such)", run[0], count - 1),
@@ -276,6 +306,14 @@ impl fmt::Display for Notice {
                 "{}: frame {frame} has more than {most} pixels, the most that are read of such a file; left out",
                 path.display()
             ),
+            Self::OtherKind { path, frame, what } => {
+                write!(f, "{}: frame {frame} is {what}; left out", path.display())
+            }
+            Self::FirstOfSeveral { path, pictures } => write!(
+                f,
+                "{}: holds {pictures} pictures, of which the first is taken; save each as a file of its own",
+                path.display()
+            ),
             Self::Corrupt { path, first, count } => write!(
                 f,
                 "{}: {count} frames, the first of them {first}, have errors in them; what could not be decoded was guessed",
@@ -294,6 +332,11 @@ impl fmt::Display for Notice {
             } => write!(
                 f,
                 "{}: ends early, at frame {ended_at} of {announced}; {good} frames were good",
+                path.display()
+            ),
+            Self::CutOff { path, good } => write!(
+                f,
+                "{}: the file is cut off, its end is missing; {good} frames were good",
                 path.display()
             ),
         }

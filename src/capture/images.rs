@@ -59,6 +59,7 @@ impl ImageFrames {
             let path = folder.to_owned();
             let why = match unread {
                 Unread::Undecodable => String::new(),
+                Unread::OtherKind(what) => format!(": it is {what}"),
                 Unread::TooManyPixels(most) => too_many_pixels(most),
                 Unread::TooLong(size_px) => return CaptureError::TooLong { path, size_px },
             };
@@ -104,6 +105,11 @@ impl ImageFrames {
                 false => read_picture(path),
             };
             match read {
+                Err(Unread::OtherKind(what)) => notices.push(Notice::OtherKind {
+                    path: path.clone(),
+                    frame: index,
+                    what,
+                }),
                 Err(Unread::Undecodable | Unread::TooLong(_)) => notices.push(Notice::Broken {
                     path: path.clone(),
                     first: index,
@@ -129,6 +135,12 @@ impl ImageFrames {
                             path: path.clone(),
                             first: index,
                             count: 1,
+                        });
+                    }
+                    if picture.of > 1 {
+                        notices.push(Notice::FirstOfSeveral {
+                            path: path.clone(),
+                            pictures: picture.of,
                         });
                     }
                     let picture = picture.bgr;

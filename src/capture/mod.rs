@@ -12,6 +12,7 @@ mod jpeg_end;
 pub mod linear;
 pub mod live;
 mod pixels;
+mod several_pictures;
 mod times;
 pub mod video;
 
@@ -110,8 +111,8 @@ impl FrameSource {
             return Err(io_error(plain_file::not_plain()));
         }
         if metadata.is_dir() {
-            let files = files_of(path).map_err(io_error)?;
-            Self::open_folder(path, files)
+            let (files, folders) = contents_of(path).map_err(io_error)?;
+            Self::open_folder(path, files, &folders)
         } else if images::is_image(path) {
             let images = ImageFrames::open(path, vec![path.to_owned()])?;
             Ok(Self::new(
@@ -131,7 +132,11 @@ impl FrameSource {
         }
     }
 
-    fn open_folder(folder: &Path, files: Vec<PathBuf>) -> Result<Self, CaptureError> {
+    fn open_folder(
+        folder: &Path,
+        files: Vec<PathBuf>,
+        folders: &[PathBuf],
+    ) -> Result<Self, CaptureError> {
         let named = |name: &str| {
             files
                 .iter()
@@ -149,7 +154,7 @@ impl FrameSource {
                 if pictures.is_empty() {
                     return Err(CaptureError::NoPictures {
                         path: folder.to_owned(),
-                        there: what_is_there(&files),
+                        there: what_is_there(&files, folders),
                     });
                 }
                 passed_over = passed_over_among(&files);
@@ -361,20 +366,27 @@ impl PictureSource {
     }
 }
 
-fn files_of(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
-    let mut files = Vec::new();
+/// The files and the folders in a folder.
+fn contents_of(folder: &Path) -> std::io::Result<(Vec<PathBuf>, Vec<PathBuf>)> {
+    let (mut files, mut folders) = (Vec::new(), Vec::new());
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
         // What is hidden is no picture: macOS leaves `._1.png` beside each file on foreign disks.
         let is_hidden = path
             .file_name()
             .is_some_and(|name| name.as_encoded_bytes().starts_with(b"."));
-        if path.is_file() && !is_hidden {
+        if is_hidden {
+            continue;
+        }
+        if path.is_file() {
             files.push(path);
+        } else if path.is_dir() {
+            folders.push(path);
         }
     }
     files.sort();
-    Ok(files)
+    folders.sort();
+    Ok((files, folders))
 }
 
 /// What is said of pictures that nothing here reads.
@@ -417,7 +429,7 @@ fn listed(files: &[impl AsRef<Path>]) -> String {
 }
 
 /// What a folder has in place of a recording, in words that go on a sentence.
-fn what_is_there(files: &[PathBuf]) -> String {
+fn what_is_there(files: &[PathBuf], folders: &[PathBuf]) -> String {
     let is_video = |file: &&PathBuf| has_extension(file, &VIDEO_EXTENSIONS);
     if let Some(video) = files.iter().find(is_video) {
         return format!(
@@ -429,6 +441,13 @@ fn what_is_there(files: &[PathBuf]) -> String {
     let is_heic = files
         .iter()
         .any(|file| has_extension(file, &["heic", "heif", "avif"]));
+    if let ([], [first, ..]) = (files, folders) {
+        return format!(
+            "; it has nothing but folders ({}), which are named by their own paths, as {}",
+            listed(folders),
+            first.display()
+        );
+    }
     match (files.is_empty(), is_heic) {
         (true, _) => "; it is empty".to_owned(),
         (false, false) => format!("; it has {names}"),

@@ -8,9 +8,10 @@ use image::{ImageFormat, ImageReader};
 use opencv::core::{self, Mat, MatTraitConst, Vec4b};
 use opencv::{imgcodecs, imgproc};
 
-use super::jpeg_end;
+use super::{jpeg_end, several_pictures};
 use crate::geometry::camera::MOST_SIDE_PX;
 use crate::geometry::quarter_turns::QuarterTurns;
+use crate::scene::in_its_place::in_place_of;
 use crate::scene::plain_file::{self, MOST_PICTURE};
 use crate::scene::tiff_header;
 
@@ -34,13 +35,17 @@ pub(super) struct Picture {
     pub bgr: Mat,
     /// Whether its file ends before it does, and what is missing was guessed.
     pub is_cut_off: bool,
+    /// How many pictures its file holds.
+    pub of: u32,
 }
 
 /// Why a picture file is not read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Unread {
-    /// It cannot be decoded (OpenCV has no better word for it), or is of a kind that is not read.
+    /// It cannot be decoded (OpenCV has no better word for it).
     Undecodable,
+    /// It is of a kind that is not read: which, and what to do.
+    OtherKind(&'static str),
     /// Its header asks for more pixels than a file of its size has, which are these at most.
     TooManyPixels(u64),
     /// A side of its width and height is longer than any that is read.
@@ -103,6 +108,11 @@ fn as_shown(sensor: &Mat, orientation: u32) -> opencv::Result<Mat> {
 /// The picture as the camera's sensor has it: what EXIF says of how it was held is not looked at.
 pub(super) fn read_picture_as_taken(path: &Path) -> Result<Picture, Unread> {
     let mut bytes = plain_file::read(path, MOST_PICTURE).map_err(|_| Unread::Undecodable)?;
+    if several_pictures::is_animated_webp(&bytes) {
+        return Err(Unread::OtherKind(
+            "an animated WebP: its frames have to be saved as PNG or as a video first",
+        ));
+    }
     let format = format_within_bounds(&bytes)?;
     if format == ImageFormat::Tiff {
         // OpenCV turns these, though told not to.
@@ -116,6 +126,7 @@ pub(super) fn read_picture_as_taken(path: &Path) -> Result<Picture, Unread> {
             .filter(|picture| !picture.empty())
             .ok_or(Unread::Undecodable)?,
         is_cut_off: format == ImageFormat::Jpeg && jpeg_end::is_cut_off(&bytes),
+        of: several_pictures::count(format, &bytes),
     })
 }
 
@@ -130,7 +141,10 @@ fn format_within_bounds(bytes: &[u8]) -> Result<ImageFormat, Unread> {
         is_honest.then_some(())?;
         Some((format, reader.into_dimensions().ok()?))
     };
-    let (format, (width, height)) = dimensions().ok_or(Unread::Undecodable)?;
+    let (format, (width, height)) = dimensions().ok_or_else(|| {
+        let what = in_place_of(bytes);
+        what.map_or(Unread::Undecodable, Unread::OtherKind)
+    })?;
     let most = SMALL_PIXELS.max((bytes.len() as u64).saturating_mul(MOST_PIXELS_PER_BYTE));
     if u64::from(width) * u64::from(height) > most {
         return Err(Unread::TooManyPixels(most));

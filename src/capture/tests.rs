@@ -349,10 +349,44 @@ fn a_jpeg_that_is_cut_off_is_damaged() {
 }
 
 #[test]
+fn pictures_of_several_and_of_other_kinds_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    make_images(folder.path(), 3);
+    // An animation's control comes after the head's 33 bytes.
+    let path = folder.path().join("shot_1.png");
+    let plain = fs::read(&path).unwrap();
+    let control = b"\0\0\0\x08acTL\0\0\0\x03\0\0\0\0\0\0\0\0";
+    fs::write(&path, [&plain[..33], control, &plain[33..]].concat()).unwrap();
+    let heic = b"\0\0\0\x1cftypheic\0\0\0\0mif1heicmiaf";
+    fs::write(folder.path().join("shot_2.png"), heic).unwrap();
+    let mut source = open(folder.path()).unwrap();
+    indices(&mut source);
+    let told = said(&source);
+    for part in ["shot_1.png: holds 3 pictures", "frame 2 is a HEIC picture"] {
+        assert!(told.contains(part), "{told}");
+    }
+    for (bytes, part) in [
+        (&heic[..], "it is a HEIC picture"),
+        (
+            b"RIFF\x20\0\0\0WEBPVP8X\x0a\0\0\0\x02\0\0\0",
+            "it is an animated WebP",
+        ),
+    ] {
+        let path = folder.path().join("one.jpg");
+        fs::write(&path, bytes).unwrap();
+        let told = open(&path).err().unwrap().to_string();
+        assert!(told.contains(part), "{told}");
+    }
+}
+
+#[test]
 fn a_folder_says_what_it_has_instead() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |source: &Path| open(source).err().unwrap().to_string();
     assert!(refused(folder.path()).contains("it is empty"));
+    fs::create_dir(folder.path().join("views")).unwrap();
+    let said = refused(folder.path());
+    assert!(said.contains("nothing but folders (views)"), "{said}");
     fs::write(folder.path().join("IMG_1.HEIC"), "x").unwrap();
     let heic = refused(folder.path());
     assert!(

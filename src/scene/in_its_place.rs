@@ -3,6 +3,9 @@
 /// How a picture of HEVC begins after four bytes (ISO/IEC 23008-12, annex B).
 const HEIC_BRANDS: [&[u8; 8]; 4] = [b"ftypheic", b"ftypheix", b"ftypheim", b"ftypheis"];
 
+/// How pictures of AV1 begin there, and those that say no more than that they are one of the family.
+const AVIF_BRANDS: [&[u8; 8]; 3] = [b"ftypavif", b"ftypavis", b"ftypmif1"];
+
 /// What lies there in words, with what to do; `None` where it may be the file itself.
 pub fn in_place_of(bytes: &[u8]) -> Option<&'static str> {
     let head = &bytes[..bytes.len().min(256)];
@@ -31,6 +34,13 @@ pub fn in_place_of(bytes: &[u8]) -> Option<&'static str> {
         .any(|brand| head.get(4..12) == Some(&brand[..]))
     {
         Some("a HEIC picture: such pictures have to be saved as JPEG or PNG first")
+    } else if AVIF_BRANDS
+        .iter()
+        .any(|brand| head.get(4..12) == Some(&brand[..]))
+    {
+        Some("an AVIF or HEIF picture: such pictures have to be saved as JPEG or PNG first")
+    } else if begins(&[b"\xff\x0a", b"\0\0\0\x0cJXL \r\n\x87\n"]) {
+        Some("a JPEG XL picture: such pictures have to be saved as JPEG or PNG first")
     } else {
         None
     }
@@ -51,6 +61,8 @@ mod tests {
             (b"\x1f\x8b\x08", "gunzip"),
             (b"PK\x03\x04", "archive"),
             (b"\0\0\0\x1cftypheic\0\0\0\0mif1", "HEIC"),
+            (b"\0\0\0\x20ftypavif\0\0\0\0avif", "AVIF"),
+            (b"\0\0\0\x0cJXL \r\n\x87\n", "JPEG XL"),
         ] {
             assert!(
                 in_place_of(bytes).is_some_and(|said| said.contains(word)),

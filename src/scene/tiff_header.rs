@@ -3,7 +3,12 @@
 /// The tag of how the camera was held (TIFF 6.0, section 8).
 const ORIENTATION: u64 = 0x112;
 
-/// Where the first directory's entries are.
+/// The tag of what a picture is to the others of its file (TIFF 6.0, section 8)…
+const KIND: u64 = 0xfe;
+/// …of which this bit says that it is a smaller copy of another, and this one that it is a mask.
+const COPY_OR_MASK: u64 = 1 | 4;
+
+/// Where a directory's entries are.
 struct Directory {
     is_little: bool,
     /// Of the first entry.
@@ -12,6 +17,8 @@ struct Directory {
     entry_size: u64,
     /// Bytes of a count and of an offset.
     wide: u64,
+    /// Where the next directory is; 0 after the last.
+    next: u64,
 }
 
 impl Directory {
@@ -28,16 +35,46 @@ impl Directory {
             Some(43) => (8, 8, 8, 20),
             _ => return None,
         };
-        let directory = number(bytes, is_little, offset_at, wide)?;
-        let entries = number(bytes, is_little, directory, count_width).unwrap_or(0);
-        Some(Self {
+        let first = number(bytes, is_little, offset_at, wide)?;
+        let unread = Self {
             is_little,
-            at: directory.saturating_add(count_width),
-            // (Entries beyond the end of the file are none.)
-            entries: entries.min(bytes.len() as u64 / entry_size),
+            at: 0,
+            entries: 0,
             entry_size,
             wide,
-        })
+            next: first,
+        };
+        Some(unread.following(bytes, count_width))
+    }
+
+    /// The next directory.
+    fn following(&self, bytes: &[u8], count_width: u64) -> Self {
+        let entries = number(bytes, self.is_little, self.next, count_width).unwrap_or(0);
+        // (Entries beyond the end of the file are none.)
+        let entries = entries.min(bytes.len() as u64 / self.entry_size);
+        let at = self.next.saturating_add(count_width);
+        let end = at.saturating_add(entries.saturating_mul(self.entry_size));
+        Self {
+            at,
+            entries,
+            next: number(bytes, self.is_little, end, self.wide).unwrap_or(0),
+            ..*self
+        }
+    }
+
+    /// The first value of a tag that is among the first and has short or long ones.
+    fn value(&self, bytes: &[u8], tag: u64) -> Option<u64> {
+        const SHORT: u64 = 3;
+        const FIRST_FEW: usize = 4;
+        let number = |at: u64, width: u64| number(bytes, self.is_little, at, width);
+        // (Tags increase.)
+        let mut places = self.places().take(FIRST_FEW);
+        let entry = places.find(|&entry| number(entry, 2) == Some(tag))?;
+        let width = match number(entry + 2, 2)? {
+            SHORT => 2,
+            _ => 4,
+        };
+        number(entry + 4 + self.wide, width)
     }
 
     /// Where each entry begins.
@@ -57,6 +94,22 @@ fn number(bytes: &[u8], is_little: bool, at: u64, width: u64) -> Option<u64> {
         true => digits.iter().rev().fold(0, add),
         false => digits.iter().fold(0, add),
     })
+}
+
+/// How many pictures a file holds, smaller copies and masks of others not counted.
+pub fn pictures(bytes: &[u8]) -> u32 {
+    /// Directories may go round in a circle.
+    const MOST: usize = 10_000;
+    let count_width = |directory: &Directory| if directory.wide == 8 { 8 } else { 2 };
+    let directories = std::iter::successors(Directory::of(bytes), |directory| {
+        let more = directory.next != 0 && directory.entries > 0;
+        more.then(|| directory.following(bytes, count_width(directory)))
+    });
+    let is_picture = |directory: &Directory| {
+        let kind = directory.value(bytes, KIND).unwrap_or(0);
+        directory.entries > 0 && kind & COPY_OR_MASK == 0
+    };
+    directories.take(MOST).filter(is_picture).count() as u32
 }
 
 /// Whether no entry of the first directory has more values than its file has bytes; so with all that is no TIFF.
@@ -111,6 +164,31 @@ mod tests {
             .write_to(&mut bytes, image::ImageFormat::Tiff)
             .unwrap();
         bytes.into_inner()
+    }
+
+    /// A file of empty directories that say what they are, the last of which names the first as the next one.
+    #[test]
+    fn pictures_are_counted_without_copies_masks_and_circles() {
+        let file = |kinds: &[u16], last: u32| {
+            let mut bytes = b"II*\0\x08\0\0\0".to_vec();
+            for (k, kind) in (1..).zip(kinds) {
+                let next = if k == kinds.len() as u32 {
+                    last
+                } else {
+                    8 + 18 * k
+                };
+                bytes.extend([1, 0, 0xfe, 0, 3, 0, 1, 0, 0, 0]);
+                bytes.extend(u32::from(*kind).to_le_bytes());
+                bytes.extend(next.to_le_bytes());
+            }
+            bytes
+        };
+        assert_eq!(pictures(&tiff()), 1);
+        assert_eq!(pictures(&file(&[0, 2, 2], 0)), 3);
+        assert_eq!(pictures(&file(&[0, 1, 4, 2], 0)), 2);
+        assert_eq!(pictures(&file(&[1, 1], 8)), 0);
+        assert_eq!(pictures(&file(&[0, 0], 9999)), 2);
+        assert_eq!(pictures(b"P6 1 1"), 0);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 
 mod clock;
 mod colours;
+mod file_end;
 pub mod log;
 mod planes;
 pub mod probe;
@@ -65,6 +66,8 @@ pub(super) struct VideoFrames {
     next_index: u32,
     good_frames: u32,
     ended: bool,
+    /// Whether the file ends before its video does, though ffmpeg may not say so.
+    is_file_cut_off: bool,
 }
 
 /// What is known of what is wrong with the file.
@@ -140,6 +143,7 @@ impl VideoFrames {
             next_index: 0,
             good_frames: 0,
             ended: false,
+            is_file_cut_off: false,
         };
         video.remark = video.first_remark();
         Ok(video)
@@ -198,6 +202,7 @@ impl VideoFrames {
         while !self.ended {
             let Some(frame) = self.next_decoded() else {
                 self.ended = true;
+                self.is_file_cut_off = file_end::is_cut_off(&self.path);
                 self.tell_end(notices);
                 break;
             };
@@ -320,12 +325,18 @@ impl VideoFrames {
         }
         let after_last = self.lost_between(self.clock.last_stamp_secs, None);
         self.tell_lost(after_last, notices);
+        if notices.is_empty() && self.is_file_cut_off {
+            notices.push(Notice::CutOff {
+                path: self.path.clone(),
+                good: self.good_frames,
+            });
+        }
     }
 
     /// How many frames the header says, where the file ends before them.
     fn cut_off(&self) -> Option<u32> {
         let announced = self.announced_frames()?;
-        let may_be_cut = self.damage.complaint.is_some() || is_cut_riff(&self.path);
+        let may_be_cut = self.damage.complaint.is_some() || self.is_file_cut_off;
         let length_secs = self.header.duration_secs? - self.clock.length_secs();
         let slack_frames = match self.header.counted_frames {
             Some(_) => 1.5,
@@ -391,20 +402,6 @@ impl Conversion {
             .unwrap_or_else(|| ToSrgb::new(colours, largest));
         Ok(self.to_srgb.insert(to_srgb).rgba(&coded))
     }
-}
-
-/// Whether an AVI file is shorter than its head says: ffmpeg does not complain of its lost end.
-fn is_cut_riff(path: &Path) -> bool {
-    let head = || {
-        let mut head = [0; 8];
-        let mut file = std::fs::File::open(path).ok()?;
-        file.read_exact(&mut head).ok()?;
-        let said = u32::from_le_bytes([head[4], head[5], head[6], head[7]]);
-        // One that was written as a stream does not know its size.
-        let knows = head.starts_with(b"RIFF") && said != 0 && said != u32::MAX;
-        Some(knows && file.metadata().ok()?.len() < u64::from(said) + 8)
-    };
-    head().unwrap_or(false)
 }
 
 /// Whether a file is a list of other files or addresses, which a stranger's file does not make gnomon open.

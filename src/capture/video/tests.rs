@@ -112,6 +112,24 @@ fn every_frame_comes_with_its_own_time_and_nothing_whole_is_damaged() {
 }
 
 #[test]
+fn what_ffmpeg_does_not_miss_is_told_by_the_files_end() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["a.y4m", "a.gif", "a.ogv"] {
+        ffmpeg(
+            folder.path(),
+            &format!("-f lavfi -i testsrc2=size=160x120:rate=25 -frames:v 20 {name}"),
+        );
+        let path = folder.path().join(name);
+        let (whole, notices) = all(&path);
+        assert_eq!((whole.len(), notices), (20, Vec::new()), "{name}");
+        let bytes = std::fs::read(&path).unwrap();
+        std::fs::write(&path, &bytes[..bytes.len() * 6 / 10]).unwrap();
+        let (frames, notices) = all(&path);
+        assert!(frames.len() < 20 && !notices.is_empty(), "{name}");
+    }
+}
+
+#[test]
 fn a_frame_of_another_size_is_left_out_and_told() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
