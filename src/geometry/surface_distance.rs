@@ -29,6 +29,13 @@ const PIECES: [f64; 2] = [2.0, 6.0];
 const NEEDLE_SQUARED: f64 = 1e-20;
 /// Triangles in a leaf: fewer than for rays, since a search for the nearest ends in more leaves.
 const LEAF_TRIANGLES: u32 = 2;
+/// Among triangles that lie in each other's boxes, as long ones that cross do, a search looks at most of them. Where it looks at
+/// more boxes than these on the average…
+const MOST_STEPS: u64 = 1000;
+/// …and all searches together at more than these, it is given up: that would take the square of the triangles' number.
+const MOST_WORK: u64 = 30_000_000;
+/// Searches from which the average is told.
+const TRIED: usize = 256;
 /// Items of work that are done in one go. It is fixed, so that the result is the same on every machine.
 const CHUNK: usize = 128;
 
@@ -97,14 +104,33 @@ impl SampledSurface {
         })
     }
 
-    /// How far the two lie apart; `None` where `goes_on` says that nobody waits for it any more.
+    /// How far the two lie apart; `None` where `goes_on` says that nobody waits for it any more, or where the triangles lie so that
+    /// it would take the square of their number.
     pub fn distance_to(&self, other: &Self, goes_on: GoesOn<'_>) -> Option<SurfaceDistance> {
+        if self.is_too_long(other) || other.is_too_long(self) {
+            return None;
+        }
         let forth = self.one_sided(other, goes_on)?;
         let back = other.one_sided(self, goes_on)?;
         Some(SurfaceDistance {
             max_m: forth.max_m.max(back.max_m),
             outline_mean_m: forth.outline_mean_m.max(back.outline_mean_m),
         })
+    }
+
+    /// Whether the searches in the other surface would look at too much; told from some of them, the same on every machine.
+    fn is_too_long(&self, other: &Self) -> bool {
+        const SEARCHES_AN_EDGE: usize = 4;
+        let edges = self.edges.iter().step_by(self.edges.len().div_ceil(TRIED));
+        let mut search = other.nearest.search();
+        let mut tried = 0;
+        for edge in edges {
+            let [one, two] = edge.ends.map(|end| self.positions[end as usize]);
+            search.nearest(one.lerp(two, 1.0 / 3.0));
+            tried += 1;
+        }
+        let steps = search.steps / tried;
+        steps > MOST_STEPS && steps * (SEARCHES_AN_EDGE * self.edges.len()) as u64 > MOST_WORK
     }
 
     fn one_sided(&self, other: &Self, goes_on: GoesOn<'_>) -> Option<SurfaceDistance> {
@@ -377,6 +403,8 @@ pub(super) struct NearestSearch<'a> {
     last: usize,
     /// Nodes, with the squared distances of their boxes.
     pending: Vec<(u32, f32)>,
+    /// Nodes that were looked at.
+    steps: u64,
 }
 
 impl NearestTriangle {
@@ -415,6 +443,7 @@ impl NearestTriangle {
             triangles: self,
             last: 0,
             pending: Vec::new(),
+            steps: 0,
         }
     }
 
@@ -460,6 +489,7 @@ impl NearestSearch<'_> {
             if least == 0.0 || box_distance > box_limit {
                 continue;
             }
+            self.steps += 1;
             let node = &nodes[node as usize];
             let first = node.first_index as usize;
             if node.is_leaf() {

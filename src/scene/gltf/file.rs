@@ -180,11 +180,13 @@ impl<'a> GltfFile<'a> {
 }
 
 /// The file that a relative URI names, beside the one that names it. Where it is not there as it is written, it is looked for as
-/// [`named_file`] does: exporters write other systems' paths.
+/// [`named_file`] does: exporters write other systems' paths; and then without a query or a fragment (RFC 3986, section 3), which
+/// web servers are given with it. `file:` before an absolute path is no more than the path.
 ///
 /// # Errors
-/// A URI with a scheme or a host; one that is no text.
+/// A URI with another scheme or a host; one that is no text.
 pub(super) fn file_of_uri(beside: &Path, uri: &str) -> Result<PathBuf, String> {
+    let uri = without_file_scheme(uri);
     let has_scheme = uri.split_once(':').is_some_and(|(scheme, _)| {
         // (`C:` is a disk.)
         scheme.len() > 1 && scheme.chars().all(|c| c.is_ascii_alphanumeric())
@@ -194,17 +196,44 @@ pub(super) fn file_of_uri(beside: &Path, uri: &str) -> Result<PathBuf, String> {
             "\"{uri}\" is not beside the file; download it and name it by a relative path"
         ));
     }
-    let decoded = percent_encoding::percent_decode_str(uri);
-    let name = decoded
-        .decode_utf8()
-        .map_err(|_| format!("\"{uri}\" is no text"))?;
     let folder = beside.parent().unwrap_or(Path::new(""));
-    let plain = folder.join(&*name);
-    let found = || named_file(folder, uri).or_else(|| named_file(folder, &name));
-    Ok(match plain.is_file() {
-        true => plain,
-        false => found().unwrap_or(plain),
-    })
+    let written = decoded(uri)?;
+    if let Some(file) = file_as_written(folder, uri, &written) {
+        return Ok(file);
+    }
+    let path = uri.split(['?', '#']).next().unwrap_or_default();
+    let found = match path.is_empty() || path == uri {
+        true => None,
+        false => file_as_written(folder, path, &decoded(path)?),
+    };
+    Ok(found.unwrap_or_else(|| folder.join(&*written)))
+}
+
+/// The absolute path of a URI of this machine's files (RFC 8089); any other as it is.
+fn without_file_scheme(uri: &str) -> &str {
+    let scheme = uri
+        .get(..5)
+        .filter(|scheme| scheme.eq_ignore_ascii_case("file:"));
+    let rest = scheme.map(|_| &uri[5..]);
+    let path = rest.map(|rest| {
+        let local = rest.strip_prefix("//localhost/").map(|_| &rest[11..]);
+        local.or(rest.strip_prefix("//")).unwrap_or(rest)
+    });
+    path.filter(|path| path.starts_with('/') && !path.starts_with("//"))
+        .unwrap_or(uri)
+}
+
+fn decoded(uri: &str) -> Result<Cow<'_, str>, String> {
+    let decoded = percent_encoding::percent_decode_str(uri).decode_utf8();
+    decoded.map_err(|_| format!("\"{uri}\" is no text"))
+}
+
+fn file_as_written(folder: &Path, uri: &str, name: &str) -> Option<PathBuf> {
+    let plain = folder.join(name);
+    match plain.is_file() {
+        true => Some(plain),
+        false => named_file(folder, uri).or_else(|| named_file(folder, name)),
+    }
 }
 
 /// The JSON and the binary chunk.
@@ -330,5 +359,43 @@ fn from_data_uri(data: &str) -> Result<Vec<u8>, String> {
             .decode(content.split_ascii_whitespace().collect::<String>())
             .map_err(|error| format!("a data URI that is not base64: {error}")),
         false => Ok(percent_encoding::percent_decode_str(content).collect()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn queries_and_file_schemes_are_what_servers_and_exporters_add() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["g.bin", "h#1.bin", "a b.bin"] {
+            std::fs::write(folder.path().join(name), b"").unwrap();
+        }
+        let beside = folder.path().join("a.gltf");
+        let named = |uri: &str| file_of_uri(&beside, uri);
+        for (uri, name) in [
+            ("g.bin?v=3", "g.bin"),
+            ("g.bin#t", "g.bin"),
+            ("g.bin?v=3#t", "g.bin"),
+            ("a%20b.bin?v=a/b", "a b.bin"),
+            ("h#1.bin", "h#1.bin"),
+            ("h%231.bin?v", "h#1.bin"),
+        ] {
+            assert_eq!(named(uri), Ok(folder.path().join(name)), "{uri}");
+        }
+        let absolute = folder.path().join("g.bin").display().to_string();
+        for before in ["", "file:", "file://", "FILE://localhost"] {
+            let found = named(&format!("{before}{absolute}"));
+            assert_eq!(found, Ok(absolute.clone().into()), "{before}");
+        }
+        for uri in [
+            "file://elsewhere/g.bin",
+            "//elsewhere/g.bin",
+            "https://a.b/g.bin",
+        ] {
+            assert!(named(uri).is_err(), "{uri}");
+        }
+        assert_eq!(named("none.bin?v"), Ok(folder.path().join("none.bin?v")));
     }
 }
