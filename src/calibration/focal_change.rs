@@ -20,7 +20,7 @@ pub struct FocalChange {
 }
 
 /// Corners that are less far off on the whole need no such explanation, pixels.
-const LEAST_RMS_PX: f64 = 0.25;
+const LEAST_RMS_PX: f64 = 0.12;
 /// What a focal length for each view would have to take away of the squared distances.
 const LEAST_EXPLAINED: f64 = 0.4;
 /// Views that differ by less, as a part of the focal length, are bent paper.

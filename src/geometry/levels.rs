@@ -53,6 +53,9 @@ const PICTURE_WEIGHT: f64 = 3.0;
 const COLOR_WEIGHT: f32 = 0.2;
 /// Colours at corners are nowhere off by more, of 1.
 const LARGEST_COLOR_ERROR: f32 = 0.04;
+/// Where more triangles than these share an edge, as the pages of a book do, there are no levels: the simplifier takes the square
+/// of their number.
+const MOST_ON_AN_EDGE: usize = 2000;
 /// Where more corners than these meet in a vertex, ...
 const MOST_CORNERS: usize = 256;
 /// ... those whose faces are turned alike to a part of this count as one.
@@ -69,7 +72,7 @@ pub fn levels(mesh: &Mesh) -> Vec<Level> {
 
 /// The same, as far as it is when `goes_on` says no.
 pub fn levels_while(mesh: &Mesh, goes_on: GoesOn<'_>) -> Vec<Level> {
-    if mesh.triangles.len() < WORTH_IT {
+    if mesh.triangles.len() < WORTH_IT || has_crowded_edge(mesh) {
         return Vec::new();
     }
     chain(mesh, FEWEST, goes_on)
@@ -130,6 +133,11 @@ fn chain(mesh: &Mesh, fewest: usize, goes_on: GoesOn<'_>) -> Vec<Level> {
             mean_error_m: distance.outline_mean_m,
         });
     }
+}
+
+fn has_crowded_edge(mesh: &Mesh) -> bool {
+    let uses = edge_uses(mesh.triangles.iter().copied());
+    by_edge(&uses).any(|around| around.len() > MOST_ON_AN_EDGE)
 }
 
 fn largest_facet_m(mesh: &Mesh) -> f64 {

@@ -33,7 +33,7 @@ const LEAF_TRIANGLES: u32 = 2;
 /// more boxes than these on the average…
 const MOST_STEPS: u64 = 1000;
 /// …and all searches together at more than these, it is given up: that would take the square of the triangles' number.
-const MOST_WORK: u64 = 100_000_000;
+const MOST_WORK: u64 = 30_000_000;
 /// Searches from which the average is told.
 const TRIED: usize = 256;
 /// Items of work that are done in one go. It is fixed, so that the result is the same on every machine.

@@ -214,7 +214,7 @@ fn squares_that_are_too_small_are_told() {
 #[test]
 fn views_of_two_focal_lengths_are_told() {
     let print = Print::chessboard();
-    for times in [1.08, 1.2] {
+    for times in [1.15, 1.3] {
         let longer = Photographer::new(Intrinsics {
             focal_px: times * CAMERA.focal_px,
             ..CAMERA

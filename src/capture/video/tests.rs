@@ -117,7 +117,7 @@ fn what_ffmpeg_does_not_miss_is_told_by_the_files_end() {
     for name in ["a.y4m", "a.gif", "a.ogv"] {
         ffmpeg(
             folder.path(),
-            &format!("-f lavfi -i testsrc2=size=64x48:rate=25 -frames:v 20 {name}"),
+            &format!("-f lavfi -i testsrc2=size=160x120:rate=25 -frames:v 20 {name}"),
         );
         let path = folder.path().join(name);
         let (whole, notices) = all(&path);
