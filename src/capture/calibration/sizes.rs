@@ -1,5 +1,7 @@
 //! The picture's size that a camera's entries tell, however they name it.
 
+use std::borrow::Borrow;
+
 use serde_json::{Map, Value};
 
 use super::entries::{Entry, entries, entry};
@@ -13,13 +15,12 @@ const SIDES_OF_LETTERS: [&[&str]; 2] = [
     &["width", "imagewidth", "w", "cols"],
     &["height", "imageheight", "h", "rows"],
 ];
-const PAIRS: [&str; 6] = [
+const PAIRS: [&str; 5] = [
     "resolution",
     "imagesize",
     "imgsize",
     "imageresolution",
     "imagersize",
-    "dim",
 ];
 
 /// The size in a table, without the tables in it.
@@ -73,7 +74,7 @@ pub(super) fn size_beside(letters: &[Entry<'_>], table: usize) -> Result<Option<
 
 /// The size of the entries of one table.
 fn size_among<'a>(
-    entries: &[impl std::borrow::Borrow<Entry<'a>>],
+    entries: &[impl Borrow<Entry<'a>>],
     sides: [&[&str]; 2],
 ) -> Result<Option<[u32; 2]>, String> {
     let find = |names: &[&str]| {

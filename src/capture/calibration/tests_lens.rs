@@ -193,7 +193,7 @@ fn signs_of_a_lens_are_never_passed_over() {
             ),
             ("w: 0.92", "w belongs to the FOV model"),
             (
-                "left_distortion: {coefficients: [1, 2, 3, 4]}",
+                "left: {left_distortion: {coefficients: [1, 2, 3, 4]}}",
                 "coefficients speaks of a lens",
             ),
             ("other: {k1: 0.1}", "k1"),

@@ -251,22 +251,3 @@ fn binned_pictures_are_refused() {
     let said = message("a.json", &text);
     assert!(said.contains("binningX says"), "{said}");
 }
-
-/// The finder's files, for the eye.
-#[test]
-fn zz_dump() {
-    for folder in ["/tmp/find/footage/cal", "/tmp/find/footage/cal2"] {
-        let mut files: Vec<_> = std::fs::read_dir(folder)
-            .unwrap()
-            .map(|e| e.unwrap().path())
-            .collect();
-        files.sort();
-        for path in files {
-            println!(
-                "DUMP {} {:?}",
-                path.display(),
-                load_calibration_among(&path, [640, 480]).map_err(|e| e.to_string())
-            );
-        }
-    }
-}
