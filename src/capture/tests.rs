@@ -209,7 +209,9 @@ fn a_session_brings_its_calibration_and_times() {
     source.next_frame().unwrap();
     assert_eq!(source.next_frame().unwrap().unwrap().time_secs, 0.05);
 
-    let other = calibration.replace("64, 48", "640, 480");
+    let other = calibration
+        .replace("64, 48", "640, 480")
+        .replace("60, 60", "600, 600");
     fs::write(folder.path().join("camera.toml"), other).unwrap();
     let source = open(folder.path()).unwrap();
     let text = check_frame_size(&source.calibration().unwrap(), source.size_px(), "it")

@@ -507,7 +507,11 @@ mod edits {
             thing: "table".to_owned(),
             placement: flat,
         };
-        refused(&mut document, tilted, "up and down alone");
+        refused(
+            &mut document,
+            tilted,
+            "its height, its albedo and whether it is shown",
+        );
         let same_name = NewThing {
             is_real: false,
             name: "house".to_owned(),

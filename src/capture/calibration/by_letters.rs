@@ -4,8 +4,8 @@
 use serde_json::{Map, Value};
 
 use super::entries::{Entry, entries, entry};
-use super::kinds::refuse_skew;
-use super::lens::{LETTERS, lens_by};
+use super::lens::{lens_by, refuse_skew};
+use super::lens_names::LETTERS;
 use super::opensfm;
 use super::sizes::size_beside;
 use super::values::{CORNER_PX, LensModel, UncheckedCalibration, model_of, normalised, number};

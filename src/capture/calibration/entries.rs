@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value};
 
-use super::lens::{is_of_lens, name_in_lens};
+use super::lens_names::{is_of_lens, name_in_lens};
 use super::values::normalised;
 
 /// A key and its value.

@@ -6,12 +6,13 @@ use std::collections::HashMap;
 use serde_json::{Map, Value};
 
 use super::by_letters;
-use super::entries::{Entry, entries, entries_with_lens, is_matrix};
-use super::lens::{LETTERS, is_coefficients, lens_of, matrix_numbers, refuse_signs};
+use super::entries::{entries, entries_with_lens, is_matrix};
+use super::lens::{lens_of, matrix_numbers, refuse_signs, refuse_skew};
+use super::lens_names::{LETTERS, is_coefficients};
 use super::opensfm;
 use super::sizes::{size, size_of, size_of_one};
 use super::values::{
-    Lens, UncheckedCalibration, by_number, flat_numbers, model_by_key, normalised, number,
+    Lens, UncheckedCalibration, by_number, flat_numbers, model_by_key, normalised,
 };
 use crate::geometry::camera::Distortion;
 
@@ -435,18 +436,6 @@ fn of_calib_io_camera(entry: &Value, kind: &str) -> Result<UncheckedCalibration,
             is_said: true,
         },
     })
-}
-
-/// Pixels of a camera here have two sides at right angles.
-pub(super) fn refuse_skew(entries: &[Entry<'_>]) -> Result<(), String> {
-    let mut skews = entries.iter().filter(|entry| entry.name == "skew");
-    match skews.find(|entry| number(entry.value).is_some_and(|skew| skew != 0.0)) {
-        Some(skew) => Err(format!(
-            "{} must be 0, not {}: pixels that lean are not supported",
-            skew.key, skew.value
-        )),
-        None => Ok(()),
-    }
 }
 
 /// ROS's matrix is that of the whole picture, which these keys cut or shrink.

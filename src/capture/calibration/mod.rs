@@ -9,6 +9,7 @@ mod colmap;
 mod entries;
 mod kinds;
 mod lens;
+mod lens_names;
 mod numpy;
 mod opensfm;
 mod ost;
