@@ -254,11 +254,6 @@ fn the_flip_of_a_lone_marker_in_a_hand() {
             frames += 1;
             tracked += usize::from(verdict.is_tracked());
         }
-        let jumps = turnings(&ours, &moments);
-        assert!(
-            jumps <= 1,
-            "tilt {tilt_deg}° at {distance_m} m: it turned over {jumps} times"
-        );
         let mut count = |k: usize, verdicts: &[Verdict]| {
             let wrong = verdicts
                 .iter()
@@ -269,9 +264,22 @@ fn the_flip_of_a_lone_marker_in_a_hand() {
         };
         count(0, &ours);
         count(1, &run(&full_resolution, &MIDDLE, &card, &moments));
+        // Of 20 px across and almost frontal, both poses draw the same within the noise: which one a sequence begins
+        // with, and when it turns over, is the noise's to say (one or two of 45 frames in 16 draws of it).
+        if distance_m < 1.0 {
+            assert_eq!(
+                turnings(&ours, &moments),
+                0,
+                "tilt {tilt_deg}° at {distance_m} m"
+            );
+        }
     }
     eprintln!(
         "of {frames}: tracked {tracked}; flipped, ours and libapriltag's: {flipped:?}; turned over: {turned_over:?}"
+    );
+    assert!(
+        turned_over[0] * 10 <= turned_over[1],
+        "turned over: {turned_over:?}"
     );
     assert!(2 * tracked > frames, "only {tracked} of {frames} decided");
     assert!(
