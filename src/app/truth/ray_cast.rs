@@ -2,9 +2,10 @@
 
 use super::comparison::FACES_AWAY;
 use crate::geometry::camera::Intrinsics;
+use crate::geometry::ray_caster::{BoxContent, RayCaster};
 use crate::light::Light;
 use crate::render::{REAL, REAL_HIDES, VIRTUAL, VIRTUAL_HIDES};
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DAffine3, DVec2, DVec3, Vec3};
 
 /// The light passes along the surface: what hides it there is a matter of the last bits of single precision.
 pub const GRAZES: u8 = 8;
@@ -98,7 +99,7 @@ impl World {
     pub fn new(triangles: Vec<Triangle>) -> Self {
         let where_ = |takes: &dyn Fn(&Triangle) -> bool| {
             let indices = (0..triangles.len()).filter(|&index| takes(&triangles[index]));
-            BoxHierarchy::new(&triangles, indices.collect())
+            BoxHierarchy::new(&triangles, &indices.collect::<Vec<_>>())
         };
         let things = triangles.iter().map(|triangle| triangle.thing + 1).max();
         Self {
@@ -275,73 +276,78 @@ impl Triangle {
         let determinant = first.dot(across);
         let from_corner = ray.origin - a;
         let u = from_corner.dot(across) / determinant;
+        // (A triangle without area gives no number, which is in no range.)
+        if !(0.0..=1.0).contains(&u) {
+            return None;
+        }
         let aside = from_corner.cross(first);
         let v = ray.direction.dot(aside) / determinant;
+        if !(v >= 0.0 && u + v <= 1.0) {
+            return None;
+        }
         let distance = second.dot(aside) / determinant;
-        // A triangle without area gives no number, and no comparison with that holds.
-        let inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
-        (inside && distance > ray.near && distance < ray.reach).then_some(distance)
+        (distance > ray.near && distance < ray.reach).then_some(distance)
     }
 }
 
-/// Boxes around triangles, halved at the median of the longest side.
+/// Boxes around triangles, in double precision. Which triangles share one is single precision's to say.
 struct BoxHierarchy {
     /// Indices of triangles, in the order of the leaves.
     order: Vec<usize>,
+    /// The first has all others in it.
     nodes: Vec<Node>,
 }
 
 struct Node {
     low: DVec3,
     high: DVec3,
-    content: NodeContent,
+    content: BoxContent,
 }
-
-enum NodeContent {
-    /// A range of `order`.
-    Leaf(usize, usize),
-    /// The other child follows its parent.
-    SecondChild(usize),
-}
-
-const LEAF: usize = 4;
 
 impl BoxHierarchy {
-    fn new(triangles: &[Triangle], order: Vec<usize>) -> Self {
-        let mut made = Self {
-            order,
-            nodes: Vec::new(),
-        };
-        if !made.order.is_empty() {
-            made.add(triangles, 0, made.order.len());
-        }
-        made
-    }
-
-    fn add(&mut self, triangles: &[Triangle], start: usize, end: usize) {
-        let corners = |index: &usize| triangles[*index].corners;
-        let around = self.order[start..end].iter().flat_map(corners);
-        let (low, high) = around.fold((DVec3::MAX, DVec3::MIN), |(low, high), corner| {
-            (low.min(corner), high.max(corner))
+    fn new(triangles: &[Triangle], indices: &[usize]) -> Self {
+        let corners = indices.iter().map(|&index| triangles[index].corners);
+        let single: Vec<[Vec3; 3]> = corners
+            .map(|corners| corners.map(|corner| corner.as_vec3()))
+            .collect();
+        let tree = RayCaster::new(&single);
+        let order: Vec<usize> = tree.triangle_order().map(|place| indices[place]).collect();
+        let nodes = tree.boxes().map(|node| Node {
+            low: DVec3::MAX,
+            high: DVec3::MIN,
+            content: node.content,
         });
-        // A flat box has no thickness to lose to rounding.
-        let slack = 1e-9 + 1e-12 * low.abs().max(high.abs()).max_element();
-        let node = self.nodes.len();
-        self.nodes.push(Node {
-            low: low - slack,
-            high: high + slack,
-            content: NodeContent::Leaf(start, end),
-        });
-        if end - start <= LEAF {
-            return;
+        let mut nodes: Vec<Node> = nodes.collect();
+        // Each box before those in it; so that backwards, what is in a box is known before it.
+        let mut visited: Vec<usize> = (!nodes.is_empty()).then_some(0).into_iter().collect();
+        let mut next = 0;
+        while let Some(&index) = visited.get(next) {
+            if let BoxContent::Boxes(first) = nodes[index].content {
+                visited.extend([first, first + 1]);
+            }
+            next += 1;
         }
-        let axis = (high - low).max_position();
-        let place = |index: &usize| corners(index).iter().map(|c| c[axis]).sum::<f64>();
-        let middle = (end - start) / 2;
-        self.order[start..end].select_nth_unstable_by(middle, |a, b| place(a).total_cmp(&place(b)));
-        self.add(triangles, start, start + middle);
-        self.nodes[node].content = NodeContent::SecondChild(self.nodes.len());
-        self.add(triangles, start + middle, end);
+        for &index in visited.iter().rev() {
+            let (low, high) = match nodes[index].content {
+                BoxContent::Boxes(first) => {
+                    let [one, other] = [&nodes[first], &nodes[first + 1]];
+                    (one.low.min(other.low), one.high.max(other.high))
+                }
+                BoxContent::Triangles { first, count } => {
+                    let inside = order[first..first + count].iter();
+                    let corners = inside.flat_map(|&triangle| triangles[triangle].corners);
+                    let (low, high) = corners
+                        .fold((DVec3::MAX, DVec3::MIN), |(low, high), corner| {
+                            (low.min(corner), high.max(corner))
+                        });
+                    // A flat box has no thickness to lose to rounding.
+                    let slack = 1e-9 + 1e-12 * low.abs().max(high.abs()).max_element();
+                    (low - slack, high + slack)
+                }
+            };
+            (nodes[index].low, nodes[index].high) = (low, high);
+        }
+        Self { order, nodes }
     }
 
     /// Calls `found` with triangle and distance of each hit until it answers with the reach that is left, 0 to end.
@@ -364,13 +370,13 @@ impl BoxHierarchy {
                 enters = enters.max(near.min(far));
                 leaves = leaves.min(near.max(far));
             }
-            if enters > leaves + 1e-9 * leaves.abs() {
+            if enters > leaves * (1.0 + 1e-9) {
                 continue;
             }
             match node.content {
-                NodeContent::SecondChild(second) => open.extend([second, index + 1]),
-                NodeContent::Leaf(start, end) => {
-                    for &triangle in &self.order[start..end] {
+                BoxContent::Boxes(first) => open.extend([first + 1, first]),
+                BoxContent::Triangles { first, count } => {
+                    for &triangle in &self.order[first..first + count] {
                         let shortened = triangles[triangle]
                             .hit(&Ray { reach, ..*ray })
                             .and_then(|distance| found(triangle, distance));
