@@ -211,29 +211,7 @@ pub fn compare(frame: u32, truth: &Truth, drawn: &Drawn) -> Result<Errors> {
     let outline_levels = change_error.rms(&outlines);
     let change_error = change_error.blurred();
 
-    let gain_picture = LinearPicture {
-        width,
-        pixels: gain.iter().map(|gain| gain.map(f64::from)).collect(),
-    };
-    let darkened: Vec<bool> = truth
-        .factor
-        .pixels
-        .iter()
-        .map(|factor| factor.iter().sum::<f64>() / 3.0 < DARKENED)
-        .collect();
-    let factor_error = gain_picture.blurred().minus(&truth.factor);
-    let light = truth.without.map(|level| linear_from_srgb(level / 255.0));
-    let left = gain_picture.with_each(&light, |gain, light| gain * light);
-    let by_light = left
-        .blurred()
-        .with_each(&light.blurred(), |left, light| left / light.max(1e-4));
-    let factor_error_by_light = by_light.minus(&truth.factor);
-    let in_shadow = both(&inner_real, &darkened);
-
-    let of_shadow = |error: &LinearPicture| {
-        let rms = error.rms(&in_shadow);
-        rms.with_context(|| format!("frame {frame}: the truth darkens nothing"))
-    };
+    let [factor, factor_by_light] = factor_errors(frame, truth, &drawn.layers.gain, &inner_real)?;
 
     // A sample of a virtual thing may touch a pixel whose centre it misses.
     let beside_virtual = |i: usize| around(i, 1, width, count).any(|near| role[near] == VIRTUAL);
@@ -255,14 +233,42 @@ pub fn compare(frame: u32, truth: &Truth, drawn: &Drawn) -> Result<Errors> {
         change_real: ratio(&change_error, &on_real)?,
         residual_real: ratio(&error, &on_real)?,
         residual_virtual: ratio(&error, &on_virtual)?,
-        factor: of_shadow(&factor_error)?,
-        factor_by_light: of_shadow(&factor_error_by_light)?,
+        factor,
+        factor_by_light,
         outline_levels: outline_levels
             .with_context(|| format!("frame {frame}: the truth shows no virtual thing"))?,
         untouched_pct: 100.0 * untouched.len() as f64 / count as f64,
         untouched_wrong: untouched.iter().filter(has_changed).count(),
         alone_wrong_pct: 100.0 * alone_wrong as f64 / alone.len().max(1) as f64,
     })
+}
+
+/// RMS errors of [`Errors::factor`] and [`Errors::factor_by_light`] on real pixels.
+fn factor_errors(
+    frame: u32,
+    truth: &Truth,
+    gain: &[[f32; 3]],
+    inner_real: &[bool],
+) -> Result<[f64; 2]> {
+    let gain = LinearPicture {
+        width: truth.with.width,
+        pixels: gain.iter().map(|gain| gain.map(f64::from)).collect(),
+    };
+    let factors = truth.factor.pixels.iter();
+    let means = factors.map(|factor| factor.iter().sum::<f64>() / 3.0);
+    let darkened: Vec<bool> = means.map(|mean| mean < DARKENED).collect();
+    let in_shadow = both(inner_real, &darkened);
+    let light = truth.without.map(|level| linear_from_srgb(level / 255.0));
+    let left = gain.with_each(&light, |gain, light| gain * light);
+    let by_light = left
+        .blurred()
+        .with_each(&light.blurred(), |left, light| left / light.max(1e-4));
+    let rms = |of: &LinearPicture| {
+        let error = of.minus(&truth.factor);
+        let rms = error.rms(&in_shadow);
+        rms.with_context(|| format!("frame {frame}: the truth darkens nothing"))
+    };
+    Ok([rms(&gain.blurred())?, rms(&by_light)?])
 }
 
 /// The first light's shadow against its true mask, where there are both.
