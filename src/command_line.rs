@@ -119,7 +119,7 @@ pub enum Command {
 /// What results may take the place of.
 #[derive(Args)]
 pub struct ForceArgs {
-    /// Replace whatever file has an output's name; without this an older result of its kind alone
+    /// Replace whatever file has an output's name; without this an older result of gnomon's alone
     #[arg(long)]
     pub force: bool,
 }

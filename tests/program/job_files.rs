@@ -457,7 +457,23 @@ fn an_older_result_is_replaced_and_nothing_else_without_force() {
     fs::write(at("empty"), "").unwrap();
     done(folder.path(), &quick(&["--poses", "empty"]));
 
-    for (name, bytes) in [("a.mp4", &b"a letter"[..]), ("d/000000.png", b"a letter")] {
+    // What others made may be there once alone: a video of one's own, a photograph.
+    let [video, photograph] = ["recordings/lamp/video.mp4", "charts/shadows.png"]
+        .map(|name| fs::read(project_file(name)).unwrap());
+    fs::write(at("sheet.png"), &photograph).unwrap();
+    refused(
+        folder.path(),
+        &quick(&["--sheet", "sheet.png"]),
+        &["made by gnomon", "--force"],
+    );
+    for (name, bytes) in [
+        ("a.mp4", &b"a letter"[..]),
+        ("a.mp4", &video),
+        ("a.mkv", &video),
+        ("a.avi", &video),
+        ("d/000000.png", b"a letter"),
+        ("d/000000.png", &photograph),
+    ] {
         fs::create_dir_all(at(name).parent().unwrap()).unwrap();
         fs::write(at(name), bytes).unwrap();
         let out = name.strip_suffix("/000000.png").unwrap_or(name);

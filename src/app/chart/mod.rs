@@ -185,8 +185,8 @@ fn files_of(request: &ChartRequest, names: impl Iterator<Item = &'static str>) -
     writes("README.md".to_owned(), ResultKind::ChartsPage);
     for name in names {
         writes(format!("{name}.csv"), ResultKind::Table);
-        writes(format!("{name}.svg"), ResultKind::Svg);
-        writes(format!("{name}.png"), ResultKind::Png);
+        writes(format!("{name}.svg"), ResultKind::ChartDrawing);
+        writes(format!("{name}.png"), ResultKind::ChartPicture);
         writes(format!("{MEASURED}/{name}.csv"), ResultKind::Measurements);
     }
     files

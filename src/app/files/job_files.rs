@@ -363,9 +363,9 @@ fn is_of_kind(path: &Path, kind: ResultKind) -> bool {
     if !path.is_file() {
         return false;
     }
-    let most = match kind.is_text() || kind == ResultKind::PrintedMarkers {
-        true => MOST_BYTES,
-        false => FIRST_BYTES,
+    let most = match kind.is_marked_early() {
+        true => FIRST_BYTES,
+        false => MOST_BYTES,
     };
     read(most).is_some_and(|bytes| kind.is(&bytes))
 }

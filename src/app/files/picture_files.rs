@@ -6,11 +6,11 @@ use std::path::Path;
 use exr::prelude::WritableImage;
 use glam::Vec3;
 use image::codecs::hdr::HdrEncoder;
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
+use png::{BitDepth, ColorType, Compression, Filter};
 
 use super::new_file::NewFile;
 use super::output_error::OutputError;
+use super::result_kind::SOFTWARE;
 
 /// Writes 8-bit RGBA as an 8-bit RGB PNG; alpha is dropped.
 pub fn write_rgb_png(path: &Path, size_px: [u32; 2], rgba: &[u8]) -> Result<(), OutputError> {
@@ -24,29 +24,21 @@ pub fn rgb_png(path: &Path, size_px: [u32; 2], rgba: &[u8]) -> Result<Vec<u8>, O
         .flat_map(|pixel| [pixel[0], pixel[1], pixel[2]])
         .collect();
     // Photographs: one cheap filter is as good as trying all.
-    png(path, size_px, &rgb, ExtendedColorType::Rgb8, FilterType::Up)
+    let samples = (ColorType::Rgb, BitDepth::Eight, &rgb[..]);
+    png(path, size_px, samples, Filter::Up)
 }
 
 /// An 8-bit grey PNG (masks, roles).
 pub fn grey_png(path: &Path, size_px: [u32; 2], grey: &[u8]) -> Result<Vec<u8>, OutputError> {
-    png(
-        path,
-        size_px,
-        grey,
-        ExtendedColorType::L8,
-        FilterType::NoFilter,
-    )
+    let samples = (ColorType::Grayscale, BitDepth::Eight, grey);
+    png(path, size_px, samples, Filter::NoFilter)
 }
 
 /// A 16-bit RGB PNG (gain), three values a pixel.
 pub fn rgb16_png(path: &Path, size_px: [u32; 2], rgb: &[u16]) -> Result<Vec<u8>, OutputError> {
-    png(
-        path,
-        size_px,
-        bytemuck::cast_slice(rgb),
-        ExtendedColorType::Rgb16,
-        FilterType::Up,
-    )
+    let bytes: Vec<u8> = rgb.iter().flat_map(|value| value.to_be_bytes()).collect();
+    let samples = (ColorType::Rgb, BitDepth::Sixteen, &bytes[..]);
+    png(path, size_px, samples, Filter::Up)
 }
 
 /// One 32-bit float a pixel as an EXR whose only channel is `Y` (depth).
@@ -63,7 +55,8 @@ pub fn float_exr(path: &Path, size_px: [u32; 2], values: &[f32]) -> Result<Vec<u
     let channels = exr::image::SpecificChannels::build()
         .with_channel("Y")
         .with_pixel_fn(value_at);
-    let image = exr::image::Image::from_channels((width, height), channels);
+    let mut image = exr::image::Image::from_channels((width, height), channels);
+    image.layer_data.attributes.software_name = Some(SOFTWARE.into());
     exr_bytes(path, |bytes| {
         image.write().non_parallel().to_buffered(bytes)
     })
@@ -88,13 +81,18 @@ pub fn write_radiance(path: &Path, size_px: [usize; 2], rgb: &[Vec3]) -> Result<
             HdrEncoder::new(&mut bytes)
                 .encode(&rgb, width, height)
                 .map_err(|error| refuse(path, error.to_string()))?;
+            // The encoder's head has no place for more.
+            let first_line = bytes.iter().position(|&byte| byte == b'\n');
+            let after = first_line.map_or(0, |end| end + 1);
+            bytes.splice(after..after, format!("SOFTWARE={SOFTWARE}\n").into_bytes());
             bytes
         }
         RadianceFormat::Exr => {
             let pixel_at =
                 |position: exr::math::Vec2<usize>| rgb[position.y() * width + position.x()].into();
             let channels = exr::image::SpecificChannels::rgb::<f32, f32, f32>(pixel_at);
-            let image = exr::image::Image::from_channels((width, height), channels);
+            let mut image = exr::image::Image::from_channels((width, height), channels);
+            image.layer_data.attributes.software_name = Some(SOFTWARE.into());
             exr_bytes(path, |bytes| {
                 image.write().non_parallel().to_buffered(bytes)
             })?
@@ -169,22 +167,30 @@ fn exr_bytes(
 fn png(
     path: &Path,
     size_px: [u32; 2],
-    samples: &[u8],
-    color: ExtendedColorType,
-    filter: FilterType,
+    (color, depth, samples): (ColorType, BitDepth, &[u8]),
+    filter: Filter,
 ) -> Result<Vec<u8>, OutputError> {
-    let expected =
-        size_px[0] as usize * size_px[1] as usize * usize::from(color.bits_per_pixel() / 8);
-    if samples.len() != expected {
+    let bytes_per_pixel = color.samples() * usize::from(depth as u8) / 8;
+    if samples.len() != size_px[0] as usize * size_px[1] as usize * bytes_per_pixel {
         return Err(refuse(
             path,
             "the picture's size and its data disagree".to_owned(),
         ));
     }
     let mut bytes = Vec::new();
-    PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, filter)
-        .write_image(samples, size_px[0], size_px[1], color)
-        .map_err(|error| refuse(path, error.to_string()))?;
+    let mut encoder = png::Encoder::new(&mut bytes, size_px[0], size_px[1]);
+    encoder.set_color(color);
+    encoder.set_depth(depth);
+    encoder.set_compression(Compression::Fast);
+    encoder.set_filter(filter);
+    let written = encoder
+        .add_text_chunk("Software".to_owned(), SOFTWARE.to_owned())
+        .and_then(|()| encoder.write_header())
+        .and_then(|mut writer| {
+            writer.write_image_data(samples)?;
+            writer.finish()
+        });
+    written.map_err(|error| refuse(path, error.to_string()))?;
     Ok(bytes)
 }
 

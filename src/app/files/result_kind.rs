@@ -7,6 +7,11 @@ use serde_json::Value as Json;
 use super::{anchor_block, detections_file, poses_file};
 use crate::light::response::Response;
 
+/// The program's name, where a format has a field for it.
+pub const SOFTWARE: &str = "gnomon";
+/// The comment by which videos and drawings are known again.
+pub const MADE_BY: &str = "made by gnomon";
+
 /// The kind of thing that a job writes under a name that it was given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ResultKind {
@@ -24,6 +29,10 @@ pub enum ResultKind {
     Measurements,
     /// The page that shows all charts (Markdown).
     ChartsPage,
+    /// A picture of a chart (PNG).
+    ChartPicture,
+    /// A drawing of a chart (SVG).
+    ChartDrawing,
     /// A video.
     Video,
     /// A picture (PNG).
@@ -69,11 +78,13 @@ impl ResultKind {
             Self::Table => "a table (CSV)",
             Self::Measurements => "measurements of a chart",
             Self::ChartsPage => "the page of the charts",
-            Self::Video => "a video",
-            Self::Png => "a picture (PNG)",
-            Self::Radiance => "a probe (Radiance HDR or OpenEXR)",
-            Self::Pdf => "a PDF",
-            Self::Svg => "an SVG",
+            Self::ChartPicture => "a picture (PNG)",
+            Self::ChartDrawing => "a drawing (SVG)",
+            Self::Video => "a video made by gnomon",
+            Self::Png => "a picture (PNG) made by gnomon",
+            Self::Radiance => "a probe (Radiance HDR or OpenEXR) made by gnomon",
+            Self::Pdf => "a PDF made by gnomon",
+            Self::Svg => "an SVG made by gnomon",
             Self::LearntBoard => "a [[board]] alone (TOML)",
             Self::PrintedMarkers => "printed markers alone (TOML)",
             Self::Calibration => "a calibration (TOML)",
@@ -101,13 +112,29 @@ impl ResultKind {
         )
     }
 
-    /// Whether a file holds such a result. One that is empty holds nothing that could be lost.
+    /// Whether its mark stands in a file's first kilobytes.
+    pub fn is_marked_early(self) -> bool {
+        // What describes an MP4 as a whole stands behind the places of all its frames.
+        use ResultKind::*;
+        matches!(
+            self,
+            Png | Radiance | Pdf | Svg | ChartPicture | ChartDrawing
+        )
+    }
+
+    /// Whether a file holds such a result. What others make too, pictures and videos, has to say that it is this program's. One
+    /// that is empty holds nothing that could be lost.
     pub fn is(self, bytes: &[u8]) -> bool {
         let first_line = || {
             let line = bytes.split(|&byte| byte == b'\n').next();
             std::str::from_utf8(line.unwrap_or_default()).map_or("", str::trim_end)
         };
         let begins = |magic: &[u8]| bytes.starts_with(magic);
+        let has = |mark: String| {
+            let mut windows = bytes.windows(mark.len());
+            windows.any(|window| window == mark.as_bytes())
+        };
+        let is_png = begins(b"\x89PNG\r\n\x1a\n");
         if bytes.is_empty() {
             return !self.is_folder();
         }
@@ -121,11 +148,17 @@ impl ResultKind {
             Self::Measurements => begins(b"# made from "),
             Self::ChartsPage => begins(b"# Charts: "),
             Self::Stats => is_stats(bytes),
-            Self::Video => is_video(bytes),
-            Self::Png => begins(b"\x89PNG\r\n\x1a\n"),
-            Self::Radiance => begins(b"#?") || begins(b"\x76\x2f\x31\x01"),
-            Self::Pdf => begins(b"%PDF-"),
-            Self::Svg => begins(b"<svg "),
+            Self::ChartPicture => is_png,
+            Self::ChartDrawing => begins(b"<svg "),
+            Self::Video => is_video(bytes) && has(MADE_BY.to_owned()),
+            Self::Png => is_png && has(format!("tEXtSoftware\0{SOFTWARE}")),
+            Self::Radiance => {
+                begins(b"#?") && has(format!("\nSOFTWARE={SOFTWARE}\n"))
+                    || begins(b"\x76\x2f\x31\x01")
+                        && has(format!("software\0string\0\x06\0\0\0{SOFTWARE}"))
+            }
+            Self::Pdf => begins(b"%PDF-") && has(format!("/Creator ({SOFTWARE})")),
+            Self::Svg => begins(b"<svg ") && has(MADE_BY.to_owned()),
             // Who has gathered more than one did so by hand.
             Self::LearntBoard => has_keys(bytes, &["board"], &[]) && count_of(bytes, "board") == 1,
             // A layout that was learnt may have cost an hour; a printed one is made again by the same command.
@@ -207,6 +240,7 @@ fn count_of(bytes: &[u8], key: &str) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use super::super::picture_files::grey_png;
     use super::*;
 
     fn project_file(name: &str) -> Vec<u8> {
@@ -219,17 +253,21 @@ mod tests {
         let poses = format!("{}\n0,0,a,lost,0,,,,,,,,\n", poses_file::HEADER).into_bytes();
         let board = b"[[board]]\nname = \"t\"\nmarkers = []\n".to_vec();
         let printed = [anchor_block::PRINTED.as_bytes(), b".\n", &board].concat();
-        let cases: [(ResultKind, Vec<u8>); 10] = [
+        let marked = |head: &str, mark: &str| format!("{head} {mark} ").into_bytes();
+        let picture = grey_png(Path::new("p.png"), [1, 1], &[7]).unwrap();
+        let cases: [(ResultKind, Vec<u8>); 12] = [
             (Poses, poses),
             (LearntBoard, board),
             (PrintedMarkers, printed),
             (Calibration, project_file("recordings/lamp/camera.toml")),
-            (Video, project_file("recordings/lamp/video.mp4")),
+            (Video, marked("0000ftypisom", MADE_BY)),
             (Table, project_file("charts/shadows.csv")),
-            (Svg, project_file("charts/shadows.svg")),
-            (Png, project_file("charts/shadows.png")),
+            (ChartDrawing, project_file("charts/shadows.svg")),
+            (Svg, marked("<svg >", MADE_BY)),
+            (ChartPicture, project_file("charts/shadows.png")),
+            (Png, picture),
             (ChartsPage, project_file("charts/README.md")),
-            (Pdf, b"%PDF-1.7\n".to_vec()),
+            (Pdf, marked("%PDF-1.7\n", "/Creator (gnomon)")),
         ];
         let kinds = [
             Poses,
@@ -239,6 +277,8 @@ mod tests {
             Table,
             Measurements,
             ChartsPage,
+            ChartPicture,
+            ChartDrawing,
             Video,
             Png,
             Radiance,
@@ -254,9 +294,14 @@ mod tests {
         for (kind, bytes) in &cases {
             assert!(kind.is(bytes), "{kind:?}");
             for other in kinds.iter().filter(|other| *other != kind) {
-                // Printed markers can be learnt anew; each CSV is a table.
-                let both =
-                    [(PrintedMarkers, LearntBoard), (Poses, Table)].contains(&(*kind, *other));
+                // Printed markers can be learnt anew; each CSV is a table, each picture a chart's.
+                let both = [
+                    (PrintedMarkers, LearntBoard),
+                    (Poses, Table),
+                    (Png, ChartPicture),
+                    (Svg, ChartDrawing),
+                ];
+                let both = both.contains(&(*kind, *other));
                 assert_eq!(other.is(bytes), both, "{kind:?} as {other:?}");
             }
         }
@@ -266,6 +311,8 @@ mod tests {
             "Cargo.toml",
             "README.md",
             "LICENSE",
+            "recordings/lamp/video.mp4",
+            "recordings/room/probe.hdr",
         ] {
             let bytes = project_file(foreign);
             assert!(kinds.iter().all(|kind| !kind.is(&bytes)), "{foreign}");

@@ -8,6 +8,7 @@ use super::encoder::Encoder;
 use super::file_identity::is_at;
 use super::new_file::{NewFile, ends_as_folder, vanished};
 use super::output_error::OutputError;
+use super::result_kind::MADE_BY;
 use super::stamped_frames::{write_frame, write_head};
 
 /// A video's encoding.
@@ -129,6 +130,7 @@ impl VideoWriter {
         let mut arguments = pace.input_arguments(size_px);
         arguments.extend(codec.arguments().iter().map(|&word| word.to_owned()));
         arguments.extend(pace.output_arguments(path));
+        arguments.extend(["-metadata".to_owned(), format!("comment={MADE_BY}")]);
         arguments.extend(naming.arguments().iter().map(|&word| word.to_owned()));
         let url = file_url(file.working_path(path));
         // From here on the file goes if the encoder does not start.

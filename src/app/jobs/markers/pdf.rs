@@ -1,17 +1,19 @@
 //! Pages as PDF, in their true size.
 
-use pdf_writer::{Content, Finish as _, Name, Pdf, Rect as Box, Ref, Str};
+use pdf_writer::{Content, Finish as _, Name, Pdf, Rect as Box, Ref, Str, TextStr};
 
 use super::page::{Page, Rect};
+use crate::app::files::result_kind::SOFTWARE;
 
 const POINTS_PER_MM: f64 = 72.0 / 25.4;
 
 /// The whole file.
 pub fn bytes(pages: &[Page]) -> Vec<u8> {
     let mut pdf = Pdf::new();
-    let (catalog, tree, font) = (Ref::new(1), Ref::new(2), Ref::new(3));
-    let page_ref = |index: usize| Ref::new(4 + 2 * index as i32);
-    let content_ref = |index: usize| Ref::new(5 + 2 * index as i32);
+    let [about, catalog, tree, font] = [1, 2, 3, 4].map(Ref::new);
+    let page_ref = |index: usize| Ref::new(5 + 2 * index as i32);
+    let content_ref = |index: usize| Ref::new(6 + 2 * index as i32);
+    pdf.document_info(about).creator(TextStr(SOFTWARE));
     pdf.catalog(catalog).pages(tree);
     pdf.pages(tree)
         .kids((0..pages.len()).map(page_ref))

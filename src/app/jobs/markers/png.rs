@@ -6,6 +6,7 @@ use opencv::core::{Mat, Point, Scalar};
 use opencv::imgproc;
 
 use super::page::{Page, Rect, Text};
+use crate::app::files::result_kind::SOFTWARE;
 use crate::light::srgb::srgb_level;
 
 const MM_PER_INCH: f64 = 25.4;
@@ -29,6 +30,7 @@ pub fn bytes(page: &Page, dpi: f64) -> Result<Vec<u8>> {
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Grayscale);
     encoder.set_depth(png::BitDepth::Eight);
+    encoder.add_text_chunk("Software".to_owned(), SOFTWARE.to_owned())?;
     let per_metre = (pixels_per_mm * 1000.0).round() as u32;
     encoder.set_pixel_dims(Some(png::PixelDimensions {
         xppu: per_metre,

@@ -3,13 +3,14 @@
 use std::fmt::Write as _;
 
 use super::page::{Page, Rect};
+use crate::app::files::result_kind::MADE_BY;
 
 /// The whole file.
 pub fn text(page: &Page) -> String {
     let [width, height] = page.size_mm;
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}mm\" height=\"{height}mm\" \
-         viewBox=\"0 0 {width} {height}\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n"
+         viewBox=\"0 0 {width} {height}\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n<desc>{MADE_BY}</desc>\n"
     );
     for black in &page.blacks {
         let mut path = String::new();
