@@ -21,13 +21,15 @@ pub const FAINT: RGBColor = RGBColor(215, 215, 215);
 pub const GREY: RGBColor = RGBColor(120, 120, 120);
 
 /// Colours that colour-blind eyes tell apart (Okabe & Ito 2008), each with a mark and dashes of its own for printers.
-pub const LOOKS: [SeriesLook; 6] = [
+pub const LOOKS: [SeriesLook; 8] = [
     SeriesLook(RGBColor(0, 114, 178), Mark::Disc, &[]),
     SeriesLook(RGBColor(213, 94, 0), Mark::Square, &[9.0, 4.0]),
     SeriesLook(RGBColor(0, 158, 115), Mark::Triangle, &[2.0, 3.0]),
     SeriesLook(RGBColor(150, 80, 130), Mark::Diamond, &[9.0, 3.0, 2.0, 3.0]),
     SeriesLook(RGBColor(190, 130, 0), Mark::Ring, &[5.0, 3.0]),
     SeriesLook(RGBColor(0, 0, 0), Mark::Cross, &[1.5, 4.0]),
+    SeriesLook(RGBColor(86, 180, 233), Mark::Frame, &[14.0, 4.0]),
+    SeriesLook(RGBColor(125, 85, 50), Mark::Plus, &[5.0, 2.0, 1.5, 2.0]),
 ];
 
 /// Colour, mark and dashes (lengths of ink and gap) of a series.
@@ -47,8 +49,12 @@ pub enum Mark {
     Diamond,
     /// A circle.
     Ring,
-    /// Two strokes.
+    /// Two strokes aslant.
     Cross,
+    /// A square.
+    Frame,
+    /// Two strokes, one upright.
+    Plus,
 }
 
 /// Where a text lies against its place.
@@ -200,6 +206,20 @@ impl<B: DrawingBackend> ChartCanvas<'_, B> {
             Mark::Cross => {
                 self.line(&[[x - 4.0, y - 4.0], [x + 4.0, y + 4.0]], color, 1.5)?;
                 self.line(&[[x - 4.0, y + 4.0], [x + 4.0, y - 4.0]], color, 1.5)
+            }
+            Mark::Frame => {
+                let corners = [
+                    [-4.0, -4.0],
+                    [4.0, -4.0],
+                    [4.0, 4.0],
+                    [-4.0, 4.0],
+                    [-4.0, -4.0],
+                ];
+                self.line(&corners.map(|[a, b]| [x + a, y + b]), color, 1.5)
+            }
+            Mark::Plus => {
+                self.line(&[[x - 5.0, y], [x + 5.0, y]], color, 1.5)?;
+                self.line(&[[x, y - 5.0], [x, y + 5.0]], color, 1.5)
             }
         }
     }

@@ -10,6 +10,7 @@ pub mod frame_sink;
 pub mod job_files;
 pub mod layer_files;
 mod locked_folder;
+pub mod made_by;
 pub mod new_file;
 pub mod output_error;
 pub mod picture_files;

@@ -8,9 +8,9 @@ use glam::Vec3;
 use image::codecs::hdr::HdrEncoder;
 use png::{BitDepth, ColorType, Compression, Filter};
 
+use super::made_by::SOFTWARE;
 use super::new_file::NewFile;
 use super::output_error::OutputError;
-use super::result_kind::SOFTWARE;
 
 /// Writes 8-bit RGBA as an 8-bit RGB PNG; alpha is dropped.
 pub fn write_rgb_png(path: &Path, size_px: [u32; 2], rgba: &[u8]) -> Result<(), OutputError> {

@@ -4,13 +4,9 @@ use std::path::Path;
 
 use serde_json::Value as Json;
 
+use super::made_by::{MADE_BY, SOFTWARE};
 use super::{anchor_block, detections_file, poses_file};
 use crate::light::response::Response;
-
-/// The program's name, where a format has a field for it.
-pub const SOFTWARE: &str = "gnomon";
-/// The comment by which videos and drawings are known again.
-pub const MADE_BY: &str = "made by gnomon";
 
 /// The kind of thing that a job writes under a name that it was given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

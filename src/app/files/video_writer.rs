@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use super::encoder::Encoder;
 use super::file_identity::is_at;
+use super::made_by::MADE_BY;
 use super::new_file::{NewFile, ends_as_folder, vanished};
 use super::output_error::OutputError;
-use super::result_kind::MADE_BY;
 use super::stamped_frames::{write_frame, write_head};
 
 /// A video's encoding.

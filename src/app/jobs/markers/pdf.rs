@@ -3,7 +3,7 @@
 use pdf_writer::{Content, Finish as _, Name, Pdf, Rect as Box, Ref, Str, TextStr};
 
 use super::page::{Page, Rect};
-use crate::app::files::result_kind::SOFTWARE;
+use crate::app::files::made_by::SOFTWARE;
 
 const POINTS_PER_MM: f64 = 72.0 / 25.4;
 

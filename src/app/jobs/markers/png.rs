@@ -6,7 +6,7 @@ use opencv::core::{Mat, Point, Scalar};
 use opencv::imgproc;
 
 use super::page::{Page, Rect, Text};
-use crate::app::files::result_kind::SOFTWARE;
+use crate::app::files::made_by::SOFTWARE;
 use crate::light::srgb::srgb_level;
 
 const MM_PER_INCH: f64 = 25.4;

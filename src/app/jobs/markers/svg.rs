@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::page::{Page, Rect};
-use crate::app::files::result_kind::MADE_BY;
+use crate::app::files::made_by::MADE_BY;
 
 /// The whole file.
 pub fn text(page: &Page) -> String {
