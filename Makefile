@@ -5,9 +5,10 @@ export NODEVICE_SELECT = 1
 
 .PHONY: demo install uninstall test test-deep test-camera soak fuzz charts reference bench bench-volumes bench-tracking setup setup-tests setup-deep
 
+# (Its files are its own: those of an earlier version bear no mark by which they would be known.)
 demo: setup
 	cargo build --release
-	target/release/gnomon replay config/lamp.toml --out out/lamp.mp4 --sheet out/lamp.png --poses out/lamp_poses.csv --stats out/lamp_stats.json
+	target/release/gnomon replay config/lamp.toml --out out/lamp.mp4 --sheet out/lamp.png --poses out/lamp_poses.csv --stats out/lamp_stats.json --force
 	@echo
 	@echo "A virtual torus on a real table:"
 	@echo "  out/lamp.mp4         the video"
