@@ -484,6 +484,43 @@ fn an_older_result_is_replaced_and_nothing_else_without_force() {
 }
 
 #[test]
+fn probes_and_sheets_are_known_again_in_each_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let given = project_file("recordings/room/probe.hdr");
+    let foreign = |name: &str| match Path::new(name).extension().unwrap().to_str().unwrap() {
+        "hdr" => given.clone(),
+        "png" => project_file("charts/shadows.png"),
+        "svg" => project_file("charts/shadows.svg"),
+        // (None of the kind is in the project.)
+        _ => project_file("LICENSE"),
+    };
+    let of_probe = ["probe", plain(&given), "--kind", "panorama", "--out"];
+    let of_sheet = [
+        "markers",
+        "--chessboard",
+        "5x4",
+        "--square-mm",
+        "25",
+        "--out",
+    ];
+    let outputs: [(&[&str], &str); 5] = [
+        (&of_probe, "p.hdr"),
+        (&of_probe, "p.exr"),
+        (&of_sheet, "s.png"),
+        (&of_sheet, "s.svg"),
+        (&of_sheet, "s.pdf"),
+    ];
+    for (job, name) in outputs {
+        let job = [job, &[name]].concat();
+        done(folder.path(), &job);
+        done(folder.path(), &job);
+        fs::copy(foreign(name), at(name)).unwrap();
+        refused(folder.path(), &job, &[name, "made by gnomon", "--force"]);
+    }
+}
+
+#[test]
 fn sheets_leave_layouts_that_were_learnt() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);

@@ -325,7 +325,8 @@ fn a_renderer_that_follows_an_edit_draws_what_a_new_one_draws() {
             assert!(following.follow(&scene), "{method:?}: {what}: not followed");
             let kept = seen(&mut following);
             assert!(kept != before, "{method:?}: {what}: nothing changes");
-            // A new renderer takes seconds; what was followed wrongly is wrong after the next edit too.
+            // A new renderer takes seconds; what was followed wrongly is wrong after the next edit too, as none takes back the one
+            // before it.
             if step % 2 == 0 || method == EnvironmentMethod::Rays {
                 let anew = seen(&mut Stage::of_scene(scene.clone()).renderer(CAMERA));
                 let off = kept.iter().zip(&anew).map(|(a, b)| a.abs_diff(*b)).max();

@@ -370,6 +370,7 @@ impl BoxHierarchy {
                 enters = enters.max(near.min(far));
                 leaves = leaves.min(near.max(far));
             }
+            // Beside a ray along an axis a box is left at minus infinity, from which no sum leads away.
             if enters > leaves * (1.0 + 1e-9) {
                 continue;
             }
