@@ -9,19 +9,19 @@ use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
 
 use crate::geometry::bounds::Bounds;
+use crate::light::bounce::FurtherLight;
 use crate::light::irradiance_records::IrradianceRecords;
 use crate::light::{Light, irradiance};
 use crate::shafts::light_of_room::{hemisphere, over_hemisphere};
 
-use super::placed::{OFFSET_M, PlacedScene, PlacedThing, SeenSurface};
+use super::placed::{PlacedScene, PlacedThing, SeenSurface};
 use super::sky::Sky;
+use super::thing::OFFSET_M;
 
 /// Edges of real surfaces are at most this part of a virtual thing's size where they touch it, ...
 const NEAR_PART: f32 = 1.0 / 20.0;
 /// ... and elsewhere this part of the way to it: what it hides varies over such lengths.
 const AWAY_PART: f32 = 0.25;
-/// Places that a light of some size shines from on what rays meet.
-const PLACES_OF_A_LIGHT: usize = 8;
 /// Directions over the place that a ray ends at, ...
 const DIRECTIONS_OF_AN_END: usize = 64;
 /// ... of which each ray takes so many, ...
@@ -50,17 +50,6 @@ pub struct Gathered {
     pub taken: Vec3,
 }
 
-/// What rays that end on a surface take from there beside what the lights give it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FurtherLight {
-    /// The sky's light as if nothing hid it, which stands for what hides it and reflects other light.
-    Estimated,
-    /// The sky's light as far as nothing hides it.
-    None,
-    /// That, and what is reflected by what hides it.
-    Bounce,
-}
-
 /// How light is gathered.
 #[derive(Debug, Clone)]
 pub struct Gathering<'a> {
@@ -72,14 +61,6 @@ pub struct Gathering<'a> {
     pub further: FurtherLight,
     /// Of each compact light of the scene the places that it shines from, so that each ray's end sees one of them.
     pub shining_from: Vec<Vec<Light>>,
-}
-
-/// Places that a light of some size shines from.
-pub fn shining_from(light: &Light) -> Vec<Light> {
-    match light.has_size() {
-        true => light.pieces(PLACES_OF_A_LIGHT),
-        false => vec![*light],
-    }
 }
 
 /// Points of a surface that get light, and where it is gathered for them.

@@ -10,10 +10,8 @@ use crate::light::regions::Region;
 use crate::light::{Light, irradiance};
 
 use super::distant_light::DistantLight;
-use super::thing::Thing;
+use super::thing::{OFFSET_M, Thing};
 
-/// Rays start so far off a surface, metres: past the rounding of a simplified thing.
-pub const OFFSET_M: f32 = 1e-4;
 /// Of so many regions a place that reflects light is asked whether it sees them; places beside each other ask others.
 const ASKED_REGIONS: usize = 4;
 

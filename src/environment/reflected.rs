@@ -9,7 +9,8 @@ use rayon::prelude::*;
 use crate::shafts::light_of_room::hemisphere;
 use crate::shafts::surfels::{Surfel, as_one, from_open_disc, mean_by_area, open_directions};
 
-use super::placed::{Among, OFFSET_M, PlacedScene, PlacedThing, SeenSurface};
+use super::placed::{Among, PlacedScene, PlacedThing, SeenSurface};
+use super::thing::OFFSET_M;
 
 /// Parts that a group is cut into.
 const PARTS: usize = 4;

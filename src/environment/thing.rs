@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use crate::geometry::bounds::Bounds;
 use crate::geometry::corner_points::is_buried;
@@ -11,10 +12,19 @@ use crate::geometry::solid::holes;
 use crate::light::mean_surface::MeanSurface;
 use crate::shafts::bounding::Ball;
 use crate::shafts::casters::Occluder;
+use crate::shafts::light_of_room::hemisphere;
 use crate::shafts::surfels::{Surfel, surfels_of_triangles};
 
-/// Discs that a thing's surface reflects light from.
+/// Rays start so far off a surface, metres: past the rounding of a simplified thing.
+pub const OFFSET_M: f32 = 1e-4;
+/// Discs that a thing's surface reflects light from, on one side.
 const SURFELS: usize = 256;
+/// Rays that tell whether a disc's back can be seen, ...
+const RAYS_BEHIND: usize = 16;
+/// ... and how many of them are to find no inside there.
+const FEWEST_OPEN: usize = 4;
+/// Surfaces within some 60 degrees of each other get like light.
+const LIKE_NORMALS: f32 = 0.5;
 
 /// A phantom or a virtual thing.
 pub struct Thing {
@@ -39,10 +49,11 @@ pub struct Thing {
     pub ball: Ball,
     /// Around them too.
     pub bounds: Bounds,
-    /// Its surface as discs of one area; none where it casts no shadow: what a table reflects is known otherwise.
+    /// Its surface as discs of one area, and the backs of those that are on a sheet; none where it casts no shadow: what a table
+    /// reflects is known otherwise.
     pub surfels: Vec<Surfel>,
-    /// For each triangle the numbers of those on it, or nearest to it.
-    surfels_on: Vec<Range<usize>>,
+    /// For the two sides of each triangle the numbers of those on it, or of one near it.
+    surfels_on: Vec<[Range<usize>; 2]>,
 }
 
 impl Thing {
@@ -53,25 +64,83 @@ impl Thing {
         }
         let triangles = thing.simplified_in_anchor();
         let own = Self::of_triangles(thing, is_real, &triangles)?;
-        let (surfels, surfels_on) = match thing.casts {
-            true => surfels_of_triangles(&thing.with_albedos(&triangles), SURFELS),
-            false => Default::default(),
+        match thing.casts {
+            true => Some(own.with_surfels(&thing.with_albedos(&triangles))),
+            false => Some(own),
+        }
+    }
+
+    /// With discs on its triangles, which come with their albedo.
+    fn with_surfels(self, triangles: &[([Vec3; 3], Vec3)]) -> Self {
+        let (fronts, on_triangle) = surfels_of_triangles(triangles, SURFELS);
+        let is_seen_behind: Vec<bool> = fronts
+            .par_iter()
+            .map(|it| self.is_open_behind(it))
+            .collect();
+        let backs_before = |front: usize| {
+            let before = is_seen_behind[..front].iter();
+            fronts.len() + before.filter(|&&is_seen| is_seen).count()
         };
-        Some(Self {
+        let backs = fronts
+            .iter()
+            .zip(&is_seen_behind)
+            .filter(|(_, is_seen)| **is_seen);
+        let backs = backs.map(|(front, _)| Surfel {
+            normal: -front.normal,
+            ..*front
+        });
+        let surfels: Vec<Surfel> = fronts.iter().copied().chain(backs).collect();
+        let near = |corners: &[Vec3; 3], normal: Vec3| {
+            let middle = corners.iter().sum::<Vec3>() / 3.0;
+            let like = surfels.iter().enumerate();
+            let like = like.filter(|(_, surfel)| surfel.normal.dot(normal) > LIKE_NORMALS);
+            let nearest = like.min_by(|(_, one), (_, other)| {
+                let distance = |surfel: &Surfel| surfel.position.distance_squared(middle);
+                distance(one).total_cmp(&distance(other))
+            });
+            nearest.map_or(0..0, |(number, _)| number..number + 1)
+        };
+        let sides = triangles.par_iter().zip(on_triangle);
+        let sides = sides.map(|((corners, _), on)| {
+            let [a, b, c] = *corners;
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            // (Where there is none on a triangle, it has one of those before it in their order.)
+            let is_like = |surfel: &Surfel| surfel.normal.dot(normal) > LIKE_NORMALS;
+            let own = fronts.get(on.clone());
+            let has_own = own.is_some_and(|own| own.iter().all(is_like));
+            let behind = backs_before(on.start)..backs_before(on.end);
+            match has_own {
+                true => [on, behind],
+                false => [near(corners, normal), near(corners, -normal)],
+            }
+        });
+        Self {
+            surfels_on: sides.collect(),
             surfels,
-            surfels_on,
-            ..own
-        })
+            ..self
+        }
+    }
+
+    /// Whether the back of a disc on its surface can be seen: whether the surface there is a sheet and not a solid's.
+    fn is_open_behind(&self, surfel: &Surfel) -> bool {
+        let start = surfel.position - surfel.normal * OFFSET_M;
+        let is_open = |direction: &Vec3| {
+            let Some(hit) = self.caster.first_hit(start, *direction, f32::INFINITY) else {
+                return true;
+            };
+            let [a, b, c] = self.triangles[hit.triangle];
+            (b - a).cross(c - a).dot(*direction) < 0.0
+        };
+        let rays = hemisphere(-surfel.normal, RAYS_BEHIND);
+        rays.filter(is_open).count() >= FEWEST_OPEN
     }
 
     /// Number of the disc of its surface that is nearest to a place on a triangle, and on the side of a normal; in the anchor's
     /// space.
     pub fn disc_at(&self, triangle: usize, place: Vec3, normal: Vec3) -> Option<usize> {
-        let on = self.surfels_on.get(triangle)?.clone();
-        let on = on.filter(|&number| {
-            let surfel = self.surfels.get(number);
-            surfel.is_some_and(|surfel| surfel.normal.dot(normal) > 0.0)
-        });
+        let [a, b, c] = self.triangles[triangle];
+        let is_behind = (b - a).cross(c - a).dot(normal) < 0.0;
+        let on = self.surfels_on.get(triangle)?[usize::from(is_behind)].clone();
         let distance = |&number: &usize| self.surfels[number].position.distance_squared(place);
         on.min_by(|one, other| distance(one).total_cmp(&distance(other)))
     }

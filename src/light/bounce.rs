@@ -1,6 +1,6 @@
 //! The light that reaches a virtual surface from its surroundings: the ambient light where nothing hides it, and what
-//! the things around throw back of the lights (one bounce). A white sheet under a lamp lights what stands on it more
-//! than the room does.
+//! the things around throw back of the lights and of what reaches them from around. A white sheet under a lamp lights what
+//! stands on it more than the room does.
 //!
 //! What stands still is gathered once ([`Surroundings::gather`]): the rays of each point with what they met. What moves
 //! then only takes from those rays what it hides ([`Gathering::irradiances`]), frame by frame.
@@ -21,6 +21,20 @@ const LEAST_RAYS: usize = 32;
 /// Rays start this part of the surroundings' size off the surface, past its own rounding.
 const START_OFFSET: f64 = 1e-5;
 
+/// Steps from one ray to the next over the hemisphere of what they end on (Roberts 2018: powers of the plastic number's inverse).
+const STEPS_OVER_AN_END: [f64; 2] = [0.754_877_666, 0.569_840_291];
+
+/// What rays that end on a surface take from there beside what the lights give it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FurtherLight {
+    /// The ambient light as if nothing hid it, which stands for what hides it and reflects other light.
+    Estimated,
+    /// The ambient light as far as nothing hides it.
+    None,
+    /// That, and what is reflected by what hides it.
+    Bounce,
+}
+
 /// A diffuse triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reflector {
@@ -34,9 +48,33 @@ pub struct Reflector {
 pub struct Surroundings {
     reflectors: Vec<Reflector>,
     caster: RayCaster,
-    lights: Vec<Light>,
+    lights: Vec<ShiningLight>,
     ambient_radiance: DVec3,
+    further: FurtherLight,
     start_offset_m: f64,
+}
+
+/// A light, and the places that it shines from.
+#[derive(Clone)]
+struct ShiningLight {
+    light: Light,
+    places: Vec<Light>,
+}
+
+impl ShiningLight {
+    /// The way to it from a place on which a ray with this number ended, and the part of that at which it is.
+    fn way_from(&self, place: DVec3, number: usize) -> (DVec3, f32) {
+        self.places[number % self.places.len()].way_from(place)
+    }
+}
+
+/// A place on a surface that a ray ended on.
+struct End {
+    /// A little off the surface.
+    place: DVec3,
+    normal: DVec3,
+    albedo: DVec3,
+    distance_m: f32,
 }
 
 /// Things that move together.
@@ -83,7 +121,7 @@ pub struct Gathering {
     rays: Vec<GatheredRay>,
     /// For each ray and light the radiance that the light has its end throw back; zero where hidden.
     lit: Vec<Vec3>,
-    lights: Vec<Light>,
+    lights: Vec<ShiningLight>,
     ambient_radiance: DVec3,
 }
 
@@ -98,7 +136,12 @@ struct GatheredRay {
 
 impl Surroundings {
     /// Prepares what may hide or throw back light.
-    pub fn new(reflectors: Vec<Reflector>, lights: Vec<Light>, ambient_radiance: DVec3) -> Self {
+    pub fn new(
+        reflectors: Vec<Reflector>,
+        lights: Vec<Light>,
+        ambient_radiance: DVec3,
+        further: FurtherLight,
+    ) -> Self {
         let corners: Vec<_> = reflectors
             .iter()
             .map(|reflector| reflector.corners)
@@ -110,8 +153,15 @@ impl Surroundings {
             caster: RayCaster::new(&corners),
             start_offset_m: f64::from(size.max_element().max(1e-3)) * START_OFFSET,
             reflectors,
-            lights,
+            lights: lights
+                .into_iter()
+                .map(|light| ShiningLight {
+                    light,
+                    places: light.shining_from(),
+                })
+                .collect(),
             ambient_radiance,
+            further,
         }
     }
 
@@ -170,16 +220,19 @@ impl Surroundings {
             let direction = tangent * (radius * cosine)
                 + bitangent * (radius * sine)
                 + normal * (1.0 - radius * radius).max(0.0).sqrt();
-            rays.push(self.follow(start, direction, lit));
+            rays.push(self.follow(start, direction, index, lit));
         }
     }
 
-    fn follow(&self, start: DVec3, direction: DVec3, lit: &mut Vec<Vec3>) -> GatheredRay {
+    fn follow(
+        &self,
+        start: DVec3,
+        direction: DVec3,
+        number: usize,
+        lit: &mut Vec<Vec3>,
+    ) -> GatheredRay {
         let single = direction.as_vec3();
-        let Some(hit) = self
-            .caster
-            .first_hit(start.as_vec3(), single, f32::INFINITY)
-        else {
+        let Some(end) = self.end(start, direction) else {
             lit.extend(self.lights.iter().map(|_| Vec3::ZERO));
             let unlit = self.ambient_radiance.as_vec3();
             return GatheredRay {
@@ -188,6 +241,22 @@ impl Surroundings {
                 unlit,
             };
         };
+        let lights = self.lights.iter();
+        lit.extend(lights.map(|light| {
+            let arriving = self.arriving(light, &end, number);
+            (end.albedo / PI * arriving).as_vec3()
+        }));
+        GatheredRay {
+            direction: single,
+            distance_m: end.distance_m,
+            unlit: (end.albedo * self.from_around(&end, number)).as_vec3(),
+        }
+    }
+
+    /// What a ray meets first.
+    fn end(&self, start: DVec3, direction: DVec3) -> Option<End> {
+        let (from, way) = (start.as_vec3(), direction.as_vec3());
+        let hit = self.caster.first_hit(from, way, f32::INFINITY)?;
         let Reflector {
             corners: [a, b, c],
             albedo,
@@ -198,26 +267,55 @@ impl Surroundings {
         } else {
             outward
         };
-        let place = start + direction * f64::from(hit.distance) + normal * self.start_offset_m;
-        lit.extend(self.lights.iter().map(|light| {
-            let (to_light, reach) = light.way_from(place);
-            let hidden = self
-                .caster
-                .is_hidden(place.as_vec3(), to_light.as_vec3(), reach);
-            let arriving = if hidden {
-                DVec3::ZERO
-            } else {
-                irradiance(light, place, normal)
-            };
-            (albedo / PI * arriving).as_vec3()
-        }));
-        let unlit = (albedo * self.ambient_radiance).as_vec3();
-        GatheredRay {
-            direction: single,
+        Some(End {
+            place: start + direction * f64::from(hit.distance) + normal * self.start_offset_m,
+            normal,
+            albedo,
             distance_m: hit.distance,
-            unlit,
+        })
+    }
+
+    /// Irradiance that a light gives a place.
+    fn arriving(&self, light: &ShiningLight, at: &End, number: usize) -> DVec3 {
+        let (to_light, reach) = light.way_from(at.place, number);
+        let (from, way) = (at.place.as_vec3(), to_light.as_vec3());
+        match self.caster.is_hidden(from, way, reach) {
+            true => DVec3::ZERO,
+            false => irradiance(&light.light, at.place, at.normal),
         }
     }
+
+    /// The mean radiance that reaches a place from around, but for the lights themselves, as a single ray tells it.
+    fn from_around(&self, at: &End, number: usize) -> DVec3 {
+        if self.further == FurtherLight::Estimated {
+            return self.ambient_radiance;
+        }
+        let Some(end) = self.end(at.place, from_end(at, number)) else {
+            return self.ambient_radiance;
+        };
+        if self.further == FurtherLight::None {
+            return DVec3::ZERO;
+        }
+        let lights = self.lights.iter();
+        let direct: DVec3 = lights.map(|light| self.arriving(light, &end, number)).sum();
+        // (Not along the direction that led here.)
+        let toward = from_end(&end, number + 1);
+        let (from, way) = (end.place.as_vec3(), toward.as_vec3());
+        let ambient = match self.caster.is_hidden(from, way, f32::INFINITY) {
+            true => DVec3::ZERO,
+            false => self.ambient_radiance,
+        };
+        end.albedo * (direct / PI + ambient)
+    }
+}
+
+/// A direction over the place that a ray with this number ended on, the more often the straighter.
+fn from_end(at: &End, number: usize) -> DVec3 {
+    let (tangent, bitangent) = at.normal.any_orthonormal_pair();
+    let [part, turn] = STEPS_OVER_AN_END.map(|step| (0.5 + step * number as f64).fract());
+    let (sine, cosine) = (TAU * turn).sin_cos();
+    let radius = part.sqrt();
+    tangent * (radius * cosine) + bitangent * (radius * sine) + at.normal * (1.0 - part).sqrt()
 }
 
 impl Gathering {
@@ -240,7 +338,9 @@ impl Gathering {
         let lit: DVec3 = self
             .lights
             .iter()
-            .map(|light| irradiance(light, center, light.way_from(center).0.normalize_or_zero()))
+            .map(|ShiningLight { light, .. }| {
+                irradiance(light, center, light.way_from(center).0.normalize_or_zero())
+            })
             .sum();
         PlacedMover {
             caster: &mover.caster,
@@ -253,7 +353,7 @@ impl Gathering {
         let start = self.starts[point];
         let rays = point * self.rays_per_point..(point + 1) * self.rays_per_point;
         let mut sum = Vec3::ZERO;
-        for index in rays {
+        for (number, index) in rays.enumerate() {
             let ray = self.rays[index];
             let blocker = movers
                 .iter()
@@ -270,7 +370,7 @@ impl Gathering {
                     continue;
                 }
                 let end = start + ray.direction * ray.distance_m;
-                let (to_light, reach) = light.way_from(end.as_dvec3());
+                let (to_light, reach) = light.way_from(end.as_dvec3(), number);
                 if !movers
                     .iter()
                     .any(|m| m.hides(end, to_light.as_vec3(), reach))
@@ -324,14 +424,24 @@ mod tests {
 
     #[test]
     fn an_empty_furnace_gives_pi_times_its_radiance() {
-        let empty = Surroundings::new(Vec::new(), Vec::new(), DVec3::new(1.0, 2.0, 3.0));
+        let empty = Surroundings::new(
+            Vec::new(),
+            Vec::new(),
+            DVec3::new(1.0, 2.0, 3.0),
+            FurtherLight::Estimated,
+        );
         let irradiance = irradiance_at(&empty, DVec3::ZERO, DVec3::new(0.6, 0.0, 0.8));
         assert!((irradiance - PI * DVec3::new(1.0, 2.0, 3.0)).length() < 1e-5);
     }
 
     #[test]
     fn a_white_table_keeps_the_furnace_white() {
-        let table = Surroundings::new(square(50.0, 0.0, 1.0).to_vec(), Vec::new(), DVec3::ONE);
+        let table = Surroundings::new(
+            square(50.0, 0.0, 1.0).to_vec(),
+            Vec::new(),
+            DVec3::ONE,
+            FurtherLight::Estimated,
+        );
         for normal in [DVec3::X, DVec3::Z, DVec3::NEG_Z] {
             let irradiance = irradiance_at(&table, DVec3::new(0.0, 0.0, 0.1), normal);
             assert!(
@@ -346,7 +456,12 @@ mod tests {
         // Distant light of irradiance E straight down on a wide table of albedo a: a surface facing down gets a E, one
         // that stands upright half of it.
         let light = Light::directional(DVec3::NEG_Z, DVec3::splat(2.0));
-        let table = Surroundings::new(square(500.0, 0.0, 0.5).to_vec(), vec![light], DVec3::ZERO);
+        let table = Surroundings::new(
+            square(500.0, 0.0, 0.5).to_vec(),
+            vec![light],
+            DVec3::ZERO,
+            FurtherLight::Estimated,
+        );
         let above = DVec3::new(0.3, 0.2, 0.5);
         let down = irradiance_at(&table, above, DVec3::NEG_Z).x;
         let aside = irradiance_at(&table, above, DVec3::X).x;
@@ -366,6 +481,7 @@ mod tests {
             square(half_m as f32, height as f32, 0.0).to_vec(),
             Vec::new(),
             DVec3::ONE,
+            FurtherLight::Estimated,
         );
         let ratio: f64 = half_m / height;
         let slant = ratio / (1.0 + ratio * ratio).sqrt();
@@ -377,6 +493,85 @@ mod tests {
             "{found} {}",
             1.0 - hidden
         );
+    }
+
+    #[test]
+    fn a_floor_below_a_disc_shines_as_far_as_the_disc_leaves_it_light() {
+        // From below a disc's middle a place on the floor, some way aside, sees the disc by Howell's catalogue B-12 (a surface
+        // parallel to a disc, off its axis).
+        let (radius, height): (f64, f64) = (0.5, 0.3);
+        let hidden_at = |aside: f64| {
+            let (h, r) = (height / aside, radius / aside);
+            let z = 1.0 + h * h + r * r;
+            0.5 * (1.0 - (1.0 + h * h - r * r) / (z * z - 4.0 * r * r).sqrt())
+        };
+        // All of the disc's middle faces the floor: parts of it by the square of the sine.
+        let steps = 10_000;
+        let light = (0..steps).map(|step| {
+            let sine_squared = (f64::from(step) + 0.5) / f64::from(steps);
+            let aside = height * (sine_squared / (1.0 - sine_squared)).sqrt();
+            1.0 - hidden_at(aside)
+        });
+        let expected = PI * light.sum::<f64>() / f64::from(steps);
+        let corner = |step: u32| {
+            let (sine, cosine) = (TAU * f64::from(step) / 256.0).sin_cos();
+            DVec3::new(radius * cosine, radius * sine, height).as_vec3()
+        };
+        let disc = (0..256).map(|step| Reflector {
+            corners: [Vec3::Z * height as f32, corner(step), corner(step + 1)],
+            albedo: DVec3::ZERO,
+        });
+        let scene: Vec<Reflector> = disc.chain(square(100.0, 0.0, 1.0)).collect();
+        let below = DVec3::new(0.0, 0.0, height - 1e-3);
+        let found = |further| {
+            let around = Surroundings::new(scene.clone(), Vec::new(), DVec3::ONE, further);
+            irradiance_at(&around, below, DVec3::NEG_Z).x
+        };
+        for further in [FurtherLight::None, FurtherLight::Bounce] {
+            let found = found(further);
+            assert!(
+                (found / expected - 1.0).abs() < 0.03,
+                "{further:?}: {found} {expected}"
+            );
+        }
+        // (What hides it counts as bright as what it hides, where nobody looks.)
+        assert!((found(FurtherLight::Estimated) - PI).abs() < 1e-4);
+    }
+
+    #[test]
+    fn light_in_a_hollow_sphere_is_followed_as_far_as_is_said() {
+        // From its middle a lamp gives the same everywhere, and what that reflects does so too.
+        let (radius, albedo, intensity) = (0.5, 0.6, 2.0);
+        let at = |turn: u32, rise: u32| {
+            let (sine, cosine) = (TAU * f64::from(turn) / 64.0).sin_cos();
+            let (height, aside) = (PI * f64::from(rise) / 32.0).sin_cos();
+            (radius * DVec3::new(height * cosine, height * sine, aside)).as_vec3()
+        };
+        let quads = (0..64).flat_map(|turn| (0..32).map(move |rise| (turn, rise)));
+        let sphere = quads.flat_map(|(turn, rise)| {
+            let [a, b] = [at(turn, rise), at(turn, rise + 1)];
+            let [c, d] = [at(turn + 1, rise + 1), at(turn + 1, rise)];
+            [[a, b, c], [a, c, d]].map(|corners| Reflector {
+                corners,
+                albedo: DVec3::splat(albedo),
+            })
+        });
+        let sphere: Vec<Reflector> = sphere.collect();
+        let lamp = Light::point(DVec3::ZERO, DVec3::splat(intensity));
+        let first = albedo * intensity / (radius * radius);
+        let way = DVec3::new(0.4, -0.5, 0.3).normalize();
+        for (further, expected) in [
+            (FurtherLight::Estimated, first),
+            (FurtherLight::None, first),
+            (FurtherLight::Bounce, first * (1.0 + albedo)),
+        ] {
+            let around = Surroundings::new(sphere.clone(), vec![lamp], DVec3::ZERO, further);
+            let found = irradiance_at(&around, way * (radius - 0.01), -way).x;
+            assert!(
+                (found / expected - 1.0).abs() < 0.02,
+                "{further:?}: {found} {expected}"
+            );
+        }
     }
 
     #[test]
@@ -401,9 +596,11 @@ mod tests {
             [floor.clone(), lifted.to_vec()].concat(),
             lights.clone(),
             DVec3::ONE,
+            FurtherLight::Estimated,
         );
         let expected = standing.gather(&places, 1 << 20).irradiances(&[]);
-        let floor_alone = Surroundings::new(floor, lights, DVec3::ONE).gather(&places, 1 << 20);
+        let floor_alone = Surroundings::new(floor, lights, DVec3::ONE, FurtherLight::Estimated)
+            .gather(&places, 1 << 20);
         let mover = Mover::new(&plate).expect("triangles");
         for (expected, found) in expected
             .iter()

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::form_factor;
-use super::pieces::{in_sphere, in_square};
+use super::pieces::{Onlooking, in_sphere, in_square};
 
 /// What shines at a [`Light::Point`]'s place.
 ///
@@ -129,12 +129,12 @@ impl Shape {
     /// [`Light::pieces`].
     ///
     /// [`Light::pieces`]: super::Light::pieces
-    pub fn piece(self, index: usize, count: usize) -> (DVec3, Self) {
+    pub fn piece(self, index: usize, count: usize, onlooking: Onlooking) -> (DVec3, Self) {
         let smaller = (1.0 / count as f64).sqrt();
         match self {
             Self::Point | Self::Spot { .. } => (DVec3::ZERO, self),
             Self::Sphere { radius_m } => {
-                let aside_m = in_sphere(index) * radius_m;
+                let aside_m = in_sphere(index, count, onlooking) * radius_m;
                 let radius_m = radius_m * smaller;
                 (aside_m, Self::Sphere { radius_m })
             }

@@ -95,6 +95,19 @@ pub(super) fn widest_penumbra_px(
     widest_px
 }
 
+/// A box in the world around all virtual things that cast shadows.
+pub(super) fn casters(
+    things: &[AnchoredModel],
+    camera_from_anchor: &[Option<DAffine3>],
+) -> Option<Bounds> {
+    let world_from_camera = camera_from_anchor.first().copied().flatten()?.inverse();
+    let placed = placed(things, camera_from_anchor, &world_from_camera);
+    let casters = things.iter().zip(&placed);
+    let casters = casters.filter(|(thing, _)| thing.casts && thing.role == Role::Virtual);
+    let bounds = casters.filter_map(|(_, placed)| Some(placed.as_ref()?.bounds));
+    Bounds::around(bounds.flat_map(|bounds| bounds.corners()))
+}
+
 fn placed(
     things: &[AnchoredModel],
     camera_from_anchor: &[Option<DAffine3>],

@@ -10,9 +10,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DVec3, Vec3};
 
 use crate::environment::distant_light::DistantLight;
-use crate::environment::final_gather::{
-    FurtherLight, GatherPoints, Gathered, Gathering, longest_edge_m, shining_from,
-};
+use crate::environment::final_gather::{GatherPoints, Gathered, Gathering, longest_edge_m};
 use crate::environment::placed::{PlacedScene, PlacedThing};
 use crate::environment::sky::Sky;
 use crate::environment::thing::Thing;
@@ -21,7 +19,9 @@ use crate::geometry::corner_points::corner_points;
 use crate::geometry::ray_caster::RayCaster;
 use crate::geometry::reach::{self, PixelRect};
 use crate::geometry::subdivide::{Corner, subdivided};
-use crate::scene::{Bounces, Scene};
+use crate::light::Light;
+use crate::light::bounce::FurtherLight;
+use crate::scene::Scene;
 
 use super::anchor_geometry::Role;
 use super::deforming::DeformingThing;
@@ -160,11 +160,7 @@ impl FinalGather {
             distant: DistantLight::default(),
             sky: sky(rays_of_sky(rays, moves)),
             rays,
-            further: match (scene.bounces, moves) {
-                (Bounces::Estimated, _) | (Bounces::Auto, true) => FurtherLight::Estimated,
-                (Bounces::Once, _) => FurtherLight::None,
-                (Bounces::Twice, _) | (Bounces::Auto, false) => FurtherLight::Bounce,
-            },
+            further: scene.further_light(),
             pipeline: gpu.pipeline(&PipelineDescription {
                 shader: "final_gather.wgsl",
                 vertex: "place_gathered",
@@ -276,7 +272,7 @@ impl FinalGather {
             sky: &self.sky,
             rays: self.rays.div_ceil(fineness.rays_for_one),
             further: self.further,
-            shining_from: lights.iter().map(shining_from).collect(),
+            shining_from: lights.iter().map(Light::shining_from).collect(),
         };
         for model in models {
             let Some(pose) = world_from_anchor[model.anchor] else {

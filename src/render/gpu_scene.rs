@@ -25,7 +25,7 @@ use super::anchor_geometry::{
 };
 use super::attachments::texture;
 use super::casters::Casters;
-use super::detail::{chosen_levels, widest_penumbra_px};
+use super::detail::{casters, chosen_levels, widest_penumbra_px};
 use super::gpu::Gpu;
 use super::indirect::Indirect;
 use super::insides::{Insides, insides};
@@ -321,7 +321,8 @@ impl GpuScene {
                 false => 1,
             }
         };
-        self.lights.cut(gpu, camera_from_world, pieces);
+        let casters = casters(&self.things, &self.camera_from_anchor);
+        self.lights.cut(gpu, camera_from_world, pieces, casters);
     }
 
     /// Chooses the levels of detail of a frame, which go by those of the frame before it.

@@ -30,6 +30,13 @@ struct Budget {
     rays_per_record: usize,
 }
 
+/// Things whose light is gathered corner by corner, where ambient light is light (`ambient_samples`).
+pub(super) fn lit_by_surroundings(scene: &Scene) -> impl Iterator<Item = &Object> {
+    let is_gathered = scene.shadows.ambient_samples > 0;
+    let virtuals = scene.virtuals.iter();
+    virtuals.filter(move |object| is_gathered && object.visible && object.anchor == 0)
+}
+
 /// The gathered light of the world's virtual things.
 pub(super) struct Indirect {
     gathering: Gathering,
@@ -60,8 +67,12 @@ impl Indirect {
         let movers: Vec<(usize, Mover)> = (1..scene.node_count())
             .filter_map(|anchor| Some((anchor, Mover::new(&on_anchor(anchor))?)))
             .collect();
-        let surroundings =
-            Surroundings::new(on_anchor(0), scene.world_lights(), scene.ambient_radiance);
+        let surroundings = Surroundings::new(
+            on_anchor(0),
+            scene.world_lights(),
+            scene.ambient_radiance,
+            scene.further_light(),
+        );
         let (points, point_of_corner) = corner_points(corners, triangles, surroundings.caster());
         let Budget {
             rays,

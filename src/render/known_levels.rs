@@ -1,9 +1,11 @@
 //! Other versions of meshes, which take long to make: coarser ones that may be drawn in their place where that is not seen, and
-//! finer ones that an environment's light asks for.
+//! finer ones that light which is worked out at corners asks for.
 
 use std::sync::Arc;
 
 use super::precomputation::Precomputation;
+use crate::environment::finer;
+use crate::environment::self_occlusion::OwnSpace;
 use crate::geometry::levels::{Level, levels};
 use crate::geometry::mesh::Mesh;
 use crate::scene::{Object, Scene, Shortcut};
@@ -67,6 +69,25 @@ impl KnownLevels {
         let levels = coarser.map_or(&[][..], |index| &self.coarser[index].1);
         std::iter::once(finer.unwrap_or(mesh)).chain(levels.iter().map(|level| &level.mesh))
     }
+}
+
+/// The meshes of things whose light is worked out at corners and that have too few of these, each with a finer one.
+pub(super) fn finer_meshes<'a>(
+    lit_by_corners: impl Iterator<Item = &'a Object>,
+    precomputation: &dyn Precomputation,
+) -> Vec<(Arc<Mesh>, Mesh)> {
+    let mut finer: Vec<(Arc<Mesh>, Mesh)> = Vec::new();
+    for object in lit_by_corners {
+        let mesh = &object.mesh;
+        if object.animation.is_some() || finer.iter().any(|(known, _)| known == mesh) {
+            continue;
+        }
+        let cuts = precomputation.cuts(mesh, &OwnSpace::new(&object.anchor_from_object));
+        if !cuts.is_empty() {
+            finer.push((Arc::clone(mesh), finer::finer(mesh, &cuts)));
+        }
+    }
+    finer
 }
 
 /// Whether coarser versions of a thing may be drawn. (How far one is off is measured in one shape.)

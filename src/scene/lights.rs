@@ -2,7 +2,6 @@
 
 use glam::{DVec2, DVec3};
 
-use super::Anchor;
 use super::error::SceneError;
 use super::objects::{STANDING, StandingKeys, anchor_index};
 use super::placement::POSITION;
@@ -13,6 +12,8 @@ use super::schema::key::Missing::Is;
 use super::schema::key::{Key, NewKey, Required, new_key};
 use super::schema::section::{Example, Section, Times};
 use super::schema::values::Vectors;
+use super::{Anchor, Scene};
+use crate::light::bounce::FurtherLight;
 use crate::light::{Light, Rect, Shape};
 
 /// As many as the shadow masks have room for.
@@ -149,6 +150,17 @@ choices! {
     }
 }
 
+impl Scene {
+    /// How far light from around is followed beyond what a ray ends on.
+    pub fn further_light(&self) -> FurtherLight {
+        match (self.bounces, self.moves()) {
+            (Bounces::Estimated, _) | (Bounces::Auto, true) => FurtherLight::Estimated,
+            (Bounces::Once, _) => FurtherLight::None,
+            (Bounces::Twice, _) | (Bounces::Auto, false) => FurtherLight::Bounce,
+        }
+    }
+}
+
 impl Default for Bounces {
     fn default() -> Self {
         *AMBIENT.bounces.default()
@@ -161,7 +173,7 @@ keys! {
 
     /// Radiance from everywhere, W/(m² sr) up to the camera's exposure, linear RGB.
     radiance: DVec3, Vectors::one_or_three(POWER) => Is(DVec3::ZERO);
-    /// How often light that things reflect on to real surfaces is followed (`ambient_samples` of `[shadows]` are the rays).
+    /// How often light that things reflect is followed (`ambient_samples` of `[shadows]` are the rays).
     bounces: Bounces => Is(Bounces::Auto);
 }
 

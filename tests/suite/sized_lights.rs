@@ -1,7 +1,9 @@
 //! Lights of some size, held against the many small ones that they are.
 
 use glam::{DVec2, DVec3};
+use gnomon::geometry::bounds::Bounds;
 use gnomon::geometry::camera::{Distortion, Intrinsics};
+use gnomon::light::pieces::Onlooking;
 use gnomon::light::{Light, Rect, Shape};
 use gnomon::render::{REAL, Shown};
 use gnomon::scene::format::LightKind;
@@ -60,12 +62,31 @@ fn lights() -> Vec<Light> {
     LightKind::BY_NAME.into_iter().filter_map(of_kind).collect()
 }
 
+/// From where a light is looked at in the scene.
+fn onlooking(light: &Light) -> Onlooking {
+    let Light::Point {
+        position_m, shape, ..
+    } = light
+    else {
+        return Onlooking::ALL_AROUND;
+    };
+    let radius_m = match shape {
+        Shape::Sphere { radius_m } => *radius_m,
+        Shape::Point | Shape::Spot { .. } | Shape::Rect(_) => 0.0,
+    };
+    let virtuals = scene(vec![*light], 1).virtuals;
+    let visible = virtuals.iter().filter(|object| object.visible);
+    let corners = visible.flat_map(|object| object.positions_in_anchor(&object.mesh));
+    let bounds = Bounds::around(corners.map(|corner| corner.as_dvec3()));
+    Onlooking::from_within(&bounds.expect("virtual things"), *position_m, radius_m)
+}
+
 #[test]
 fn a_light_of_some_size_shades_as_its_pieces_do() {
     for light in lights() {
         let (whole, role) = drawn(&scene(vec![light], 16));
         // Each of them is one light, that casts one shadow.
-        let (pieces, _) = drawn(&scene(light.pieces(16), 1));
+        let (pieces, _) = drawn(&scene(light.pieces(16, onlooking(&light)), 1));
         let (mut changed, mut worst) = (0, 0);
         for index in (0..role.len()).filter(|&index| role[index] == REAL) {
             let [a, b] = [&whole, &pieces].map(|picture| picture.pixel(index));

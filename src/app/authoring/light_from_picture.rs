@@ -15,7 +15,7 @@ use crate::geometry::light_placing::{
 };
 use crate::geometry::robust::{deviation, tukey_weight};
 use crate::geometry::shadow_outline::{OutlinePoint, StandingThings};
-use crate::light::bounce::{Reflector, Surroundings};
+use crate::light::bounce::{FurtherLight, Reflector, Surroundings};
 use crate::light::contrast::{ContrastSample, Strengths, strengths};
 use crate::light::{Light, irradiance};
 use crate::scene::{Marker, Scene};
@@ -429,7 +429,8 @@ impl PicturedThings {
             places.extend([lit_place, shaded_place].map(|facet| (facet.point_m, facet.normal)));
         }
         let around = |lights: Vec<Light>, ambient: DVec3| {
-            Surroundings::new(self.reflectors.clone(), lights, ambient)
+            let reflectors = self.reflectors.clone();
+            Surroundings::new(reflectors, lights, ambient, FurtherLight::Estimated)
                 .gather(&places, RAYS * places.len())
                 .irradiances(&[])
         };

@@ -9,20 +9,15 @@ mod data;
 mod own_light;
 mod pipelines;
 
-use std::sync::Arc;
-
 use glam::{DAffine3, Vec3};
 
 use crate::environment::distant_light::DistantLight;
-use crate::environment::finer;
 use crate::environment::glossy::EnvironmentMatrix;
 use crate::environment::placed::PlacedScene;
-use crate::environment::self_occlusion::OwnSpace;
 use crate::environment::sky::Sky;
 use crate::environment::surroundings::Budget;
 use crate::environment::thing::Thing;
 use crate::geometry::bounds::Bounds;
-use crate::geometry::mesh::Mesh;
 use crate::geometry::reach::{self, PixelRect};
 use crate::light::Light;
 use crate::light::probe::Probe;
@@ -275,26 +270,12 @@ fn lit_by_corners(scene: &Scene, is_real_gathered: bool) -> Vec<Option<&Object>>
     real.chain(virtuals).collect()
 }
 
-/// The meshes whose light is worked out at corners and that have too few of these, each with a finer one; of phantoms only where
-/// no rays tell their light.
-pub(super) fn finer_meshes(
-    scene: &Scene,
-    precomputation: &dyn Precomputation,
-) -> Vec<(Arc<Mesh>, Mesh)> {
+/// Things whose light is worked out at their corners: phantoms only where no rays tell theirs.
+pub(super) fn things_lit_by_corners(scene: &Scene) -> impl Iterator<Item = &Object> {
     let is_real_gathered = scene.shadows.environment.method == EnvironmentMethod::Rays;
-    let objects = lit_by_corners(scene, is_real_gathered);
-    let mut finer: Vec<(Arc<Mesh>, Mesh)> = Vec::new();
-    for object in objects.into_iter().flatten() {
-        let mesh = &object.mesh;
-        if object.animation.is_some() || finer.iter().any(|(known, _)| known == mesh) {
-            continue;
-        }
-        let cuts = precomputation.cuts(mesh, &OwnSpace::new(&object.anchor_from_object));
-        if !cuts.is_empty() {
-            finer.push((Arc::clone(mesh), finer::finer(mesh, &cuts)));
-        }
-    }
-    finer
+    lit_by_corners(scene, is_real_gathered)
+        .into_iter()
+        .flatten()
 }
 
 /// They as light from afar meets them.

@@ -4,11 +4,12 @@ use super::super::accumulated::Accumulated;
 use super::super::background::Background;
 use super::super::combined::Combined;
 use super::super::direct::Direct;
-use super::super::environment::{Environment, finer_meshes};
+use super::super::environment::{Environment, things_lit_by_corners};
 use super::super::final_gather::FinalGather;
 use super::super::gpu::Gpu;
 use super::super::gpu_scene::GpuScene;
-use super::super::known_levels::KnownLevels;
+use super::super::indirect::lit_by_surroundings;
+use super::super::known_levels::{KnownLevels, finer_meshes};
 use super::super::light_kind::LightKind;
 use super::super::light_piece::LitBy;
 use super::super::precomputation::Precomputation;
@@ -34,11 +35,14 @@ impl ChosenTechnique {
     /// Coarser versions of a scene's meshes, and finer ones where its technique asks for them.
     pub fn known_levels(scene: &Scene, precomputation: &dyn Precomputation) -> KnownLevels {
         let finer = match (scene.chosen_technique().0, &scene.probe) {
-            (ShadowTechnique::Environment, Some(_)) => finer_meshes(scene, precomputation),
-            (ShadowTechnique::Environment, None)
-            | (ShadowTechnique::Volumes | ShadowTechnique::Shafts | ShadowTechnique::Both, _) => {
-                Vec::new()
+            (ShadowTechnique::Environment, Some(_)) => {
+                finer_meshes(things_lit_by_corners(scene), precomputation)
             }
+            (ShadowTechnique::Volumes, _) => {
+                finer_meshes(lit_by_surroundings(scene), precomputation)
+            }
+            (ShadowTechnique::Environment, None)
+            | (ShadowTechnique::Shafts | ShadowTechnique::Both, _) => Vec::new(),
         };
         KnownLevels::new(scene, finer, precomputation)
     }
