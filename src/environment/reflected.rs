@@ -259,3 +259,69 @@ impl DiscNode {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{DAffine3, DVec3};
+
+    use super::*;
+    use crate::environment::distant_light::DistantLight;
+    use crate::environment::thing::Thing;
+    use crate::geometry::mesh::Mesh;
+    use crate::geometry::mesh::tests::welded;
+    use crate::light::Light;
+    use crate::light::material::Material;
+    use crate::light::mean_surface::MeanSurface;
+    use crate::shafts::casters::Occluder;
+
+    /// A square that faces up.
+    fn square(half_m: f32, height_m: f32) -> Mesh {
+        let corner = |x: f32, y: f32| Vec3::new(x * half_m, y * half_m, height_m);
+        let corners = [
+            corner(-1.0, -1.0),
+            corner(1.0, -1.0),
+            corner(1.0, 1.0),
+            corner(-1.0, 1.0),
+        ];
+        welded(&corners, &[[0, 1, 2], [0, 2, 3]])
+    }
+
+    fn thing(mesh: &Mesh, albedo: f64) -> Thing {
+        let occluder = Occluder {
+            mesh,
+            surfaces: vec![MeanSurface::plain(&Material::matt(DVec3::splat(albedo)))],
+            anchor: 0,
+            anchor_from_object: DAffine3::IDENTITY,
+            casts: true,
+            visible: true,
+            deforms: false,
+        };
+        Thing::new(&occluder, false).expect("triangles")
+    }
+
+    #[test]
+    fn the_back_of_a_sheet_passes_on_what_the_floor_below_it_reflects() {
+        // A sheet some way above a wide floor that the sun is on: from below it has what the floor has times both albedos.
+        let (of_floor, of_sheet, height) = (0.5, 0.8, 10.0);
+        let things = [
+            thing(&square(400.0, 0.0), of_floor),
+            thing(&square(1.0, height), of_sheet),
+        ];
+        let sun = Light::directional(DVec3::new(1.0, 0.0, -1.0).normalize(), DVec3::splat(3.0));
+        let (distant, compact) = (DistantLight::default(), [sun]);
+        let placed = [Some(DAffine3::IDENTITY)];
+        let scene = PlacedScene::new(things.iter().enumerate(), &placed, &distant, &compact);
+        let discs = scene.reflecting();
+        let passed_on = |from: Vec3, along: Vec3| {
+            let seen = scene.seen(from, along, |_| true).expect("the sheet");
+            assert_eq!(seen.thing, 1);
+            f64::from(discs.passed_on(&scene, Among::All, &seen).x)
+        };
+        let on_floor = 3.0 * 0.5_f64.sqrt();
+        let expected = of_sheet * of_floor * on_floor / std::f64::consts::PI;
+        let below = passed_on(Vec3::new(0.1, 0.2, 1.0), Vec3::Z);
+        assert!((below / expected - 1.0).abs() < 0.05, "{below} {expected}");
+        // Its front faces nothing.
+        assert_eq!(passed_on(Vec3::new(0.1, 0.2, 20.0), Vec3::NEG_Z), 0.0);
+    }
+}

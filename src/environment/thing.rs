@@ -77,22 +77,24 @@ impl Thing {
             .par_iter()
             .map(|it| self.is_open_behind(it))
             .collect();
-        let backs_before = |front: usize| {
-            let before = is_seen_behind[..front].iter();
-            fronts.len() + before.filter(|&&is_seen| is_seen).count()
-        };
-        let backs = fronts
-            .iter()
-            .zip(&is_seen_behind)
-            .filter(|(_, is_seen)| **is_seen);
-        let backs = backs.map(|(front, _)| Surfel {
-            normal: -front.normal,
-            ..*front
-        });
+        // For each front the number of the first back that is its own or of one after it.
+        let mut backs_from = vec![fronts.len()];
+        backs_from.extend(is_seen_behind.iter().scan(fronts.len(), |next, &is_seen| {
+            *next += usize::from(is_seen);
+            Some(*next)
+        }));
+        let backs = fronts.iter().zip(&is_seen_behind);
+        let backs = backs
+            .filter(|(_, is_seen)| **is_seen)
+            .map(|(front, _)| Surfel {
+                normal: -front.normal,
+                ..*front
+            });
         let surfels: Vec<Surfel> = fronts.iter().copied().chain(backs).collect();
-        let near = |corners: &[Vec3; 3], normal: Vec3| {
-            let middle = corners.iter().sum::<Vec3>() / 3.0;
-            let like = surfels.iter().enumerate();
+        let near = |corners: &[Vec3; 3]| {
+            let [a, b, c] = *corners;
+            let (normal, middle) = ((b - a).cross(c - a).normalize_or_zero(), (a + b + c) / 3.0);
+            let like = fronts.iter().enumerate();
             let like = like.filter(|(_, surfel)| surfel.normal.dot(normal) > LIKE_NORMALS);
             let nearest = like.min_by(|(_, one), (_, other)| {
                 let distance = |surfel: &Surfel| surfel.position.distance_squared(middle);
@@ -102,17 +104,12 @@ impl Thing {
         };
         let sides = triangles.par_iter().zip(on_triangle);
         let sides = sides.map(|((corners, _), on)| {
-            let [a, b, c] = *corners;
-            let normal = (b - a).cross(c - a).normalize_or_zero();
-            // (Where there is none on a triangle, it has one of those before it in their order.)
-            let is_like = |surfel: &Surfel| surfel.normal.dot(normal) > LIKE_NORMALS;
-            let own = fronts.get(on.clone());
-            let has_own = own.is_some_and(|own| own.iter().all(is_like));
-            let behind = backs_before(on.start)..backs_before(on.end);
-            match has_own {
-                true => [on, behind],
-                false => [near(corners, normal), near(corners, -normal)],
-            }
+            let on = match on.is_empty() {
+                true => near(corners),
+                false => on,
+            };
+            let behind = backs_from[on.start]..backs_from[on.end];
+            [on, behind]
         });
         Self {
             surfels_on: sides.collect(),
@@ -199,5 +196,63 @@ impl Thing {
             surface_numbers,
             surfaces: thing.surfaces.clone(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DAffine3;
+
+    use super::*;
+    use crate::geometry::cuboid::cuboid;
+    use crate::geometry::mesh::Mesh;
+    use crate::geometry::mesh::tests::welded;
+    use crate::light::material::Material;
+
+    fn thing(mesh: &Mesh, deforms: bool) -> Thing {
+        let occluder = Occluder {
+            mesh,
+            surfaces: vec![MeanSurface::plain(&Material::matt(DVec3::ONE))],
+            anchor: 0,
+            anchor_from_object: DAffine3::IDENTITY,
+            casts: true,
+            visible: true,
+            deforms,
+        };
+        Thing::new(&occluder, false).expect("triangles")
+    }
+
+    #[test]
+    fn a_sheet_has_discs_on_both_sides_and_a_solid_outside_alone() {
+        let corners = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y];
+        let sheet = thing(&welded(&corners, &[[0, 1, 2], [0, 2, 3]]), false);
+        for normal in [Vec3::Z, Vec3::NEG_Z] {
+            for triangle in [0, 1] {
+                let disc = sheet.disc_at(triangle, Vec3::new(0.4, 0.6, 0.0), normal);
+                let disc = sheet.surfels[disc.expect("a disc")];
+                assert_eq!(disc.normal, normal);
+                assert!(disc.position.distance(Vec3::new(0.4, 0.6, 0.0)) < 0.4);
+            }
+        }
+        let (positions, triangles) = cuboid(Vec3::ZERO, Vec3::ONE);
+        let solid = thing(&welded(&positions, &triangles), false);
+        let outwards =
+            |surfel: &Surfel| surfel.normal.dot(surfel.position - solid.ball.center) > 0.0;
+        assert!(!solid.surfels.is_empty() && solid.surfels.iter().all(outwards));
+    }
+
+    #[test]
+    fn what_is_too_small_for_a_disc_has_that_of_what_lies_near_it_and_alike() {
+        let floor = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y];
+        let above = [Vec3::ZERO, Vec3::X, Vec3::Y].map(|it| 1e-3 * it + Vec3::new(0.5, 0.5, 0.1));
+        let upright = [Vec3::ZERO, Vec3::X, Vec3::Z].map(|it| 1e-3 * it + Vec3::splat(0.3));
+        let corners: Vec<Vec3> = floor.into_iter().chain(above).chain(upright).collect();
+        let triangles = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [7, 8, 9]];
+        let all = thing(&welded(&corners, &triangles), true);
+        let disc = all.disc_at(2, above[0], Vec3::Z).expect("the floor's");
+        let near = all.surfels[disc];
+        assert_eq!((near.normal, near.position.z), (Vec3::Z, 0.0));
+        assert!(near.position.distance(above[0]) < 0.2);
+        assert_eq!(all.disc_at(3, upright[0], Vec3::Y), None);
     }
 }

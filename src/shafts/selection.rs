@@ -1,8 +1,6 @@
 //! n sources that stand for all that may be hidden (Gibson et al. 2003, section 8): nodes of the source tree. The light of
 //! all is kept.
 
-use std::collections::BinaryHeap;
-
 use glam::{DMat3, DVec3, Mat3, Vec3};
 
 use super::source_tree::{SourceNode, SourceTree};
@@ -12,7 +10,7 @@ pub const LEAST_WEIGHT: f32 = 1.0 / 2048.0;
 
 /// One shadow for all of a node is half as wrong as it can be where the node is seen as wide as this, in parts of its distance: the
 /// wider it is the more the shadow is off, until none of it is left.
-const HALF_AS_WRONG: f32 = 0.1;
+const HALF_AS_WRONG: f32 = 0.2;
 
 /// A source as it weighs in the present frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,27 +36,6 @@ pub struct Representative {
     pub spread: Mat3,
     /// Sum of their weights.
     pub weight: f32,
-}
-
-#[derive(PartialEq)]
-struct Candidate {
-    priority: f32,
-    node: u32,
-}
-
-impl Eq for Candidate {}
-
-impl Ord for Candidate {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        let by_priority = self.priority.total_cmp(&other.priority);
-        by_priority.then(other.node.cmp(&self.node))
-    }
-}
-
-impl PartialOrd for Candidate {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
 }
 
 /// Sums over the first sources of the tree, none to all: any node's moments are a difference.
@@ -109,9 +86,9 @@ fn outer(vector: DVec3) -> DMat3 {
     DMat3::from_cols(vector * vector.x, vector * vector.y, vector * vector.z)
 }
 
-/// Up to `count` representatives for the sources, which come in the tree's order, as they are seen from `casters`. A node
-/// is cut by what one shadow for all of it does wrong: its weight times a part that grows with how wide it is seen, for the
-/// shadow of a narrow node is right however bright it is. Nodes below `least` there are not cut: no eye could tell.
+/// Up to `count` representatives for the sources, which come in the tree's order, as they are seen from `casters`: of all ways to
+/// cut the tree into so many nodes the one that does least wrong, all in all. Nodes that do less than `least` wrong as one are
+/// not cut: no eye could tell.
 pub fn representatives(
     tree: &SourceTree,
     sources: &[WeighedSource],
@@ -124,44 +101,96 @@ pub fn representatives(
     if count == 0 || tree.nodes.is_empty() || all <= 0.0 {
         return Vec::new();
     }
-    let candidate = |node: u32| {
-        let one = sums.representative(&tree.nodes[node as usize]);
-        let distance = one.position.distance_squared(casters).max(1e-9);
-        let width = (one.spread_trace() / (2.0 * distance)).sqrt();
-        let priority = one.weight * width / (width + HALF_AS_WRONG);
-        Candidate { priority, node }
-    };
-    let weight = |node: u32| sums.representative(&tree.nodes[node as usize]).weight;
-    let mut open = BinaryHeap::from([candidate(0)]);
-    let mut closed = Vec::new();
-    while open.len() + closed.len() < count {
-        let Some(Candidate { priority, node }) = open.pop() else {
-            break;
-        };
-        match tree.nodes[node as usize].children {
-            Some(children) if priority > least => {
-                // What differences of sums leave of nothing is nothing.
-                let lit = children
-                    .into_iter()
-                    .filter(|&child| f64::from(weight(child)) > 1e-12 * all);
-                open.extend(lit.map(candidate));
+    // What differences of sums leave of nothing is nothing.
+    let lit = |one: &Representative| f64::from(one.weight) > 1e-12 * all;
+    let nodes = tree.nodes.iter();
+    let nodes = nodes.map(|node| Some(sums.representative(node)).filter(lit));
+    let nodes: Vec<Option<Representative>> = nodes.collect();
+    let cuts = LeastWrong::new(tree, &nodes, (count, least), casters);
+    let best = (1..cuts.of[0].len()).min_by(|&one, &other| {
+        let [one, other] = [one, other].map(|count| cuts.of[0][count]);
+        one.total_cmp(&other)
+    });
+    let mut chosen = Vec::new();
+    cuts.choose(0, best.unwrap_or(1), &mut chosen);
+    chosen.into_iter().filter_map(|node| nodes[node]).collect()
+}
+
+/// For each node of a tree, and each number of nodes that it may be cut into, what the best of these cuts does wrong.
+struct LeastWrong<'a> {
+    tree: &'a SourceTree,
+    of: Vec<Vec<f32>>,
+}
+
+impl<'a> LeastWrong<'a> {
+    fn new(
+        tree: &'a SourceTree,
+        nodes: &[Option<Representative>],
+        (most, least): (usize, f32),
+        casters: Vec3,
+    ) -> Self {
+        let mut of = vec![Vec::new(); nodes.len()];
+        // (Children come after their parents.)
+        for (index, node) in nodes.iter().enumerate().rev() {
+            let Some(one) = node else {
+                of[index] = vec![0.0];
+                continue;
+            };
+            let as_one = one.wrong(casters);
+            let mut wrong = vec![f32::INFINITY, as_one];
+            let children = tree.nodes[index].children;
+            if let Some(children) = children.filter(|_| as_one > least) {
+                let [low, high] = children.map(|child| &of[child as usize]);
+                let largest = (low.len() + high.len() - 2).min(most);
+                wrong.resize(wrong.len().max(largest + 1), f32::INFINITY);
+                for (low_count, of_low) in low.iter().enumerate() {
+                    // (Only of a node without light are none a cut.)
+                    for (high_count, of_high) in high.iter().enumerate() {
+                        let count = low_count + high_count;
+                        if count > largest {
+                            break;
+                        }
+                        wrong[count] = wrong[count].min(of_low + of_high);
+                    }
+                }
             }
-            _ => closed.push(node),
+            of[index] = wrong;
+        }
+        Self { tree, of }
+    }
+
+    /// Adds the nodes of the best cut of a node into `count`, in the tree's order.
+    fn choose(&self, node: usize, count: usize, chosen: &mut Vec<usize>) {
+        let wrong = &self.of[node];
+        let cut = self.tree.nodes[node].children.and_then(|children| {
+            let [low, high] = children.map(|child| &self.of[child as usize]);
+            let counts =
+                (0..low.len()).filter(|&of_low| of_low <= count && count - of_low < high.len());
+            let is_best = |&of_low: &usize| low[of_low] + high[count - of_low] <= wrong[count];
+            let of_low = { counts }.find(is_best)?;
+            Some([(children[0], of_low), (children[1], count - of_low)])
+        });
+        match cut {
+            Some(parts) if count > 0 => {
+                for (child, count) in parts {
+                    self.choose(child as usize, count, chosen);
+                }
+            }
+            _ if count > 0 => chosen.push(node),
+            _ => {}
         }
     }
-    let mut nodes: Vec<u32> = open
-        .into_iter()
-        .map(|candidate| candidate.node)
-        .chain(closed)
-        .collect();
-    nodes.sort_unstable_by_key(|&node| tree.nodes[node as usize].first);
-    nodes
-        .into_iter()
-        .map(|node| sums.representative(&tree.nodes[node as usize]))
-        .collect()
 }
 
 impl Representative {
+    /// How wrong one shadow for all of it is: its weight times a part that grows with how wide it is seen from `casters`, for the
+    /// shadow of a narrow node is right however bright it is.
+    fn wrong(&self, casters: Vec3) -> f32 {
+        let distance = self.position.distance_squared(casters).max(1e-9);
+        let width = (self.spread_trace() / (2.0 * distance)).sqrt();
+        self.weight * width / (width + HALF_AS_WRONG)
+    }
+
     /// Sum of its variances along all axes, square metres.
     pub fn spread_trace(&self) -> f32 {
         (self.spread.x_axis.x + self.spread.y_axis.y + self.spread.z_axis.z).max(0.0)
@@ -235,29 +264,72 @@ mod tests {
         assert!(representatives(&tree, &sources, 0, 0.0, CASTERS).is_empty());
     }
 
+    /// What each cut of a node into lit nodes does wrong, with how many these are.
+    fn all_cuts(tree: &SourceTree, sources: &[WeighedSource], node: usize) -> Vec<(usize, f32)> {
+        let sums = MomentSums::new(sources);
+        let one = sums.representative(&tree.nodes[node]);
+        if one.weight < 1e-6 {
+            return vec![(0, 0.0)];
+        }
+        let mut cuts = vec![(1, one.wrong(CASTERS))];
+        if let Some(children) = tree.nodes[node].children {
+            let [low, high] = children.map(|child| all_cuts(tree, sources, child as usize));
+            for (low_count, of_low) in low {
+                let both = high
+                    .iter()
+                    .map(|(count, wrong)| (low_count + count, of_low + wrong));
+                cuts.extend(both);
+            }
+        }
+        cuts
+    }
+
     #[test]
-    fn what_one_shadow_does_most_wrong_is_cut_first_and_what_nobody_sees_never() {
+    fn no_other_cut_into_as_many_nodes_does_less_wrong() {
         let (tree, sources) = scene();
-        let few = representatives(&tree, &sources, 12, 0.0, CASTERS);
-        let many = representatives(&tree, &sources, 13, 0.0, CASTERS);
-        let cut: Vec<_> = few.iter().filter(|one| !many.contains(one)).collect();
-        assert_eq!(cut.len(), 1);
-        let wrong = |one: &Representative| {
-            let members = &sources[one.first as usize..one.last as usize];
-            let spread: f32 = members
-                .iter()
-                .map(|source| source.weight * source.center.distance_squared(one.position))
-                .sum();
-            (one.weight * spread / 2.0).sqrt() / one.position.distance(CASTERS)
-        };
-        let largest = few.iter().map(wrong).fold(0.0, f32::max);
-        assert!(
-            wrong(cut[0]) > 0.95 * largest,
-            "{} {largest}",
-            wrong(cut[0])
-        );
+        // A part of the tree that has few enough cuts to try all.
+        let part = (0..tree.nodes.len()).find(|&node| {
+            let node = &tree.nodes[node];
+            (10..16).contains(&(node.last - node.first))
+        });
+        let part = tree.nodes[part.expect("a small part")];
+        let sources: Vec<WeighedSource> = sources
+            .iter()
+            .enumerate()
+            .map(|(index, source)| {
+                let is_in = (part.first..part.last).contains(&(index as u32));
+                WeighedSource {
+                    weight: if is_in { source.weight } else { 0.0 },
+                    ..*source
+                }
+            })
+            .collect();
+        let cuts = all_cuts(&tree, &sources, 0);
+        assert!(cuts.len() > 100, "{}", cuts.len());
+        for count in 1..12 {
+            let chosen = representatives(&tree, &sources, count, 0.0, CASTERS);
+            let wrong: f32 = chosen.iter().map(|one| one.wrong(CASTERS)).sum();
+            let best = cuts.iter().filter(|cut| cut.0 <= count);
+            let best = best.map(|cut| cut.1).fold(f32::INFINITY, f32::min);
+            assert!(chosen.len() <= count);
+            assert!(
+                (wrong - best).abs() < 1e-4 * best.max(1e-3),
+                "{count}: {wrong} {best}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_nobody_sees_is_not_cut() {
+        let (tree, sources) = scene();
         let coarse = representatives(&tree, &sources, 1000, 20.0, CASTERS);
         assert!((2..40).contains(&coarse.len()), "{}", coarse.len());
+        let fine = representatives(&tree, &sources, 1000, 0.0, CASTERS);
+        assert!(fine.len() > coarse.len());
+        // All that was left as one does no more than that wrong, or is one patch.
+        for one in &coarse {
+            assert!(one.wrong(CASTERS) <= 20.0 || one.last - one.first == 1);
+        }
     }
 
     #[test]

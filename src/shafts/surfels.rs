@@ -176,7 +176,7 @@ pub fn surfels(triangles: &[([Vec3; 3], Vec3)], count: usize) -> Vec<Surfel> {
     surfels_of_triangles(triangles, count).0
 }
 
-/// The same, and for each triangle those that are on it or, where none is, the nearest in their order.
+/// The same, and for each triangle those that are on it.
 pub fn surfels_of_triangles(
     triangles: &[([Vec3; 3], Vec3)],
     count: usize,
@@ -196,11 +196,7 @@ pub fn surfels_of_triangles(
         let before = (covered / share + 0.5).floor();
         covered += area(corners);
         let here = ((covered / share + 0.5).floor() - before) as usize;
-        let first = match here {
-            0 => result.len().saturating_sub(1),
-            _ => result.len(),
-        };
-        on_triangle[index] = first..first + here.max(1);
+        on_triangle[index] = result.len()..result.len() + here;
         result.extend(points_on(corners, here).map(|position| Surfel {
             position,
             normal: (b - a).cross(c - a).normalize_or_zero(),

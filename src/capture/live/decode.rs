@@ -135,6 +135,9 @@ fn convert(
     Ok(rgba)
 }
 
+/// Six blocks of 256 pixels that share their colour take a bit each and more; of a picture most of which is lost some are left.
+const MOST_PIXELS_OF_A_BYTE: usize = 512;
+
 /// RGBA of a JPEG and its size.
 pub fn rgba_of_jpeg(bytes: &[u8], tolerance: Tolerance) -> Option<([u32; 2], Vec<u8>)> {
     // Zeros in place of a lost end are codes like any other; the mark of the end tells.
@@ -146,9 +149,14 @@ pub fn rgba_of_jpeg(bytes: &[u8], tolerance: Tolerance) -> Option<([u32; 2], Vec
         .jpeg_set_out_colorspace(ColorSpace::RGBA);
     let jpeg = with_tables(bytes);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(&*jpeg), options);
-    let rgba = decoder.decode().ok()?;
+    decoder.decode_headers().ok()?;
     let info = decoder.info()?;
     let size_px = [u32::from(info.width), u32::from(info.height)];
+    // A damaged head may ask for any memory.
+    if size_px[0] as usize * size_px[1] as usize / MOST_PIXELS_OF_A_BYTE > bytes.len() {
+        return None;
+    }
+    let rgba = decoder.decode().ok()?;
     let whole = rgba.len() == size_px[0] as usize * size_px[1] as usize * 4;
     whole.then_some((size_px, rgba))
 }
@@ -174,6 +182,22 @@ mod tests {
     }
     use opencv::core::{Mat, Vector};
     use opencv::imgcodecs;
+
+    #[test]
+    fn a_damaged_head_takes_no_memory_for_what_cannot_be_there() {
+        let grey = Mat::new_rows_cols_with_default(480, 640, opencv::core::CV_8UC3, 127.into());
+        let mut jpeg = Vector::new();
+        let grey = grey.expect("a picture");
+        imgcodecs::imencode(".jpg", &grey, &mut jpeg, &Vector::new()).expect("a JPEG");
+        let mut jpeg: Vec<u8> = jpeg.into();
+        assert!(rgba_of_jpeg(&jpeg, Tolerance::Strict).is_some());
+        let frame = jpeg.windows(2).position(|pair| pair == [0xff, 0xc0]);
+        let sides = frame.expect("a frame's head") + 5;
+        jpeg[sides..sides + 4].copy_from_slice(&[0x3f, 0xff, 0x3f, 0xff]);
+        for tolerance in [Tolerance::Strict, Tolerance::Lenient] {
+            assert_eq!(rgba_of_jpeg(&jpeg, tolerance), None);
+        }
+    }
 
     /// What BT.601 says of a limited-range YCbCr colour, in f64.
     fn rgb_of([y, cb, cr]: [u8; 3]) -> [f64; 3] {
