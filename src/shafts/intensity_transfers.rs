@@ -30,10 +30,12 @@ pub fn intensity_transfers<const N: usize>(
         .collect()
 }
 
-/// The set of a source by its place in the order: as if drawn by lot, and the same in each frame.
+/// The set of a source by its place in the order: of two that follow each other one is in either, so that the sets are equally
+/// large, and which is where is as if drawn by lot, and the same in each frame.
 pub fn set_of(place: usize) -> usize {
     // Knuth's multiplicative hash.
-    ((place as u32).wrapping_mul(2_654_435_761) >> 16) as usize % SETS
+    let lot = (((place / SETS) as u32).wrapping_mul(2_654_435_761) >> 16) as usize;
+    (place + lot) % SETS
 }
 
 /// How a camera encodes linear light as sRGB, 0 to 1.
