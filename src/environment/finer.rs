@@ -28,8 +28,10 @@ const RAYS: usize = 1024;
 const INSET: f32 = 0.05;
 /// Edges are halved so many times at most, ...
 const MOST_HALVINGS: usize = 9;
-/// ... and no more are where so many triangles have come in.
+/// ... and no more are where so many triangles have come in, or would at once.
 const MOST_ADDED: usize = 8192;
+/// Of more triangles than these no transfer is looked at, which would take minutes; edges that are too long are halved.
+const MOST_LOOKED_AT: usize = 16_384;
 
 /// The edges that are halved, one set after the other, each of the mesh that the one before left.
 pub type Cuts = Vec<Vec<Edge>>;
@@ -66,12 +68,16 @@ pub fn cuts(mesh: &Mesh, space: &OwnSpace, goes_on: &(dyn Fn() -> bool + Sync)) 
     // (A triangle that is whole and even once is so later.)
     let mut even: HashSet<[u32; 3]> = HashSet::new();
     for _ in 0..MOST_HALVINGS {
+        if finer.triangles.len() >= most {
+            break;
+        }
         let numbers: Vec<usize> = (0..finer.triangles.len())
             .filter(|&number| !even.contains(&finer.triangles[number]))
             .collect();
+        let are_few = numbers.len() <= MOST_LOOKED_AT;
         let looked_at: Vec<Vec<Edge>> = numbers
             .par_iter()
-            .map(|&number| goes_on().then(|| looking.uneven_edges(&finer, number)))
+            .map(|&number| goes_on().then(|| looking.uneven_edges(&finer, number, are_few)))
             .collect::<Option<_>>()?;
         for (&number, uneven) in numbers.iter().zip(&looked_at) {
             if uneven.is_empty() {
@@ -79,7 +85,7 @@ pub fn cuts(mesh: &Mesh, space: &OwnSpace, goes_on: &(dyn Fn() -> bool + Sync)) 
             }
         }
         let edges: HashSet<Edge> = looked_at.into_iter().flatten().collect();
-        if edges.is_empty() || finer.triangles.len() >= most {
+        if edges.is_empty() || edges.len() > MOST_ADDED {
             break;
         }
         finer = finer.with_edges_cut(&edges);
@@ -115,8 +121,9 @@ struct Looking<'a> {
 }
 
 impl Looking<'_> {
-    /// The edges of a triangle along which, or on whose side, transfer is not what lies between the corners.
-    fn uneven_edges(&self, mesh: &Mesh, number: usize) -> Vec<Edge> {
+    /// The edges of a triangle that are too long, or else, if they are looked at, along which, or on whose side, transfer is not
+    /// what lies between the corners.
+    fn uneven_edges(&self, mesh: &Mesh, number: usize, are_looked_at: bool) -> Vec<Edge> {
         let triangle = mesh.triangles[number];
         let normals = mesh.corner_normals[number];
         let corners: [Place; 3] = std::array::from_fn(|corner| {
@@ -143,7 +150,7 @@ impl Looking<'_> {
             .filter(is_too_long)
             .map(|&(a, b)| edge(triangle[a], triangle[b]))
             .collect();
-        if !too_long.is_empty() {
+        if !too_long.is_empty() || !are_looked_at {
             return too_long;
         }
         let mut known: HashMap<[u8; 3], Transfer> = HashMap::new();

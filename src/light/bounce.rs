@@ -64,7 +64,10 @@ struct ShiningLight {
 impl ShiningLight {
     /// The way to it from a place on which a ray with this number ended, and the part of that at which it is.
     fn way_from(&self, place: DVec3, number: usize) -> (DVec3, f32) {
-        self.places[number % self.places.len()].way_from(place)
+        // (Not each eighth: of a spiral by the golden angle these lie on one arm.)
+        let part = (number as f64 * STEPS_OVER_AN_END[0]).fract();
+        let which = (part * self.places.len() as f64) as usize;
+        self.places[which].way_from(place)
     }
 }
 

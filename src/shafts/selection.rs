@@ -161,23 +161,26 @@ impl<'a> LeastWrong<'a> {
 
     /// Adds the nodes of the best cut of a node into `count`, in the tree's order.
     fn choose(&self, node: usize, count: usize, chosen: &mut Vec<usize>) {
-        let wrong = &self.of[node];
+        if count == 0 {
+            return;
+        }
+        let wrong = self.of[node][count];
         let cut = self.tree.nodes[node].children.and_then(|children| {
             let [low, high] = children.map(|child| &self.of[child as usize]);
-            let counts =
-                (0..low.len()).filter(|&of_low| of_low <= count && count - of_low < high.len());
-            let is_best = |&of_low: &usize| low[of_low] + high[count - of_low] <= wrong[count];
-            let of_low = { counts }.find(is_best)?;
+            let of_high = |of_low: usize| high.get(count.checked_sub(of_low)?).copied();
+            let is_best = |of_low: &usize| {
+                of_high(*of_low).is_some_and(|of_high| low[*of_low] + of_high <= wrong)
+            };
+            let of_low = (0..low.len()).find(is_best)?;
             Some([(children[0], of_low), (children[1], count - of_low)])
         });
         match cut {
-            Some(parts) if count > 0 => {
+            Some(parts) => {
                 for (child, count) in parts {
                     self.choose(child as usize, count, chosen);
                 }
             }
-            _ if count > 0 => chosen.push(node),
-            _ => {}
+            None => chosen.push(node),
         }
     }
 }
