@@ -10,7 +10,7 @@ use super::AnyChart;
 use super::lab::Lab;
 use super::sheet::{ENLARGED, Sheet, SheetPart, changed_part};
 use super::shots::Shots;
-use crate::app::files::picture_files::write_rgb_png;
+use crate::app::files::picture_files::write_small_rgb_png;
 use crate::app::stages::progress::Progress;
 use crate::app::truth::LinearPicture;
 use crate::geometry::mesh::{HeldCorner, HeldNormal, RigPoint};
@@ -181,7 +181,7 @@ impl AnyChart for EnvironmentPictures {
             rows,
         }
         .paint()?;
-        write_rgb_png(&out.join(format!("{NAME}.png")), size_px, &rgba)?;
+        write_small_rgb_png(&out.join(format!("{NAME}.png")), size_px, &rgba)?;
         Ok(true)
     }
 }

@@ -35,7 +35,7 @@ use anyhow::{Context as _, Result, bail};
 
 use crate::app::files::LockedFolder;
 use crate::app::files::job_files::{JobFiles, Replacing};
-use crate::app::files::picture_files::{write_rgb_png, write_text};
+use crate::app::files::picture_files::{write_small_rgb_png, write_text};
 use crate::app::files::result_kind::ResultKind;
 use crate::app::stages::progress::Progress;
 use crate::app::talk;
@@ -231,7 +231,7 @@ impl<C: Chart> AnyChart for C {
         write_text(&file("csv"), &to_csv(&rows, true)?)?;
         write_text(&file("svg"), &svg(&figure)?)?;
         let (size_px, rgba) = bitmap(&figure)?;
-        write_rgb_png(&file("png"), size_px, &rgba)?;
+        write_small_rgb_png(&file("png"), size_px, &rgba)?;
         Ok(true)
     }
 }

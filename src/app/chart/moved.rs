@@ -13,7 +13,7 @@ use super::lab::Lab;
 use super::measured::{rounded, to_csv};
 use super::sheet::{ENLARGED, Sheet, SheetPart, changed_part};
 use super::shots::Shots;
-use crate::app::files::picture_files::{write_rgb_png, write_text};
+use crate::app::files::picture_files::{write_small_rgb_png, write_text};
 use crate::app::stages::progress::Progress;
 use crate::app::truth::{Drawn, LinearPicture, draw};
 use crate::render::VIRTUAL;
@@ -154,7 +154,7 @@ impl AnyChart for Moved {
         }
         .paint()?;
         write_text(&out.join(format!("{NAME}.csv")), &to_csv(&rows, true)?)?;
-        write_rgb_png(&out.join(format!("{NAME}.png")), size_px, &rgba)?;
+        write_small_rgb_png(&out.join(format!("{NAME}.png")), size_px, &rgba)?;
         progress.advance();
         Ok(true)
     }

@@ -9,7 +9,7 @@ use super::lab::Lab;
 use super::shadows::with_sources;
 use super::sheet::{Cell, ENLARGED, Sheet, changed_part};
 use super::shots::{Shot, Shots, mean};
-use crate::app::files::picture_files::write_rgb_png;
+use crate::app::files::picture_files::write_small_rgb_png;
 use crate::app::stages::progress::Progress;
 use crate::app::stages::stats::quantile;
 use crate::app::stopwatch::Stopwatch;
@@ -135,7 +135,7 @@ fn make_sheet(
         rows,
     }
     .paint()?;
-    write_rgb_png(&out.join(format!("{}.png", chart.name())), size_px, &rgba)?;
+    write_small_rgb_png(&out.join(format!("{}.png", chart.name())), size_px, &rgba)?;
     Ok(true)
 }
 

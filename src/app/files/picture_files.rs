@@ -17,28 +17,50 @@ pub fn write_rgb_png(path: &Path, size_px: [u32; 2], rgba: &[u8]) -> Result<(), 
     write_bytes(path, &rgb_png(path, size_px, rgba)?)
 }
 
+/// The same as small as can be: for what is made once and kept in a repository, as charts are.
+pub fn write_small_rgb_png(path: &Path, size_px: [u32; 2], rgba: &[u8]) -> Result<(), OutputError> {
+    let rgb = rgb_of(rgba);
+    let samples = (ColorType::Rgb, BitDepth::Eight, &rgb[..]);
+    let bytes = png(
+        path,
+        size_px,
+        samples,
+        (Filter::Adaptive, Compression::High),
+    )?;
+    write_bytes(path, &bytes)
+}
+
 /// An 8-bit RGB PNG of 8-bit RGBA; alpha is dropped. `path` is for messages, here as below.
 pub fn rgb_png(path: &Path, size_px: [u32; 2], rgba: &[u8]) -> Result<Vec<u8>, OutputError> {
-    let rgb: Vec<u8> = rgba
-        .chunks_exact(4)
-        .flat_map(|pixel| [pixel[0], pixel[1], pixel[2]])
-        .collect();
+    let rgb = rgb_of(rgba);
     // Photographs: one cheap filter is as good as trying all.
     let samples = (ColorType::Rgb, BitDepth::Eight, &rgb[..]);
-    png(path, size_px, samples, Filter::Up)
+    png(path, size_px, samples, (Filter::Up, Compression::Fast))
+}
+
+fn rgb_of(rgba: &[u8]) -> Vec<u8> {
+    let pixels = rgba.chunks_exact(4);
+    pixels
+        .flat_map(|pixel| [pixel[0], pixel[1], pixel[2]])
+        .collect()
 }
 
 /// An 8-bit grey PNG (masks, roles).
 pub fn grey_png(path: &Path, size_px: [u32; 2], grey: &[u8]) -> Result<Vec<u8>, OutputError> {
     let samples = (ColorType::Grayscale, BitDepth::Eight, grey);
-    png(path, size_px, samples, Filter::NoFilter)
+    png(
+        path,
+        size_px,
+        samples,
+        (Filter::NoFilter, Compression::Fast),
+    )
 }
 
 /// A 16-bit RGB PNG (gain), three values a pixel.
 pub fn rgb16_png(path: &Path, size_px: [u32; 2], rgb: &[u16]) -> Result<Vec<u8>, OutputError> {
     let bytes: Vec<u8> = rgb.iter().flat_map(|value| value.to_be_bytes()).collect();
     let samples = (ColorType::Rgb, BitDepth::Sixteen, &bytes[..]);
-    png(path, size_px, samples, Filter::Up)
+    png(path, size_px, samples, (Filter::Up, Compression::Fast))
 }
 
 /// One 32-bit float a pixel as an EXR whose only channel is `Y` (depth).
@@ -168,7 +190,7 @@ fn png(
     path: &Path,
     size_px: [u32; 2],
     (color, depth, samples): (ColorType, BitDepth, &[u8]),
-    filter: Filter,
+    (filter, compression): (Filter, Compression),
 ) -> Result<Vec<u8>, OutputError> {
     let bytes_per_pixel = color.samples() * usize::from(depth as u8) / 8;
     if samples.len() != size_px[0] as usize * size_px[1] as usize * bytes_per_pixel {
@@ -181,7 +203,7 @@ fn png(
     let mut encoder = png::Encoder::new(&mut bytes, size_px[0], size_px[1]);
     encoder.set_color(color);
     encoder.set_depth(depth);
-    encoder.set_compression(Compression::Fast);
+    encoder.set_compression(compression);
     encoder.set_filter(filter);
     let written = encoder
         .add_text_chunk("Software".to_owned(), SOFTWARE.to_owned())
