@@ -458,8 +458,11 @@ fn an_older_result_is_replaced_and_nothing_else_without_force() {
     done(folder.path(), &quick(&["--poses", "empty"]));
 
     // What others made may be there once alone: a video of one's own, a photograph.
-    let [video, photograph] = ["recordings/lamp/video.mp4", "charts/shadows.png"]
-        .map(|name| fs::read(project_file(name)).unwrap());
+    let [video, photograph] = [
+        "recordings/lamp/video.mp4",
+        "recordings/bulb/truth/000_with.png",
+    ]
+    .map(|name| fs::read(project_file(name)).unwrap());
     fs::write(at("sheet.png"), &photograph).unwrap();
     refused(
         folder.path(),
@@ -490,7 +493,7 @@ fn probes_and_sheets_are_known_again_in_each_format() {
     let given = project_file("recordings/room/probe.hdr");
     let foreign = |name: &str| match Path::new(name).extension().unwrap().to_str().unwrap() {
         "hdr" => given.clone(),
-        "png" => project_file("charts/shadows.png"),
+        "png" => project_file("recordings/bulb/truth/000_with.png"),
         "svg" => project_file("charts/shadows.svg"),
         // (None of the kind is in the project.)
         _ => project_file("LICENSE"),

@@ -290,11 +290,13 @@ mod tests {
         for (kind, bytes) in &cases {
             assert!(kind.is(bytes), "{kind:?}");
             for other in kinds.iter().filter(|other| *other != kind) {
-                // Printed markers can be learnt anew; each CSV is a table, each picture a chart's.
+                // Printed markers can be learnt anew; each CSV is a table, each picture may be a chart's, and charts say that
+                // gnomon made them.
                 let both = [
                     (PrintedMarkers, LearntBoard),
                     (Poses, Table),
                     (Png, ChartPicture),
+                    (ChartPicture, Png),
                     (Svg, ChartDrawing),
                 ];
                 let both = both.contains(&(*kind, *other));
