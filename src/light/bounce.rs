@@ -252,7 +252,7 @@ impl Surroundings {
         GatheredRay {
             direction: single,
             distance_m: end.distance_m,
-            unlit: (end.albedo * self.from_around(&end, number)).as_vec3(),
+            unlit: (end.albedo * self.arriving_from_around(&end, number)).as_vec3(),
         }
     }
 
@@ -289,7 +289,7 @@ impl Surroundings {
     }
 
     /// The mean radiance that reaches a place from around, but for the lights themselves, as a single ray tells it.
-    fn from_around(&self, at: &End, number: usize) -> DVec3 {
+    fn arriving_from_around(&self, at: &End, number: usize) -> DVec3 {
         if self.further == FurtherLight::Estimated {
             return self.ambient_radiance;
         }
