@@ -266,13 +266,10 @@ mod tests {
 
     use super::*;
     use crate::environment::distant_light::DistantLight;
-    use crate::environment::thing::Thing;
+    use crate::environment::thing::tests::thing;
     use crate::geometry::mesh::Mesh;
     use crate::geometry::mesh::tests::welded;
     use crate::light::Light;
-    use crate::light::material::Material;
-    use crate::light::mean_surface::MeanSurface;
-    use crate::shafts::casters::Occluder;
 
     /// A square that faces up.
     fn square(half_m: f32, height_m: f32) -> Mesh {
@@ -286,26 +283,13 @@ mod tests {
         welded(&corners, &[[0, 1, 2], [0, 2, 3]])
     }
 
-    fn thing(mesh: &Mesh, albedo: f64) -> Thing {
-        let occluder = Occluder {
-            mesh,
-            surfaces: vec![MeanSurface::plain(&Material::matt(DVec3::splat(albedo)))],
-            anchor: 0,
-            anchor_from_object: DAffine3::IDENTITY,
-            casts: true,
-            visible: true,
-            deforms: false,
-        };
-        Thing::new(&occluder, false).expect("triangles")
-    }
-
     #[test]
     fn the_back_of_a_sheet_passes_on_what_the_floor_below_it_reflects() {
         // A sheet some way above a wide floor that the sun is on: from below it has what the floor has times both albedos.
         let (of_floor, of_sheet, height) = (0.5, 0.8, 10.0);
         let things = [
-            thing(&square(400.0, 0.0), of_floor),
-            thing(&square(1.0, height), of_sheet),
+            thing(&square(400.0, 0.0), of_floor, false),
+            thing(&square(1.0, height), of_sheet, false),
         ];
         let sun = Light::directional(DVec3::new(1.0, 0.0, -1.0).normalize(), DVec3::splat(3.0));
         let (distant, compact) = (DistantLight::default(), [sun]);

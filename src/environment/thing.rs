@@ -200,7 +200,7 @@ impl Thing {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use glam::DAffine3;
 
     use super::*;
@@ -209,10 +209,11 @@ mod tests {
     use crate::geometry::mesh::tests::welded;
     use crate::light::material::Material;
 
-    fn thing(mesh: &Mesh, deforms: bool) -> Thing {
+    /// Of one albedo, where its mesh is.
+    pub fn thing(mesh: &Mesh, albedo: f64, deforms: bool) -> Thing {
         let occluder = Occluder {
             mesh,
-            surfaces: vec![MeanSurface::plain(&Material::matt(DVec3::ONE))],
+            surfaces: vec![MeanSurface::plain(&Material::matt(DVec3::splat(albedo)))],
             anchor: 0,
             anchor_from_object: DAffine3::IDENTITY,
             casts: true,
@@ -225,7 +226,7 @@ mod tests {
     #[test]
     fn a_sheet_has_discs_on_both_sides_and_a_solid_outside_alone() {
         let corners = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y];
-        let sheet = thing(&welded(&corners, &[[0, 1, 2], [0, 2, 3]]), false);
+        let sheet = thing(&welded(&corners, &[[0, 1, 2], [0, 2, 3]]), 1.0, false);
         for normal in [Vec3::Z, Vec3::NEG_Z] {
             for triangle in [0, 1] {
                 let disc = sheet.disc_at(triangle, Vec3::new(0.4, 0.6, 0.0), normal);
@@ -235,7 +236,7 @@ mod tests {
             }
         }
         let (positions, triangles) = cuboid(Vec3::ZERO, Vec3::ONE);
-        let solid = thing(&welded(&positions, &triangles), false);
+        let solid = thing(&welded(&positions, &triangles), 1.0, false);
         let outwards =
             |surfel: &Surfel| surfel.normal.dot(surfel.position - solid.ball.center) > 0.0;
         assert!(!solid.surfels.is_empty() && solid.surfels.iter().all(outwards));
@@ -248,7 +249,7 @@ mod tests {
         let upright = [Vec3::ZERO, Vec3::X, Vec3::Z].map(|it| 1e-3 * it + Vec3::splat(0.3));
         let corners: Vec<Vec3> = floor.into_iter().chain(above).chain(upright).collect();
         let triangles = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [7, 8, 9]];
-        let all = thing(&welded(&corners, &triangles), true);
+        let all = thing(&welded(&corners, &triangles), 1.0, true);
         let disc = all.disc_at(2, above[0], Vec3::Z).expect("the floor's");
         let near = all.surfels[disc];
         assert_eq!((near.normal, near.position.z), (Vec3::Z, 0.0));

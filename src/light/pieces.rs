@@ -36,8 +36,20 @@ impl Onlooking {
     /// How large as a part of its distance a sphere is for which a disc stands, and one for which none does.
     const SMALL_AND_LARGE: [f64; 2] = [0.4, 0.7];
 
+    /// Of a light whose shadows are those of what stands within a box.
+    pub fn of(light: &Light, casters: &Bounds) -> Self {
+        match light {
+            Light::Point { position_m, .. } => {
+                let extents = light.half_extents().into_iter();
+                let radius_m = extents.map(|extent| extent.length()).fold(0.0, f64::max);
+                Self::from_within(casters, *position_m, radius_m)
+            }
+            Light::Directional { .. } => Self::ALL_AROUND,
+        }
+    }
+
     /// From somewhere within a box, at a light within a sphere.
-    pub fn from_within(bounds: &Bounds, light: DVec3, radius_m: f64) -> Self {
+    fn from_within(bounds: &Bounds, light: DVec3, radius_m: f64) -> Self {
         let middle = 0.5 * (bounds.low + bounds.high);
         // (Rounding in what tells where things are is not to turn the light.)
         let way = (middle - light).normalize_or_zero();

@@ -17,6 +17,7 @@ use crate::geometry::mesh::Mesh;
 use crate::geometry::reach::PixelRect;
 use crate::geometry::subdivide::Corner;
 use crate::light::Light;
+use crate::light::pieces::Onlooking;
 use crate::scene::{Scene, SceneLight, ShadowSettings, Shortcut};
 
 use super::anchor_geometry::{
@@ -311,18 +312,20 @@ impl GpuScene {
     fn cut_lights(&mut self, gpu: &Gpu, camera_from_world: &DAffine3) {
         let most = self.shadows.light_samples as usize;
         let pieces = |light: &Light| {
-            if !light.has_size() {
-                return 1;
-            }
             let (things, poses) = (&self.things, &self.camera_from_anchor);
-            let width_px = widest_penumbra_px(things, light, poses, &self.intrinsics);
-            match width_px > 1.0 {
-                true => (2 * (0.5 * width_px).ceil() as usize).min(most),
-                false => 1,
+            let width_px = match light.has_size() {
+                true => widest_penumbra_px(things, light, poses, &self.intrinsics),
+                false => 0.0,
+            };
+            if width_px <= 1.0 {
+                return vec![*light];
             }
+            let casters = casters(things, poses);
+            let onlooking = casters.map(|casters| Onlooking::of(light, &casters));
+            let count = (2 * (0.5 * width_px).ceil() as usize).min(most);
+            light.pieces(count, onlooking.unwrap_or(Onlooking::ALL_AROUND))
         };
-        let casters = casters(&self.things, &self.camera_from_anchor);
-        self.lights.cut(gpu, camera_from_world, pieces, casters);
+        self.lights.cut(gpu, camera_from_world, pieces);
     }
 
     /// Chooses the levels of detail of a frame, which go by those of the frame before it.

@@ -8,11 +8,8 @@ use std::ops::Range;
 
 use glam::DAffine3;
 
-use crate::geometry::bounds::Bounds;
 use crate::geometry::penumbra::SizedPlace;
-use crate::geometry::shadow_volume::LightPlace;
 use crate::light::Light;
-use crate::light::pieces::Onlooking;
 use crate::scene::SceneLight;
 
 use super::gpu::Gpu;
@@ -87,22 +84,17 @@ impl Lights {
         self.pieces.clear();
     }
 
-    /// Cuts each light into as many pieces as `count` says, for shadows of `casters` (world space), and takes all to the GPU.
+    /// Cuts each light into its `pieces`, and takes all to the GPU.
     pub fn cut(
         &mut self,
         gpu: &Gpu,
         camera_from_world: &DAffine3,
-        count: impl Fn(&Light) -> usize,
-        casters: Option<Bounds>,
+        pieces: impl Fn(&Light) -> Vec<Light>,
     ) {
         self.pieces.clear();
         for (placed, slots) in self.placed.iter_mut().zip(&mut self.slots) {
             let first = self.pieces.len();
-            let pieces = placed.light.map(|light| {
-                let onlooking = casters.map(|casters| onlooking(&casters, &light));
-                let onlooking = onlooking.unwrap_or(Onlooking::ALL_AROUND);
-                light.pieces(count(&light), onlooking)
-            });
+            let pieces = placed.light.map(|light| pieces(&light));
             for (index, light) in pieces.into_iter().flatten().enumerate() {
                 if index == slots.len() {
                     slots.push(self.slot_count);
@@ -195,21 +187,6 @@ fn uniforms(gpu: &Gpu, count: usize) -> (UniformRow, wgpu::BindGroup) {
     let row = UniformRow::new::<CameraLight>(&gpu.device, "lights", count.max(2));
     let group = gpu.bind_group(&LIGHT_GROUP, [row.binding()]);
     (row, group)
-}
-
-/// From where a light is looked at by shadows of what stands within a box.
-fn onlooking(casters: &Bounds, light: &Light) -> Onlooking {
-    let SizedPlace {
-        place,
-        half_extents,
-    } = sized_place(light);
-    match place {
-        LightPlace::Point(middle) => {
-            let lengths = half_extents.iter().map(|extent| extent.length());
-            Onlooking::from_within(casters, middle, lengths.fold(0.0, f64::max))
-        }
-        LightPlace::Along(_) => Onlooking::ALL_AROUND,
-    }
 }
 
 /// A light's middle and its half extents, in world space; none for a light without a size.

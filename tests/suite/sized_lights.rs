@@ -64,21 +64,11 @@ fn lights() -> Vec<Light> {
 
 /// From where a light is looked at in the scene.
 fn onlooking(light: &Light) -> Onlooking {
-    let Light::Point {
-        position_m, shape, ..
-    } = light
-    else {
-        return Onlooking::ALL_AROUND;
-    };
-    let radius_m = match shape {
-        Shape::Sphere { radius_m } => *radius_m,
-        Shape::Point | Shape::Spot { .. } | Shape::Rect(_) => 0.0,
-    };
     let virtuals = scene(vec![*light], 1).virtuals;
     let visible = virtuals.iter().filter(|object| object.visible);
     let corners = visible.flat_map(|object| object.positions_in_anchor(&object.mesh));
     let bounds = Bounds::around(corners.map(|corner| corner.as_dvec3()));
-    Onlooking::from_within(&bounds.expect("virtual things"), *position_m, radius_m)
+    Onlooking::of(light, &bounds.expect("virtual things"))
 }
 
 #[test]
